@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "daemon/pipeline/health.hpp"
+#include "hal/frame.hpp"
+#include "hal/light_ring.hpp"
+
+namespace dtact::pipeline {
+
+/// Nanoseconds of each stage of one frame.
+struct StageTimes {
+  std::int64_t decode_ns = 0;
+  std::int64_t rectify_ns = 0;
+  std::int64_t smooth_ns = 0;
+  std::int64_t list_ns = 0;
+  std::int64_t inspect_ns = 0;  ///< Contact summary and health statistics.
+};
+
+/// What touches, in the depth map's coordinates (origin at its centre, x right, y down).
+struct ContactSummary {
+  bool touching = false;
+  double area_mm2 = 0;  ///< Area pressed deeper than the contact threshold.
+  double x_mm = 0;      ///< Depth-weighted centroid of that area.
+  double y_mm = 0;
+  double deepest_mm = 0;  ///< Greatest indentation.
+  double deepest_x_mm = 0;
+  double deepest_y_mm = 0;
+  double volume_mm3 = 0;  ///< Indentation summed over the contact area.
+};
+
+/// One frame's result, in buffers that are allocated once and used again.
+struct DepthFrame {
+  hal::FrameInfo camera;
+  std::int64_t wall_ns = 0;   ///< CLOCK_REALTIME at camera.timestamp_ns, nanoseconds since 1970.
+  std::int64_t done_ns = 0;   ///< CLOCK_MONOTONIC when the result was published.
+  std::uint64_t skipped = 0;  ///< Results since start that nobody fetched in time.
+  hal::Light light;           ///< What the ring showed when the frame was exposed.
+  HealthSet health;
+  StageTimes times;
+  ContactSummary contact;
+
+  bool has_depth = false;
+  int width = 0;  ///< Pixels of the depth map.
+  int height = 0;
+  double mm_per_px = 0;
+  std::vector<std::int16_t>
+      depth_um;  ///< Row-major; recon::kUntrusted marks pixels not to believe.
+
+  bool has_luma = false;
+  int luma_width = 0;  ///< Pixels of the camera frame.
+  int luma_height = 0;
+  std::vector<std::uint8_t> luma;  ///< Row-major, without padding.
+};
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <bit>
+#include <cstdint>
+
+namespace dtact::pipeline {
+
+/// Named conditions under which depth deserves less trust. The values are those of the wire
+/// (dtact.proto, Health); a set is carried by every frame.
+enum class Health : std::uint8_t {
+  uncalibrated = 0,        ///< No calibration: luma only.
+  starting = 1,            ///< Start-up is not through: no reference yet.
+  light_unsettled = 2,     ///< A light change is under way; depth is off until the next reference.
+  reference_stale = 3,     ///< The reference does not belong to the present light.
+  reference_restored = 4,  ///< Touched at start: the last good reference is used.
+  light_mismatch = 5,      ///< The ring shows another light than at calibration.
+  camera_mismatch = 6,     ///< Camera, mode, format or controls differ from the calibration's.
+  beyond_calibration = 7,  ///< Somewhere the image is darker than the calibrated list reaches.
+  frames_lost = 8,         ///< The camera lost frames within the last second.
+  camera_trouble = 9,      ///< Unplugged, stalled, busy, denied; status has the sentence.
+  ring_trouble = 10,       ///< The last write to the ring failed; status has the sentence.
+  not_realtime = 11        ///< The capture thread runs without real-time scheduling.
+};
+inline constexpr int kHealthCount = 12;
+
+class HealthSet {
+ public:
+  void set(Health h, bool on = true) noexcept { bits_ = on ? bits_ | bit(h) : bits_ & ~bit(h); }
+  [[nodiscard]] bool has(Health h) const noexcept { return (bits_ & bit(h)) != 0; }
+  [[nodiscard]] bool empty() const noexcept { return bits_ == 0; }
+  [[nodiscard]] std::uint32_t bits() const noexcept { return bits_; }
+  bool operator==(const HealthSet&) const = default;
+
+ private:
+  static constexpr std::uint32_t bit(Health h) noexcept {
+    return 1U << static_cast<std::uint32_t>(h);
+  }
+  std::uint32_t bits_ = 0;
+};
+
+}  // namespace dtact::pipeline

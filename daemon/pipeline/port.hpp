@@ -1,0 +1,114 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "daemon/calibration/calibration.hpp"
+#include "daemon/pipeline/depth_frame.hpp"
+#include "hal/camera.hpp"
+#include "hal/light_ring.hpp"
+
+namespace dtact::pipeline {
+
+/// Where the pipeline is between power-on and shutdown.
+enum class State : std::uint8_t {
+  settling,      ///< Ring and camera on; waiting for the mean grey to stop moving.
+  referencing,   ///< Averaging the untouched image.
+  serving,       ///< Depth flows.
+  uncalibrated,  ///< Luma flows; there is no calibration.
+  camera_lost    ///< The camera is away; the report says why.
+};
+
+// Commands: what the network may ask of the pipeline. Each is answered by one CommandDone.
+struct SetLight {
+  hal::Light light;
+};
+struct Rezero {
+  bool force = false;  ///< Take the reference although something touches.
+};
+struct UseCalibration {
+  std::shared_ptr<const calibration::Calibration> calibration;
+};
+struct Command {
+  std::uint64_t ticket = 0;  ///< Comes back in CommandDone.
+  std::variant<SetLight, Rezero, UseCalibration> what;
+};
+
+// Events: what the pipeline tells the network. Never lost: when the queue is full the pipeline
+// keeps its state and tells later.
+enum class Outcome : std::uint8_t { done, refused_contact, device_error, camera_away, invalid };
+struct CommandDone {
+  std::uint64_t ticket = 0;
+  Outcome outcome = Outcome::done;
+  std::string message;  ///< Empty when done; else what happened and what to do.
+};
+struct ContactChanged {
+  bool touching = false;
+  std::uint64_t sequence = 0;
+  std::int64_t timestamp_ns = 0;
+  ContactSummary contact;
+};
+struct LightChanged {
+  hal::Light light;
+};
+struct ReferenceTaken {
+  std::uint64_t sequence = 0;
+  bool restored = false;  ///< The last good one from the state directory, not a new one.
+};
+struct StateChanged {
+  State state = State::settling;
+  HealthSet health;
+};
+using Event = std::variant<CommandDone, ContactChanged, LightChanged, ReferenceTaken, StateChanged>;
+
+struct StageStatistics {
+  std::string stage;
+  double p50_us = 0;
+  double p99_us = 0;
+  double max_us = 0;
+};
+
+/// What `dtactctl status` shows.
+struct Status {
+  State state = State::settling;
+  HealthSet health;
+  hal::CameraInfo camera;
+  hal::CameraReport camera_report;
+  hal::RingInfo ring;
+  std::string ring_message;  ///< The ring's last error; empty when well.
+  hal::Light light;
+  std::shared_ptr<const calibration::Calibration> calibration;  ///< Null when uncalibrated.
+  std::uint64_t frames = 0;                                     ///< Published since start.
+  std::uint64_t skipped = 0;          ///< Published but replaced before the network fetched them.
+  double fps = 0;                     ///< Over the last second.
+  std::vector<std::string> realtime;  ///< One sentence for each real-time setting refused.
+  std::vector<StageStatistics> stages;
+};
+
+/// The one seam between the network thread (the only caller) and the pipeline's threads. No call
+/// blocks.
+class Port {
+ public:
+  Port() = default;
+  Port(const Port&) = delete;
+  Port& operator=(const Port&) = delete;
+  virtual ~Port() = default;
+
+  /// Becomes readable when a frame or an event waits. The caller polls it, reads it empty
+  /// (an eventfd), then calls latest() and next_event() until they have nothing more.
+  [[nodiscard]] virtual int event_fd() const noexcept = 0;
+  /// The newest frame not fetched yet, or null. Valid until the next call.
+  [[nodiscard]] virtual const DepthFrame* latest() noexcept = 0;
+  [[nodiscard]] virtual std::optional<Event> next_event() = 0;
+  /// False: too many commands wait; ask again later.
+  [[nodiscard]] virtual bool submit(Command command) = 0;
+  /// What subscribers want. With neither, frames are inspected but not published.
+  virtual void want(bool depth, bool luma) noexcept = 0;
+  [[nodiscard]] virtual Status status() const = 0;
+};
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "daemon/recon/list.hpp"
+#include "daemon/recon/rectify.hpp"
+
+namespace dtact::recon {
+
+/// Depth value of a pixel that must not be believed. 0 is a valid depth (untouched).
+inline constexpr std::int16_t kUntrusted = INT16_MIN;
+
+enum class Method : std::uint8_t {
+  list,      ///< Ours: signed difference, smoothing, per-pixel gain, monotone list.
+  published  ///< The paper's single-image list: difference, list, two 7×7 Gaussian filters.
+};
+
+/// All that a calibration fixes. Immutable and shared between threads once made.
+struct Model {
+  Method method = Method::list;
+  RectifyTable rectify;  ///< Camera frame → depth map.
+  double mm_per_px = 0;  ///< Millimetres per pixel of the depth map.
+  DepthList list;
+  /// The untouched image at calibration time, frame sized, Q8 luma (0…65280), row-major without
+  /// padding: brings a differently lit image back to the calibration's light.
+  std::vector<std::uint16_t> reference_q8;
+  /// Depth-map sized; non-zero marks pixels that are never trusted. Empty: none.
+  std::vector<std::uint8_t> untrusted;
+};
+
+}  // namespace dtact::recon

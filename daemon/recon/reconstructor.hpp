@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+#include "daemon/recon/model.hpp"
+
+namespace dtact::recon {
+
+/// Nanoseconds of each step of one reconstruction.
+struct StepTimes {
+  std::int64_t rectify_ns = 0;  ///< Rectify and difference.
+  std::int64_t smooth_ns = 0;
+  std::int64_t list_ns = 0;  ///< Gain, list, untrusted mark.
+};
+
+/// Turns luma into depth, in fixed point (README of the format in design: Q6 luma, Q12 gain, int16
+/// micrometres). Holds its scratch rows, so run() never allocates. One thread at a time.
+class Reconstructor {
+ public:
+  /// Throws std::invalid_argument when the model's parts disagree in size.
+  explicit Reconstructor(std::shared_ptr<const Model> model);
+  ~Reconstructor();
+  Reconstructor(Reconstructor&&) noexcept;
+  Reconstructor& operator=(Reconstructor&&) noexcept;
+
+  [[nodiscard]] const Model& model() const noexcept;
+
+  /// Takes the untouched image under the present light: frame sized, Q8 luma, row-major without
+  /// padding. Until then the model's own reference is used. Does not allocate, and takes about as
+  /// long as two frames: call it between frames.
+  void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+
+  /// `luma`: frame sized, rows `stride` bytes apart, 64 bytes readable after the last pixel.
+  /// `depth_um`: width × height of the model's table, row-major.
+  void run(const std::uint8_t* luma, std::ptrdiff_t stride, std::span<std::int16_t> depth_um,
+           StepTimes* times = nullptr) noexcept;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dtact::recon

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+namespace dtact::recon {
+
+/// For every pixel of the depth map, where it is read in the camera frame. Bilinear with weights of
+/// 1/128; identity and crop are tables like any other.
+struct RectifyTable {
+  int frame_width = 0;   ///< Pixels of the camera frame.
+  int frame_height = 0;  ///< Pixels of the camera frame.
+  int width = 0;         ///< Pixels of the depth map.
+  int height = 0;        ///< Pixels of the depth map.
+  struct Entry {
+    std::int16_t x = 0;   ///< Column of the upper left source pixel, 0 … frame_width − 1.
+    std::int16_t y = 0;   ///< Row of the upper left source pixel, 0 … frame_height − 1.
+    std::uint8_t fx = 0;  ///< Weight of the right column, 0 … 128.
+    std::uint8_t fy = 0;  ///< Weight of the lower row, 0 … 128.
+  };
+  std::vector<Entry> entries;  ///< Row-major, width × height.
+};
+
+/// The table that copies the rectangle whose upper left corner is (crop_col, crop_row). Throws
+/// std::invalid_argument when the rectangle leaves the frame.
+[[nodiscard]] RectifyTable make_crop_table(int frame_width, int frame_height, int crop_col,
+                                           int crop_row, int width, int height);
+
+}  // namespace dtact::recon

@@ -1,0 +1,91 @@
+#include "hal/base/rt_thread.hpp"
+
+#include <fmt/format.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/mman.h>
+
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+namespace dtact::base {
+namespace {
+
+void* run_body(void* argument) {
+  const std::unique_ptr<std::function<void()>> body(static_cast<std::function<void()>*>(argument));
+  (*body)();
+  return nullptr;
+}
+
+}  // namespace
+
+RtThread::RtThread(const RtSettings& settings, std::function<void()> body) {
+  pthread_attr_t attributes;
+  ::pthread_attr_init(&attributes);
+  ::pthread_attr_setstacksize(&attributes, settings.stack_bytes);
+  auto owned = std::make_unique<std::function<void()>>(std::move(body));
+  const int error = ::pthread_create(&thread_, &attributes, run_body, owned.get());
+  ::pthread_attr_destroy(&attributes);
+  if (error != 0) {
+    throw std::system_error(error, std::generic_category(),
+                            fmt::format("cannot start thread \"{}\"", settings.name));
+  }
+  (void)owned.release();  // run_body owns it now
+  joinable_ = true;
+
+  ::pthread_setname_np(thread_, settings.name.substr(0, 15).c_str());
+  if (settings.cpu) {
+    cpu_set_t cpus;
+    CPU_ZERO(&cpus);
+    CPU_SET(static_cast<std::size_t>(*settings.cpu), &cpus);
+    if (const int e = ::pthread_setaffinity_np(thread_, sizeof cpus, &cpus); e != 0) {
+      refused_.push_back(fmt::format(
+          "thread {} is not pinned to CPU {} ({}): choose a CPU this machine and the unit's "
+          "AllowedCPUs= have",
+          settings.name, *settings.cpu, std::strerror(e)));
+    }
+  }
+  if (settings.fifo_priority > 0) {
+    const sched_param parameters{.sched_priority = settings.fifo_priority};
+    if (const int e = ::pthread_setschedparam(thread_, SCHED_FIFO, &parameters); e != 0) {
+      refused_.push_back(fmt::format(
+          "thread {} runs without SCHED_FIFO priority {} ({}): give the user an rtprio limit "
+          "(LimitRTPRIO={} in the unit, or /etc/security/limits.d)",
+          settings.name, settings.fifo_priority, std::strerror(e), settings.fifo_priority));
+    }
+  }
+}
+
+RtThread::RtThread(RtThread&& other) noexcept
+    : thread_(other.thread_),
+      joinable_(std::exchange(other.joinable_, false)),
+      refused_(std::move(other.refused_)) {}
+
+RtThread& RtThread::operator=(RtThread&& other) noexcept {
+  if (this != &other) {
+    join();
+    thread_ = other.thread_;
+    joinable_ = std::exchange(other.joinable_, false);
+    refused_ = std::move(other.refused_);
+  }
+  return *this;
+}
+
+void RtThread::join() noexcept {
+  if (std::exchange(joinable_, false)) ::pthread_join(thread_, nullptr);
+}
+
+std::optional<std::string> lock_memory() {
+  // ONFAULT: pages are locked when first touched, so untouched reserve costs nothing.
+  if (::mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return std::nullopt;
+  const int error = errno;
+  return fmt::format(
+      "memory is not locked ({}): raise the memlock limit (LimitMEMLOCK=infinity in the unit, or "
+      "/etc/security/limits.d)",
+      std::strerror(error));
+}
+
+}  // namespace dtact::base

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+namespace dtact::base {
+
+struct RtSettings {
+  std::string name;                      ///< At most 15 characters (the kernel's limit).
+  std::optional<int> cpu;                ///< Pin to this CPU; empty = not pinned.
+  int fifo_priority = 0;                 ///< SCHED_FIFO 1…99; 0 = normal scheduling.
+  std::size_t stack_bytes = 256 * 1024;  ///< Small, since locked memory counts it whole.
+};
+
+/// A thread with a name, a CPU and a scheduling class. What the system refuses is collected and
+/// the thread runs all the same. Joins on destruction; the body must watch its own stop flag.
+class RtThread {
+ public:
+  RtThread() = default;
+  /// Starts `body`. Throws std::system_error when no thread can be made at all.
+  RtThread(const RtSettings& settings, std::function<void()> body);
+  RtThread(RtThread&& other) noexcept;
+  RtThread& operator=(RtThread&& other) noexcept;
+  RtThread(const RtThread&) = delete;
+  RtThread& operator=(const RtThread&) = delete;
+  ~RtThread() { join(); }
+
+  void join() noexcept;
+  /// One sentence for each setting the system refused, with the remedy.
+  [[nodiscard]] const std::vector<std::string>& refused() const noexcept { return refused_; }
+
+ private:
+  pthread_t thread_{};
+  bool joinable_ = false;
+  std::vector<std::string> refused_;
+};
+
+/// Locks the process's memory as it is touched (MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT). Returns
+/// the sentence that says why it was refused and what to do, or nothing.
+[[nodiscard]] std::optional<std::string> lock_memory();
+
+}  // namespace dtact::base

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "hal/frame.hpp"
+
+namespace dtact::hal {
+
+/// One photometric control as the camera reports it after it was set.
+struct CameraControl {
+  std::string name;        ///< "exposure_absolute", ...
+  std::int64_t value = 0;  ///< In the camera's own unit, as read back.
+  bool locked = false;     ///< Manual and equal to what was asked for.
+};
+
+/// Who the camera is and how it runs. Fixed from construction on.
+struct CameraInfo {
+  std::string backend;       ///< "null", "sim", "replay", ...
+  std::string identity;      ///< Stable name: by-path, serial, scene file, folder.
+  std::string pixel_format;  ///< "GREY", "YUYV", "MJPEG", ... as it comes from the device.
+  int width = 0;             ///< Pixels.
+  int height = 0;            ///< Pixels.
+  double fps = 0;            ///< Frames a second that the mode promises.
+  /// The delay, in frames, after which a light change is complete in the image (exposure plus the
+  /// camera's queue).
+  int light_delay_frames = 2;
+  std::vector<CameraControl> controls;
+};
+
+enum class CameraState : std::uint8_t { streaming, stalled, unplugged, busy, denied, ended };
+
+/// Run-time condition of a camera. Any thread may ask.
+struct CameraReport {
+  CameraState state = CameraState::streaming;
+  std::string remedy;             ///< A sentence saying what to do; empty while streaming.
+  std::uint64_t delivered = 0;    ///< Frames handed out.
+  std::uint64_t lost = 0;         ///< Gaps in the sequence.
+  std::uint64_t skipped = 0;      ///< Whole frames passed over for a newer one.
+  std::uint64_t damaged = 0;      ///< Truncated or undecodable payloads.
+  std::uint64_t disconnects = 0;  ///< Times the device went away.
+};
+
+enum class GrabStatus : std::uint8_t {
+  ok,
+  timeout,    ///< Nothing came in time; ask again.
+  damaged,    ///< A frame came, was unusable and has been counted; ask again.
+  unplugged,  ///< The device is away. Later calls try to get it back and return ok once it is.
+  ended       ///< No frame will ever come again (a recording played once).
+};
+
+/// A source of grey frames. One thread calls start() and grab().
+class Camera {
+ public:
+  Camera() = default;
+  Camera(const Camera&) = delete;
+  Camera& operator=(const Camera&) = delete;
+  virtual ~Camera() = default;
+
+  [[nodiscard]] virtual CameraInfo info() const = 0;
+  [[nodiscard]] virtual CameraReport report() const = 0;
+  /// Begins streaming. Throws std::runtime_error with a sentence that names the remedy.
+  virtual void start() = 0;
+  /// Waits at most `timeout` for the newest complete frame. Does not allocate in steady state. The
+  /// caller holds at most one frame: assigning `out` gives the one before back.
+  [[nodiscard]] virtual GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept = 0;
+};
+
+}  // namespace dtact::hal

@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+
+namespace dtact::hal {
+
+/// Bytes that may be read after the last pixel of the last row, so that vector loads need no tail
+/// loop. Their values are unspecified.
+inline constexpr std::size_t kLumaPadding = 64;
+
+/// A grey image in full range (0 = black, 255 = white), rows from top to bottom as the camera sees
+/// them. Rows are `stride` bytes apart, `stride >= width`.
+struct LumaView {
+  const std::uint8_t* data = nullptr;
+  int width = 0;
+  int height = 0;
+  std::ptrdiff_t stride = 0;
+
+  [[nodiscard]] const std::uint8_t* row(int y) const noexcept { return data + y * stride; }
+};
+
+/// What the moment in FrameInfo::timestamp_ns is.
+enum class TimestampMeaning : std::uint8_t {
+  start_of_exposure,  ///< The first row's exposure began (UVC's SOE).
+  end_of_frame,       ///< The last byte left the sensor or reached the driver.
+  arrival             ///< The frame reached this process; nothing earlier is known.
+};
+
+/// What is odd about a frame that is still whole enough to use. A bit set.
+enum FrameFlag : std::uint32_t {
+  kFrameNormal = 0,
+  kFrameAfterGap = 1U << 0U  ///< Frames between this one and the one before were lost.
+};
+
+struct FrameInfo {
+  /// The camera's own counter. A gap means frames that the camera or driver lost.
+  std::uint64_t sequence = 0;
+  /// CLOCK_MONOTONIC, nanoseconds; `meaning` says which moment.
+  std::int64_t timestamp_ns = 0;
+  /// CLOCK_MONOTONIC, nanoseconds: when the frame's payload was complete at the HAL, before
+  /// decoding.
+  std::int64_t ready_ns = 0;
+  /// Time spent turning the payload into luma, nanoseconds.
+  std::int64_t decode_ns = 0;
+  TimestampMeaning meaning = TimestampMeaning::arrival;
+  std::uint32_t flags = kFrameNormal;
+};
+
+/// Whoever lends frames. `index` is the lender's own name for the buffer.
+class FrameOwner {
+ public:
+  virtual void give_back(int index) noexcept = 0;
+
+ protected:
+  ~FrameOwner() = default;
+};
+
+/// A frame on loan: the buffer goes home when the lease is destroyed or overwritten. Must not
+/// outlive its camera. Move-only; a moved-from lease is empty.
+class Frame {
+ public:
+  Frame() = default;
+  Frame(FrameOwner& owner, int index, LumaView luma, FrameInfo info) noexcept
+      : owner_(&owner), index_(index), luma_(luma), info_(info) {}
+  Frame(Frame&& other) noexcept { swap(other); }
+  Frame& operator=(Frame&& other) noexcept {
+    Frame taken(std::move(other));
+    swap(taken);
+    return *this;
+  }
+  Frame(const Frame&) = delete;
+  Frame& operator=(const Frame&) = delete;
+  ~Frame() { reset(); }
+
+  void reset() noexcept {
+    if (owner_ != nullptr) std::exchange(owner_, nullptr)->give_back(index_);
+    luma_ = {};
+  }
+  [[nodiscard]] explicit operator bool() const noexcept { return owner_ != nullptr; }
+  [[nodiscard]] const LumaView& luma() const noexcept { return luma_; }
+  [[nodiscard]] const FrameInfo& info() const noexcept { return info_; }
+
+ private:
+  void swap(Frame& other) noexcept {
+    std::swap(owner_, other.owner_);
+    std::swap(index_, other.index_);
+    std::swap(luma_, other.luma_);
+    std::swap(info_, other.info_);
+  }
+
+  FrameOwner* owner_ = nullptr;
+  int index_ = -1;
+  LumaView luma_;
+  FrameInfo info_;
+};
+
+}  // namespace dtact::hal

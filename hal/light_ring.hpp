@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+namespace dtact::hal {
+
+inline constexpr int kLedCount = 8;
+
+/// Linear command value of each channel, 0 (off) to 255.
+struct Rgb {
+  std::uint8_t r = 0;
+  std::uint8_t g = 0;
+  std::uint8_t b = 0;
+  bool operator==(const Rgb&) const = default;
+};
+
+/// What the ring is told to show: LED 0 is at the image's right (3 o'clock), the others follow
+/// clockwise as the camera sees them. Each LED shows its colour scaled by brightness / 255.
+struct Light {
+  std::array<Rgb, kLedCount> leds = all({255, 255, 255});
+  std::uint8_t brightness = 255;
+  bool operator==(const Light&) const = default;
+
+  static constexpr std::array<Rgb, kLedCount> all(Rgb colour) {
+    std::array<Rgb, kLedCount> leds{};
+    leds.fill(colour);
+    return leds;
+  }
+};
+
+struct RingInfo {
+  std::string backend;   ///< "null", "sim", ...
+  std::string identity;  ///< "/dev/spidev0.0", ...
+};
+
+/// What became of a write to the ring.
+struct ShowResult {
+  bool ok = true;
+  std::string message;  ///< When not ok: what failed and the remedy.
+};
+
+/// The LEDs that light the layer. show() may block for a millisecond and more, so it is called on
+/// the ring's own thread and never on the capture thread.
+class LightRing {
+ public:
+  LightRing() = default;
+  LightRing(const LightRing&) = delete;
+  LightRing& operator=(const LightRing&) = delete;
+  virtual ~LightRing() = default;
+
+  [[nodiscard]] virtual RingInfo info() const = 0;
+  [[nodiscard]] virtual ShowResult show(const Light& light) = 0;
+};
+
+}  // namespace dtact::hal

@@ -1,0 +1,47 @@
+#include "hal/registry.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <stdexcept>
+
+#include "hal/null/null_camera.hpp"
+#include "hal/null/null_ring.hpp"
+#include "hal/replay/replay_camera.hpp"
+#include "hal/sim/sim_camera.hpp"
+#include "hal/sim/sim_ring.hpp"
+
+namespace dtact::hal {
+
+std::vector<std::string> camera_backends() { return {"null", "replay", "sim"}; }
+std::vector<std::string> ring_backends() { return {"null", "sim"}; }
+
+Devices open_devices(const Config& config) {
+  // The one thing camera and ring share is the light in the simulated sensor.
+  const auto light = std::make_shared<sim::LightLink>();
+  Devices devices;
+
+  if (config.ring.backend == "null") {
+    devices.ring = std::make_unique<null::NullRing>();
+  } else if (config.ring.backend == "sim") {
+    devices.ring = std::make_unique<sim::SimRing>(light);
+  } else {
+    throw std::runtime_error(fmt::format("ring.backend = \"{}\": allowed are {}",
+                                         config.ring.backend, fmt::join(ring_backends(), ", ")));
+  }
+
+  if (config.camera.backend == "null") {
+    devices.camera = std::make_unique<null::NullCamera>(config.camera);
+  } else if (config.camera.backend == "replay") {
+    devices.camera = std::make_unique<replay::ReplayCamera>(config.camera);
+  } else if (config.camera.backend == "sim") {
+    devices.camera = std::make_unique<sim::SimCamera>(config.camera, light);
+  } else {
+    throw std::runtime_error(fmt::format("camera.backend = \"{}\": allowed are {}",
+                                         config.camera.backend,
+                                         fmt::join(camera_backends(), ", ")));
+  }
+  return devices;
+}
+
+}  // namespace dtact::hal

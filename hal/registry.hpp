@@ -1,0 +1,27 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hal/camera.hpp"
+#include "hal/config.hpp"
+#include "hal/light_ring.hpp"
+
+namespace dtact::hal {
+
+struct Devices {
+  std::unique_ptr<LightRing> ring;
+  std::unique_ptr<Camera> camera;
+};
+
+/// The names that `camera.backend` and `ring.backend` may have.
+[[nodiscard]] std::vector<std::string> camera_backends();
+[[nodiscard]] std::vector<std::string> ring_backends();
+
+/// Makes the camera and the ring that the configuration names. The simulated camera sees the
+/// simulated ring's light; with any other ring it sees the calibration light (all white).
+/// Throws std::runtime_error naming the backend, what failed and the remedy.
+[[nodiscard]] Devices open_devices(const Config& config);
+
+}  // namespace dtact::hal

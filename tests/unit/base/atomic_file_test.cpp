@@ -1,0 +1,58 @@
+#include "hal/base/atomic_file.hpp"
+
+#include <gtest/gtest.h>
+
+#include <system_error>
+
+namespace dtact::base {
+namespace {
+
+namespace fs = std::filesystem;
+
+class AtomicFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::path(::testing::TempDir()) / ("atomic_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  [[nodiscard]] int files() const {
+    return static_cast<int>(std::distance(fs::directory_iterator(folder_), {}));
+  }
+  fs::path folder_;
+};
+
+TEST_F(AtomicFile, WritesAndReplaces) {
+  const fs::path file = folder_ / "a";
+  write_file_atomically(file, "one");
+  EXPECT_EQ(read_file(file), "one");
+  write_file_atomically(file, "");
+  EXPECT_EQ(read_file(file), "");
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(AtomicFile, FailureLeavesTheOldFileAndNoOther) {
+  const fs::path file = folder_ / "dir";
+  fs::create_directories(file / "inside");  // a file cannot replace a folder with content
+  EXPECT_THROW(write_file_atomically(file, "x"), std::system_error);
+  EXPECT_TRUE(fs::exists(file / "inside"));
+  EXPECT_EQ(files(), 1);
+}
+
+TEST_F(AtomicFile, ReadNamesTheMissingFile) {
+  try {
+    (void)read_file(folder_ / "none");
+    FAIL();
+  } catch (const std::system_error& e) {
+    EXPECT_NE(std::string(e.what()).find("none"), std::string::npos);
+  }
+}
+
+TEST_F(AtomicFile, ReadRefusesMoreThanTheLimit) {
+  write_file_atomically(folder_ / "a", "12345");
+  EXPECT_EQ(read_file(folder_ / "a", 5), "12345");
+  EXPECT_THROW((void)read_file(folder_ / "a", 4), std::system_error);
+}
+
+}  // namespace
+}  // namespace dtact::base
