@@ -30,7 +30,8 @@ std::vector<std::int16_t> gaussian_taps(double sigma_px) {
 }
 
 RowBuffer::RowBuffer(int rows, int width)
-    : stride_(static_cast<std::size_t>(kernels::padded(width)) + 2 * kernels::kMaxRadius),
+    : stride_(static_cast<std::size_t>(kernels::padded(width)) +
+              std::size_t{2} * kernels::kMaxRadius),
       data_(stride_ * static_cast<std::size_t>(rows)) {}
 
 std::span<std::int16_t> RowBuffer::at(int y) noexcept {
@@ -59,9 +60,9 @@ int Smoother::ready() const noexcept {
 }
 
 void Smoother::take(int y, std::int16_t* out) noexcept {
-  for (int k = -radius_; k <= radius_; ++k) {
-    const int source = std::clamp(y + k, 0, height_ - 1);
-    span_[static_cast<std::size_t>(k + radius_)] = ring_.row(source % ring_rows_);
+  int row = y - radius_;
+  for (const std::int16_t*& source : span_) {
+    source = ring_.row(std::clamp(row++, 0, height_ - 1) % ring_rows_);
   }
   kernels::smooth_vertical_row(span_.data(), taps_, kernels::padded(width_), out);
 }
