@@ -29,6 +29,9 @@ class GuestCamera : public testing::Test {
     return c;
   }
 
+  /// A camera's nodes outlive its unplugging by a moment.
+  void TearDown() override { wait_for_no_camera(); }
+
   /// The picture files, made once.
   [[nodiscard]] static const PlayedFrames& played() {
     static const PlayedFrames frames;
