@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 
+#include "hal/v4l2/finder.hpp"
 #include "hal/v4l2/v4l2_camera.hpp"
 #include "tests/kernel/camera/played_frames.hpp"
 #include "tests/kernel/camera/usb_camera.hpp"

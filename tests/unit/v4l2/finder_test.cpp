@@ -4,7 +4,7 @@
 
 #include <cerrno>
 
-#include "hal/v4l2/device_error.hpp"
+#include "hal/v4l2/error_of.hpp"
 #include "tests/unit/v4l2/emulated_camera.hpp"
 
 namespace dtact::hal::v4l2 {

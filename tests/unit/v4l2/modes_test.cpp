@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 #include <linux/videodev2.h>
 
-#include "hal/v4l2/device_error.hpp"
-#include "hal/v4l2/payload.hpp"
+#include "hal/live/payload.hpp"
+#include "hal/v4l2/error_of.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {
@@ -65,13 +65,16 @@ TEST(Modes, ChecksTheConfiguredFormat) {
   EXPECT_THROW(check_pixel_format(""), std::runtime_error);
 }
 
+using live::PayloadDecoder;
+using live::PayloadStatus;
+
 TEST(Payload, FindsAJpegsMarkersUnderPadding) {
-  Format format;
-  format.fourcc = V4L2_PIX_FMT_MJPEG;
+  live::Format format;
+  format.encoding = live::Encoding::jpeg;
   format.width = format.height = 8;
   const PayloadDecoder decoder(format);
   const auto inspect = [&](const std::vector<std::uint8_t>& payload) {
-    Filled filled;
+    live::Filled filled;
     filled.payload = payload;
     return decoder.inspect(filled);
   };
