@@ -38,6 +38,18 @@ struct V4l2Config {
   std::map<std::string, std::int64_t> controls;
 };
 
+/// A camera reached by libcamera, as CSI cameras are.
+struct LibcameraConfig {
+  std::string device;  ///< libcamera's id of the camera. Empty = the only camera attached.
+  std::string pixel_format = "auto";  ///< "auto", "grey", "nv12", "yuv420", "yuyv" or "mjpeg".
+  double exposure_us = 0;             ///< 0 = the camera's default.
+  int exposure_pwm_periods = 0;       ///< As V4l2Config's.
+  double pwm_hz = 0;                  ///< As V4l2Config's.
+  /// "analogue_gain", "brightness", ... in libcamera's units. What is not named is locked at the
+  /// camera's default.
+  std::map<std::string, double> controls;
+};
+
 struct CameraConfig {
   std::string backend = "sim";  ///< A name the registry knows.
   int width = 800;              ///< Pixels.
@@ -46,6 +58,7 @@ struct CameraConfig {
   SimConfig sim;
   ReplayConfig replay;
   V4l2Config v4l2;
+  LibcameraConfig libcamera;
 };
 
 struct RingConfig {
