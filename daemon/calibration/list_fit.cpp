@@ -8,7 +8,7 @@
 namespace dtact::calibration {
 namespace {
 
-constexpr double kSure = 0.85;       // of the contact radius
+constexpr double kSure = 0.9;       // of the contact radius
 constexpr double kBinsPerLevel = 2;  // of the monotone fit
 constexpr double kVouched = 2;       // grey levels beyond the greatest one seen
 constexpr int kFewest = 4;           // pixels that make a grey level's vote
