@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -21,6 +22,29 @@ struct ReplayConfig {
   bool loop = true;
   bool paced = true;  ///< false: as fast as they are asked for.
 };
+
+/// The photometric controls that V4l2Config::controls may name.
+inline constexpr std::array kV4l2Controls{"auto_exposure",
+                                          "exposure_dynamic_framerate",
+                                          "gain_automatic",
+                                          "white_balance_automatic",
+                                          "focus_automatic_continuous",
+                                          "power_line_frequency",
+                                          "backlight_compensation",
+                                          "exposure_time_absolute",
+                                          "gain",
+                                          "white_balance_temperature",
+                                          "focus_absolute",
+                                          "gamma",
+                                          "contrast",
+                                          "brightness",
+                                          "saturation",
+                                          "hue",
+                                          "sharpness"};
+/// Those that LibcameraConfig::controls may name.
+inline constexpr std::array kLibcameraControls{"auto_exposure", "auto_white_balance", "auto_focus",
+                                               "analogue_gain", "lens_position",      "brightness",
+                                               "contrast",      "saturation",         "sharpness"};
 
 /// A camera behind a V4L2 driver, as USB cameras are.
 struct V4l2Config {
