@@ -59,8 +59,8 @@ class LightDriver {
   void run();
   void serve(const Request& request);
   hal::ShowResult write(const hal::Light& light);
-  void note(LightNote note);
-  void tell(Event event);
+  void note(const LightNote& note);
+  void tell(const Event& event);
 
   std::unique_ptr<hal::LightRing> ring_;
   base::Clock& clock_;
