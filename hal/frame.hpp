@@ -31,7 +31,9 @@ enum class TimestampMeaning : std::uint8_t {
 /// What is odd about a frame that is still whole enough to use. A bit set.
 enum FrameFlag : std::uint32_t {
   kFrameNormal = 0,
-  kFrameAfterGap = 1U << 0U  ///< Frames between this one and the one before were lost.
+  kFrameAfterGap = 1U << 0U,  ///< Frames between this one and the one before were lost.
+  /// A locked control of the camera has moved by itself: the brightness may have, too.
+  kFrameControlsMoved = 1U << 1U
 };
 
 struct FrameInfo {

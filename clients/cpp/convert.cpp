@@ -135,15 +135,28 @@ Status to_status(const v1::Status& message) {
   status.health = health_of(message);
   status.advice = message.advice();
   const auto& camera = message.camera();
-  status.camera = {camera.backend(),      camera.identity(),
-                   camera.pixel_format(), camera.width(),
-                   camera.height(),       camera.fps(),
-                   camera.condition(),    camera.remedy(),
-                   camera.delivered(),    camera.lost(),
-                   camera.skipped(),      camera.damaged(),
-                   camera.disconnects(),  {}};
+  status.camera = {camera.backend(),
+                   camera.identity(),
+                   camera.pixel_format(),
+                   camera.width(),
+                   camera.height(),
+                   camera.fps(),
+                   camera.condition(),
+                   camera.remedy(),
+                   camera.delivered(),
+                   camera.lost(),
+                   camera.skipped(),
+                   camera.damaged(),
+                   camera.damage().flagged(),
+                   camera.damage().markers(),
+                   camera.damage().too_short(),
+                   camera.damage().undecodable(),
+                   camera.disconnects(),
+                   camera.moved(),
+                   {}};
   for (const auto& control : camera.controls()) {
-    status.camera.controls.push_back({control.name(), control.value(), control.locked()});
+    status.camera.controls.push_back(
+        {control.name(), control.value(), control.locked(), control.note()});
   }
   status.ring = {message.ring().backend(), message.ring().identity(), message.ring().message()};
   status.light = to_light(message.light());

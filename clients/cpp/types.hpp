@@ -129,6 +129,7 @@ struct Status {
     std::string name;
     std::int64_t value = 0;
     bool locked = false;
+    std::string note;  ///< When not locked: what the camera refused. Else what to know, or empty.
   };
   struct Camera {
     std::string backend;
@@ -143,7 +144,13 @@ struct Status {
     std::uint64_t lost = 0;
     std::uint64_t skipped = 0;
     std::uint64_t damaged = 0;
+    /// `damaged` by cause.
+    std::uint64_t damaged_flagged = 0;      ///< Marked by the driver.
+    std::uint64_t damaged_markers = 0;      ///< A JPEG without its first or last marker.
+    std::uint64_t damaged_short = 0;        ///< Fewer bytes than the image has.
+    std::uint64_t damaged_undecodable = 0;  ///< Whole, but broken inside.
     std::uint64_t disconnects = 0;
+    std::string moved;  ///< Controls that moved by themselves lately; empty when none.
     std::vector<Control> controls;
   } camera;
   struct Ring {

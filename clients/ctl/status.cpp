@@ -23,9 +23,17 @@ void print_camera(const Status::Camera& camera, std::ostream& out) {
   if (!camera.remedy.empty()) fmt::print(out, "             {}\n", camera.remedy);
   fmt::print(out, "             delivered {}, lost {}, skipped {}, damaged {}, disconnects {}\n",
              camera.delivered, camera.lost, camera.skipped, camera.damaged, camera.disconnects);
+  if (camera.damaged > 0) {
+    fmt::print(out,
+               "             damaged: {} marked, {} without markers, {} short, {} undecodable\n",
+               camera.damaged_flagged, camera.damaged_markers, camera.damaged_short,
+               camera.damaged_undecodable);
+  }
+  if (!camera.moved.empty()) fmt::print(out, "             {}\n", camera.moved);
   for (const auto& control : camera.controls) {
-    fmt::print(out, "             {} {}{}\n", control.name, control.value,
-               control.locked ? "" : " (not locked)");
+    fmt::print(out, "             {} {}{}{}\n", control.name, control.value,
+               control.locked ? "" : " (not locked)",
+               control.note.empty() ? "" : ": " + control.note);
   }
 }
 
@@ -71,10 +79,15 @@ void add_camera(const Status::Camera& camera, Json& json) {
   json.member("condition", camera.condition).member("remedy", camera.remedy);
   json.member("delivered", camera.delivered).member("lost", camera.lost);
   json.member("skipped", camera.skipped).member("damaged", camera.damaged);
-  json.member("disconnects", camera.disconnects).key("controls").open('[');
+  json.member("damaged_flagged", camera.damaged_flagged);
+  json.member("damaged_markers", camera.damaged_markers);
+  json.member("damaged_short", camera.damaged_short);
+  json.member("damaged_undecodable", camera.damaged_undecodable);
+  json.member("disconnects", camera.disconnects).member("moved", camera.moved);
+  json.key("controls").open('[');
   for (const auto& control : camera.controls) {
     json.open('{').member("name", control.name).member("value", control.value);
-    json.member("locked", control.locked).close('}');
+    json.member("locked", control.locked).member("note", control.note).close('}');
   }
   json.close(']').close('}');
 }

@@ -56,6 +56,7 @@ void add(std::string& text, std::string_view sentence) {
 /// The report's own sentence where there is one: it knows the device.
 std::string_view detail(const pipeline::Status& status, Health health) {
   if (health == Health::camera_trouble) return status.camera_report.remedy;
+  if (health == Health::camera_mismatch) return status.camera_report.moved;
   if (health == Health::ring_trouble) return status.ring_message;
   return {};
 }

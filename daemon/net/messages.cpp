@@ -99,11 +99,18 @@ void fill_camera(const hal::CameraInfo& info, const hal::CameraReport& report,
   out.set_skipped(report.skipped);
   out.set_damaged(report.damaged);
   out.set_disconnects(report.disconnects);
+  out.set_moved(report.moved);
+  auto& damage = *out.mutable_damage();
+  damage.set_flagged(report.damage.flagged);
+  damage.set_markers(report.damage.markers);
+  damage.set_too_short(report.damage.too_short);
+  damage.set_undecodable(report.damage.undecodable);
   for (const auto& control : info.controls) {
     auto& to = *out.add_controls();
     to.set_name(control.name);
     to.set_value(control.value);
     to.set_locked(control.locked);
+    to.set_note(control.note);
   }
 }
 

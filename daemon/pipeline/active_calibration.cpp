@@ -66,14 +66,18 @@ std::unique_ptr<ActiveCalibration> activate(
                     "from touch: calibrate with a crop of at least a quarter of each side",
                     calibration->name, table.width, table.height));
   }
-  auto active = std::make_unique<ActiveCalibration>(ActiveCalibration{
-      .calibration = calibration,
-      .reconstructor = recon::Reconstructor(calibration->model),
-      .grid = {},
-      .region = region,
-      .camera_mismatch = !calibration::camera_mismatches(*calibration, attached(camera)).empty()});
+  auto active = std::make_unique<ActiveCalibration>(
+      ActiveCalibration{.calibration = calibration,
+                        .reconstructor = recon::Reconstructor(calibration->model),
+                        .grid = {},
+                        .region = region,
+                        .camera_mismatch = camera_differs(*calibration, camera)});
   measure(model.reference_q8, table.frame_width, table.frame_height, active->grid);
   return active;
+}
+
+bool camera_differs(const calibration::Calibration& calibration, const hal::CameraInfo& camera) {
+  return !calibration::camera_mismatches(calibration, attached(camera)).empty();
 }
 
 bool light_differs(const calibration::Calibration& calibration, const hal::Light& light) noexcept {

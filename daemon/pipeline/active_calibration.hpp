@@ -28,6 +28,10 @@ struct ActiveCalibration {
     const std::shared_ptr<const calibration::Calibration>& calibration,
     const hal::CameraInfo& camera);
 
+/// The camera, its mode or its controls are not those of the calibration.
+[[nodiscard]] bool camera_differs(const calibration::Calibration& calibration,
+                                  const hal::CameraInfo& camera);
+
 /// The ring shows another light than at calibration: any channel, after brightness, off by more
 /// than one step. False when the calibration did not record its light. Does not allocate.
 [[nodiscard]] bool light_differs(const calibration::Calibration& calibration,

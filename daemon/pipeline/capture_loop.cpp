@@ -126,6 +126,7 @@ void CaptureLoop::execute(CalibrationOrder& order) noexcept {
   if (keeper_.ready()) active_->reconstructor.set_reference(keeper_.reference());
   light_mismatch_ = light_differs(*active_->calibration, shown_);
   keep_due_ = keeper_.ready() && keeper_.worth_keeping();
+  exchange_.camera_mismatch.store(active_->camera_mismatch, std::memory_order_relaxed);
   exchange_.generation.store(active_->generation, std::memory_order_release);
   if (order.next) (void)exchange_.retired.push(std::move(order.next));  // room was made sure of
   teller_.answer({order.ticket, Outcome::done, ""});
@@ -133,7 +134,12 @@ void CaptureLoop::execute(CalibrationOrder& order) noexcept {
 
 void CaptureLoop::process(std::int64_t now_ns) noexcept {
   const hal::FrameInfo& info = frame_.info();
-  if (watch_.arrived(info, now_ns)) keeper_.begin();
+  if (watch_.arrived(info, now_ns)) {
+    keeper_.begin();
+    exchange_.camera_returned.store(true, std::memory_order_release);
+    exchange_.wake.signal();
+  }
+  controls_moved_ = (info.flags & hal::kFrameControlsMoved) != 0;
   const std::int64_t exposure_ns = exposure_start_ns(info, period_ns_);
   const bool settled = timeline_.settled_at(exposure_ns);
 
@@ -280,7 +286,8 @@ HealthSet CaptureLoop::health(bool settled, std::int64_t now_ns) const noexcept 
     set.set(Health::light_unsettled, !settled);
   }
   set.set(Health::light_mismatch, light_mismatch_);
-  set.set(Health::camera_mismatch, unusable_ || (active_ && active_->camera_mismatch));
+  const bool differs = active_ && exchange_.camera_mismatch.load(std::memory_order_relaxed);
+  set.set(Health::camera_mismatch, unusable_ || controls_moved_ || differs);
   set.set(Health::beyond_calibration, beyond_);
   set.set(Health::frames_lost, watch_.lost_lately(now_ns));
   set.set(Health::camera_trouble, watch_.trouble());

@@ -80,7 +80,8 @@ class CaptureLoop {
 
   hal::Light shown_;  // by the ring, as last noted
   bool light_mismatch_ = false;
-  bool beyond_ = false;  // in the newest frame
+  bool beyond_ = false;          // in the newest frame
+  bool controls_moved_ = false;  // as the newest frame says
   std::int64_t beyond_until_ns_ = INT64_MIN;
   bool keep_due_ = false;                // the reference in use waits to be written
   std::optional<std::uint64_t> rezero_;  // ticket of the one under way

@@ -50,6 +50,9 @@ struct Exchange {
   std::atomic<bool> want_luma{false};
   std::atomic<bool> stop{false};
   std::atomic<bool> not_realtime{false};
+  /// A camera that was away delivers again: the network thread compares it with the calibration.
+  std::atomic<bool> camera_returned{false};
+  std::atomic<bool> camera_mismatch{false};
   std::atomic<State> state{State::settling};
   std::atomic<std::uint32_t> health{0};  ///< HealthSet::bits()
   std::atomic<std::uint64_t> frames{0};

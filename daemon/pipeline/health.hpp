@@ -14,7 +14,8 @@ enum class Health : std::uint8_t {
   reference_stale = 3,     ///< The reference does not belong to the present light.
   reference_restored = 4,  ///< Touched at start: the last good reference is used.
   light_mismatch = 5,      ///< The ring shows another light than at calibration.
-  camera_mismatch = 6,     ///< Camera, mode, format or controls differ from the calibration's.
+  camera_mismatch = 6,     ///< Camera, mode, format or controls differ from the calibration's, or a
+                           ///< control moved by itself.
   beyond_calibration = 7,  ///< Somewhere the image is darker than the calibrated list reaches.
   frames_lost = 8,         ///< The camera lost frames within the last second.
   camera_trouble = 9,      ///< Unplugged, stalled, busy, denied; status has the sentence.

@@ -96,6 +96,7 @@ void Pipeline::start() {
   }
   light_.start();
   camera_->start();
+  compare_camera();
   writer_.start();
   capture_ = base::RtThread(
       {.name = "dtact-capture", .cpu = config_.cpu, .fifo_priority = config_.fifo_priority},
@@ -115,6 +116,7 @@ void Pipeline::stop() noexcept {
 
 std::optional<Event> Pipeline::next_event() {
   free_retired();
+  if (exchange_.camera_returned.exchange(false, std::memory_order_acquire)) compare_camera();
   if (!own_events_.empty()) {
     Event event = std::move(own_events_.front());
     own_events_.pop_front();
@@ -147,7 +149,7 @@ bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
   if (exchange_.orders.room() == 0) return false;
   try {
     if (!command.calibration) throw std::invalid_argument("no calibration was given");
-    auto active = activate(command.calibration, info_);
+    auto active = activate(command.calibration, camera_->info());
     const recon::RectifyTable& table = command.calibration->model->rectify;
     if (pixels(table.width, table.height) > depth_capacity_) {
       throw std::invalid_argument(
@@ -163,6 +165,14 @@ bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
     exchange_.wake.signal();
     return true;
   }
+}
+
+// A camera may come up after the daemon, or as another one after a plug.
+void Pipeline::compare_camera() {
+  if (calibrations_.empty()) return;
+  exchange_.camera_mismatch.store(
+      camera_differs(*calibrations_.back().calibration, camera_->info()),
+      std::memory_order_relaxed);
 }
 
 void Pipeline::free_retired() {
@@ -183,7 +193,7 @@ Status Pipeline::status() const {
   Status status;
   status.state = exchange_.state.load(std::memory_order_relaxed);
   status.health = health_of(exchange_.health.load(std::memory_order_relaxed));
-  status.camera = info_;
+  status.camera = camera_->info();
   status.camera_report = camera_->report();
   status.ring = light_.info();
   status.ring_message = light_.message();

@@ -49,6 +49,7 @@ class Pipeline final : public Port {
   };
   [[nodiscard]] DepthFrame prototype(const calibration::Calibration* calibration) const;
   [[nodiscard]] bool use(std::uint64_t ticket, const UseCalibration& command);
+  void compare_camera();
   void free_retired();
 
   PipelineConfig config_;

@@ -310,7 +310,9 @@ PayloadStatus LiveCamera::deliver(const Filled& filled, std::uint64_t sequence, 
 }
 
 std::uint32_t LiveCamera::take_flags() noexcept {
-  return std::exchange(after_gap_, false) ? kFrameAfterGap : kFrameNormal;
+  std::uint32_t flags = std::exchange(after_gap_, false) ? kFrameAfterGap : kFrameNormal;
+  if (controls_moved_.load(std::memory_order_relaxed)) flags |= kFrameControlsMoved;
+  return flags;
 }
 
 void LiveCamera::note_delivery() noexcept {
@@ -375,6 +377,7 @@ void LiveCamera::watch_controls() noexcept {
       held.reset();  // may close the device: not under the mutex
       guard.lock();
       const bool same = checked == connection_.get();
+      controls_moved_.store(!moved.empty());
       moved_ = std::move(moved);
       if (same) info_.controls = std::move(controls);
     } catch (const std::exception&) {

@@ -95,6 +95,7 @@ class LiveCamera : public Camera, private FrameOwner {
   std::string moved_;
   bool stopping_ = false;
   std::atomic<CameraState> state_{CameraState::unplugged};
+  std::atomic<bool> controls_moved_{false};
   struct Counters {
     std::atomic<std::uint64_t> delivered, lost, skipped, disconnects;
     std::atomic<std::uint64_t> flagged, markers, too_short, undecodable;

@@ -187,6 +187,9 @@ TEST_F(Faults, AControlThatMovesByItselfIsReportedAndSetBack) {
   const double seconds =
       grab_until(camera, frame, [&](GrabStatus) { return !camera.report().moved.empty(); });
   measured("moved control to its report", seconds, "s");
+  grab_until(camera, frame, [&](GrabStatus status) {
+    return status == GrabStatus::ok && (frame.info().flags & hal::kFrameControlsMoved) != 0;
+  });
   EXPECT_EQ(camera.report().moved,
             "gain moved from 10 to 17 by itself: it was set back; another program or the camera's "
             "own automatic is at work");

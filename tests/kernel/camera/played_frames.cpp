@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 namespace dtact::kernel_test {
@@ -33,7 +34,7 @@ Image picture(int number) {
   return pixels;
 }
 
-std::string encode_jpeg(const Image& ycc) {
+std::string encode_ycc(const Image& ycc) {
   jpeg_compress_struct c{};
   jpeg_error_mgr errors{};
   c.err = jpeg_std_error(&errors);
@@ -100,13 +101,23 @@ void write(const std::filesystem::path& path, const std::string& bytes) {
 
 }  // namespace
 
+std::string encode_jpeg(const image::Grey8& picture) {
+  if (picture.width != kWidth || picture.height != kHeight) {
+    throw std::invalid_argument("the fake camera plays pictures of 800x600");
+  }
+  Image ycc;
+  ycc.reserve(3 * picture.pixels.size());
+  for (const std::uint8_t grey : picture.pixels) ycc.insert(ycc.end(), {grey, 128, 128});
+  return encode_ycc(ycc);
+}
+
 PlayedFrames::PlayedFrames() {
   std::string name = std::filesystem::temp_directory_path() / "dtact-frames.XXXXXX";
   if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
   folder_ = name;
   for (int i = 0; i < kCount; ++i) {
     const Image ycc = picture(i);
-    const std::string jpeg = encode_jpeg(ycc);
+    const std::string jpeg = encode_ycc(ycc);
     jpeg_luma_.push_back(decode_luma(jpeg));
     yuyv_luma_.emplace_back();
     write(folder_ / (std::to_string(i) + ".jpg"), jpeg);

@@ -2,11 +2,16 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "hal/frame.hpp"
+#include "hal/image/png.hpp"
 
 namespace dtact::kernel_test {
+
+/// A grey picture as the JPEG that a USB camera would send (4:2:2, grey chroma).
+[[nodiscard]] std::string encode_jpeg(const image::Grey8& picture);
 
 /// Eight pictures of 800×600 for the fake camera to play: files in a folder of their own, and the
 /// luma that must leave the HAL, bit for bit.

@@ -1,0 +1,157 @@
+#include "hal/live/live_camera.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <deque>
+#include <memory>
+
+#include "hal/base/clock.hpp"
+#include "hal/live/device_error.hpp"
+
+namespace dtact::hal::live {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr int kSide = 16;
+
+/// A source of grey frames that lends its payloads.
+class LendingSource final : public Source {
+ public:
+  ~LendingSource() override { *destroyed = true; }
+
+  [[nodiscard]] Format format() const noexcept override {
+    Format f;
+    f.width = f.height = kSide;
+    f.bytes_per_line = kSide;
+    f.full_range = full_range;
+    f.lendable = true;
+    return f;
+  }
+  void wait(std::int64_t deadline_ns) noexcept override {
+    base::system_clock().sleep_until(deadline_ns);
+  }
+  DequeueStatus dequeue(Filled& out) noexcept override {
+    if (stopped) return DequeueStatus::failed;
+    if (filled.empty()) return DequeueStatus::none;
+    out.index = filled.front();
+    filled.pop_front();
+    out.payload = std::span(memory[static_cast<std::size_t>(out.index)]).first(kSide * kSide);
+    out.sequence = sequence++;
+    out.timestamp_ns = base::system_clock().monotonic_ns();
+    return DequeueStatus::filled;
+  }
+  bool enqueue(int index) noexcept override {
+    home.push_back(index);
+    return true;
+  }
+  void stop() noexcept override { stopped = true; }
+  std::string check_controls(std::vector<CameraControl>& /*controls*/) override { return {}; }
+
+  void fill(int index, std::uint8_t grey) {
+    memory[static_cast<std::size_t>(index)].fill(grey);
+    filled.push_back(index);
+  }
+
+  bool full_range = true;
+  bool stopped = false;
+  std::shared_ptr<bool> destroyed = std::make_shared<bool>(false);
+  std::array<std::array<std::uint8_t, kSide * kSide + kLumaPadding>, 3> memory{};
+  std::deque<int> filled;
+  std::vector<int> home;  // what came back
+  std::uint32_t sequence = 0;
+};
+
+CameraConfig small() {
+  CameraConfig c;
+  c.width = c.height = kSide;
+  c.fps = 60;
+  return c;
+}
+
+/// A camera whose opener hands out `source` until it is taken away.
+struct Rig {
+  std::shared_ptr<LendingSource> source = std::make_shared<LendingSource>();
+  LiveCamera camera{small(), "test", "nothing yet", [this]() -> Opened {
+                      if (!source) throw DeviceError(CameraState::busy, "busy: wait");
+                      return {source, "the one", "GREY", {}};
+                    }};
+};
+
+TEST(LiveCamera, LendsFullRangeLumaWithoutACopy) {
+  Rig rig;
+  rig.camera.start();
+  EXPECT_EQ(rig.camera.info().identity, "the one");
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.luma().data, rig.source->memory[0].data());
+  EXPECT_TRUE(rig.source->home.empty());
+  rig.source->fill(1, 60);
+  rig.source->fill(2, 70);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.luma().data, rig.source->memory[2].data());
+  EXPECT_EQ(rig.source->home, (std::vector<int>{0, 1}));  // the one before, and the one skipped
+  frame.reset();
+  EXPECT_EQ(rig.source->home, (std::vector<int>{0, 1, 2}));
+}
+
+TEST(LiveCamera, CopiesWhatMustBeExpanded) {
+  Rig rig;
+  rig.source->full_range = false;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 235);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_NE(frame.luma().data, rig.source->memory[0].data());
+  EXPECT_EQ(frame.luma().row(0)[0], 255);
+  EXPECT_EQ(rig.source->home, (std::vector<int>{0}));
+}
+
+TEST(LiveCamera, AFrameOutlivesTheSourceItWasLentFrom) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  const std::shared_ptr<bool> destroyed = rig.source->destroyed;
+  rig.source->stopped = true;
+  rig.source.reset();
+  Frame none;
+  EXPECT_EQ(rig.camera.grab(none, milliseconds(250)), GrabStatus::unplugged);
+  EXPECT_EQ(rig.camera.report().state, CameraState::busy);  // as the opener says now
+  EXPECT_EQ(rig.camera.report().remedy, "busy: wait");
+  EXPECT_FALSE(*destroyed);
+  EXPECT_EQ(frame.luma().row(3)[3], 50);
+  frame.reset();
+  EXPECT_TRUE(*destroyed);
+  EXPECT_EQ(rig.camera.report().disconnects, 1U);
+}
+
+TEST(LiveCamera, SilenceIsAStallAndIsRestarted) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(rig.camera.grab(frame, milliseconds(200)), GrabStatus::timeout);
+  EXPECT_EQ(rig.camera.report().state, CameraState::stalled);
+  EXPECT_NE(rig.camera.report().remedy.find("sends nothing"), std::string::npos);
+  // Three seconds later the source is let go; this one cannot be opened twice.
+  GrabStatus status = GrabStatus::timeout;
+  for (int i = 0; i < 1000 && !rig.source->stopped; ++i) {
+    status = rig.camera.grab(frame, milliseconds(20));
+  }
+  EXPECT_TRUE(rig.source->stopped);
+  EXPECT_NE(status, GrabStatus::ok);
+}
+
+TEST(LiveCamera, RefusesImpossibleRates) {
+  CameraConfig c = small();
+  c.fps = 0;
+  EXPECT_THROW(LiveCamera(c, "test", "", [] { return Opened{}; }), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace dtact::hal::live
