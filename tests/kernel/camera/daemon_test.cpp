@@ -224,6 +224,9 @@ TEST_F(Daemon, StreamsDepthThroughAnUnplug) {
   std::this_thread::sleep_for(std::chrono::seconds(4));
   const double rate = (watcher.frames_with_depth() - first) / (now_s() - begin);
   measured("depth at a client", rate, "frames/s");
+  const client::Status serving = status();
+  measured("frames published by the daemon", serving.fps, "frames/s");
+  for (const auto& stage : serving.stages) measured(stage.name + ", p50", stage.p50_us, "us");
   EXPECT_GT(rate, 20);
 
   usb.reset();
