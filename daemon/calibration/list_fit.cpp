@@ -171,7 +171,6 @@ recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
   recon::DepthList list;
   constexpr int kStep = recon::kEntriesPerLevel;
   list.first_q6 = kListFirstLevel * kStep;
-  list.um.reserve(static_cast<std::size_t>((kListLastLevel - kListFirstLevel) * kStep + 1));
   for (int q6 = kListFirstLevel * kStep; q6 <= kListLastLevel * kStep; ++q6) {
     const double level = static_cast<double>(q6) / kStep;
     double mm = 0;
