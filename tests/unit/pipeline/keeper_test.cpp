@@ -32,13 +32,14 @@ class KeeperTest : public ::testing::Test {
     return false;
   }
   /// Grey levels by which the reference in use misses the untouched image under the present light.
-  double worst_error() const {
+  [[nodiscard]] double worst_error() const {
     ToyScene untouched = scene;
     untouched.press_mm = 0;
     double worst = 0;
     for (int y = 10; y < fakes::kToyHeight - 10; ++y) {
       for (int x = 10; x < fakes::kToyWidth - 10; ++x) {
-        const auto i = static_cast<std::size_t>(y * fakes::kToyWidth + x);
+        const std::size_t i =
+            static_cast<std::size_t>(y) * fakes::kToyWidth + static_cast<std::size_t>(x);
         worst = std::max(
             worst, std::abs(keeper.reference()[i] / 256.0 - fakes::toy_grey(untouched, x, y)));
       }
