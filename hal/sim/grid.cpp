@@ -35,8 +35,10 @@ Grid make_grid(const Scene& scene) {
   grid.height = side(-2 * corner.y_mm);
   // Whole points to the left of and above the centre: an object at the origin is sampled the same
   // way for every size of image.
-  grid.x0_mm = -(grid.width / 2) * grid.spacing_mm;
-  grid.y0_mm = -(grid.height / 2) * grid.spacing_mm;
+  const int left = grid.width / 2;
+  const int above = grid.height / 2;
+  grid.x0_mm = -left * grid.spacing_mm;
+  grid.y0_mm = -above * grid.spacing_mm;
   return grid;
 }
 

@@ -11,16 +11,18 @@ namespace {
 constexpr std::int32_t kOne = 1 << 15;
 constexpr std::int32_t kHalf = kOne / 2;
 
-int coarse_factor(const OpticsModel& optics, const Grid& grid) {
+std::size_t coarse_factor(const OpticsModel& optics, const Grid& grid) {
   // A quarter of the wide blur's width is fine enough to carry it.
-  return std::clamp(static_cast<int>(optics.wide_mm / grid.spacing_mm / 4), 1, 8);
+  return std::clamp<std::size_t>(static_cast<std::size_t>(optics.wide_mm / grid.spacing_mm / 4), 1,
+                                 8);
 }
 
-int divide_up(int a, int b) { return (a + b - 1) / b; }
+std::size_t divide_up(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
 
 // Width of the blur on the coarse grid. Averaging `factor` points and interpolating between coarse
 // ones blur by themselves; what they do is taken off (variances add).
-double wide_sigma(const OpticsModel& optics, const Grid& grid, int factor) {
+double wide_sigma(const OpticsModel& optics, const Grid& grid, std::size_t count) {
+  const auto factor = static_cast<double>(count);
   const double sigma = optics.wide_mm / grid.spacing_mm;
   const double f2 = factor * factor;
   const double own = factor == 1 ? 0 : (f2 - 1) / 12 + f2 / 6;
@@ -34,11 +36,8 @@ double response(const OpticsModel& optics, double d_mm) noexcept {
   return (optics.bulged_slope + optics.bulged_curve * d_mm) * d_mm;
 }
 
-Optics::Blur::Blur(double sigma, int width, int height)
-    : width_(width),
-      height_(height),
-      sums_(static_cast<std::size_t>(width)),
-      between_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {
+Optics::Blur::Blur(double sigma, std::size_t width, std::size_t height)
+    : width_(width), height_(static_cast<int>(height)), sums_(width), between_(width * height) {
   const int radius = static_cast<int>(std::ceil(3.5 * sigma));
   std::vector<double> weights;
   double sum = 0;
@@ -53,12 +52,12 @@ Optics::Blur::Blur(double sigma, int width, int height)
   }
   taps_[static_cast<std::size_t>(radius)] =
       static_cast<std::int16_t>(taps_[static_cast<std::size_t>(radius)] + rest);
-  line_.resize(static_cast<std::size_t>(width + 2 * radius));
+  line_.resize(width + 2 * static_cast<std::size_t>(radius));
 }
 
 void Optics::Blur::run(std::span<const std::int16_t> in, std::span<std::int16_t> out) noexcept {
   const int radius = static_cast<int>(taps_.size()) / 2;
-  const auto w = static_cast<std::size_t>(width_);
+  const std::size_t w = width_;
   const auto round_to = [&](std::int16_t* to) {
     for (std::size_t x = 0; x < w; ++x) to[x] = static_cast<std::int16_t>(sums_[x] >> 15);
   };
@@ -88,17 +87,17 @@ void Optics::Blur::run(std::span<const std::int16_t> in, std::span<std::int16_t>
 }
 
 Optics::Optics(const OpticsModel& optics, const Grid& grid)
-    : width_(grid.width),
-      height_(grid.height),
+    : width_(static_cast<std::size_t>(grid.width)),
+      height_(static_cast<std::size_t>(grid.height)),
       factor_(coarse_factor(optics, grid)),
-      coarse_width_(divide_up(grid.width, factor_)),
-      coarse_height_(divide_up(grid.height, factor_)),
+      coarse_width_(divide_up(width_, factor_)),
+      coarse_height_(divide_up(height_, factor_)),
       narrow_weight_(static_cast<std::int32_t>(std::lround(optics.narrow_weight * kOne))),
       responses_(1U << 16U),
       narrow_(optics.narrow_mm / grid.spacing_mm, width_, height_),
       wide_(wide_sigma(optics, grid, factor_), coarse_width_, coarse_height_),
       sharp_(grid.size()),
-      coarse_(static_cast<std::size_t>(coarse_width_) * static_cast<std::size_t>(coarse_height_)),
+      coarse_(coarse_width_ * coarse_height_),
       coarse_blurred_(coarse_.size()) {
   for (int i = 0; i < 1 << 16; ++i) {
     const double share = response(optics, static_cast<double>(i - kOne) / Truth::kPerMm);
@@ -110,7 +109,7 @@ Optics::Optics(const OpticsModel& optics, const Grid& grid)
 
 void Optics::run(std::span<const std::int16_t> indentation, std::span<std::int16_t> loss) noexcept {
   for (std::size_t i = 0; i < sharp_.size(); ++i) {
-    sharp_[i] = responses_[static_cast<std::size_t>(indentation[i] + kOne)];
+    sharp_[i] = responses_[static_cast<std::uint32_t>(indentation[i] + kOne)];
   }
   narrow_.run(sharp_, loss);
   if (narrow_weight_ == kOne) return;
@@ -120,19 +119,18 @@ void Optics::run(std::span<const std::int16_t> indentation, std::span<std::int16
 }
 
 void Optics::shrink(std::span<const std::int16_t> fine) noexcept {
-  for (int cy = 0; cy < coarse_height_; ++cy) {
-    const int y1 = std::min((cy + 1) * factor_, height_);
-    for (int cx = 0; cx < coarse_width_; ++cx) {
-      const int x1 = std::min((cx + 1) * factor_, width_);
+  for (std::size_t cy = 0; cy < coarse_height_; ++cy) {
+    const std::size_t y0 = cy * factor_;
+    const std::size_t y1 = std::min(y0 + factor_, height_);
+    for (std::size_t cx = 0; cx < coarse_width_; ++cx) {
+      const std::size_t x0 = cx * factor_;
+      const std::size_t x1 = std::min(x0 + factor_, width_);
       std::int32_t sum = 0;
-      for (int y = cy * factor_; y < y1; ++y) {
-        for (int x = cx * factor_; x < x1; ++x) {
-          sum += fine[static_cast<std::size_t>(y * width_ + x)];
-        }
+      for (std::size_t y = y0; y < y1; ++y) {
+        for (std::size_t x = x0; x < x1; ++x) sum += fine[y * width_ + x];
       }
-      const int count = (y1 - cy * factor_) * (x1 - cx * factor_);
-      coarse_[static_cast<std::size_t>(cy * coarse_width_ + cx)] =
-          static_cast<std::int16_t>(sum / count);
+      const auto count = std::max(static_cast<std::int32_t>((y1 - y0) * (x1 - x0)), 1);
+      coarse_[cy * coarse_width_ + cx] = static_cast<std::int16_t>(sum / count);
     }
   }
 }
@@ -140,27 +138,27 @@ void Optics::shrink(std::span<const std::int16_t> fine) noexcept {
 // loss = narrow·weight + wide·(1 − weight), the wide one interpolated between coarse centres.
 void Optics::add_wide(std::span<std::int16_t> loss) const noexcept {
   const std::int32_t wide_weight = kOne - narrow_weight_;
-  const int full = 2 * factor_;
-  // The coarse point before fine point i and twice its distance from there, in fine points.
-  const auto split = [&](int i, int count, int& index, int& weight) {
-    const int twice = std::clamp(2 * i + 1 - factor_, 0, (count - 1) * full);
-    index = std::min(twice / full, count - 2);
-    weight = twice - index * full;
+  const auto full = static_cast<std::int32_t>(2 * factor_);
+  struct Split {
+    std::size_t index;    // of the coarse point before the fine one
+    std::int32_t weight;  // twice the distance from there, in fine points
   };
-  for (int y = 0; y < height_; ++y) {
-    int cy = 0;
-    int wy = 0;
-    split(y, coarse_height_, cy, wy);
-    const std::int16_t* const upper = coarse_blurred_.data() + cy * coarse_width_;
+  const auto split = [&](std::size_t i, std::size_t count) {
+    const std::size_t from_first = std::max(2 * i + 1, factor_) - factor_;
+    const std::size_t twice = std::min(from_first, (count - 1) * 2 * factor_);
+    const std::size_t index = std::min(twice / (2 * factor_), count - 2);
+    return Split{index, static_cast<std::int32_t>(twice - index * 2 * factor_)};
+  };
+  for (std::size_t y = 0; y < height_; ++y) {
+    const Split at_y = split(y, coarse_height_);
+    const std::int16_t* const upper = coarse_blurred_.data() + at_y.index * coarse_width_;
     const std::int16_t* const lower = upper + coarse_width_;
-    for (int x = 0; x < width_; ++x) {
-      int cx = 0;
-      int wx = 0;
-      split(x, coarse_width_, cx, wx);
+    for (std::size_t x = 0; x < width_; ++x) {
+      const auto [cx, wx] = split(x, coarse_width_);
       const std::int32_t top = upper[cx] * (full - wx) + upper[cx + 1] * wx;
       const std::int32_t bottom = lower[cx] * (full - wx) + lower[cx + 1] * wx;
-      const std::int32_t wide = (top * (full - wy) + bottom * wy) / (full * full);
-      std::int16_t& value = loss[static_cast<std::size_t>(y * width_ + x)];
+      const std::int32_t wide = (top * (full - at_y.weight) + bottom * at_y.weight) / (full * full);
+      std::int16_t& value = loss[y * width_ + x];
       value =
           static_cast<std::int16_t>((value * narrow_weight_ + wide * wide_weight + kHalf) >> 15);
     }

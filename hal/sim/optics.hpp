@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -27,11 +28,11 @@ class Optics {
   /// A separable Gaussian in Q15 on a plane of 16-bit values.
   class Blur {
    public:
-    Blur(double sigma, int width, int height);
+    Blur(double sigma, std::size_t width, std::size_t height);
     void run(std::span<const std::int16_t> in, std::span<std::int16_t> out) noexcept;
 
    private:
-    int width_;
+    std::size_t width_;
     int height_;
     std::vector<std::int16_t> taps_;  // odd count, sum 2^15
     std::vector<std::int16_t> line_;
@@ -42,11 +43,11 @@ class Optics {
   void shrink(std::span<const std::int16_t> fine) noexcept;
   void add_wide(std::span<std::int16_t> loss) const noexcept;
 
-  int width_;
-  int height_;
-  int factor_;  // the wide blur runs on a grid this many times coarser
-  int coarse_width_;
-  int coarse_height_;
+  std::size_t width_;
+  std::size_t height_;
+  std::size_t factor_;  // the wide blur runs on a grid this many times coarser
+  std::size_t coarse_width_;
+  std::size_t coarse_height_;
   std::int32_t narrow_weight_;           // Q15
   std::vector<std::int16_t> responses_;  // by indentation + 2^15, Q15
   Blur narrow_;

@@ -15,10 +15,12 @@ namespace dtact::hal::sim {
 namespace {
 
 constexpr int kQuality = 90;
-constexpr std::size_t kSpare = 256 * 1024;
+constexpr std::size_t kSpare = std::size_t{256} * 1024;
 
 // 800 × 600 asks libjpeg for 60 kB; four times that and a line's worth of everything.
-std::size_t arena_bytes(int width) { return 256 * 1024 + static_cast<std::size_t>(width) * 256; }
+std::size_t arena_bytes(int width) {
+  return std::size_t{256} * 1024 + static_cast<std::size_t>(width) * 256;
+}
 
 // Rows that libjpeg reads at once: one row of 8 × 8 blocks.
 constexpr int kRows = 8;

@@ -2,12 +2,14 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
@@ -34,22 +36,14 @@ struct Range {
 
 // "200:210" are the ten frames 200 to 209; "200" is one.
 Range parse_range(const std::string& text) {
-  try {
-    const std::size_t colon = text.find(':');
-    std::size_t used = 0;
-    Range range;
-    range.first = std::stoull(text, &used);
-    range.end = range.first + 1;
-    if (colon != std::string::npos) {
-      const std::string tail = text.substr(colon + 1);
-      if (used != colon) throw std::invalid_argument(text);
-      range.end = std::stoull(tail, &used);
-      used += colon + 1;
-    }
-    if (used == text.size() && range.end > range.first) return range;
-  } catch (const std::logic_error&) {
-    // Falls through to the one message.
+  Range range;
+  const char* const end = text.data() + text.size();
+  auto parsed = std::from_chars(text.data(), end, range.first);
+  range.end = range.first + 1;
+  if (parsed.ec == std::errc() && parsed.ptr != end && *parsed.ptr == ':') {
+    parsed = std::from_chars(parsed.ptr + 1, end, range.end);
   }
+  if (parsed.ec == std::errc() && parsed.ptr == end && range.end > range.first) return range;
   throw std::runtime_error(fmt::format(
       "--frames {}: must be a frame or first:end with end after first, as in 200:210", text));
 }

@@ -40,9 +40,12 @@ void wait_for(int fd, std::int64_t ns) noexcept {
 
 }  // namespace
 
-struct SimCamera::Impl final : FrameOwner {
-  Impl(const CameraConfig& config, std::shared_ptr<LightLink> link, base::Clock& the_clock)
-      : output(output_from_name(config.sim.output)),
+class SimCamera::Impl {
+ public:
+  Impl(FrameOwner& frames, const CameraConfig& config, std::shared_ptr<LightLink> link,
+       base::Clock& the_clock)
+      : owner(frames),
+        output(output_from_name(config.sim.output)),
         paced(config.sim.paced),
         clock(the_clock),
         device(configured_scene(config), config.sim.seed, output, std::move(link), the_clock) {
@@ -53,8 +56,9 @@ struct SimCamera::Impl final : FrameOwner {
   GrabStatus grab(Frame& out, std::int64_t timeout_ns) noexcept;
   GrabStatus hand_out(const Payload& payload, Frame& out) noexcept;
   bool decode(const Payload& payload, luma::LumaBuffer& buffer) noexcept;
-  void give_back(int index) noexcept override { lent[static_cast<std::size_t>(index)] = false; }
+  void give_back(int index) noexcept { lent[static_cast<std::size_t>(index)] = false; }
 
+  FrameOwner& owner;
   const Output output;
   const bool paced;
   base::Clock& clock;
@@ -121,7 +125,7 @@ GrabStatus SimCamera::Impl::hand_out(const Payload& payload, Frame& out) noexcep
   info.decode_ns = clock.monotonic_ns() - begin;
   ++delivered;
   lent[index] = true;
-  out = Frame(*this, static_cast<int>(index), buffers[index].view(), info);
+  out = Frame(owner, static_cast<int>(index), buffers[index].view(), info);
   return GrabStatus::ok;
 }
 
@@ -135,16 +139,19 @@ bool SimCamera::Impl::decode(const Payload& payload, luma::LumaBuffer& buffer) n
       return luma::extract(luma::Layout::yuyv, luma::Range::limited, bytes, 0, buffer) ==
              luma::ExtractStatus::ok;
     case Output::mjpeg:
-      return decoder->decode(bytes, buffer.data(), buffer.stride()) == mjpeg::Status::ok;
+      return decoder && decoder->decode(bytes, buffer.data(), buffer.stride()) == mjpeg::Status::ok;
   }
   return false;
 }
 
 SimCamera::SimCamera(const CameraConfig& config, std::shared_ptr<LightLink> link,
                      base::Clock& clock)
-    : impl_(std::make_unique<Impl>(config, std::move(link), clock)) {}
+    : impl_(std::make_unique<Impl>(static_cast<FrameOwner&>(*this), config, std::move(link),
+                                   clock)) {}
 
 SimCamera::~SimCamera() = default;
+
+void SimCamera::give_back(int index) noexcept { impl_->give_back(index); }
 
 CameraInfo SimCamera::info() const {
   const Scene& scene = impl_->device.scene();

@@ -17,7 +17,7 @@ namespace dtact::hal::sim {
 ///
 /// With config.sim.paced == false there is no thread: every grab() makes the next frame of the
 /// sequence, none is skipped, and scripted gaps pass without waiting.
-class SimCamera final : public Camera {
+class SimCamera final : public Camera, private FrameOwner {
  public:
   /// Loads and solves the scene (seconds for many presses). Throws std::runtime_error naming file,
   /// line, key and remedy.
@@ -31,7 +31,9 @@ class SimCamera final : public Camera {
   [[nodiscard]] GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept override;
 
  private:
-  struct Impl;
+  class Impl;
+  void give_back(int index) noexcept override;
+
   std::unique_ptr<Impl> impl_;
 };
 

@@ -30,8 +30,11 @@ class ReplayTest : public ::testing::Test {
     config.fps = 100;
     config.replay.folder = folder;
   }
+
+ public:
   ~ReplayTest() override { fs::remove_all(folder); }
 
+ protected:
   void png(const std::string& name, std::uint8_t grey, int width = 100, int height = 50) {
     const image::Grey8 image{
         width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width * height), grey)};

@@ -32,13 +32,14 @@ class KeeperTest : public ::testing::Test {
     return false;
   }
   /// Grey levels by which the reference in use misses the untouched image under the present light.
-  double worst_error() const {
+  [[nodiscard]] double worst_error() const {
     ToyScene untouched = scene;
     untouched.press_mm = 0;
     double worst = 0;
     for (int y = 10; y < fakes::kToyHeight - 10; ++y) {
       for (int x = 10; x < fakes::kToyWidth - 10; ++x) {
-        const auto i = static_cast<std::size_t>(y * fakes::kToyWidth + x);
+        const std::size_t i =
+            static_cast<std::size_t>(y) * fakes::kToyWidth + static_cast<std::size_t>(x);
         worst = std::max(
             worst, std::abs(keeper.reference()[i] / 256.0 - fakes::toy_grey(untouched, x, y)));
       }
@@ -86,7 +87,7 @@ TEST_F(KeeperTest, WaitsWhileTheLightWarmsUp) {
 
 TEST_F(KeeperTest, TouchedAtStartUsesTheLastGoodOne) {
   const ToyScene yesterday{.light = 0.97};  // drift since
-  keeper.restore(fakes::toy_reference_q8(yesterday), true);
+  keeper.restore(fakes::toy_reference_q8(yesterday), true, true);
   calibrate();
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
@@ -109,7 +110,7 @@ TEST_F(KeeperTest, TouchedAtStartWithoutOneScalesTheCalibrations) {
 }
 
 TEST_F(KeeperTest, ALastGoodOneFromAnotherLightIsStale) {
-  keeper.restore(fakes::toy_reference_q8({.light = 0.6}), false);
+  keeper.restore(fakes::toy_reference_q8({.light = 0.6}), false, true);
   calibrate();
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
@@ -183,7 +184,7 @@ TEST_F(KeeperTest, RezeroOfAMovingImageIsRefused) {
 TEST_F(KeeperTest, ALightChangeWithoutContactTakesANewOne) {
   calibrate();
   ASSERT_TRUE(run(40));
-  keeper.light_changed(false);
+  keeper.light_changed(false, false);
   EXPECT_FALSE(keeper.ready());
   EXPECT_FALSE(keeper.starting());
   scene.light = 0.5;
@@ -197,7 +198,7 @@ TEST_F(KeeperTest, ALightChangeUnderContactScalesAndWaits) {
   calibrate();
   ASSERT_TRUE(run(40));
   scene.press_mm = 1;
-  keeper.light_changed(true);
+  keeper.light_changed(true, true);
   scene.light = 0.5;
   ASSERT_TRUE(run(40));
   EXPECT_EQ(keeper.footing(), Footing::stale);
@@ -217,7 +218,7 @@ TEST_F(KeeperTest, ALongPressIsNeverAbsorbed) {
 TEST_F(KeeperTest, InTheDarkThereIsNoReference) {
   calibrate();
   ASSERT_TRUE(run(40));
-  keeper.light_changed(false);
+  keeper.light_changed(false, true);
   scene.light = 0;
   EXPECT_FALSE(run(150));
   EXPECT_EQ(keeper.state(), State::settling);
@@ -249,7 +250,7 @@ TEST_F(KeeperTest, ANewCalibrationKeepsAFreshReference) {
 
 TEST_F(KeeperTest, RefusesWhatCannotWork) {
   EXPECT_THROW(ReferenceKeeper(79, 60, rules()), std::invalid_argument);
-  EXPECT_THROW(keeper.restore(std::vector<std::uint16_t>(5), true), std::invalid_argument);
+  EXPECT_THROW(keeper.restore(std::vector<std::uint16_t>(5), true, true), std::invalid_argument);
 }
 
 }  // namespace

@@ -37,19 +37,22 @@ class PipelineTest : public ::testing::Test {
     config.state_folder = folder;
     ring.on_show = [this](const hal::Light& light) { camera.light(light.brightness / 255.0); };
   }
+
+ public:
   ~PipelineTest() override {
     pipeline.reset();
     fs::remove_all(folder);
   }
 
-  void build(std::shared_ptr<const calibration::Calibration> calibration) {
-    pipeline = std::make_unique<Pipeline>(std::make_unique<FakeCamera>(camera),
-                                          std::make_unique<fakes::FakeRing>(ring),
-                                          std::move(calibration), config);
+ protected:
+  void build(const std::shared_ptr<const calibration::Calibration>& calibration) {
+    pipeline =
+        std::make_unique<Pipeline>(std::make_unique<FakeCamera>(camera),
+                                   std::make_unique<fakes::FakeRing>(ring), calibration, config);
     pipeline->want(true, false);
   }
-  void start(std::shared_ptr<const calibration::Calibration> calibration) {
-    build(std::move(calibration));
+  void start(const std::shared_ptr<const calibration::Calibration>& calibration) {
+    build(calibration);
     pipeline->start();
   }
 

@@ -19,8 +19,11 @@ namespace fs = std::filesystem;
 class StoreTest : public ::testing::Test {
  protected:
   StoreTest() { fs::remove_all(folder); }
+
+ public:
   ~StoreTest() override { fs::remove_all(folder); }
 
+ protected:
   StoredReference some() {
     StoredReference reference{fakes::kToyWidth, fakes::kToyHeight, fakes::toy_reference_q8(), {}};
     reference.light.brightness = 200;
