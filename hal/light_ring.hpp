@@ -38,7 +38,17 @@ struct RingInfo {
 /// What became of a write to the ring.
 struct ShowResult {
   bool ok = true;
-  std::string message;  ///< When not ok: what failed and the remedy.
+  std::string message;   ///< When not ok: what failed and the remedy. When dimmed: why.
+  double dimmed_to = 1;  ///< What a current limit left of the light asked for; 1 = all of it.
+};
+
+/// Run-time condition of a ring that writes by itself (a re-send can fail). Any thread may ask.
+struct RingReport {
+  bool ok = true;              ///< The last write worked.
+  std::string message;         ///< When not ok: what failed and the remedy.
+  std::string note;            ///< Found at start: worth knowing, not wrong. Empty = nothing.
+  std::uint64_t writes = 0;    ///< Tried, re-sends included.
+  std::uint64_t failures = 0;  ///< Of these.
 };
 
 /// The LEDs that light the layer. show() may block for a millisecond and more, so it is called on
@@ -52,6 +62,7 @@ class LightRing {
 
   [[nodiscard]] virtual RingInfo info() const = 0;
   [[nodiscard]] virtual ShowResult show(const Light& light) = 0;
+  [[nodiscard]] virtual RingReport report() const { return {}; }
 };
 
 }  // namespace dtact::hal
