@@ -1,0 +1,204 @@
+#include "hal/mjpeg/grey_decoder.hpp"
+
+#include <algorithm>
+#include <array>
+#include <csetjmp>
+#include <stdexcept>
+
+#include "hal/mjpeg/jpeg_arena.hpp"
+
+namespace dtact::hal::mjpeg {
+namespace {
+
+constexpr int kMaxSide = 16384;
+
+/// Bytes between two markers that are passed over. Some cameras pad their entropy-coded data before
+/// the end marker; a longer rest means that the decoder lost its place.
+constexpr int kToleratedStuffing = 16;
+
+/// What libjpeg needs for a single-scan picture: rows of three components in work, at most 4×4
+/// subsampled (measured: under 70 kB for 800 pixels), and tables.
+std::size_t arena_bytes(int width) { return 256 * 1024 + 256 * static_cast<std::size_t>(width); }
+
+Status status_of_error(int code) noexcept {
+  switch (code) {
+    case JERR_NO_SOI:
+      return Status::not_jpeg;
+    case JERR_INPUT_EMPTY:
+    case JERR_INPUT_EOF:
+      return Status::truncated;
+    case JERR_ARITH_NOTIMPL:
+    case JERR_BAD_PRECISION:
+    case JERR_CONVERSION_NOTIMPL:
+    case JERR_NOT_COMPILED:
+    case JERR_OUT_OF_MEMORY:
+    case JERR_SOF_UNSUPPORTED:
+      return Status::unsupported;
+    default:
+      return Status::corrupt;
+  }
+}
+
+/// Warnings that leave the picture whole.
+bool harmless(const jpeg_error_mgr& err) noexcept {
+  switch (err.msg_code) {
+    case JWRN_ADOBE_XFORM:
+    case JWRN_JFIF_MAJOR:
+      return true;
+    case JWRN_EXTRANEOUS_DATA:
+      return err.msg_parm.i[0] <= kToleratedStuffing;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+const char* describe(Status status) noexcept {
+  switch (status) {
+    case Status::ok:
+      return "the frame is whole";
+    case Status::empty:
+      return "the payload is empty";
+    case Status::not_jpeg:
+      return "the payload is not a JPEG";
+    case Status::truncated:
+      return "the payload ends before the end-of-image marker";
+    case Status::corrupt:
+      return "the payload's coded data is broken";
+    case Status::wrong_size:
+      return "the picture has another size than the camera's mode";
+    case Status::unsupported:
+      return "the payload is not a baseline JPEG of one interleaved scan";
+  }
+  return "unknown";
+}
+
+struct GreyDecoder::Impl {
+  Impl(int w, int h) : width(w), height(h), arena(arena_bytes(w)) {
+    cinfo.err = jpeg_std_error(&errors);
+    cinfo.client_data = this;
+    errors.error_exit = [](j_common_ptr c) {
+      Impl& self = *static_cast<Impl*>(c->client_data);
+      self.failure = status_of_error(c->err->msg_code);
+      std::longjmp(self.way_out, 1);
+    };
+    errors.emit_message = [](j_common_ptr c, int level) {
+      // Negative levels are warnings: the data are damaged and libjpeg would make something up.
+      if (level >= 0 || harmless(*c->err)) return;
+      c->err->error_exit(c);
+    };
+    errors.output_message = [](j_common_ptr) {};
+    source.init_source = [](j_decompress_ptr) {};
+    source.fill_input_buffer = [](j_decompress_ptr c) -> boolean {
+      c->err->msg_code = JERR_INPUT_EOF;
+      c->err->error_exit(reinterpret_cast<j_common_ptr>(c));
+      return FALSE;
+    };
+    source.skip_input_data = [](j_decompress_ptr c, long bytes) {
+      if (bytes <= 0) return;
+      if (static_cast<std::size_t>(bytes) > c->src->bytes_in_buffer) c->src->fill_input_buffer(c);
+      c->src->next_input_byte += bytes;
+      c->src->bytes_in_buffer -= static_cast<std::size_t>(bytes);
+    };
+    source.resync_to_restart = jpeg_resync_to_restart;
+    source.term_source = [](j_decompress_ptr) {};
+    if (setjmp(way_out) != 0) throw std::runtime_error("libjpeg cannot be started");
+    jpeg_create_decompress(&cinfo);
+    cinfo.src = &source;
+    arena.attach(cinfo);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() {
+    arena.detach(cinfo);
+    jpeg_destroy_decompress(&cinfo);
+  }
+
+  /// Back to the state after construction; frees nothing, since all memory is the arena's.
+  void begin(std::span<const std::uint8_t> payload) noexcept {
+    jpeg_abort_decompress(&cinfo);
+    arena.reset();
+    std::fill(std::begin(cinfo.quant_tbl_ptrs), std::end(cinfo.quant_tbl_ptrs), nullptr);
+    std::fill(std::begin(cinfo.dc_huff_tbl_ptrs), std::end(cinfo.dc_huff_tbl_ptrs), nullptr);
+    std::fill(std::begin(cinfo.ac_huff_tbl_ptrs), std::end(cinfo.ac_huff_tbl_ptrs), nullptr);
+    // A doubled start marker is some cameras' habit and an error to libjpeg.
+    constexpr std::array<std::uint8_t, 4> kDoubledStart = {0xFF, 0xD8, 0xFF, 0xD8};
+    while (payload.size() >= 4 && std::ranges::equal(payload.first(4), kDoubledStart)) {
+      payload = payload.subspan(2);
+    }
+    source.next_input_byte = payload.data();
+    source.bytes_in_buffer = payload.size();
+  }
+
+  // No object with a destructor lives in the functions below: longjmp passes them by.
+  Status header(std::span<const std::uint8_t> payload) noexcept {
+    if (payload.empty()) return Status::empty;
+    if (setjmp(way_out) != 0) return failure;
+    begin(payload);
+    jpeg_read_header(&cinfo, TRUE);
+    return Status::ok;
+  }
+
+  Status pixels(std::uint8_t* luma, std::ptrdiff_t stride) noexcept {
+    if (setjmp(way_out) != 0) return failure;
+    if (cinfo.progressive_mode != 0 || jpeg_has_multiple_scans(&cinfo) != 0) {
+      return Status::unsupported;
+    }
+    cinfo.out_color_space = JCS_GRAYSCALE;
+    jpeg_start_decompress(&cinfo);
+    while (cinfo.output_scanline < cinfo.output_height) {
+      // libjpeg hands out at most one row of blocks at a time (rec_outbuf_height ≤ 4 rows).
+      std::array<JSAMPROW, 4> rows{};
+      const JDIMENSION left = cinfo.output_height - cinfo.output_scanline;
+      const JDIMENSION count = std::min<JDIMENSION>(rows.size(), left);
+      for (JDIMENSION i = 0; i < count; ++i) {
+        rows[i] = luma + static_cast<std::ptrdiff_t>(cinfo.output_scanline + i) * stride;
+      }
+      jpeg_read_scanlines(&cinfo, rows.data(), count);
+    }
+    jpeg_finish_decompress(&cinfo);
+    return Status::ok;
+  }
+
+  int width;
+  int height;
+  JpegArena arena;
+  jpeg_decompress_struct cinfo{};
+  jpeg_error_mgr errors{};
+  jpeg_source_mgr source{};
+  std::jmp_buf way_out{};
+  Status failure = Status::ok;
+};
+
+GreyDecoder::GreyDecoder(int width, int height) {
+  if (width < 1 || height < 1 || width > kMaxSide || height > kMaxSide) {
+    throw std::invalid_argument("JPEG decoder: width and height must be 1 to 16384 pixels");
+  }
+  impl_ = std::make_unique<Impl>(width, height);
+}
+GreyDecoder::GreyDecoder(GreyDecoder&&) noexcept = default;
+GreyDecoder& GreyDecoder::operator=(GreyDecoder&&) noexcept = default;
+GreyDecoder::~GreyDecoder() = default;
+
+Status GreyDecoder::decode(std::span<const std::uint8_t> payload, std::uint8_t* luma,
+                           std::ptrdiff_t stride) noexcept {
+  Impl& d = *impl_;
+  if (const Status status = d.header(payload); status != Status::ok) return status;
+  if (static_cast<int>(d.cinfo.image_width) != d.width ||
+      static_cast<int>(d.cinfo.image_height) != d.height) {
+    return Status::wrong_size;
+  }
+  return d.pixels(luma, stride);
+}
+
+Status GreyDecoder::read_size(std::span<const std::uint8_t> payload, Size& size) noexcept {
+  const Status status = impl_->header(payload);
+  if (status == Status::ok) {
+    size = {static_cast<int>(impl_->cinfo.image_width),
+            static_cast<int>(impl_->cinfo.image_height)};
+  }
+  return status;
+}
+
+}  // namespace dtact::hal::mjpeg

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstdint>
+
+namespace dtact::wire {
+
+/// The version this tree speaks. The daemon refuses another major version; a minor version only
+/// adds fields.
+inline constexpr std::uint32_t kMajor = 1;
+inline constexpr std::uint32_t kMinor = 0;
+
+/// The daemon's TCP port unless configured. From the range 7366–7390, which IANA's service name
+/// and port number registry leaves unassigned.
+inline constexpr std::uint16_t kDefaultPort = 7377;
+
+/// Where the daemon listens, and clients connect to, unless told otherwise: this machine only.
+inline constexpr const char* kDefaultAddress = "127.0.0.1";
+
+/// Longest program name in Hello, bytes.
+inline constexpr std::size_t kMaxProgramName = 64;
+
+/// Longest calibration name in UploadCalibration, bytes.
+inline constexpr std::size_t kMaxCalibrationName = 64;
+
+}  // namespace dtact::wire
