@@ -46,7 +46,7 @@ Dimmed dim(const Light& light, const DimmingSettings& settings) {
   }
 
   out.milliamps = current_ma(out.leds);
-  if (out.milliamps > settings.budget_ma) {
+  if (out.milliamps > settings.budget_ma + 1e-6) {
     out.scale = (settings.budget_ma - kRingIdle) / (out.milliamps - kRingIdle);
     const auto cut = [&](std::uint8_t channel) {
       // The epsilon keeps an exact product from falling one step through rounding.

@@ -83,7 +83,8 @@ std::string why_refused(const SpiFormat& format) {
 }
 
 std::size_t latch_bytes(double hz) {
-  return static_cast<std::size_t>(std::ceil(kLatchNs * 1e-9 * hz / 8));
+  // Rounding must not make a byte of a whole number's last digit.
+  return static_cast<std::size_t>(std::ceil(kLatchNs * 1e-9 * hz / 8 - 1e-6));
 }
 
 std::vector<std::uint8_t> encode(std::span<const Rgb> leds, const SpiFormat& format) {

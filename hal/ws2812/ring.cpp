@@ -52,7 +52,7 @@ ShowResult Ring::show(const Light& light) {
   const std::uint64_t ticket = ++asked_;
   wake_.notify_one();
   written_.wait(lock, [&] { return done_ >= ticket; });
-  if (!report_.ok) return {false, report_.message, dimmed.scale};
+  if (!outcome_.empty()) return {false, outcome_, dimmed.scale};
   if (dimmed.scale >= 1) return {};
   return {true,
           fmt::format("dimmed to {:.0f} % of the light asked for, {:.0f} mA: "
@@ -84,7 +84,8 @@ void Ring::run() {
     ++report_.writes;
     report_.failures += error.empty() ? 0U : 1U;
     report_.ok = error.empty();
-    report_.message = std::move(error);
+    report_.message = error;
+    if (done_ != ticket) outcome_ = std::move(error);  // a re-send is nobody's command
     done_ = ticket;
     written_.notify_all();
   };

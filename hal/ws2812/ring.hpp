@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <string>
 
 #include "hal/base/rt_thread.hpp"
 #include "hal/config.hpp"
@@ -51,6 +52,7 @@ class Ring final : public LightRing {
   // Guarded by mutex_:
   Leds wanted_{};  // in chain order
   std::uint64_t asked_ = 0, done_ = 0;
+  std::string outcome_;  // of the last light that was asked for
   bool prepared_ = false, stop_ = false;
   RingReport report_;
 
