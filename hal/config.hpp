@@ -39,7 +39,8 @@ struct GpioLineConfig {
 
 /// A real ring of WS2812B, on SPI or on a GPIO line.
 struct Ws2812Config {
-  double gamma = 1;                ///< light = colour × (brightness / 255)^gamma.
+  /// light = colour × (brightness / 255)^gamma; 2.2: equal steps look equal, 1: proportional.
+  double gamma = 2.2;
   double current_budget_ma = 500;  ///< What the ring may draw; a LED draws 1 … 60 mA.
   int resend_ms = 1000;            ///< A glitch heals after at most this long; 0 = never re-sent.
   bool leave_on = false;           ///< Keep the light when the program ends.

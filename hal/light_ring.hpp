@@ -17,7 +17,8 @@ struct Rgb {
 };
 
 /// What the ring is told to show: LED 0 is at the image's right (3 o'clock), the others follow
-/// clockwise as the camera sees them. Each LED shows its colour scaled by brightness / 255.
+/// clockwise as the camera sees them. Each LED shows its colour scaled by brightness / 255, or,
+/// where a ring dims along a gamma, by (brightness / 255)^gamma.
 struct Light {
   std::array<Rgb, kLedCount> leds = all({255, 255, 255});
   std::uint8_t brightness = 255;
