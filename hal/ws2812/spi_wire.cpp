@@ -16,7 +16,7 @@ namespace {
 
 // At 3.2 MHz 4096 bytes last 10 ms, of which an interruption of 50 µs is half a percent.
 constexpr std::size_t kLongestProbe = 16384;
-constexpr int kProbes = 5;
+constexpr int kProbes = 8;
 // Above this a deviation is worth a note although the pulses still fit.
 constexpr double kNoteworthy = 0.03;
 
