@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <string>
 
 namespace dtact::hal {
@@ -21,6 +22,22 @@ struct ReplayConfig {
   bool paced = true;  ///< false: as fast as they are asked for.
 };
 
+/// A camera behind a V4L2 driver, as USB cameras are.
+struct V4l2Config {
+  /// Which camera: a path below /dev/v4l/by-path or by-id, "serial:NUMBER", "bus:NAME" (the
+  /// driver's bus_info), or a node such as /dev/video0, whose number may change at every plug.
+  /// Empty = the only camera attached.
+  std::string device;
+  std::string pixel_format = "auto";  ///< "auto", "grey", "nv12", "yuyv" or "mjpeg".
+  std::string range = "auto";  ///< Of raw luma: "full", "limited", or "auto" = as the driver says.
+  double exposure_us = 0;      ///< 0 = the camera's default.
+  int exposure_pwm_periods = 0;  ///< Exposure as whole periods of the LEDs' PWM; 0 = not used.
+  double pwm_hz = 0;             ///< The LEDs' PWM frequency, for exposure_pwm_periods.
+  /// Photometric controls by their V4L2 names ("gain", "white_balance_temperature", ...), in the
+  /// camera's own units. What is not named is locked at the camera's default.
+  std::map<std::string, std::int64_t> controls;
+};
+
 struct CameraConfig {
   std::string backend = "sim";  ///< A name the registry knows.
   int width = 800;              ///< Pixels.
@@ -28,6 +45,7 @@ struct CameraConfig {
   double fps = 60;              ///< Frames a second.
   SimConfig sim;
   ReplayConfig replay;
+  V4l2Config v4l2;
 };
 
 /// One line of a GPIO chip.

@@ -10,11 +10,12 @@
 #include "hal/replay/replay_camera.hpp"
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_ring.hpp"
+#include "hal/v4l2/v4l2_camera.hpp"
 #include "hal/ws2812/ring.hpp"
 
 namespace dtact::hal {
 
-std::vector<std::string> camera_backends() { return {"null", "replay", "sim"}; }
+std::vector<std::string> camera_backends() { return {"null", "replay", "sim", "v4l2"}; }
 std::vector<std::string> ring_backends() { return {"null", "sim", "ws2812_gpio", "ws2812_spi"}; }
 
 Devices open_devices(const Config& config) {
@@ -41,6 +42,8 @@ Devices open_devices(const Config& config) {
     devices.camera = std::make_unique<replay::ReplayCamera>(config.camera);
   } else if (config.camera.backend == "sim") {
     devices.camera = std::make_unique<sim::SimCamera>(config.camera, light);
+  } else if (config.camera.backend == "v4l2") {
+    devices.camera = std::make_unique<v4l2::V4l2Camera>(config.camera);
   } else {
     throw std::runtime_error(fmt::format("camera.backend = \"{}\": allowed are {}",
                                          config.camera.backend,

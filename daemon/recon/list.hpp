@@ -5,14 +5,23 @@
 
 namespace dtact::recon {
 
+/// Entries of a list for one grey level.
+inline constexpr int kEntriesPerLevel = 64;
+
 /// Darkening → indentation, 64 entries a grey level, so that a look-up needs no interpolation.
-/// Entry i belongs to the Q6 darkening first_q6 + i. Outside its covered range the list holds its
-/// end value and the pixel is untrusted on the deep side (beyond what was calibrated).
+/// Entry i belongs to the Q6 darkening first_q6 + i. Below first_q6 the first entry stands (a bulge
+/// brighter than the list reaches is still a bulge); above covered_to_q6 the method `list` marks
+/// pixels untrusted (pressed deeper than was calibrated) and `published` holds the end value.
 struct DepthList {
   int first_q6 = 0;              ///< Darkening of entry 0, Q6 grey levels (64 = one level).
   std::vector<std::int16_t> um;  ///< Indentation in micrometres, positive = pressed.
   int covered_from_q6 = 0;       ///< Smallest darkening the calibration saw.
-  int covered_to_q6 = 0;         ///< Greatest darkening the calibration saw.
+  int covered_to_q6 = 0;         ///< Greatest darkening the calibration vouches for.
 };
+
+/// Throws std::invalid_argument, naming the key as in calibration.toml, unless the list is
+/// monotone, lies within ±255 grey levels, covers a range inside itself and holds no untrusted
+/// marker.
+void check(const DepthList& list);
 
 }  // namespace dtact::recon

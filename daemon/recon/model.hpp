@@ -13,8 +13,12 @@ namespace dtact::recon {
 inline constexpr std::int16_t kUntrusted = INT16_MIN;
 
 enum class Method : std::uint8_t {
-  list,      ///< Ours: signed difference, smoothing, per-pixel gain, monotone list.
-  published  ///< The paper's single-image list: difference, list, two 7×7 Gaussian filters.
+  /// Ours: signed difference, smoothing, per-pixel gain, monotone list.
+  list,
+  /// The paper's single-image list as its authors run it: whole grey levels, list, two 7×7 Gaussian
+  /// filters. The list's entries below the threshold are 0 and the threshold's own depth is already
+  /// taken off the others (calibration/published.hpp); the light's gain is not applied.
+  published
 };
 
 /// All that a calibration fixes. Immutable and shared between threads once made.
@@ -22,6 +26,9 @@ struct Model {
   Method method = Method::list;
   RectifyTable rectify;  ///< Camera frame → depth map.
   double mm_per_px = 0;  ///< Millimetres per pixel of the depth map.
+  /// Standard deviation of the Gaussian that smooths the difference, pixels of the depth map, 0 …
+  /// 10. Method::published has filters of its own and ignores it.
+  double smoothing_px = 0;
   DepthList list;
   /// The untouched image at calibration time, frame sized, Q8 luma (0…65280), row-major without
   /// padding: brings a differently lit image back to the calibration's light.

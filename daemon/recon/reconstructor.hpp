@@ -16,8 +16,8 @@ struct StepTimes {
   std::int64_t list_ns = 0;  ///< Gain, list, untrusted mark.
 };
 
-/// Turns luma into depth, in fixed point (README of the format in design: Q6 luma, Q12 gain, int16
-/// micrometres). Holds its scratch rows, so run() never allocates. One thread at a time.
+/// Turns luma into depth, in fixed point (formats and ranges in kernels.hpp: Q6 luma, Q12 gain,
+/// int16 micrometres). Holds its scratch rows, so run() never allocates. One thread at a time.
 class Reconstructor {
  public:
   /// Throws std::invalid_argument when the model's parts disagree in size.
@@ -35,8 +35,15 @@ class Reconstructor {
 
   /// `luma`: frame sized, rows `stride` bytes apart, 64 bytes readable after the last pixel.
   /// `depth_um`: width × height of the model's table, row-major.
+  /// Borders are replicated when smoothing. Beyond the list's covered range on the deep side
+  /// Method::list writes kUntrusted; so do both methods where the mask says so and where either
+  /// reference is darker than eight grey levels or the light less than an eighth of the
+  /// calibration's.
   void run(const std::uint8_t* luma, std::ptrdiff_t stride, std::span<std::int16_t> depth_um,
            StepTimes* times = nullptr) noexcept;
+
+  /// Pixels of the last run() that were darker than the list covers, masked ones not counted.
+  [[nodiscard]] int beyond_pixels() const noexcept;
 
  private:
   struct Impl;

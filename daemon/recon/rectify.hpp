@@ -6,15 +6,16 @@
 namespace dtact::recon {
 
 /// For every pixel of the depth map, where it is read in the camera frame. Bilinear with weights of
-/// 1/128; identity and crop are tables like any other.
+/// 1/128; identity and crop are tables like any other. All four source pixels of an entry lie in
+/// the frame: its last column and row are reached from the one before with weight 128.
 struct RectifyTable {
   int frame_width = 0;   ///< Pixels of the camera frame.
   int frame_height = 0;  ///< Pixels of the camera frame.
   int width = 0;         ///< Pixels of the depth map.
   int height = 0;        ///< Pixels of the depth map.
   struct Entry {
-    std::int16_t x = 0;   ///< Column of the upper left source pixel, 0 … frame_width − 1.
-    std::int16_t y = 0;   ///< Row of the upper left source pixel, 0 … frame_height − 1.
+    std::int16_t x = 0;   ///< Column of the upper left source pixel, 0 … frame_width − 2.
+    std::int16_t y = 0;   ///< Row of the upper left source pixel, 0 … frame_height − 2.
     std::uint8_t fx = 0;  ///< Weight of the right column, 0 … 128.
     std::uint8_t fy = 0;  ///< Weight of the lower row, 0 … 128.
   };

@@ -28,11 +28,11 @@ std::ptrdiff_t packed_line(Layout layout, int width) noexcept {
 template <int kStep>
 void copy_line(const std::uint8_t* in, std::uint8_t* out, int width, Range range) noexcept {
   if (range == Range::limited) {
-    for (int x = 0; x < width; ++x) out[x] = kExpansion[in[kStep * x]];
+    for (int x = 0; x < width; ++x) out[x] = kExpansion[in[std::ptrdiff_t{kStep} * x]];
   } else if constexpr (kStep == 1) {
     std::memcpy(out, in, static_cast<std::size_t>(width));
   } else {
-    for (int x = 0; x < width; ++x) out[x] = in[kStep * x];
+    for (int x = 0; x < width; ++x) out[x] = in[std::ptrdiff_t{kStep} * x];
   }
 }
 

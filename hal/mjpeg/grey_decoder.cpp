@@ -18,7 +18,9 @@ constexpr int kToleratedStuffing = 16;
 
 /// What libjpeg needs for a single-scan picture: rows of three components in work, at most 4×4
 /// subsampled (measured: under 70 kB for 800 pixels), and tables.
-std::size_t arena_bytes(int width) { return 256 * 1024 + 256 * static_cast<std::size_t>(width); }
+std::size_t arena_bytes(int width) {
+  return std::size_t{256} * (1024 + static_cast<std::size_t>(width));
+}
 
 Status status_of_error(int code) noexcept {
   switch (code) {

@@ -1,0 +1,164 @@
+#include "daemon/app/config.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <sched.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <ostream>
+#include <stdexcept>
+#include <string_view>
+
+#include "daemon/app/config_keys.hpp"
+#include "hal/base/atomic_file.hpp"
+
+namespace dtact::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The keys and where each value came from, while a configuration is put together.
+class Assembly {
+ public:
+  explicit Assembly(Config& config) : keys_(bind_keys(config)) {
+    for (const Key& key : keys_) origins_.push_back({key.path, "default"});
+  }
+
+  /// Every value of `table`. `place` makes "FILE:LINE" of a line, `folder` starts relative paths.
+  void take(const toml::table& table, const std::string& prefix, const fs::path& folder,
+            const std::function<std::string(unsigned)>& place) {
+    for (const auto& [name, node] : table) {
+      const std::string path = prefix + std::string(name.str());
+      const std::string where = place(node.source().begin.line);
+      const auto key =
+          std::find_if(keys_.begin(), keys_.end(), [&](const Key& k) { return k.path == path; });
+      if (key != keys_.end()) {
+        if (!key->assign(node, folder)) {
+          throw std::runtime_error(fmt::format("{}: {}: must be {}", where, path, key->allowed));
+        }
+        origins_[static_cast<std::size_t>(key - keys_.begin())].origin = where;
+      } else if (node.is_table() && is_table_name(path)) {
+        take(*node.as_table(), path + ".", folder, place);
+      } else {
+        throw std::runtime_error(fmt::format("{}: unknown key \"{}\"; allowed here are {}", where,
+                                             path, fmt::join(siblings(prefix), ", ")));
+      }
+    }
+  }
+
+  [[nodiscard]] std::vector<KeyOrigin> origins() && { return std::move(origins_); }
+
+ private:
+  [[nodiscard]] bool is_table_name(const std::string& path) const {
+    return std::any_of(keys_.begin(), keys_.end(),
+                       [&](const Key& k) { return k.path.starts_with(path + "."); });
+  }
+
+  /// The names that may stand in the table `prefix`.
+  [[nodiscard]] std::vector<std::string> siblings(const std::string& prefix) const {
+    std::vector<std::string> names;
+    for (const Key& key : keys_) {
+      if (!key.path.starts_with(prefix)) continue;
+      const std::string rest = key.path.substr(prefix.size());
+      const std::size_t dot = rest.find('.');
+      std::string name = dot == std::string::npos ? rest : "[" + rest.substr(0, dot) + "]";
+      if (std::find(names.begin(), names.end(), name) == names.end()) {
+        names.push_back(std::move(name));
+      }
+    }
+    return names;
+  }
+
+  std::vector<Key> keys_;
+  std::vector<KeyOrigin> origins_;
+};
+
+toml::table parse(std::string_view text, const std::string& name) {
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& e) {
+    throw std::runtime_error(
+        fmt::format("{}:{}: not valid TOML: {}", name, e.source().begin.line, e.description()));
+  }
+}
+
+/// "key=value" as TOML. A value that is no TOML by itself is taken as a string, so that
+/// `camera.backend=replay` needs no quotes within the shell's.
+toml::table parse_setting(const std::string& setting) {
+  const std::size_t equals = setting.find('=');
+  if (equals == std::string::npos || equals == 0) {
+    throw std::runtime_error(
+        fmt::format("--set {}: must be KEY=VALUE, as in camera.fps=30", setting));
+  }
+  const std::string key = setting.substr(0, equals);
+  const std::string value = setting.substr(equals + 1);
+  try {
+    return toml::parse(fmt::format("{} = {}", key, value));
+  } catch (const toml::parse_error&) {
+    const toml::value<std::string> text(value);
+    toml::table line;
+    line.insert("text", text);
+    std::ostringstream quoted;
+    quoted << toml::toml_formatter(line);
+    return parse(key + quoted.str().substr(std::string_view("text").size()), "--set " + setting);
+  }
+}
+
+}  // namespace
+
+Config::Config() {
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  if (::sched_getaffinity(0, sizeof allowed, &allowed) != 0) return;
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+    if (CPU_ISSET(static_cast<std::size_t>(cpu), &allowed)) pipeline.cpu = cpu;
+  }
+}
+
+LoadedConfig load_config(const std::optional<fs::path>& file,
+                         const std::vector<std::string>& settings) {
+  LoadedConfig loaded;
+  Assembly assembly(loaded.config);
+  if (file) {
+    const std::string name = file->string();
+    const toml::table table = parse(base::read_file(*file), name);
+    assembly.take(table, "", fs::absolute(*file).parent_path(),
+                  [&](unsigned line) { return fmt::format("{}:{}", name, line); });
+  }
+  for (const std::string& setting : settings) {
+    assembly.take(parse_setting(setting), "", fs::current_path(),
+                  [&](unsigned) { return "--set"; });
+  }
+  if (const char* level = std::getenv("DTACTD_LOG"); level != nullptr) {
+    toml::table table;
+    table.insert("log_level", level);
+    assembly.take(table, "", {}, [](unsigned) { return "DTACTD_LOG"; });
+  }
+  const pipeline::ContactRules& contact = loaded.config.pipeline.contact;
+  if (contact.lost_mm >= contact.made_mm) {
+    throw std::runtime_error(
+        fmt::format("contact.lost_mm = {} must be less than contact.made_mm = {}: contact would "
+                    "flicker",
+                    contact.lost_mm, contact.made_mm));
+  }
+  loaded.origins = std::move(assembly).origins();
+  return loaded;
+}
+
+void print_config(const LoadedConfig& loaded, std::ostream& out) {
+  Config config = loaded.config;
+  const std::vector<Key> keys = bind_keys(config);
+  std::string table;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const std::size_t dot = keys[i].path.rfind('.');
+    const std::string here = dot == std::string::npos ? "" : keys[i].path.substr(0, dot);
+    if (here != table) out << "\n[" << here << "]\n";
+    table = here;
+    const std::string name = keys[i].path.substr(dot == std::string::npos ? 0 : dot + 1);
+    out << fmt::format("{:<40} # {}\n", fmt::format("{} = {}", name, keys[i].show()),
+                       loaded.origins[i].origin);
+  }
+}
+
+}  // namespace dtact::app

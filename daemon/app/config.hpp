@@ -1,0 +1,51 @@
+#pragma once
+
+#include <filesystem>
+#include <iosfwd>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/net/net_config.hpp"
+#include "daemon/pipeline/pipeline_config.hpp"
+#include "hal/config.hpp"
+
+namespace dtact::app {
+
+/// Everything that can be configured. config/dtactd.toml documents every key.
+struct Config {
+  Config();  ///< The defaults; the capture thread's CPU is the last one this process may use.
+
+  hal::Config hal;
+  std::string ring_scheme = "all";  ///< Which LEDs are lit at start (net/light_schemes.hpp).
+  pipeline::PipelineConfig pipeline;
+  net::NetConfig net;
+  std::string log_level = "info";  ///< "trace", "debug", "info", "warn", "error".
+  /// Folder to run with as long as none was uploaded; empty = none.
+  std::filesystem::path calibration;
+  /// What outlives a restart: uploaded calibrations, the last good reference. Empty = systemd's
+  /// $STATE_DIRECTORY, else /var/lib/dtactd.
+  std::filesystem::path state_dir;
+};
+
+/// Where the value of a key came from: "default", "FILE:LINE", "--set", "DTACTD_LOG".
+struct KeyOrigin {
+  std::string key;
+  std::string origin;
+};
+
+struct LoadedConfig {
+  Config config;
+  std::vector<KeyOrigin> origins;  ///< One for each key, in the order of the documentation.
+};
+
+/// Reads `file` (none: defaults only), then applies each "key=value" of `settings`, then the
+/// environment's DTACTD_LOG. Relative paths in a file are relative to its folder; in settings, to
+/// the working directory. Throws std::runtime_error with file, line, key and the allowed values.
+[[nodiscard]] LoadedConfig load_config(const std::optional<std::filesystem::path>& file,
+                                       const std::vector<std::string>& settings);
+
+/// The effective values as TOML, each with where it came from.
+void print_config(const LoadedConfig& loaded, std::ostream& out);
+
+}  // namespace dtact::app

@@ -1,0 +1,193 @@
+#include "daemon/app/config_keys.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <sstream>
+
+#include "daemon/net/light_schemes.hpp"
+#include "hal/registry.hpp"
+
+namespace dtact::app {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string toml_string(const std::string& text) {
+  std::ostringstream out;
+  out << toml::toml_formatter(toml::array{text});  // toml++ prints no bare string
+  const std::string array = out.str();
+  const std::size_t first = array.find_first_of("\"'");
+  return array.substr(first, array.find_last_of("\"'") - first + 1);
+}
+
+template <typename Integer>
+Key integer(std::string path, Integer& field, std::int64_t least, std::int64_t most,
+            const std::string& unit) {
+  return {std::move(path), fmt::format("a whole number, {} … {} {}", least, most, unit),
+          [&field, least, most](const toml::node& node, const fs::path&) {
+            const auto value = node.value_exact<std::int64_t>();
+            if (!value || *value < least || *value > most) return false;
+            field = static_cast<Integer>(*value);
+            return true;
+          },
+          [&field] { return fmt::format("{}", field); }};
+}
+
+Key real(std::string path, double& field, double least, double most, const std::string& unit) {
+  return {std::move(path), fmt::format("a number, {} … {} {}", least, most, unit),
+          [&field, least, most](const toml::node& node, const fs::path&) {
+            if (!node.is_number()) return false;
+            const double value = node.value<double>().value_or(NAN);
+            if (!(value >= least && value <= most)) return false;
+            field = value;
+            return true;
+          },
+          [&field] { return fmt::format("{}", field); }};
+}
+
+Key boolean(std::string path, bool& field) {
+  return {std::move(path), "true or false",
+          [&field](const toml::node& node, const fs::path&) {
+            const auto value = node.value_exact<bool>();
+            if (value) field = *value;
+            return value.has_value();
+          },
+          [&field] { return field ? "true" : "false"; }};
+}
+
+Key text(std::string path, std::string& field, const std::string& allowed) {
+  return {std::move(path), allowed,
+          [&field](const toml::node& node, const fs::path&) {
+            const auto value = node.value_exact<std::string>();
+            if (value) field = *value;
+            return value.has_value();
+          },
+          [&field] { return toml_string(field); }};
+}
+
+Key choice(std::string path, std::string& field, std::vector<std::string> allowed) {
+  const std::string words = fmt::format("one of \"{}\"", fmt::join(allowed, "\", \""));
+  return {std::move(path), words,
+          [&field, allowed = std::move(allowed)](const toml::node& node, const fs::path&) {
+            const auto value = node.value_exact<std::string>();
+            if (!value || std::find(allowed.begin(), allowed.end(), *value) == allowed.end()) {
+              return false;
+            }
+            field = *value;
+            return true;
+          },
+          [&field] { return toml_string(field); }};
+}
+
+Key path(std::string key, fs::path& field, const std::string& allowed) {
+  return {std::move(key), allowed,
+          [&field](const toml::node& node, const fs::path& folder) {
+            const auto value = node.value_exact<std::string>();
+            if (!value) return false;
+            field = value->empty() ? fs::path() : (folder / *value).lexically_normal();
+            return true;
+          },
+          [&field] { return toml_string(field.string()); }};
+}
+
+/// A number, or false for "none".
+Key optional_integer(std::string path, std::optional<int>& field, int least, int most,
+                     const std::string& unit) {
+  return {std::move(path), fmt::format("a whole number, {} … {} {}, or false", least, most, unit),
+          [&field, least, most](const toml::node& node, const fs::path&) {
+            if (node.value_exact<bool>() == false) {
+              field.reset();
+              return true;
+            }
+            const auto value = node.value_exact<std::int64_t>();
+            if (!value || *value < least || *value > most) return false;
+            field = static_cast<int>(*value);
+            return true;
+          },
+          [&field] { return field ? fmt::format("{}", *field) : std::string("false"); }};
+}
+
+}  // namespace
+
+namespace {
+
+Key milliseconds(std::string path, std::chrono::milliseconds& field, std::int64_t least,
+                 std::int64_t most) {
+  return {std::move(path), fmt::format("a whole number, {} … {} (milliseconds)", least, most),
+          [&field, least, most](const toml::node& node, const fs::path&) {
+            const auto value = node.value_exact<std::int64_t>();
+            if (!value || *value < least || *value > most) return false;
+            field = std::chrono::milliseconds(*value);
+            return true;
+          },
+          [&field] { return fmt::format("{}", field.count()); }};
+}
+
+/// LEDs by the name of a scheme.
+Key scheme(std::string path, std::string& field) {
+  return {std::move(path), fmt::format("one of {}", net::scheme_names()),
+          [&field](const toml::node& node, const fs::path&) {
+            const std::string name = node.value_or(std::string());
+            if (!net::scheme_leds(name)) return false;
+            field = name;
+            return true;
+          },
+          [&field] { return toml_string(field); }};
+}
+
+}  // namespace
+
+std::vector<Key> bind_keys(Config& c) {
+  hal::CameraConfig& camera = c.hal.camera;
+  pipeline::PipelineConfig& p = c.pipeline;
+  return {
+      choice("log_level", c.log_level, {"trace", "debug", "info", "warn", "error"}),
+      path("calibration", c.calibration, "a folder with calibration.toml, or \"\""),
+      path("state_dir", c.state_dir, "a folder, or \"\""),
+
+      choice("camera.backend", camera.backend, hal::camera_backends()),
+      integer("camera.width", camera.width, 16, 8192, "(pixels)"),
+      integer("camera.height", camera.height, 16, 8192, "(pixels)"),
+      real("camera.fps", camera.fps, 0.1, 1000, "(frames a second)"),
+      path("camera.sim.scene", camera.sim.scene, "a scene file, or \"\" for the built-in one"),
+      integer("camera.sim.seed", camera.sim.seed, 0, std::numeric_limits<std::int64_t>::max(), ""),
+      choice("camera.sim.output", camera.sim.output, {"luma", "yuyv", "mjpeg"}),
+      boolean("camera.sim.paced", camera.sim.paced),
+      path("camera.replay.folder", camera.replay.folder, "a folder with PNG or JPEG frames"),
+      boolean("camera.replay.loop", camera.replay.loop),
+      boolean("camera.replay.paced", camera.replay.paced),
+
+      choice("ring.backend", c.hal.ring.backend, hal::ring_backends()),
+      integer("ring.brightness", p.light.brightness, 0, 255, ""),
+      scheme("ring.scheme", c.ring_scheme),
+
+      optional_integer("capture.cpu", p.cpu, 0, 1023, ""),
+      integer("capture.fifo_priority", p.fifo_priority, 0, 99, "(0 = normal scheduling)"),
+      boolean("capture.lock_memory", p.lock_memory),
+
+      integer("reference.frames", p.reference.frames, 1, 256, "(frames)"),
+      integer("reference.settle_frames", p.reference.settle_frames, 2, 64, "(frames)"),
+      real("reference.settle_grey", p.reference.settle_grey, 0.01, 16, "(grey levels)"),
+      integer("reference.patience_frames", p.reference.patience_frames, 10, 100000, "(frames)"),
+
+      real("contact.made_mm", p.contact.made_mm, 0.005, 5, "(millimetres)"),
+      real("contact.lost_mm", p.contact.lost_mm, 0.001, 5, "(millimetres)"),
+      real("contact.area_mm2", p.contact.area_mm2, 0, 1000, "(square millimetres)"),
+      integer("contact.debounce_frames", p.contact.debounce_frames, 1, 1000, "(frames)"),
+      integer("contact.beyond_pixels", p.beyond_pixels, 0, 1 << 26, "(pixels)"),
+
+      text("net.address", c.net.address, "an IPv4 or IPv6 address in quotes"),
+      integer("net.port", c.net.port, 0, 65535, "(0 = any free one)"),
+      integer("net.max_clients", c.net.max_clients, 1, 1024, ""),
+      text("net.frame_id", c.net.frame_id, "a name in quotes"),
+      milliseconds("net.hello_timeout_ms", c.net.hello_timeout, 100, 600000),
+      milliseconds("net.dead_after_ms", c.net.dead_after, 1000, 600000),
+  };
+}
+
+}  // namespace dtact::app

@@ -1,0 +1,146 @@
+#include "daemon/app/daemon.hpp"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <system_error>
+
+#include "daemon/app/service.hpp"
+#include "daemon/calibration/calibration.hpp"
+#include "daemon/net/calibration_store.hpp"
+#include "daemon/net/light_schemes.hpp"
+#include "daemon/net/server.hpp"
+#include "daemon/pipeline/pipeline.hpp"
+#include "hal/registry.hpp"
+#include "version.hpp"
+
+namespace dtact::app {
+namespace {
+
+namespace fs = std::filesystem;
+namespace asio = boost::asio;
+
+fs::path make_state_folder(const Config& config) {
+  fs::path folder = config.state_dir;
+  if (folder.empty()) folder = state_directory();
+  if (folder.empty()) folder = "/var/lib/dtactd";
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) {
+    throw std::runtime_error(fmt::format(
+        "cannot make the state folder {} ({}): set state_dir to a folder this user may write",
+        folder.string(), error.message()));
+  }
+  return folder;
+}
+
+/// The calibration to start with and the folder it came from.
+struct Start {
+  fs::path folder;
+  std::shared_ptr<const calibration::Calibration> calibration;
+};
+
+Start load_calibration(const Config& config, const fs::path& state) {
+  Start start;
+  start.folder = net::FolderCalibrationStore::current(state);
+  if (start.folder.empty()) start.folder = config.calibration;
+  if (start.folder.empty()) {
+    spdlog::warn(
+        "no calibration: serving the camera's image only. Make one with `dtactctl calibrate "
+        "depth` and send it with `dtactctl calibration upload`");
+    return start;
+  }
+  start.calibration =
+      std::make_shared<const calibration::Calibration>(calibration::load(start.folder));
+  spdlog::info("calibration {} from {}", start.calibration->name, start.folder.string());
+  return start;
+}
+
+net::NetConfig make_net_config(const Config& config) {
+  net::NetConfig net = config.net;
+  net.program = "dtactd " DTACT_VERSION;
+  net.version = DTACT_VERSION;
+  net.log = [](net::LogLevel level, const std::string& message) {
+    spdlog::log(level == net::LogLevel::info ? spdlog::level::info : spdlog::level::warn, "{}",
+                message);
+  };
+  return net;
+}
+
+/// Tells systemd's watchdog that frames, or the camera's report of why there are none, still come
+/// from the capture thread.
+class Watchdog {
+ public:
+  Watchdog(asio::io_context& io, const pipeline::Pipeline& pipeline)
+      : timer_(io), pipeline_(pipeline), interval_(watchdog_interval_us()) {
+    if (interval_.count() > 0) wait();
+  }
+  void stop() { timer_.cancel(); }
+
+ private:
+  void wait() {
+    timer_.expires_after(interval_);
+    timer_.async_wait([this](const boost::system::error_code& error) {
+      if (error) return;
+      const hal::CameraReport report = pipeline_.status().camera_report;
+      if (report.delivered != delivered_ || report.state != hal::CameraState::streaming) {
+        notify_alive();
+      }
+      delivered_ = report.delivered;
+      wait();
+    });
+  }
+
+  asio::steady_timer timer_;
+  const pipeline::Pipeline& pipeline_;
+  std::chrono::microseconds interval_;
+  std::uint64_t delivered_ = 0;
+};
+
+}  // namespace
+
+void run_daemon(const Config& config) {
+  asio::io_context io(1);
+  // Before any thread starts, so that every thread leaves the signals to this one.
+  asio::signal_set signals(io, SIGTERM, SIGINT);
+
+  const fs::path state = make_state_folder(config);
+  const Start start = load_calibration(config, state);
+  net::FolderCalibrationStore store(state, start.folder);
+
+  hal::Devices devices = hal::open_devices(config.hal);
+  pipeline::PipelineConfig settings = config.pipeline;
+  settings.state_folder = state;
+  settings.light.leds = *net::scheme_leds(config.ring_scheme);
+  pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), start.calibration,
+                              settings);
+  net::Server server(io, make_net_config(config), pipeline, store);
+  pipeline.start();
+  for (const std::string& refused : pipeline.status().realtime) spdlog::warn("{}", refused);
+
+  Watchdog watchdog(io, pipeline);
+  signals.async_wait([&](const boost::system::error_code& error, int signal) {
+    if (error) return;
+    spdlog::info("{}: stopping", signal == SIGTERM ? "SIGTERM" : "SIGINT");
+    notify_stopping();
+    watchdog.stop();
+    server.stop();
+  });
+
+  const std::string listening =
+      fmt::format("listening on {}:{}", config.net.address, server.port());
+  spdlog::info("dtactd {}, {}", DTACT_VERSION, listening);
+  notify_ready(listening);
+  io.run();
+  pipeline.stop();
+}
+
+}  // namespace dtact::app

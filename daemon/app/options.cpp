@@ -1,0 +1,38 @@
+#include "daemon/app/options.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include "version.hpp"
+
+namespace dtact::app {
+
+Parsed parse_options(int argc, const char* const* argv) {
+  Parsed parsed;
+  Options& options = parsed.options;
+  CLI::App cli(
+      "Reads a DTact sensor, reconstructs depth and streams it over TCP.\n"
+      "Every key of the configuration is documented in dtactd.toml.",
+      "dtactd");
+  cli.set_version_flag("--version", "dtactd " DTACT_VERSION);
+  cli.add_option("-c,--config", options.config, "Configuration file (TOML)")
+      ->check(CLI::ExistingFile);
+  cli.add_option("--set", options.settings,
+                 "Set one key, as in --set camera.fps=30; wins over the file, may be repeated")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  cli.add_flag("--check-config", options.check_config,
+               "Check the configuration, say what is wrong, and exit");
+  cli.add_flag("--print-config", options.print_config,
+               "Print the effective values and where each came from, and exit");
+  cli.footer(
+      "Environment: DTACTD_LOG sets the log level (trace, debug, info, warn, error).\n"
+      "Exit status: 0 after SIGTERM or SIGINT, 1 on an error, 2 on a wrong command line.");
+  try {
+    cli.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    parsed.exit_status = cli.exit(e) == 0 ? 0 : 2;
+  }
+  return parsed;
+}
+
+}  // namespace dtact::app

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dtact::app {
+
+/// The command line of dtactd.
+struct Options {
+  std::optional<std::filesystem::path> config;  ///< --config; none = built-in defaults.
+  std::vector<std::string> settings;            ///< --set KEY=VALUE, in order.
+  bool check_config = false;
+  bool print_config = false;
+};
+
+/// Either options to run with, or the exit status after --help, --version or a mistake, whose text
+/// has been printed.
+struct Parsed {
+  Options options;
+  std::optional<int> exit_status;
+};
+
+[[nodiscard]] Parsed parse_options(int argc, const char* const* argv);
+
+}  // namespace dtact::app

@@ -1,0 +1,127 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string_view>
+
+#include "daemon/calibration/sha256.hpp"
+#include "daemon/calibration/text.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+/// A TOML basic string.
+std::string toml_string(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) {
+      out += fmt::format("\\u{:04X}", static_cast<unsigned>(static_cast<unsigned char>(c)));
+    } else {
+      out += c;
+    }
+  }
+  return out + "\"";
+}
+
+/// A TOML array, broken into lines that an editor can show.
+template <typename Value>
+std::string array_text(const std::vector<Value>& values) {
+  constexpr std::size_t kPerLine = 16;
+  std::string out = "[";
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    out += i % kPerLine == 0 ? "\n  " : " ";
+    out += fmt::format("{},", values[i]);
+  }
+  return out + "\n]";
+}
+
+bool same(const recon::RectifyTable& a, const recon::RectifyTable& b) {
+  return std::ranges::equal(a.entries, b.entries, [](const auto& p, const auto& q) {
+    return p.x == q.x && p.y == q.y && p.fx == q.fx && p.fy == q.fy;
+  });
+}
+
+/// The mask as runs: first pixel, number of pixels, first, number, ...
+std::vector<std::int64_t> runs_of(const std::vector<std::uint8_t>& mask) {
+  std::vector<std::int64_t> runs;
+  for (std::size_t i = 0; i < mask.size(); ++i) {
+    if (mask[i] == 0) continue;
+    if (i == 0 || mask[i - 1] == 0) {
+      runs.push_back(static_cast<std::int64_t>(i));
+      runs.push_back(0);
+    }
+    ++runs.back();
+  }
+  return runs;
+}
+
+}  // namespace
+
+Files format(const Calibration& calibration) {
+  const recon::Model& model = *calibration.model;
+  const recon::RectifyTable& map = model.rectify;
+  if (!same(map, recon::make_crop_table(map.frame_width, map.frame_height, calibration.crop_col,
+                                        calibration.crop_row, map.width, map.height))) {
+    throw std::invalid_argument("calibration: the rectification is not the crop");
+  }
+  Files files;
+  files.reference_png =
+      image::encode_png(image::Grey16{map.frame_width, map.frame_height, model.reference_q8});
+
+  std::string& t = files.toml;
+  t = fmt::format(
+      "# A calibration of dtactd. Written by dtactctl; checksums protect what belongs together.\n"
+      "version = {}\n"
+      "method = {}\n"
+      "created = {}  # UTC\n"
+      "mm_per_px = {}  # of the depth map\n"
+      "smoothing_px = {}  # standard deviation of the Gaussian on the difference\n\n",
+      kFormatVersion, toml_string(model.method == recon::Method::list ? "list" : "published"),
+      toml_string(calibration.origin.created), model.mm_per_px, model.smoothing_px);
+  t += fmt::format("[frame]\nwidth = {}\nheight = {}\n\n", map.frame_width, map.frame_height);
+  t += fmt::format(
+      "[crop]  # the depth map in the frame\ncol = {}\nrow = {}\nwidth = {}\n"
+      "height = {}\n\n",
+      calibration.crop_col, calibration.crop_row, map.width, map.height);
+  t += fmt::format("[reference]  # {}: 16-bit grey, grey level times 256\nsha256 = {}\n\n",
+                   kReferenceName, toml_string(sha256_hex(files.reference_png)));
+  t += fmt::format(
+      "[camera]  # empty or 0: not recorded\nidentity = {}\npixel_format = {}\n"
+      "fps = {}\n\n[camera.controls]\n",
+      toml_string(calibration.origin.camera), toml_string(calibration.origin.pixel_format),
+      calibration.origin.fps);
+  for (const Control& control : calibration.origin.controls) {
+    t += fmt::format("{} = {}\n", toml_string(control.name), control.value);
+  }
+  t += fmt::format(
+      "\n[light]  # r, g, b of each LED after brightness; empty: not recorded\n"
+      "leds = [{}]\n\n",
+      fmt::join(calibration.origin.leds, ", "));
+  for (const Origin::Source& source : calibration.origin.sources) {
+    t += fmt::format("[[source]]\nname = {}\nsha256 = {}\n\n", toml_string(source.name),
+                     toml_string(source.sha256));
+  }
+  if (std::ranges::any_of(model.untrusted, [](std::uint8_t mark) { return mark != 0; })) {
+    t += fmt::format(
+        "[untrusted]  # pixels of the map never to believe: first, count, ...\n"
+        "runs = {}\n\n",
+        array_text(runs_of(model.untrusted)));
+  }
+  t += "# Reserved for the lens's distortion, a curved surface, the spatial gain. Empty: none.\n"
+       "[lens]\n[surface]\n[gain]\n\n";
+  t += fmt::format(
+      "# Indentation in micrometres, positive = pressed, of the darkening first_q6/64 "
+      "grey levels and\n# on, 64 entries a level. Covered: what the calibration "
+      "vouches for.\n[list]\nfirst_q6 = {}\n"
+      "covered_from_q6 = {}\ncovered_to_q6 = {}\num = {}\n",
+      model.list.first_q6, model.list.covered_from_q6, model.list.covered_to_q6,
+      array_text(model.list.um));
+  return files;
+}
+
+}  // namespace dtact::calibration

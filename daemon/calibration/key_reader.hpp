@@ -1,0 +1,45 @@
+#pragma once
+
+#include <toml++/toml.h>
+
+#include <cstdint>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace dtact::calibration {
+
+/// Takes typed values out of a TOML table and, at the end, refuses keys that nobody took. Every
+/// error is a std::runtime_error "FILE:LINE: KEY: what is wrong; what is allowed".
+class KeyReader {
+ public:
+  /// `where`: the file's name. `prefix`: the table's own key with a dot, empty at the top.
+  KeyReader(const toml::table& table, std::string where, std::string prefix = "")
+      : table_(table), where_(std::move(where)), prefix_(std::move(prefix)) {}
+
+  [[nodiscard]] std::int64_t integer(const std::string& key, std::int64_t low, std::int64_t high);
+  [[nodiscard]] double number(const std::string& key, double low, double high);
+  [[nodiscard]] std::string text(const std::string& key);
+  [[nodiscard]] std::vector<std::int64_t> integers(const std::string& key, std::int64_t low,
+                                                   std::int64_t high);
+  [[nodiscard]] KeyReader table(const std::string& key);
+  /// An array of tables, or nothing when the key is absent.
+  [[nodiscard]] std::vector<KeyReader> tables(const std::string& key);
+  [[nodiscard]] bool has(const std::string& key) const { return table_.contains(key); }
+  [[nodiscard]] std::vector<std::string> keys() const;
+
+  /// Refuses every key that was not taken.
+  void finish() const;
+  /// Ends the reading with an error at `key`, or at the table when `key` is empty or absent.
+  [[noreturn]] void fail(const std::string& key, const std::string& what) const;
+
+ private:
+  [[nodiscard]] const toml::node& take(const std::string& key, const char* expected);
+
+  const toml::table& table_;
+  std::string where_;
+  std::string prefix_;
+  std::set<std::string> taken_;
+};
+
+}  // namespace dtact::calibration

@@ -1,0 +1,183 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+#include <string_view>
+
+#include "daemon/calibration/key_reader.hpp"
+#include "daemon/calibration/sha256.hpp"
+#include "daemon/calibration/text.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+constexpr int kMaxPixels = 16384;  // of a side; keeps every index within int
+
+std::vector<std::uint8_t> mask_of(KeyReader& reader, std::size_t pixels) {
+  const auto limit = static_cast<std::int64_t>(pixels);
+  const std::vector<std::int64_t> runs = reader.integers("runs", 0, limit);
+  if (runs.size() % 2 != 0) reader.fail("runs", "expected pairs of first pixel and count");
+  std::vector<std::uint8_t> mask(pixels);
+  for (std::size_t i = 0; i < runs.size(); i += 2) {
+    if (runs[i + 1] > limit - runs[i]) {
+      reader.fail("runs", fmt::format("pair {} leaves the map of {} pixels", i / 2 + 1, pixels));
+    }
+    std::fill_n(mask.begin() + runs[i], runs[i + 1], std::uint8_t{1});
+  }
+  return mask;
+}
+
+/// "2026-01-31T12:00:00Z".
+bool is_utc_time(std::string_view text) {
+  constexpr std::string_view kShape = "dddd-dd-ddTdd:dd:ddZ";
+  return std::ranges::equal(text, kShape, [](char c, char shape) {
+    return shape == 'd' ? c >= '0' && c <= '9' : c == shape;
+  });
+}
+
+std::string sha256_key(KeyReader& reader) {
+  std::string digest = reader.text("sha256");
+  if (digest.size() != 64 || digest.find_first_not_of("0123456789abcdef") != std::string::npos) {
+    reader.fail("sha256", "expected 64 lower-case hexadecimal digits");
+  }
+  return digest;
+}
+
+int small(KeyReader& reader, const char* key, int low, int high) {
+  return static_cast<int>(reader.integer(key, low, high));
+}
+
+void read_list(KeyReader list, recon::DepthList& out) {
+  constexpr int kReach = 255 * recon::kEntriesPerLevel;
+  out.first_q6 = small(list, "first_q6", -kReach, kReach);
+  out.covered_from_q6 = small(list, "covered_from_q6", -kReach, kReach);
+  out.covered_to_q6 = small(list, "covered_to_q6", -kReach, kReach);
+  for (const std::int64_t um : list.integers("um", -INT16_MAX, INT16_MAX)) {
+    out.um.push_back(static_cast<std::int16_t>(um));
+  }
+  list.finish();
+  try {
+    recon::check(out);
+  } catch (const std::invalid_argument& e) {
+    list.fail("", e.what());
+  }
+}
+
+void read_reference(KeyReader reader, const std::string& png, const std::string& where,
+                    recon::Model& model) {
+  const std::string expected = sha256_key(reader);
+  reader.finish();
+  if (sha256_hex(png) != expected) {
+    reader.fail("sha256", fmt::format("{} beside {} is another one or damaged; copy the whole "
+                                      "folder again or calibrate again",
+                                      kReferenceName, where));
+  }
+  image::Grey16 image = image::decode_png_grey16(png, kReferenceName);
+  if (image.width != model.rectify.frame_width || image.height != model.rectify.frame_height) {
+    reader.fail("",
+                fmt::format("{} is {}x{} but frame says {}x{}", kReferenceName, image.width,
+                            image.height, model.rectify.frame_width, model.rectify.frame_height));
+  }
+  if (std::ranges::max(image.pixels) > 255 * 256) {
+    reader.fail(
+        "", fmt::format("{} has values above 65280 (grey level 255 times 256)", kReferenceName));
+  }
+  model.reference_q8 = std::move(image.pixels);
+}
+
+void read_camera(KeyReader camera, Origin& origin) {
+  origin.camera = camera.text("identity");
+  origin.pixel_format = camera.text("pixel_format");
+  origin.fps = camera.number("fps", 0, 100000);
+  KeyReader controls = camera.table("controls");
+  for (const std::string& name : controls.keys()) {
+    origin.controls.push_back({name, controls.integer(name, INT64_MIN, INT64_MAX)});
+  }
+  camera.finish();
+}
+
+void read_light(KeyReader light, Origin& origin) {
+  for (const std::int64_t value : light.integers("leds", 0, 255)) {
+    origin.leds.push_back(static_cast<std::uint8_t>(value));
+  }
+  if (origin.leds.size() % 3 != 0) light.fail("leds", "expected r, g, b of each LED");
+  light.finish();
+}
+
+/// Tables that later versions fill. What this program cannot apply it must not pass over.
+void refuse_reserved(KeyReader& top) {
+  for (const char* name : {"lens", "surface", "gain"}) {
+    if (top.has(name) && !top.table(name).keys().empty()) {
+      top.fail(name,
+               "is reserved and must be empty: this program applies none of it; use the "
+               "version that wrote the file");
+    }
+  }
+}
+
+toml::table parse_toml(const std::string& text, const std::string& where) {
+  try {
+    return toml::parse(text, where);
+  } catch (const toml::parse_error& e) {
+    throw std::runtime_error(
+        fmt::format("{}:{}: {}", where, e.source().begin.line, e.description()));
+  }
+}
+
+}  // namespace
+
+Calibration parse(const std::string& toml, const std::string& reference_png,
+                  const std::string& where) {
+  const toml::table document = parse_toml(toml, where);
+  KeyReader top(document, where);
+  // Before anything else: another version's keys mean something else.
+  (void)top.integer("version", kFormatVersion, kFormatVersion);
+
+  Calibration calibration;
+  auto model = std::make_shared<recon::Model>();
+  const std::string method = top.text("method");
+  if (method != "list" && method != "published") {
+    top.fail("method", "\"" + method + "\" is not allowed; expected \"list\" or \"published\"");
+  }
+  model->method = method == "list" ? recon::Method::list : recon::Method::published;
+  calibration.origin.created = top.text("created");
+  if (!calibration.origin.created.empty() && !is_utc_time(calibration.origin.created)) {
+    top.fail("created", "expected a time as \"2026-01-31T12:00:00Z\"");
+  }
+  model->mm_per_px = top.number("mm_per_px", 0.0001, 10);
+  model->smoothing_px = top.number("smoothing_px", 0, 10);
+
+  KeyReader frame = top.table("frame");
+  const int frame_width = small(frame, "width", 2, kMaxPixels);
+  const int frame_height = small(frame, "height", 2, kMaxPixels);
+  frame.finish();
+  KeyReader crop = top.table("crop");
+  calibration.crop_col = small(crop, "col", 0, frame_width - 1);
+  calibration.crop_row = small(crop, "row", 0, frame_height - 1);
+  const int width = small(crop, "width", 1, frame_width - calibration.crop_col);
+  const int height = small(crop, "height", 1, frame_height - calibration.crop_row);
+  crop.finish();
+  model->rectify = recon::make_crop_table(frame_width, frame_height, calibration.crop_col,
+                                          calibration.crop_row, width, height);
+
+  read_list(top.table("list"), model->list);
+  read_camera(top.table("camera"), calibration.origin);
+  read_light(top.table("light"), calibration.origin);
+  for (KeyReader& source : top.tables("source")) {
+    calibration.origin.sources.push_back({source.text("name"), sha256_key(source)});
+    source.finish();
+  }
+  if (top.has("untrusted")) {
+    KeyReader untrusted = top.table("untrusted");
+    model->untrusted = mask_of(untrusted, model->rectify.entries.size());
+    untrusted.finish();
+  }
+  refuse_reserved(top);
+  read_reference(top.table("reference"), reference_png, where, *model);
+  top.finish();
+  calibration.model = std::move(model);
+  return calibration;
+}
+
+}  // namespace dtact::calibration

@@ -1,0 +1,30 @@
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <exception>
+#include <iostream>
+
+#include "daemon/app/config.hpp"
+#include "daemon/app/daemon.hpp"
+#include "daemon/app/options.hpp"
+
+int main(int argc, char** argv) {
+  using namespace dtact::app;
+  try {
+    spdlog::set_default_logger(spdlog::stderr_color_mt("dtactd"));
+    const Parsed command_line = parse_options(argc, argv);
+    if (command_line.exit_status) return *command_line.exit_status;
+    const Options& options = command_line.options;
+
+    const LoadedConfig loaded = load_config(options.config, options.settings);
+    if (options.print_config) print_config(loaded, std::cout);
+    if (options.print_config || options.check_config) return 0;
+
+    spdlog::set_level(spdlog::level::from_str(loaded.config.log_level));
+    run_daemon(loaded.config);
+    return 0;
+  } catch (const std::exception& e) {
+    spdlog::critical("{}", e.what());
+    return 1;
+  }
+}

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "hal/light_ring.hpp"
+
+namespace dtact::pipeline {
+
+/// When something counts as touching.
+struct ContactRules {
+  double made_mm = 0.10;    ///< Contact is made where indentation exceeds this, millimetres, …
+  double lost_mm = 0.05;    ///< … and lost once it exceeds only this no longer. Below made_mm.
+  double area_mm2 = 0.5;    ///< On at least this much surface, square millimetres.
+  int debounce_frames = 2;  ///< For this many frames in a row.
+};
+
+/// How the untouched image is taken.
+struct ReferenceRules {
+  int frames = 32;            ///< Averaged into one reference, 1 … 256.
+  int settle_frames = 8;      ///< The mean grey has settled when over this many frames, 2 … 64, …
+  double settle_grey = 0.25;  ///< … it moves by less than this many grey levels.
+  int patience_frames = 300;  ///< A picture that is not still by then is taken for touched.
+};
+
+/// Settings of the capture thread and what it decides. Does not change while it runs.
+struct PipelineConfig {
+  std::optional<int> cpu;   ///< Pin the capture thread to this CPU; empty = not pinned.
+  int fifo_priority = 40;   ///< SCHED_FIFO 1 … 99; 0 = normal scheduling.
+  bool lock_memory = true;  ///< Keep the process's memory out of swap.
+  hal::Light light;         ///< What the ring shows at start.
+  ContactRules contact;
+  ReferenceRules reference;
+  int beyond_pixels = 64;  ///< More pixels than this beyond the list: Health::beyond_calibration.
+  std::filesystem::path state_folder;  ///< Keeps the last good reference; empty = not kept.
+};
+
+}  // namespace dtact::pipeline

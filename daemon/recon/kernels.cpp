@@ -1,0 +1,115 @@
+#include "daemon/recon/kernels.hpp"
+
+#include <algorithm>
+
+#include "daemon/recon/model.hpp"
+
+namespace dtact::recon::kernels {
+namespace {
+
+/// The four source pixels weighted, Q14 above the pixel's own format.
+template <typename Pixel>
+std::int32_t bilinear(const Pixel* p, std::ptrdiff_t stride, RectifyTable::Entry e) noexcept {
+  const Pixel* q = p + stride;
+  const std::int32_t upper = p[0] * (128 - e.fx) + p[1] * e.fx;
+  const std::int32_t lower = q[0] * (128 - e.fx) + q[1] * e.fx;
+  return upper * (128 - e.fy) + lower * e.fy;
+}
+
+/// Half a unit of the last place, then the shift: rounds half up, also below zero.
+template <int kBits>
+std::int32_t round_shift(std::int32_t value) noexcept {
+  return (value + (1 << (kBits - 1))) >> kBits;
+}
+
+}  // namespace
+
+void rectify_difference_row(const std::uint8_t* luma, std::ptrdiff_t stride,
+                            const RectifyTable::Entry* entries, const std::int16_t* reference_q6,
+                            int width, std::int16_t* difference_q6) noexcept {
+  for (int x = 0; x < width; ++x) {
+    const RectifyTable::Entry e = entries[x];
+    const std::int32_t q14 = bilinear(luma + e.y * stride + e.x, stride, e);
+    difference_q6[x] = static_cast<std::int16_t>(reference_q6[x] - round_shift<8>(q14));
+  }
+}
+
+void rectify_reference_row(const std::uint16_t* luma_q8, std::ptrdiff_t frame_width,
+                           const RectifyTable::Entry* entries, int width,
+                           std::int16_t* reference_q6) noexcept {
+  for (int x = 0; x < width; ++x) {
+    const RectifyTable::Entry e = entries[x];
+    const std::int32_t q22 = bilinear(luma_q8 + e.y * frame_width + e.x, frame_width, e);
+    reference_q6[x] = static_cast<std::int16_t>(round_shift<16>(q22));
+  }
+}
+
+void smooth_horizontal_row(const std::int16_t* row, std::span<const std::int16_t> taps,
+                           int padded_width, std::int16_t* out) noexcept {
+  const int radius = static_cast<int>(taps.size()) - 1;
+  for (int x = 0; x < padded_width; x += kBlock) {
+    const std::int16_t* centre = row + x;
+    std::int32_t sum[kBlock];
+    for (int i = 0; i < kBlock; ++i) sum[i] = taps[0] * centre[i];
+    for (int k = 1; k <= radius; ++k) {
+      const std::int32_t tap = taps[static_cast<std::size_t>(k)];
+      for (int i = 0; i < kBlock; ++i) sum[i] += tap * (centre[i - k] + centre[i + k]);
+    }
+    for (int i = 0; i < kBlock; ++i)
+      out[x + i] = static_cast<std::int16_t>(round_shift<14>(sum[i]));
+  }
+}
+
+void smooth_vertical_row(const std::int16_t* const* rows, std::span<const std::int16_t> taps,
+                         int padded_width, std::int16_t* out) noexcept {
+  const int radius = static_cast<int>(taps.size()) - 1;
+  for (int x = 0; x < padded_width; x += kBlock) {
+    const std::int16_t* centre = rows[radius] + x;
+    std::int32_t sum[kBlock];
+    for (int i = 0; i < kBlock; ++i) sum[i] = taps[0] * centre[i];
+    for (int k = 1; k <= radius; ++k) {
+      const std::int32_t tap = taps[static_cast<std::size_t>(k)];
+      const std::int16_t* above = rows[radius - k] + x;
+      const std::int16_t* below = rows[radius + k] + x;
+      for (int i = 0; i < kBlock; ++i) sum[i] += tap * (above[i] + below[i]);
+    }
+    for (int i = 0; i < kBlock; ++i)
+      out[x + i] = static_cast<std::int16_t>(round_shift<14>(sum[i]));
+  }
+}
+
+int gain_list_mask_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12,
+                       const std::uint8_t* untrusted, const LookUp& list, int width,
+                       std::int16_t* depth_um) noexcept {
+  int beyond = 0;
+  for (int x = 0; x < width; ++x) {
+    const std::int32_t gain = gain_q12 == nullptr ? kGainOne : gain_q12[x];
+    const std::int32_t lit = std::clamp(round_shift<12>(difference_q6[x] * gain), -32768, 32767);
+    const bool trusted = untrusted == nullptr || untrusted[x] == 0;
+    beyond += static_cast<int>(trusted && lit > list.covered_q6);
+    const std::int16_t um = list.um[std::clamp(lit, list.first_q6, list.last_q6) - list.first_q6];
+    depth_um[x] = trusted ? um : kUntrusted;
+  }
+  return beyond;
+}
+
+void mask_row(const std::uint8_t* untrusted, int width, std::int16_t* depth_um) noexcept {
+  for (int x = 0; x < width; ++x) {
+    if (untrusted[x] != 0) depth_um[x] = kUntrusted;
+  }
+}
+
+void gain_row(const std::int16_t* calibration_q6, const std::int16_t* now_q6, int width,
+              std::int16_t* gain_q12, std::uint8_t* untrusted) noexcept {
+  for (int x = 0; x < width; ++x) {
+    const std::int32_t was = calibration_q6[x];
+    const std::int32_t now = now_q6[x];
+    const bool dark = was < kDarkest_q6 || now < kDarkest_q6;
+    const std::int32_t gain = dark ? kGainOne : (was * kGainOne + now / 2) / now;
+    const bool usable = !dark && gain <= INT16_MAX;
+    gain_q12[x] = static_cast<std::int16_t>(usable ? gain : kGainOne);
+    untrusted[x] = static_cast<std::uint8_t>(untrusted[x] | (usable ? 0 : 0xFF));
+  }
+}
+
+}  // namespace dtact::recon::kernels

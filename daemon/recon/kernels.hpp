@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "daemon/recon/rectify.hpp"
+
+/// The steps of a reconstruction, one row at a time. These scalar loops are the specification: any
+/// other version of a kernel gives the same bits.
+namespace dtact::recon::kernels {
+
+/// Rows inside the reconstruction are written and read in whole blocks of this many pixels, so that
+/// no kernel but the first and the last has a tail loop.
+inline constexpr int kBlock = 16;
+/// Greatest radius of a smoothing kernel: pixels that must be readable on either side of a row.
+inline constexpr int kMaxRadius = 32;
+/// Taps are Q14 and sum to one over the whole symmetric kernel.
+inline constexpr int kTapOne = 1 << 14;
+/// Gain is Q12: 0 … 32767 means 0 … 7.9998.
+inline constexpr int kGainOne = 1 << 12;
+
+/// Pixels a row buffer needs for `width` pixels of image.
+[[nodiscard]] constexpr int padded(int width) noexcept {
+  return (width + kBlock - 1) / kBlock * kBlock;
+}
+
+/// Bilinear: four 8-bit pixels with weights of 1/128 × 1/128 give Q14, rounded to Q6 (0 … 16320);
+/// then reference − frame, so that darkening is positive (±16320).
+void rectify_difference_row(const std::uint8_t* luma, std::ptrdiff_t stride,
+                            const RectifyTable::Entry* entries, const std::int16_t* reference_q6,
+                            int width, std::int16_t* difference_q6) noexcept;
+
+/// The same reading for a reference of Q8 luma (0 … 65280), `frame_width` pixels a row, to Q6.
+void rectify_reference_row(const std::uint16_t* luma_q8, std::ptrdiff_t frame_width,
+                           const RectifyTable::Entry* entries, int width,
+                           std::int16_t* reference_q6) noexcept;
+
+/// out[x] = Σ taps[k] · (row[x − k] + row[x + k]) in 32 bits, rounded half up. `taps`: Q14 from the
+/// centre outwards. Reads `taps.size() − 1` values before `row` and after `padded_width`; writes
+/// `padded_width` values, a multiple of kBlock. Inputs within ±16320 (or any int16 when no pair
+/// exceeds int32 at Q14, which the sum of taps guarantees).
+void smooth_horizontal_row(const std::int16_t* row, std::span<const std::int16_t> taps,
+                           int padded_width, std::int16_t* out) noexcept;
+
+/// The same down the columns: `rows` points at 2·radius + 1 rows, the centre in the middle.
+void smooth_vertical_row(const std::int16_t* const* rows, std::span<const std::int16_t> taps,
+                         int padded_width, std::int16_t* out) noexcept;
+
+/// A list in the shape the look-up wants.
+struct LookUp {
+  const std::int16_t* um = nullptr;  ///< um[0] belongs to first_q6.
+  int first_q6 = 0;
+  int last_q6 = 0;     ///< Index of the last entry, which stands for everything darker.
+  int covered_q6 = 0;  ///< A darkening above this is beyond the calibration.
+};
+
+/// Gain (32-bit product, rounded half up, saturated to int16), list, untrusted mark. `gain_q12`
+/// null: one. `untrusted` null: no mark. Returns how many pixels were beyond the calibration.
+int gain_list_mask_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12,
+                       const std::uint8_t* untrusted, const LookUp& list, int width,
+                       std::int16_t* depth_um) noexcept;
+
+/// Marks untrusted pixels in a row of depth.
+void mask_row(const std::uint8_t* untrusted, int width, std::int16_t* depth_um) noexcept;
+
+/// gain = calibration / now in Q12, rounded. Where either is darker than kDarkest_q6 or the
+/// quotient exceeds the Q12 range the gain is one and the pixel is marked in `untrusted`, which is
+/// or-ed into.
+void gain_row(const std::int16_t* calibration_q6, const std::int16_t* now_q6, int width,
+              std::int16_t* gain_q12, std::uint8_t* untrusted) noexcept;
+
+/// Eight grey levels. The response scales with the light: where an untouched pixel at 160 levels
+/// darkens by 31 levels a millimetre, one at 8 darkens by less than two, which is noise.
+inline constexpr int kDarkest_q6 = 8 * 64;
+
+}  // namespace dtact::recon::kernels

@@ -1,0 +1,37 @@
+#include "daemon/recon/list.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "daemon/recon/model.hpp"
+
+namespace dtact::recon {
+
+void check(const DepthList& list) {
+  constexpr int kReach = 255 * kEntriesPerLevel;
+  if (list.um.empty()) throw std::invalid_argument("list.um: must have at least one entry");
+  if (list.um.size() > 2 * kReach + 1 || list.first_q6 < -kReach ||
+      list.first_q6 + static_cast<int>(list.um.size()) - 1 > kReach) {
+    throw std::invalid_argument("list.first_q6: the list must lie within -16320 to 16320 (" +
+                                std::to_string(kEntriesPerLevel) + " entries a grey level)");
+  }
+  if (std::ranges::count(list.um, kUntrusted) > 0) {
+    throw std::invalid_argument("list.um: entries must be -32767 to 32767 micrometres");
+  }
+  const auto drop = std::ranges::adjacent_find(list.um, std::ranges::greater{});
+  if (drop != list.um.end()) {
+    throw std::invalid_argument("list.um: must not fall, but entry " +
+                                std::to_string(drop - list.um.begin() + 2) +
+                                " is below the one before");
+  }
+  const int last = list.first_q6 + static_cast<int>(list.um.size()) - 1;
+  if (list.covered_from_q6 < list.first_q6 || list.covered_to_q6 > last ||
+      list.covered_from_q6 > list.covered_to_q6) {
+    throw std::invalid_argument(
+        "list.covered_from_q6, list.covered_to_q6: must be an interval in " +
+        std::to_string(list.first_q6) + " to " + std::to_string(last));
+  }
+}
+
+}  // namespace dtact::recon

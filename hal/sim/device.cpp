@@ -1,0 +1,119 @@
+#include "hal/sim/device.hpp"
+
+#include <sys/eventfd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <system_error>
+#include <utility>
+
+namespace dtact::hal::sim {
+
+Device::Device(const Scene& scene, std::uint64_t seed, Output output,
+               std::shared_ptr<LightLink> link, base::Clock& clock)
+    : renderer_(scene, seed),
+      encoder_(output, scene.camera.width, scene.camera.height),
+      link_(std::move(link)),
+      clock_(clock),
+      image_(scene.camera.width, scene.camera.height),
+      seen_(static_cast<std::size_t>(scene.camera.light_delay_frames),
+            led_levels(link_->light())),
+      event_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  if (!event_) {
+    const int error = errno;
+    throw std::system_error(error, std::generic_category(),
+                            "the simulated camera cannot make an eventfd");
+  }
+  for (Payload& payload : payloads_) payload.buffer.resize(encoder_.capacity());
+}
+
+Device::~Device() { stop_ = true; }
+
+void Device::run_paced() {
+  if (!std::exchange(paced_, true)) {
+    base::RtSettings settings;
+    settings.name = "dtact-sim";
+    thread_ = base::RtThread(settings, [this] { loop(); });
+  }
+}
+
+void Device::loop() {
+  const std::int64_t period = std::llround(1e9 / scene().camera.fps);
+  std::int64_t deadline = clock_.monotonic_ns() + period;
+  while (!stop_) {
+    Payload& payload = payloads_[writing_];
+    const bool made = make(sequence_, payload);
+    clock_.sleep_until(deadline);
+    const std::int64_t now = clock_.monotonic_ns();
+    if (made) {
+      // The deadline, not the late wake-up: a camera's clock does not depend on the host's load.
+      payload.ready_ns = std::max(deadline, now - period);
+      writing_ = newest_.exchange(writing_ | kFresh, std::memory_order_acq_rel) & ~kFresh;
+      wake();
+    }
+    ++sequence_;
+    deadline += period;
+    if (const std::int64_t late = (now - deadline) / period; now > deadline && late > 0) {
+      sequence_ += static_cast<std::uint64_t>(late);
+      lost_ += static_cast<std::uint64_t>(late);
+      deadline += late * period;
+    }
+  }
+}
+
+const Payload* Device::take() noexcept {
+  if ((newest_.load(std::memory_order_relaxed) & kFresh) == 0) return nullptr;
+  reading_ = newest_.exchange(reading_, std::memory_order_acq_rel) & ~kFresh;
+  return &payloads_[reading_];
+}
+
+const Payload* Device::make_next() noexcept {
+  Payload& payload = payloads_[writing_];
+  if (!make(sequence_++, payload)) return nullptr;
+  payload.ready_ns = clock_.monotonic_ns();
+  return &payload;
+}
+
+bool Device::make(std::uint64_t sequence, Payload& payload) noexcept {
+  const LedLevels light = exposed_light();
+  const Fault* const fault = scene().fault_at(sequence);
+  if (fault != nullptr && fault->kind == FaultKind::unplug) {
+    ++lost_;
+    if (state_.exchange(CameraState::unplugged) != CameraState::unplugged) {
+      ++disconnects_;
+      wake();
+    }
+    return false;
+  }
+  if (fault != nullptr && (fault->kind == FaultKind::drop || fault->kind == FaultKind::stall)) {
+    ++lost_;
+    state_ = fault->kind == FaultKind::stall ? CameraState::stalled : CameraState::streaming;
+    return false;
+  }
+  state_ = CameraState::streaming;
+
+  int rows = image_.height();
+  if (fault != nullptr && fault->kind == FaultKind::torn) rows /= 2;
+  if (fault != nullptr && fault->kind == FaultKind::repeat) rows = 0;
+  renderer_.render(sequence, light, image_.data(), image_.stride(), rows);
+  payload.bytes = encoder_.encode(image_.view(), payload.buffer);
+  if (fault != nullptr && fault->kind == FaultKind::truncate) payload.bytes /= 2;
+  payload.sequence = sequence;
+  payload.lost_before = lost_;
+  return true;
+}
+
+LedLevels Device::exposed_light() noexcept {
+  std::rotate(seen_.rbegin(), seen_.rbegin() + 1, seen_.rend());
+  seen_.front() = led_levels(link_->light());
+  return mean(seen_[seen_.size() - 1], seen_[seen_.size() - 2]);
+}
+
+void Device::wake() noexcept {
+  const std::uint64_t one = 1;
+  // A full counter means that the reader has been told already.
+  (void)!::write(event_.get(), &one, sizeof one);
+}
+
+}  // namespace dtact::hal::sim

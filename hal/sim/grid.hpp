@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "hal/sim/scene.hpp"
+
+namespace dtact::hal::sim {
+
+/// The points on which contact is solved. Point (column, row) lies at x = x0_mm + column·spacing,
+/// y = y0_mm + row·spacing from the image's centre.
+struct Grid {
+  int width = 0;
+  int height = 0;
+  double spacing_mm = 0;
+  double x0_mm = 0;
+  double y0_mm = 0;
+
+  [[nodiscard]] std::size_t size() const noexcept {
+    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  }
+};
+
+/// Covers the camera's field and several thicknesses around it, so that the periodic solution has
+/// a free border; sides are lengths the FFT likes.
+[[nodiscard]] Grid make_grid(const Scene& scene);
+
+/// Where pixel (column, row) lies on the layer, lens included, mm from the image's centre.
+struct Place {
+  double x_mm = 0;
+  double y_mm = 0;
+};
+[[nodiscard]] Place pixel_place(const CameraModel& camera, double column, double row) noexcept;
+
+/// For every pixel the four grid points around it. Bilinear, in Q8.
+class PixelMap {
+ public:
+  PixelMap(const CameraModel& camera, const Grid& grid);
+
+  /// Reads `grid_values` (grid sized) at the pixels of one image row.
+  void sample_row(int row, std::span<const std::int16_t> grid_values,
+                  std::span<std::int16_t> out) const noexcept;
+
+ private:
+  struct Entry {
+    std::uint32_t index = 0;  // upper left grid point
+    std::uint16_t fx = 0;     // weight of the right column, 0 … 255
+    std::uint16_t fy = 0;     // weight of the lower row, 0 … 255
+  };
+  std::size_t width_;
+  std::size_t pitch_;
+  std::vector<Entry> entries_;
+};
+
+}  // namespace dtact::hal::sim

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "hal/light_ring.hpp"
+#include "hal/sim/scene.hpp"
+
+namespace dtact::hal::sim {
+
+/// How bright each LED is: luma of its colour times brightness, 0 … 65025.
+using LedLevels = std::array<std::uint16_t, kLedCount>;
+
+[[nodiscard]] LedLevels led_levels(const Light& light) noexcept;
+/// Half of each: what a frame sees whose exposure lies half before and half after a change.
+[[nodiscard]] LedLevels mean(const LedLevels& a, const LedLevels& b) noexcept;
+
+/// The light on the untouched layer as the camera sees it. Every LED shines through the diffuser
+/// as a point source on a plane, (1 + ρ²/d²)^−2 at the distance ρ from its foot (inverse square,
+/// and Lambert's cosine at both ends), plus an even share; the lens vignettes with the square of the
+/// radius.
+class LightField {
+ public:
+  explicit LightField(const Scene& scene);
+
+  /// Grey levels before gamma, Q6, up to 1023 levels (the camera clips later). `out`: one value a
+  /// pixel, row-major.
+  void compute(const LedLevels& levels, std::span<std::uint16_t> out) const noexcept;
+
+ private:
+  std::size_t pixels_;
+  std::vector<std::uint16_t> shares_;  // LED after LED: grey at full brightness, Q10
+};
+
+}  // namespace dtact::hal::sim

@@ -1,0 +1,116 @@
+// dtact-sim-render: frames of a simulated scene as PNG files, for calibration and for looking at.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "hal/base/atomic_file.hpp"
+#include "hal/sim/renderer.hpp"
+
+namespace {
+
+using dtact::hal::Light;
+namespace sim = dtact::hal::sim;
+
+struct Arguments {
+  std::filesystem::path scene;
+  std::string frames = "0:1";
+  std::uint64_t seed = 1;
+  int brightness = 255;
+  bool average = false;
+  std::filesystem::path output;
+};
+
+struct Range {
+  std::uint64_t first = 0;
+  std::uint64_t end = 0;
+};
+
+// "200:210" are the ten frames 200 to 209; "200" is one.
+Range parse_range(const std::string& text) {
+  try {
+    const std::size_t colon = text.find(':');
+    std::size_t used = 0;
+    Range range;
+    range.first = std::stoull(text, &used);
+    range.end = range.first + 1;
+    if (colon != std::string::npos) {
+      const std::string tail = text.substr(colon + 1);
+      if (used != colon) throw std::invalid_argument(text);
+      range.end = std::stoull(tail, &used);
+      used += colon + 1;
+    }
+    if (used == text.size() && range.end > range.first) return range;
+  } catch (const std::logic_error&) {
+    // Falls through to the one message.
+  }
+  throw std::runtime_error(fmt::format(
+      "--frames {}: must be a frame or first:end with end after first, as in 200:210", text));
+}
+
+void render(const Arguments& arguments) {
+  const sim::Scene scene =
+      arguments.scene.empty() ? sim::default_scene() : sim::load_scene(arguments.scene);
+  const Range range = parse_range(arguments.frames);
+  sim::Renderer renderer(scene, arguments.seed);
+  Light light;
+  light.brightness = static_cast<std::uint8_t>(arguments.brightness);
+  const sim::LedLevels levels = sim::led_levels(light);
+
+  const auto pixels = static_cast<std::size_t>(scene.camera.width) *
+                      static_cast<std::size_t>(scene.camera.height);
+  dtact::image::Grey8 image{scene.camera.width, scene.camera.height, {}};
+  image.pixels.resize(pixels);
+  std::vector<std::uint64_t> sums(pixels);
+  for (std::uint64_t n = range.first; n < range.end; ++n) {
+    renderer.render(n, levels, image.pixels.data(), image.width, image.height);
+    if (arguments.average) {
+      for (std::size_t i = 0; i < pixels; ++i) sums[i] += image.pixels[i];
+    } else {
+      const auto file = range.end - range.first == 1
+                            ? arguments.output
+                            : arguments.output / fmt::format("{:06}.png", n);
+      if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
+      dtact::base::write_file_atomically(file, dtact::image::encode_png(image));
+    }
+  }
+  if (!arguments.average) return;
+  // 16 bits, so that the average keeps its fractions of a grey level.
+  dtact::image::Grey16 mean{image.width, image.height, std::vector<std::uint16_t>(pixels)};
+  const std::uint64_t count = range.end - range.first;
+  for (std::size_t i = 0; i < pixels; ++i) {
+    mean.pixels[i] = static_cast<std::uint16_t>((sums[i] * 257 + count / 2) / count);
+  }
+  dtact::base::write_file_atomically(arguments.output, dtact::image::encode_png(mean));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    CLI::App app("Writes frames of a simulated scene as PNG files.", "dtact-sim-render");
+    Arguments arguments;
+    app.add_option("--scene", arguments.scene, "scene file; left out: the built-in scene")
+        ->check(CLI::ExistingFile);
+    app.add_option("--frames", arguments.frames, "frame, or first:end without the end");
+    app.add_option("--seed", arguments.seed, "noise seed");
+    app.add_option("--brightness", arguments.brightness, "all LEDs white at this brightness")
+        ->check(CLI::Range(0, 255));
+    app.add_flag("--average", arguments.average, "one 16-bit image, the mean of the frames");
+    app.add_option("-o,--output", arguments.output,
+                   "PNG file for one image, folder for several")
+        ->required();
+    CLI11_PARSE(app, argc, argv);
+    render(arguments);
+    return 0;
+  } catch (const std::exception& problem) {
+    fmt::print(stderr, "dtact-sim-render: {}\n", problem.what());
+    return 1;
+  }
+}

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "hal/image/png.hpp"
+#include "hal/sim/light_field.hpp"
+#include "hal/sim/noise.hpp"
+#include "hal/sim/optics.hpp"
+#include "hal/sim/truth.hpp"
+
+namespace dtact::hal::sim {
+
+/// Makes the frames of a scene, without a clock, threads or faults: bytes are a function of scene,
+/// seed, sequence and light. What did not change since the last frame is not computed again; noise
+/// always is. Does not allocate after construction. One thread at a time.
+class Renderer {
+ public:
+  /// Solves the scene's contacts. Throws std::runtime_error as Truth does.
+  Renderer(const Scene& scene, std::uint64_t seed);
+
+  /// Frame `sequence` in full-range luma: the first `rows` rows, `stride` bytes apart.
+  void render(std::uint64_t sequence, const LedLevels& light, std::uint8_t* luma,
+              std::ptrdiff_t stride, int rows) noexcept;
+
+  [[nodiscard]] const Truth& truth() const noexcept { return truth_; }
+
+ private:
+  void expose(int rows) noexcept;
+
+  Truth truth_;
+  Optics optics_;
+  LightField field_;
+  Noise noise_;
+  std::vector<std::uint16_t> tone_;  // linear Q6 → grey Q6: the camera's gamma and clipping
+
+  Truth::Moment moment_{-1, -1, 0};  // what indentation_ and loss_ belong to
+  LedLevels levels_{};               // what light_ belongs to
+  bool lit_ = false;
+  int exposed_rows_ = 0;  // rows of grey_ that are up to date
+  std::vector<std::int16_t> indentation_;
+  std::vector<std::int16_t> loss_;
+  std::vector<std::int16_t> loss_row_;
+  std::vector<std::uint16_t> light_;
+  std::vector<std::uint16_t> grey_;  // the image without noise, Q6
+  std::vector<std::int16_t> amplitude_;
+};
+
+/// One frame on its own, for tests: solves the scene every time.
+[[nodiscard]] image::Grey8 render_frame(const Scene& scene, std::uint64_t sequence,
+                                        const Light& light, std::uint64_t seed);
+
+}  // namespace dtact::hal::sim

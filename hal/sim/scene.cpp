@@ -1,0 +1,261 @@
+#include "hal/sim/scene.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+
+#include "hal/base/atomic_file.hpp"
+#include "hal/sim/default_scene.hpp"
+#include "hal/sim/scene_reader.hpp"
+
+namespace dtact::hal::sim {
+namespace {
+
+// A rigid object deeper than this would have to squeeze the layer to nothing, where a linear law
+// no longer holds.
+constexpr double kDeepest = 0.9;  // of the layer's thickness
+
+const std::vector<std::string> kObjects = {
+    "ball",     "ball_array", "disc",         "cube",        "cylinder",
+    "grating",  "pin_board",  "m4_nut",       "m3_long_nut", "m5_hexagon_screw",
+    "star",     "screw_cap",  "usb_c_plug",   "key",         "three_set_screws",
+    "height_map"};
+
+Object read_object(SceneReader& press, const std::filesystem::path& folder) {
+  press.require("object");
+  int index = 0;
+  press.choice("object", index, kObjects);
+  const std::string& kind = kObjects[static_cast<std::size_t>(index)];
+  const auto length = [&](std::string_view key, double lowest, double highest) {
+    press.require(key);
+    double value = 0;
+    press.number(key, value, lowest, highest);
+    return value;
+  };
+  const auto count = [&](std::string_view key) {
+    press.require(key);
+    int value = 0;
+    press.integer(key, value, 1, 50);
+    return value;
+  };
+  if (kind == "ball") return ball(length("radius_mm", 0.2, 50));
+  if (kind == "ball_array") {
+    const double radius = length("radius_mm", 0.2, 10);
+    const double pitch = length("pitch_mm", 0.5, 20);
+    const int rows = count("rows");
+    return ball_array(radius, pitch, rows, count("columns"));
+  }
+  if (kind == "disc") return disc(length("radius_mm", 0.2, 11));
+  if (kind == "cube") return cube(length("side_mm", 0.5, 20));
+  if (kind == "cylinder") {
+    const double radius = length("radius_mm", 0.2, 50);
+    return cylinder(radius, length("length_mm", 0.5, 40));
+  }
+  if (kind == "grating") {
+    const double pitch = length("pitch_mm", 0.3, 10);
+    const double depth = length("groove_mm", 0.05, 5);
+    return grating(pitch, depth, length("side_mm", 1, 20));
+  }
+  if (kind == "pin_board") return pin_board();
+  if (kind == "m4_nut") return m4_nut();
+  if (kind == "m3_long_nut") return m3_long_nut();
+  if (kind == "m5_hexagon_screw") return m5_hexagon_screw();
+  if (kind == "three_set_screws") return three_set_screws();
+  if (kind == "star") return star(length("radius_mm", 1, 10));
+  if (kind == "screw_cap") return screw_cap();
+  if (kind == "usb_c_plug") return usb_c_plug();
+  if (kind == "key") return key();
+  press.require("image");
+  std::string image;
+  press.text("image", image);
+  const double mm_per_px = length("mm_per_px", 0.001, 1);
+  const double relief = length("relief_mm", 0.01, 20);
+  try {
+    return height_map(folder / image, mm_per_px, relief);
+  } catch (const std::exception& problem) {
+    press.fail("image", problem.what());
+  }
+}
+
+Press read_press(SceneReader& table, const std::filesystem::path& folder, double thickness_mm) {
+  Press press;
+  press.object = read_object(table, folder);
+  table.require("keys");
+  PressKey key;  // what a key leaves out is as in the one before
+  for (SceneReader& entry : table.tables("keys")) {
+    entry.require("t");
+    const double last = key.time_s;
+    entry.number("t", key.time_s, 0, 1e5);
+    if (!press.keys.empty() && key.time_s <= last) {
+      entry.fail("t", "must be later than in the key before");
+    }
+    entry.number("x", key.x_mm, -100, 100);
+    entry.number("y", key.y_mm, -100, 100);
+    entry.number("depth", key.depth_mm, -10, kDeepest * thickness_mm);
+    entry.number("rotation", key.rotation_deg, -3600, 3600);
+    entry.finish();
+    press.keys.push_back(key);
+  }
+  if (press.keys.empty()) table.fail("keys", "must hold at least one key");
+  if (press.keys.front().time_s > 0 && press.keys.front().depth_mm > 0) {
+    table.fail("keys", "must begin at the surface (depth 0 or less), or at t = 0");
+  }
+  table.finish();
+  return press;
+}
+
+Fault read_fault(SceneReader& table) {
+  static const std::vector<std::string> kKinds = {"drop",     "repeat", "torn",
+                                                  "truncate", "stall",  "unplug"};
+  Fault fault;
+  table.require("kind");
+  table.require("frame");
+  int kind = 0;
+  table.choice("kind", kind, kKinds);
+  fault.kind = static_cast<FaultKind>(kind);
+  std::int64_t frame = 0;
+  std::int64_t frames = 1;
+  table.integer("frame", frame, 0, std::int64_t{1} << 40);
+  table.integer("frames", frames, 1, 1'000'000);
+  fault.frame = static_cast<std::uint64_t>(frame);
+  fault.frames = static_cast<std::uint64_t>(frames);
+  table.finish();
+  return fault;
+}
+
+void read_camera(SceneReader table, CameraModel& camera) {
+  table.integer("width", camera.width, 64, 4096);
+  table.integer("height", camera.height, 64, 4096);
+  table.number("fps", camera.fps, 1, 240);
+  table.number("mm_per_px", camera.mm_per_px, 0.005, 0.5);
+  table.number("barrel", camera.barrel, 0, 0.5);
+  table.number("exposure", camera.exposure, 0.05, 4);
+  table.number("gamma", camera.gamma, 0.5, 3);
+  table.number("read_noise", camera.read_noise, 0, 3);
+  table.number("shot_noise", camera.shot_noise, 0, 3);
+  table.integer("light_delay_frames", camera.light_delay_frames, 2, 8);
+  table.finish();
+}
+
+void read_optics(SceneReader table, OpticsModel& optics, double thickness_mm) {
+  table.number("pressed_slope", optics.pressed_slope, 0.001, 2);
+  table.number("pressed_curve", optics.pressed_curve, -1, 1);
+  table.number("bulged_slope", optics.bulged_slope, 0.001, 4);
+  table.number("bulged_curve", optics.bulged_curve, -4, 4);
+  table.number("narrow_mm", optics.narrow_mm, 0, 3);
+  table.number("wide_mm", optics.wide_mm, 0, 6);
+  table.number("narrow_weight", optics.narrow_weight, 0, 1);
+  // A response that turns back would give two indentations the same grey. The bulge stays below
+  // a fifth of the thickness even for the deepest press.
+  if (optics.pressed_slope + 2 * optics.pressed_curve * kDeepest * thickness_mm <= 0) {
+    table.fail("pressed_curve", "makes the response fall before the deepest indentation allowed");
+  }
+  if (optics.bulged_slope - 2 * optics.bulged_curve * 0.2 * thickness_mm <= 0) {
+    table.fail("bulged_curve", "makes the response fall before the highest bulge");
+  }
+  table.finish();
+}
+
+void read_light(SceneReader table, LightModel& light) {
+  int arrangement = static_cast<int>(light.arrangement);
+  table.choice("arrangement", arrangement, {"ring", "sides"});
+  light.arrangement = static_cast<Arrangement>(arrangement);
+  table.number("level", light.level, 1, 255);
+  table.number("led_radius_mm", light.led_radius_mm, 1, 50);
+  table.number("led_distance_mm", light.led_distance_mm, 2, 100);
+  table.number("fill", light.fill, 0, 1);
+  table.number("vignetting", light.vignetting, 0, 0.9);
+  table.finish();
+}
+
+void read_scene(std::string_view toml_text, const std::string& name,
+                const std::filesystem::path& folder, Scene& scene) {
+  toml::table parsed;
+  try {
+    parsed = toml::parse(toml_text, name);
+  } catch (const toml::parse_error& error) {
+    throw std::runtime_error(
+        fmt::format("{}:{}: {}", name, error.source().begin.line, error.description()));
+  }
+  SceneReader root(parsed, name, "");
+  root.text("sensor", scene.sensor);
+  read_camera(root.table("camera"), scene.camera);
+
+  SceneReader layer = root.table("layer");
+  layer.number("thickness_mm", scene.layer.thickness_mm, 0.5, 5);
+  layer.number("grid_mm", scene.layer.grid_mm, 0.05, 0.5);
+  layer.number("solve_step_mm", scene.layer.solve_step_mm, 0.02, 5);
+  layer.finish();
+
+  read_optics(root.table("optics"), scene.optics, scene.layer.thickness_mm);
+  read_light(root.table("light"), scene.light);
+
+  SceneReader loop = root.table("loop");
+  loop.number("from_s", scene.loop_from_s, 0, 1e5);
+  loop.number("to_s", scene.loop_to_s, 0, 1e5);
+  if (scene.loop_to_s != 0 && scene.loop_to_s <= scene.loop_from_s) {
+    loop.fail("to_s", "must be later than from_s");
+  }
+  loop.finish();
+
+  for (SceneReader& press : root.tables("press")) {
+    scene.presses.push_back(read_press(press, folder, scene.layer.thickness_mm));
+  }
+  for (SceneReader& fault : root.tables("fault")) scene.faults.push_back(read_fault(fault));
+  root.finish();
+}
+
+}  // namespace
+
+double Scene::time_s(std::uint64_t sequence) const noexcept {
+  const double t = static_cast<double>(sequence) / camera.fps;
+  if (loop_to_s <= 0 || t < loop_to_s) return t;
+  return loop_from_s + std::fmod(t - loop_from_s, loop_to_s - loop_from_s);
+}
+
+const Fault* Scene::fault_at(std::uint64_t sequence) const noexcept {
+  for (const Fault& fault : faults) {
+    if (sequence >= fault.frame && sequence - fault.frame < fault.frames) return &fault;
+  }
+  return nullptr;
+}
+
+Scene default_scene() {
+  Scene scene;
+  read_scene(kDefaultScene, "default.toml", {}, scene);
+  return scene;
+}
+
+Scene parse_scene(std::string_view toml, const std::string& name,
+                  const std::filesystem::path& folder) {
+  Scene scene = default_scene();
+  scene.loop_from_s = 0;
+  scene.loop_to_s = 0;
+  scene.presses.clear();
+  scene.faults.clear();
+  read_scene(toml, name, folder, scene);
+  return scene;
+}
+
+Scene load_scene(const std::filesystem::path& file) {
+  return parse_scene(base::read_file(file), file.string(), file.parent_path());
+}
+
+Scene at_mode(Scene scene, int width, int height, double fps) {
+  if (width < 64 || width > 4096 || height < 64 || height > 4096 || !(fps >= 1 && fps <= 240)) {
+    throw std::runtime_error(
+        fmt::format("the simulated camera has no mode {} x {} at {} frames a second: sides may be "
+                    "64 to 4096 pixels, the rate 1 to 240",
+                    width, height, fps));
+  }
+  scene.camera.mm_per_px *= static_cast<double>(scene.camera.width) / width;
+  scene.camera.width = width;
+  scene.camera.height = height;
+  scene.camera.fps = fps;
+  return scene;
+}
+
+}  // namespace dtact::hal::sim

@@ -1,0 +1,191 @@
+#include "hal/sim/sim_camera.hpp"
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <ctime>
+#include <optional>
+#include <utility>
+
+#include "hal/luma/extract.hpp"
+#include "hal/luma/luma_buffer.hpp"
+#include "hal/mjpeg/grey_decoder.hpp"
+#include "hal/sim/device.hpp"
+
+namespace dtact::hal::sim {
+namespace {
+
+Scene configured_scene(const CameraConfig& config) {
+  const Scene scene = config.sim.scene.empty() ? default_scene() : load_scene(config.sim.scene);
+  return at_mode(scene, config.width, config.height, config.fps);
+}
+
+CameraControl control(const char* name, double value) {
+  return {name, std::llround(value * 1000), true};
+}
+
+// Waits until `fd` is readable or `ns` have passed, and clears it.
+void wait_for(int fd, std::int64_t ns) noexcept {
+  pollfd entry{fd, POLLIN, 0};
+  const timespec limit{ns / 1'000'000'000, ns % 1'000'000'000};
+  if (::ppoll(&entry, 1, &limit, nullptr) > 0) {
+    std::uint64_t count = 0;
+    (void)!::read(fd, &count, sizeof count);
+  }
+}
+
+}  // namespace
+
+struct SimCamera::Impl final : FrameOwner {
+  Impl(const CameraConfig& config, std::shared_ptr<LightLink> link, base::Clock& the_clock)
+      : output(output_from_name(config.sim.output)),
+        paced(config.sim.paced),
+        clock(the_clock),
+        device(configured_scene(config), config.sim.seed, output, std::move(link), the_clock) {
+    for (auto& buffer : buffers) buffer = luma::LumaBuffer(config.width, config.height);
+    if (output == Output::mjpeg) decoder.emplace(config.width, config.height);
+  }
+
+  GrabStatus grab(Frame& out, std::int64_t timeout_ns) noexcept;
+  GrabStatus hand_out(const Payload& payload, Frame& out) noexcept;
+  bool decode(const Payload& payload, luma::LumaBuffer& buffer) noexcept;
+  void give_back(int index) noexcept override { lent[static_cast<std::size_t>(index)] = false; }
+
+  const Output output;
+  const bool paced;
+  base::Clock& clock;
+  Device device;
+  std::optional<mjpeg::GreyDecoder> decoder;
+  // The caller holds one frame at most: one more to decode into.
+  std::array<luma::LumaBuffer, 2> buffers;
+  std::array<std::atomic<bool>, 2> lent{};
+
+  // The grabbing thread's.
+  std::uint64_t next_sequence = 0;
+  std::uint64_t lost_seen = 0;
+  std::uint64_t disconnects_seen = 0;
+  // What report() tells any thread.
+  std::atomic<std::uint64_t> delivered{0};
+  std::atomic<std::uint64_t> lost{0};
+  std::atomic<std::uint64_t> skipped{0};
+  std::atomic<std::uint64_t> damaged{0};
+};
+
+GrabStatus SimCamera::Impl::grab(Frame& out, std::int64_t timeout_ns) noexcept {
+  if (!paced) {
+    for (;;) {
+      if (const Payload* payload = device.make_next()) return hand_out(*payload, out);
+      if (device.state() == CameraState::unplugged) return GrabStatus::unplugged;
+      if (device.state() == CameraState::stalled) return GrabStatus::timeout;
+    }
+  }
+  const std::int64_t latest = clock.monotonic_ns() + timeout_ns;
+  for (;;) {
+    // Told once as soon as it happens; later calls wait for the device to come back.
+    if (std::exchange(disconnects_seen, device.disconnects()) != disconnects_seen) {
+      return GrabStatus::unplugged;
+    }
+    if (const Payload* payload = device.take()) return hand_out(*payload, out);
+    const std::int64_t rest = latest - clock.monotonic_ns();
+    if (rest <= 0) break;
+    wait_for(device.event_fd(), rest);
+  }
+  return device.state() == CameraState::unplugged ? GrabStatus::unplugged : GrabStatus::timeout;
+}
+
+GrabStatus SimCamera::Impl::hand_out(const Payload& payload, Frame& out) noexcept {
+  FrameInfo info;
+  info.sequence = payload.sequence;
+  info.timestamp_ns = payload.ready_ns;
+  info.ready_ns = payload.ready_ns;
+  info.meaning = TimestampMeaning::end_of_frame;
+
+  const std::uint64_t gone = payload.lost_before - lost_seen;
+  lost_seen = payload.lost_before;
+  if (gone > 0) info.flags |= kFrameAfterGap;
+  lost += gone;
+  skipped += payload.sequence - next_sequence - gone;
+  next_sequence = payload.sequence + 1;
+
+  const std::size_t index = lent[0] ? 1 : 0;
+  const std::int64_t begin = clock.monotonic_ns();
+  if (!decode(payload, buffers[index])) {
+    ++damaged;
+    return GrabStatus::damaged;
+  }
+  info.decode_ns = clock.monotonic_ns() - begin;
+  ++delivered;
+  lent[index] = true;
+  out = Frame(*this, static_cast<int>(index), buffers[index].view(), info);
+  return GrabStatus::ok;
+}
+
+bool SimCamera::Impl::decode(const Payload& payload, luma::LumaBuffer& buffer) noexcept {
+  const std::span<const std::uint8_t> bytes(payload.buffer.data(), payload.bytes);
+  switch (output) {
+    case Output::luma:
+      return luma::extract(luma::Layout::grey, luma::Range::full, bytes, 0, buffer) ==
+             luma::ExtractStatus::ok;
+    case Output::yuyv:
+      return luma::extract(luma::Layout::yuyv, luma::Range::limited, bytes, 0, buffer) ==
+             luma::ExtractStatus::ok;
+    case Output::mjpeg:
+      return decoder->decode(bytes, buffer.data(), buffer.stride()) == mjpeg::Status::ok;
+  }
+  return false;
+}
+
+SimCamera::SimCamera(const CameraConfig& config, std::shared_ptr<LightLink> link,
+                     base::Clock& clock)
+    : impl_(std::make_unique<Impl>(config, std::move(link), clock)) {}
+
+SimCamera::~SimCamera() = default;
+
+CameraInfo SimCamera::info() const {
+  const Scene& scene = impl_->device.scene();
+  CameraInfo info;
+  info.backend = "sim";
+  info.identity = "sim:" + scene.sensor;
+  info.pixel_format = std::array{"GREY", "YUYV", "MJPEG"}[static_cast<std::size_t>(impl_->output)];
+  info.width = scene.camera.width;
+  info.height = scene.camera.height;
+  info.fps = scene.camera.fps;
+  info.light_delay_frames = scene.camera.light_delay_frames;
+  info.controls = {control("exposure_permille", scene.camera.exposure),
+                   control("gamma_permille", scene.camera.gamma)};
+  return info;
+}
+
+CameraReport SimCamera::report() const {
+  CameraReport report;
+  report.state = impl_->device.state();
+  if (report.state == CameraState::unplugged) {
+    report.remedy =
+        "the scene has unplugged the simulated camera: it comes back when the scripted fault "
+        "ends, or take the [[fault]] out of the scene";
+  } else if (report.state == CameraState::stalled) {
+    report.remedy =
+        "the scene has stalled the simulated camera: it goes on when the scripted fault ends, or "
+        "take the [[fault]] out of the scene";
+  }
+  report.delivered = impl_->delivered;
+  report.lost = impl_->lost;
+  report.skipped = impl_->skipped;
+  report.damaged = impl_->damaged;
+  report.disconnects = impl_->device.disconnects();
+  return report;
+}
+
+void SimCamera::start() {
+  if (impl_->paced) impl_->device.run_paced();
+}
+
+GrabStatus SimCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexcept {
+  return impl_->grab(out, timeout.count());
+}
+
+}  // namespace dtact::hal::sim

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+
+#include "hal/base/clock.hpp"
+#include "hal/camera.hpp"
+#include "hal/config.hpp"
+#include "hal/sim/light_link.hpp"
+
+namespace dtact::hal::sim {
+
+/// The simulated sensor's camera. A thread of its own, "dtact-sim", is the device: it makes each
+/// frame one period ahead and lets go of it at its deadline; grab() unpacks the payload as it would
+/// a real camera's. The device keeps three payloads: one it fills, the newest complete one, one that
+/// grab() reads; a newer frame replaces one that nobody fetched. When the device falls behind, its
+/// sequence jumps.
+///
+/// With config.sim.paced == false there is no thread: every grab() makes the next frame of the
+/// sequence, none is skipped, and scripted gaps pass without waiting.
+class SimCamera final : public Camera {
+ public:
+  /// Loads and solves the scene (seconds for many presses). Throws std::runtime_error naming file,
+  /// line, key and remedy.
+  SimCamera(const CameraConfig& config, std::shared_ptr<LightLink> link,
+            base::Clock& clock = base::system_clock());
+  ~SimCamera() override;
+
+  [[nodiscard]] CameraInfo info() const override;
+  [[nodiscard]] CameraReport report() const override;
+  void start() override;
+  [[nodiscard]] GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dtact::hal::sim

@@ -1,0 +1,181 @@
+#include "hal/sim/truth.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <optional>
+#include <set>
+
+#include "hal/sim/layer.hpp"
+
+namespace dtact::hal::sim {
+namespace {
+
+constexpr int kBlendBits = 15;
+
+// Where a press is at time t; nothing while its object is away or above the surface.
+std::optional<PressKey> state_at(const Press& press, double t) {
+  const auto& keys = press.keys;
+  if (t < keys.front().time_s) return std::nullopt;
+  PressKey state = keys.back();
+  const auto next = std::upper_bound(keys.begin(), keys.end(), t,
+                                     [](double time, const PressKey& k) { return time < k.time_s; });
+  if (next != keys.end()) {
+    const PressKey& a = *std::prev(next);
+    const double w = (t - a.time_s) / (next->time_s - a.time_s);
+    state.x_mm = std::lerp(a.x_mm, next->x_mm, w);
+    state.y_mm = std::lerp(a.y_mm, next->y_mm, w);
+    state.depth_mm = std::lerp(a.depth_mm, next->depth_mm, w);
+    state.rotation_deg = std::lerp(a.rotation_deg, next->rotation_deg, w);
+  }
+  if (state.depth_mm <= 0) return std::nullopt;
+  return state;
+}
+
+// The farthest that anything of a touching object moves between two times, mm.
+double movement(const Press& press, double t0, double t1) {
+  const auto a = state_at(press, t0);
+  const auto b = state_at(press, t1);
+  if (!a && !b) return 0;
+  if (!a || !b) return (a ? *a : *b).depth_mm;
+  const double turn = std::abs(b->rotation_deg - a->rotation_deg) * std::numbers::pi / 180;
+  return std::max({std::hypot(b->x_mm - a->x_mm, b->y_mm - a->y_mm),
+                   std::abs(b->depth_mm - a->depth_mm), turn * press.object.reach_mm});
+}
+
+void lower_object(const Object& object, const PressKey& state, const Grid& grid,
+                  cv::Mat1d& target) {
+  const double angle = state.rotation_deg * std::numbers::pi / 180;
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  for (int i = 0; i < grid.height; ++i) {
+    const double dy = grid.y0_mm + i * grid.spacing_mm - state.y_mm;
+    if (std::abs(dy) > object.reach_mm) continue;
+    for (int j = 0; j < grid.width; ++j) {
+      const double dx = grid.x0_mm + j * grid.spacing_mm - state.x_mm;
+      if (std::abs(dx) > object.reach_mm) continue;
+      const double height = object.height_mm(c * dx + s * dy, c * dy - s * dx);
+      target(i, j) = std::max(target(i, j), state.depth_mm - height);
+    }
+  }
+}
+
+// Times at which the layer is solved.
+std::vector<double> solve_times(const Scene& scene) {
+  std::set<double> keys = {0};
+  for (const Press& press : scene.presses) {
+    for (const PressKey& key : press.keys) keys.insert(key.time_s);
+  }
+  std::vector<double> times;
+  for (auto key = keys.begin(); key != keys.end(); ++key) {
+    times.push_back(*key);
+    if (std::next(key) == keys.end()) break;
+    const double t0 = *key;
+    const double t1 = *std::next(key);
+    double farthest = 0;
+    for (const Press& press : scene.presses) {
+      farthest = std::max(farthest, movement(press, t0, t1));
+    }
+    // A little less than one step more is one step: 1.2 / 0.3 is not exactly 4.
+    const int steps = static_cast<int>(std::ceil(farthest / scene.layer.solve_step_mm - 1e-6));
+    for (int i = 1; i < steps; ++i) times.push_back(t0 + (t1 - t0) * i / steps);
+  }
+  return times;
+}
+
+}  // namespace
+
+Truth::Truth(const Scene& scene)
+    : scene_(scene), grid_(make_grid(scene)), pixels_(scene.camera, grid_) {
+  solve_all();
+}
+
+void Truth::solve_all() {
+  const Layer layer(grid_.width, grid_.height, grid_.spacing_mm, scene_.layer.thickness_mm);
+  maps_.push_back({std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size())});
+
+  // A press and its release pass through the same states: each is solved once. Lengths in
+  // nanometres, so that states which differ by rounding are one.
+  using State = std::vector<std::array<long, 5>>;
+  std::map<State, int> solved = {{{}, 0}};
+  cv::Mat1d guess;
+  for (const double time : solve_times(scene_)) {
+    State state;
+    cv::Mat1d target(grid_.height, grid_.width, -kNoSurface);
+    for (std::size_t i = 0; i < scene_.presses.size(); ++i) {
+      const auto at = state_at(scene_.presses[i], time);
+      if (!at || at->depth_mm < 1e-6) continue;
+      state.push_back({static_cast<long>(i), std::lround(at->x_mm * 1e6),
+                       std::lround(at->y_mm * 1e6), std::lround(at->depth_mm * 1e6),
+                       std::lround(at->rotation_deg * 1e6)});
+      lower_object(scene_.presses[i].object, *at, grid_, target);
+    }
+    auto found = solved.find(state);
+    if (found == solved.end()) {
+      const Pressed pressed = layer.solve(target, guess);
+      guess = pressed.pressure;
+      Map map{std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size())};
+      for (std::size_t i = 0; i < grid_.size(); ++i) {
+        map.indentation[i] = static_cast<std::int16_t>(
+            std::lround(pressed.indentation_mm.ptr<double>()[i] * kPerMm));
+        map.contact[i] = pressed.pressure.ptr<double>()[i] > 0 ? 256 : 0;
+      }
+      found = solved.emplace(state, static_cast<int>(maps_.size())).first;
+      maps_.push_back(std::move(map));
+    }
+    instants_.push_back({time, found->second});
+  }
+}
+
+Truth::Moment Truth::moment(std::uint64_t sequence) const noexcept {
+  const double t = scene_.time_s(sequence);
+  const auto next = std::upper_bound(instants_.begin(), instants_.end(), t,
+                                     [](double time, const Instant& i) { return time < i.time_s; });
+  const Instant& a = *std::prev(next);  // the first instant is at 0
+  if (next == instants_.end() || next->map == a.map) return {a.map, a.map, 0};
+  const double w = (t - a.time_s) / (next->time_s - a.time_s);
+  const int weight = std::min(static_cast<int>(w * (1 << kBlendBits)), (1 << kBlendBits) - 1);
+  return {a.map, next->map, weight};
+}
+
+void Truth::blend(const Moment& moment, std::span<std::int16_t> out) const noexcept {
+  const std::int16_t* const a = maps_[static_cast<std::size_t>(moment.from)].indentation.data();
+  const std::int16_t* const b = maps_[static_cast<std::size_t>(moment.to)].indentation.data();
+  const std::int32_t weight = moment.weight;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const std::int32_t change = (b[i] - a[i]) * weight + (1 << (kBlendBits - 1));
+    out[i] = static_cast<std::int16_t>(a[i] + (change >> kBlendBits));
+  }
+}
+
+void Truth::indentation_mm(std::uint64_t sequence, std::vector<float>& out) const {
+  std::vector<std::int16_t> map(grid_.size());
+  blend(moment(sequence), map);
+  const auto width = static_cast<std::size_t>(scene_.camera.width);
+  std::vector<std::int16_t> row(width);
+  out.resize(width * static_cast<std::size_t>(scene_.camera.height));
+  for (int y = 0; y < scene_.camera.height; ++y) {
+    pixels_.sample_row(y, map, row);
+    std::transform(row.begin(), row.end(), out.begin() + y * static_cast<std::ptrdiff_t>(width),
+                   [](std::int16_t v) { return static_cast<float>(v) / kPerMm; });
+  }
+}
+
+void Truth::contact(std::uint64_t sequence, std::vector<std::uint8_t>& out) const {
+  const Moment at = moment(sequence);
+  const int nearer = at.weight < (1 << (kBlendBits - 1)) ? at.from : at.to;
+  const auto& map = maps_[static_cast<std::size_t>(nearer)].contact;
+  const auto width = static_cast<std::size_t>(scene_.camera.width);
+  std::vector<std::int16_t> row(width);
+  out.resize(width * static_cast<std::size_t>(scene_.camera.height));
+  for (int y = 0; y < scene_.camera.height; ++y) {
+    pixels_.sample_row(y, map, row);
+    std::transform(
+        row.begin(), row.end(), out.begin() + y * static_cast<std::ptrdiff_t>(width),
+        [](std::int16_t v) { return static_cast<std::uint8_t>(v >= 128 ? 255 : 0); });
+  }
+}
+
+}  // namespace dtact::hal::sim

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "hal/sim/grid.hpp"
+#include "hal/sim/scene.hpp"
+
+namespace dtact::hal::sim {
+
+/// The true indentation of every frame: a pure function of scene and sequence. Contact is solved
+/// once at construction, at the presses' keys and as often between them as solve_step_mm asks; in
+/// between, maps are blended linearly in time. Immutable afterwards: any thread may ask.
+class Truth {
+ public:
+  /// Units of the maps in a millimetre.
+  static constexpr int kPerMm = 8000;
+
+  /// Takes about 50 ms for each map that the scene needs. Throws std::runtime_error when a contact
+  /// has no solution.
+  explicit Truth(const Scene& scene);
+
+  /// Indentation at every pixel of the camera's image (distortion included), row-major, mm,
+  /// positive = pressed, negative = bulge.
+  void indentation_mm(std::uint64_t sequence, std::vector<float>& out) const;
+  /// 255 where the object touches, 0 elsewhere; of the nearer one of the two maps between which
+  /// the truth is blended.
+  void contact(std::uint64_t sequence, std::vector<std::uint8_t>& out) const;
+
+  /// The state of the layer at one frame: `from` + (`to` − `from`)·weight/2^15.
+  struct Moment {
+    int from = 0;
+    int to = 0;
+    int weight = 0;  ///< 0 … 32767
+    bool operator==(const Moment&) const = default;
+  };
+  [[nodiscard]] Moment moment(std::uint64_t sequence) const noexcept;
+  /// The blended map on the grid, in 1/kPerMm. `out` is grid sized.
+  void blend(const Moment& moment, std::span<std::int16_t> out) const noexcept;
+
+  [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
+  [[nodiscard]] const Grid& grid() const noexcept { return grid_; }
+  [[nodiscard]] const PixelMap& pixels() const noexcept { return pixels_; }
+  /// Maps that were solved, the untouched one included.
+  [[nodiscard]] std::size_t map_count() const noexcept { return maps_.size(); }
+
+ private:
+  struct Map {
+    std::vector<std::int16_t> indentation;
+    std::vector<std::int16_t> contact;  // 256 where they touch
+  };
+  struct Instant {
+    double time_s = 0;
+    int map = 0;
+  };
+  void solve_all();
+
+  Scene scene_;
+  Grid grid_;
+  PixelMap pixels_;
+  std::vector<Map> maps_;          // [0] is untouched
+  std::vector<Instant> instants_;  // times strictly ascending, the first is 0
+};
+
+}  // namespace dtact::hal::sim

@@ -1,0 +1,74 @@
+#include "hal/v4l2/payload.hpp"
+
+#include <linux/videodev2.h>
+
+#include "hal/luma/extract.hpp"
+#include "hal/v4l2/modes.hpp"
+
+namespace dtact::hal::v4l2 {
+namespace {
+
+bool is_jpeg(std::uint32_t fourcc) {
+  return fourcc == V4L2_PIX_FMT_MJPEG || fourcc == V4L2_PIX_FMT_JPEG;
+}
+
+luma::Layout layout_of(std::uint32_t fourcc) {
+  switch (fourcc) {
+    case V4L2_PIX_FMT_YUYV:
+      return luma::Layout::yuyv;
+    case V4L2_PIX_FMT_NV12:
+      return luma::Layout::nv12;
+    default:
+      return luma::Layout::grey;
+  }
+}
+
+/// FF D8 at the beginning, FF D9 at the end, followed by nothing but padding: drivers round
+/// payloads up with zeros (or with FF, as JPEG itself does).
+bool has_markers(std::span<const std::uint8_t> payload) noexcept {
+  if (payload.size() < 4 || payload[0] != 0xFF || payload[1] != 0xD8) return false;
+  std::size_t end = payload.size();
+  while (end > 4 && (payload[end - 1] == 0x00 || payload[end - 1] == 0xFF)) --end;
+  return payload[end - 2] == 0xFF && payload[end - 1] == 0xD9;
+}
+
+}  // namespace
+
+PayloadDecoder::PayloadDecoder(const Format& format)
+    : format_(format),
+      jpeg_(is_jpeg(format.fourcc)
+                ? std::make_unique<mjpeg::GreyDecoder>(format.width, format.height)
+                : nullptr) {}
+
+PayloadStatus PayloadDecoder::inspect(const Filled& filled) const noexcept {
+  if (filled.flagged) return PayloadStatus::flagged;
+  if (filled.payload.empty()) return PayloadStatus::too_short;
+  if (jpeg_) return has_markers(filled.payload) ? PayloadStatus::ok : PayloadStatus::markers;
+  const std::size_t needed = luma::payload_bytes(layout_of(format_.fourcc), format_.width,
+                                                 format_.height, format_.bytes_per_line);
+  return filled.payload.size() < needed ? PayloadStatus::too_short : PayloadStatus::ok;
+}
+
+PayloadStatus PayloadDecoder::decode(const Filled& filled, luma::LumaBuffer& out) noexcept {
+  if (!jpeg_) {
+    const auto status = luma::extract(layout_of(format_.fourcc),
+                                      format_.full_range ? luma::Range::full : luma::Range::limited,
+                                      filled.payload, format_.bytes_per_line, out);
+    if (status == luma::ExtractStatus::ok) return PayloadStatus::ok;
+    return status == luma::ExtractStatus::short_payload ? PayloadStatus::too_short
+                                                        : PayloadStatus::undecodable;
+  }
+  switch (jpeg_->decode(filled.payload, out.data(), out.stride())) {
+    case mjpeg::Status::ok:
+      return PayloadStatus::ok;
+    case mjpeg::Status::empty:
+      return PayloadStatus::too_short;
+    case mjpeg::Status::not_jpeg:
+    case mjpeg::Status::truncated:
+      return PayloadStatus::markers;
+    default:
+      return PayloadStatus::undecodable;
+  }
+}
+
+}  // namespace dtact::hal::v4l2

@@ -1,0 +1,149 @@
+#include "daemon/app/config.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <sstream>
+#include <stdexcept>
+
+#include "hal/base/atomic_file.hpp"
+
+namespace dtact::app {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class ConfigFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    ::unsetenv("DTACTD_LOG");
+    folder_ = fs::path(::testing::TempDir()) / ("config_" + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  Config load(const std::string& text, const std::vector<std::string>& settings = {}) {
+    base::write_file_atomically(folder_ / "c.toml", text);
+    return load_config(folder_ / "c.toml", settings).config;
+  }
+  std::string error(const std::string& text, const std::vector<std::string>& settings = {}) {
+    try {
+      (void)load(text, settings);
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "no error";
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(ConfigFile, EmptyFileKeepsTheDefaults) {
+  const Config config = load("");
+  EXPECT_EQ(config.hal.camera.backend, "sim");
+  EXPECT_EQ(config.hal.camera.fps, 60);
+  EXPECT_EQ(config.net.port, 7377);
+  EXPECT_EQ(config.log_level, "info");
+}
+
+TEST_F(ConfigFile, SetsEveryKind) {
+  const Config config = load(
+      "log_level = 'debug'\n[camera]\nwidth = 640\nfps = 30\n[camera.replay]\nloop = false\n"
+      "folder = 'frames'\n[ring]\nbrightness = 128\nscheme = 'scheme4'\n[capture]\ncpu = false\n"
+      "[net]\nhello_timeout_ms = 250\n");
+  EXPECT_EQ(config.log_level, "debug");
+  EXPECT_EQ(config.hal.camera.width, 640);
+  EXPECT_EQ(config.hal.camera.fps, 30);
+  EXPECT_FALSE(config.hal.camera.replay.loop);
+  EXPECT_EQ(config.hal.camera.replay.folder, folder_ / "frames");
+  EXPECT_EQ(config.pipeline.light.brightness, 128);
+  EXPECT_EQ(config.ring_scheme, "scheme4");
+  EXPECT_FALSE(config.pipeline.cpu.has_value());
+  EXPECT_EQ(config.net.hello_timeout.count(), 250);
+}
+
+TEST_F(ConfigFile, UnknownKeyNamesFileLineAndWhatIsAllowed) {
+  EXPECT_THAT(error("[camera]\nwidht = 640\n"),
+              AllOf(HasSubstr("c.toml:2:"), HasSubstr("\"camera.widht\""),
+                    HasSubstr("width, height, fps, [sim], [replay]")));
+  EXPECT_THAT(error("[camra]\n"), AllOf(HasSubstr("c.toml:1:"), HasSubstr("[camera]")));
+}
+
+TEST_F(ConfigFile, WrongTypeOrValueNamesWhatIsAllowed) {
+  EXPECT_THAT(error("\n[camera]\nwidth = '640'\n"),
+              AllOf(HasSubstr("c.toml:3: camera.width"), HasSubstr("16 … 8192")));
+  EXPECT_THAT(error("[camera]\nfps = nan\n"), HasSubstr("camera.fps"));
+  EXPECT_THAT(error("[camera]\nwidth = 640.5\n"), HasSubstr("camera.width"));
+  EXPECT_THAT(error("[net]\nport = 65536\n"), HasSubstr("0 … 65535"));
+  EXPECT_THAT(error("[camera]\nbackend = 'usb'\n"), HasSubstr("\"null\""));
+  EXPECT_THAT(error("[ring]\nscheme = 'half'\n"), HasSubstr("scheme4"));
+  EXPECT_THAT(error("camera = 3\n"), HasSubstr("c.toml:1"));
+  EXPECT_THAT(error("[contact]\nmade_mm = 0.05\nlost_mm = 0.05\n"), HasSubstr("contact.lost_mm"));
+}
+
+TEST_F(ConfigFile, BrokenTomlNamesTheLine) {
+  EXPECT_THAT(error("[camera]\nwidth = = 3\n"), HasSubstr("c.toml:2"));
+}
+
+TEST_F(ConfigFile, MissingFileIsNamed) {
+  EXPECT_THROW((void)load_config(folder_ / "none.toml", {}), std::exception);
+}
+
+TEST_F(ConfigFile, SettingsWinOverTheFile) {
+  const Config config =
+      load("[camera]\nfps = 30\n", {"camera.fps=15", "camera.backend=null", "net.port=0"});
+  EXPECT_EQ(config.hal.camera.fps, 15);
+  EXPECT_EQ(config.hal.camera.backend, "null");
+  EXPECT_EQ(config.net.port, 0);
+}
+
+TEST_F(ConfigFile, WrongSettingIsNamed) {
+  EXPECT_THAT(error("", {"camera.fps"}), HasSubstr("KEY=VALUE"));
+  EXPECT_THAT(error("", {"camera.fps=fast"}), HasSubstr("camera.fps"));
+  EXPECT_THAT(error("", {"camera.speed=1"}), HasSubstr("camera.speed"));
+}
+
+TEST_F(ConfigFile, EnvironmentSetsTheLogLevel) {
+  ::setenv("DTACTD_LOG", "trace", 1);
+  EXPECT_EQ(load("log_level = 'warn'\n").log_level, "trace");
+  ::setenv("DTACTD_LOG", "loud", 1);
+  EXPECT_THAT(error(""), HasSubstr("DTACTD_LOG"));
+  ::unsetenv("DTACTD_LOG");
+}
+
+TEST_F(ConfigFile, PrintedConfigSaysWhereAValueCameFromAndLoadsAgain) {
+  base::write_file_atomically(folder_ / "c.toml", "[camera]\nwidth = 640\n");
+  std::ostringstream out;
+  print_config(load_config(folder_ / "c.toml", {"camera.fps=15"}), out);
+  EXPECT_THAT(out.str(), HasSubstr("c.toml:2"));
+  EXPECT_THAT(out.str(), HasSubstr("# --set"));
+  EXPECT_THAT(out.str(), HasSubstr("# default"));
+  const Config again = load(out.str());
+  EXPECT_EQ(again.hal.camera.width, 640);
+  EXPECT_EQ(again.hal.camera.fps, 15);
+}
+
+TEST_F(ConfigFile, TheShippedFileHoldsTheDefaults) {
+  const LoadedConfig defaults = load_config({}, {});
+  const LoadedConfig shipped = load_config(fs::path(DTACT_SOURCE_DIR) / "config/dtactd.toml", {});
+  std::ostringstream a;
+  std::ostringstream b;
+  LoadedConfig plain = shipped;
+  plain.origins = defaults.origins;
+  print_config(defaults, a);
+  print_config(plain, b);
+  EXPECT_EQ(a.str(), b.str());
+  // Every key stands in the shipped file; the CPU depends on the machine and is a comment there.
+  for (const KeyOrigin& key : shipped.origins) {
+    if (key.key != "capture.cpu") {
+      EXPECT_THAT(key.origin, HasSubstr("dtactd.toml:")) << key.key;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dtact::app

@@ -1,0 +1,126 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "daemon/calibration/sha256.hpp"
+#include "daemon/calibration/text.hpp"
+#include "hal/image/png.hpp"
+#include "tests/unit/calibration/sample.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+using testing::ThrowsMessage;
+
+/// The sample's text with one place changed.
+std::string with(const std::string& from, const std::string& to) {
+  std::string toml = format(sample()).toml;
+  const auto at = toml.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  if (at != std::string::npos) toml.replace(at, from.size(), to);
+  return toml;
+}
+
+void expect_refused(const std::string& toml, const std::string& key, const std::string& what) {
+  const std::string png = format(sample()).reference_png;
+  EXPECT_THAT([&] { (void)parse(toml, png, "upload"); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(StartsWith("upload:"), HasSubstr(key), HasSubstr(what))));
+}
+
+TEST(ParseCalibration, TakesTheTwoFilesOfAnUpload) {
+  const Files files = format(sample());
+  const Calibration calibration = parse(files.toml, files.reference_png, "upload");
+  EXPECT_EQ(calibration.name, "");
+  EXPECT_EQ(calibration.model->reference_q8, sample().model->reference_q8);
+}
+
+TEST(ParseCalibration, NamesFileLineAndKey) {
+  // mm_per_px stands on line 5.
+  expect_refused(with("mm_per_px = 0.051", "mm_per_px = \"wide\""), "upload:5: mm_per_px",
+                 "wrong type");
+}
+
+TEST(ParseCalibration, RefusesWhatIsNotToml) {
+  expect_refused("version = \n", "upload:1", "");
+  expect_refused("", "upload:1: version", "missing");
+}
+
+TEST(ParseCalibration, RefusesImpossibleValues) {
+  expect_refused(with("version = 1", "version = 2"), "version", "2 is not allowed");
+  expect_refused(with("\"list\"", "\"magic\""), "method", "\"published\"");
+  expect_refused(with("mm_per_px = 0.051", "mm_per_px = 0"), "mm_per_px", "0 is not allowed");
+  expect_refused(with("mm_per_px = 0.051", "mm_per_px = nan"), "mm_per_px", "not allowed");
+  expect_refused(with("smoothing_px = 1.5", "smoothing_px = -1"), "smoothing_px", "not allowed");
+  expect_refused(with("created = \"2026-", "created = \"26-"), "created", "2026-01-31T12:00:00Z");
+  expect_refused(with("width = 12", "width = 1"), "frame.width", "from 2");
+  expect_refused(with("col = 3", "col = 7"), "crop.width", "from 1 to 5");
+  expect_refused(with("row = 2", "row = -2"), "crop.row", "not allowed");
+  expect_refused(with("leds = [255,", "leds = [256,"), "light.leds", "entry 1");
+  expect_refused(with("leds = [255, ", "leds = ["), "light.leds", "r, g, b");
+  expect_refused(with("first_q6 = -2", "first_q6 = 0"), "list", "list.covered_from_q6");
+  expect_refused(with("covered_to_q6 = 2", "covered_to_q6 = 9"), "list", "covered_to_q6");
+  expect_refused(with("-20, -10, 0", "-20, -10, -11"), "list", "entry 3");
+  expect_refused(with("-20, -10, 0", "-20, 1.5, 0"), "list.um", "entry 2");
+  expect_refused(with("\"gain\" = -3", "\"gain\" = \"low\""), "camera.controls.gain", "wrong type");
+  expect_refused(with("sha256 = \"aaaa", "sha256 = \"AAAA"), "source.sha256", "hexadecimal");
+  expect_refused(with("  0, 1, 7, 2, 29, 1,", "  0, 1, 7, 2, 29, 2,"), "untrusted.runs", "pair 3");
+  expect_refused(with("  0, 1, 7, 2, 29, 1,", "  0, 1, 7,"), "untrusted.runs", "pairs");
+}
+
+TEST(ParseCalibration, RefusesMissingAndUnknownKeys) {
+  expect_refused(with("mm_per_px = 0.051", "mm_per_pixel = 0.051"), "mm_per_px", "missing");
+  expect_refused(with("version = 1", "version = 1\nextra = 2"), "extra", "unknown key");
+  expect_refused(with("col = 3", "col = 3\ncolumn = 3"), "crop.column",
+                 "allowed here: col, height, row, width");
+  expect_refused(with("[crop]", "[corp]"), "crop", "missing");
+}
+
+TEST(ParseCalibration, ReservedTablesMayBeEmptyOrAbsentButNotFilled) {
+  const std::string png = format(sample()).reference_png;
+  EXPECT_NO_THROW((void)parse(with("[lens]\n[surface]\n[gain]\n", ""), png, "upload"));
+  expect_refused(with("[lens]\n", "[lens]\nk1 = 0.1\n"), "lens", "reserved");
+  expect_refused(with("[gain]\n", "[gain]\nmap = 1\n"), "gain", "reserved");
+}
+
+TEST(ParseCalibration, RefusesAnotherReference) {
+  const Files files = format(sample());
+  const std::string other =
+      image::encode_png(image::Grey16{12, 9, std::vector<std::uint16_t>(108, 1)});
+  EXPECT_THAT([&] { (void)parse(files.toml, other, "upload"); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("reference.sha256")));
+}
+
+/// The sample with `png` in the place of its reference and the checksum to match.
+void expect_reference_refused(const std::string& png, const std::string& what) {
+  const Files files = format(sample());
+  std::string toml = files.toml;
+  const std::string digest = sha256_hex(files.reference_png);
+  toml.replace(toml.find(digest), digest.size(), sha256_hex(png));
+  EXPECT_THAT([&] { (void)parse(toml, png, "upload"); },
+              ThrowsMessage<std::runtime_error>(HasSubstr(what)));
+}
+
+TEST(ParseCalibration, RefusesAReferenceThatCannotBe) {
+  expect_reference_refused("not a PNG", "reference.png");
+  expect_reference_refused(
+      image::encode_png(image::Grey16{9, 12, std::vector<std::uint16_t>(108, 1)}), "9x12");
+  expect_reference_refused(
+      image::encode_png(image::Grey16{12, 9, std::vector<std::uint16_t>(108, 65281)}), "65280");
+}
+
+TEST(FormatCalibration, RefusesAnotherRectificationThanTheCrop) {
+  Calibration calibration = sample();
+  auto model = std::make_shared<recon::Model>(*calibration.model);
+  model->rectify.entries[3].fx = 5;
+  calibration.model = model;
+  EXPECT_THROW((void)format(calibration), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dtact::calibration

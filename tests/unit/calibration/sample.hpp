@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "daemon/calibration/calibration.hpp"
+
+namespace dtact::calibration {
+
+/// A calibration that differs from the defaults in every field.
+inline Calibration sample() {
+  auto model = std::make_shared<recon::Model>();
+  model->method = recon::Method::list;
+  model->rectify = recon::make_crop_table(12, 9, 3, 2, 6, 5);  // 108 pixels → 30
+  model->mm_per_px = 0.051;
+  model->smoothing_px = 1.5;
+  model->list.first_q6 = -2;
+  model->list.um = {-20, -10, 0, 10, 20};
+  model->list.covered_from_q6 = -1;
+  model->list.covered_to_q6 = 2;
+  model->reference_q8.assign(108, 160 * 256 + 37);
+  model->reference_q8[5] = 65280;
+  model->untrusted.assign(30, 0);
+  model->untrusted[0] = model->untrusted[7] = model->untrusted[8] = model->untrusted[29] = 1;
+  Calibration calibration;
+  calibration.crop_col = 3;
+  calibration.crop_row = 2;
+  calibration.origin.camera = "usb-0:1.2 \"left\"\\";
+  calibration.origin.pixel_format = "MJPEG";
+  calibration.origin.fps = 59.94;
+  calibration.origin.controls = {{"exposure absolute", 157}, {"gain", -3}};
+  calibration.origin.leds = {255, 254, 253, 0, 1, 2};
+  calibration.origin.created = "2026-01-31T12:00:00Z";
+  calibration.origin.sources = {{"ball.png", std::string(64, 'a')},
+                                {"ball_reference.png", std::string(64, '0')}};
+  calibration.model = std::move(model);
+  return calibration;
+}
+
+/// A folder of the test's own, removed at the end.
+class TempFolder {
+ public:
+  TempFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "dtact.XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+    path_ = name;
+  }
+  TempFolder(const TempFolder&) = delete;
+  TempFolder& operator=(const TempFolder&) = delete;
+  ~TempFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace dtact::calibration

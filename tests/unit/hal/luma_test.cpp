@@ -1,0 +1,118 @@
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "hal/luma/extract.hpp"
+#include "hal/luma/luma_buffer.hpp"
+
+namespace dtact::hal::luma {
+namespace {
+
+TEST(LumaBuffer, RowsAreAlignedAndTheTailIsReadable) {
+  LumaBuffer buffer(100, 3);
+  EXPECT_EQ(buffer.stride(), 128);
+  EXPECT_EQ(reinterpret_cast<std::uintptr_t>(buffer.row(2)) % 64, 0U);
+  EXPECT_EQ(buffer.row(2)[99 + kLumaPadding], 0);
+  EXPECT_EQ(buffer.view().width, 100);
+  EXPECT_EQ(buffer.view().height, 3);
+}
+
+TEST(LumaBuffer, MovesAndLeavesNothingBehind) {
+  LumaBuffer first(64, 2);
+  first.row(1)[5] = 42;
+  LumaBuffer second(std::move(first));
+  EXPECT_EQ(second.row(1)[5], 42);
+  // NOLINTBEGIN(bugprone-use-after-move,clang-analyzer-cplusplus.Move): the state is documented
+  EXPECT_EQ(first.data(), nullptr);
+  EXPECT_EQ(first.width(), 0);
+  // NOLINTEND(bugprone-use-after-move,clang-analyzer-cplusplus.Move)
+  LumaBuffer third;
+  third = std::move(second);
+  EXPECT_EQ(third.stride(), 64);
+  EXPECT_EQ(third.row(1)[5], 42);
+}
+
+TEST(LumaBuffer, RefusesSizesNoCameraHas) {
+  EXPECT_THROW(LumaBuffer(0, 1), std::invalid_argument);
+  EXPECT_THROW(LumaBuffer(1, -1), std::invalid_argument);
+  EXPECT_THROW(LumaBuffer(16385, 1), std::invalid_argument);
+}
+
+TEST(ExpandLimited, MapsBlackAndWhiteAndRoundsToNearest) {
+  EXPECT_EQ(expand_limited(0), 0);
+  EXPECT_EQ(expand_limited(16), 0);
+  EXPECT_EQ(expand_limited(17), 1);     // 255/219 = 1.164
+  EXPECT_EQ(expand_limited(18), 2);     // 2.329
+  EXPECT_EQ(expand_limited(19), 3);     // 3.493
+  EXPECT_EQ(expand_limited(22), 7);     // 6.986
+  EXPECT_EQ(expand_limited(126), 128);  // 128.08
+  EXPECT_EQ(expand_limited(234), 254);  // 253.84
+  EXPECT_EQ(expand_limited(235), 255);
+  EXPECT_EQ(expand_limited(255), 255);
+}
+
+TEST(Extract, GreyKeepsFullRangeAsItIs) {
+  const std::vector<std::uint8_t> payload = {0, 16, 235, 255, 1, 2};
+  LumaBuffer out(3, 2);
+  ASSERT_EQ(extract(Layout::grey, Range::full, payload, 0, out), ExtractStatus::ok);
+  EXPECT_EQ(out.row(0)[0], 0);
+  EXPECT_EQ(out.row(0)[1], 16);
+  EXPECT_EQ(out.row(0)[2], 235);
+  EXPECT_EQ(out.row(1)[0], 255);
+  EXPECT_EQ(out.row(1)[2], 2);
+}
+
+TEST(Extract, YuyvTakesEverySecondByteAndExpands) {
+  const std::vector<std::uint8_t> payload = {16, 99, 235, 99, 126, 99, 10, 99};
+  LumaBuffer out(4, 1);
+  ASSERT_EQ(extract(Layout::yuyv, Range::limited, payload, 0, out), ExtractStatus::ok);
+  EXPECT_EQ(out.row(0)[0], 0);
+  EXPECT_EQ(out.row(0)[1], 255);
+  EXPECT_EQ(out.row(0)[2], 128);
+  EXPECT_EQ(out.row(0)[3], 0);
+  ASSERT_EQ(extract(Layout::yuyv, Range::full, payload, 0, out), ExtractStatus::ok);
+  EXPECT_EQ(out.row(0)[1], 235);
+  EXPECT_EQ(out.row(0)[3], 10);
+}
+
+TEST(Extract, Nv12ReadsTheFirstPlaneAndWantsTheSecond) {
+  std::vector<std::uint8_t> payload = {1, 2, 3, 4, 128, 128};
+  LumaBuffer out(2, 2);
+  ASSERT_EQ(extract(Layout::nv12, Range::full, payload, 0, out), ExtractStatus::ok);
+  EXPECT_EQ(out.row(1)[1], 4);
+  payload.pop_back();
+  EXPECT_EQ(extract(Layout::nv12, Range::full, payload, 0, out), ExtractStatus::short_payload);
+}
+
+TEST(Extract, HonoursPaddedLines) {
+  const std::vector<std::uint8_t> payload = {1, 2, 0, 0, 3, 4};
+  LumaBuffer out(2, 2);
+  ASSERT_EQ(extract(Layout::grey, Range::full, payload, 4, out), ExtractStatus::ok);
+  EXPECT_EQ(out.row(0)[1], 2);
+  EXPECT_EQ(out.row(1)[0], 3);
+}
+
+TEST(Extract, ShortPayloadsWriteNothing) {
+  LumaBuffer out(4, 2);
+  const std::vector<std::uint8_t> payload(15, 200);
+  EXPECT_EQ(extract(Layout::yuyv, Range::full, payload, 0, out), ExtractStatus::short_payload);
+  EXPECT_EQ(extract(Layout::grey, Range::full, {}, 0, out), ExtractStatus::short_payload);
+  EXPECT_EQ(out.row(0)[0], 0);
+}
+
+TEST(Extract, RefusesShapesTheLayoutCannotHave) {
+  const std::vector<std::uint8_t> payload(1000, 0);
+  LumaBuffer odd(3, 2);
+  EXPECT_EQ(extract(Layout::yuyv, Range::full, payload, 0, odd), ExtractStatus::bad_shape);
+  EXPECT_EQ(extract(Layout::nv12, Range::full, payload, 0, odd), ExtractStatus::bad_shape);
+  LumaBuffer even(4, 2);
+  EXPECT_EQ(extract(Layout::grey, Range::full, payload, 3, even), ExtractStatus::bad_shape);
+  LumaBuffer none;
+  EXPECT_EQ(extract(Layout::grey, Range::full, payload, 0, none), ExtractStatus::bad_shape);
+}
+
+}  // namespace
+}  // namespace dtact::hal::luma

@@ -1,0 +1,174 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <random>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "hal/luma/luma_buffer.hpp"
+#include "hal/mjpeg/grey_decoder.hpp"
+#include "tests/fakes/jpeg_maker.hpp"
+#include "tests/fakes/malloc_counter.hpp"
+
+namespace dtact::hal::mjpeg {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+using fakes::make_jpeg;
+
+int slope(int x, int y) { return 20 + 2 * x + y; }  // 20 … 193 on 64×48
+
+class GreyDecoderTest : public ::testing::Test {
+ protected:
+  Status decode(std::span<const std::uint8_t> payload) {
+    return decoder.decode(payload, out.data(), out.stride());
+  }
+  int worst_error() {
+    int worst = 0;
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 0; x < 64; ++x) {
+        worst = std::max(worst, std::abs(int{out.row(y)[x]} - slope(x, y)));
+      }
+    }
+    return worst;
+  }
+  GreyDecoder decoder{64, 48};
+  luma::LumaBuffer out{64, 48};
+};
+
+TEST_F(GreyDecoderTest, FlatGreyIsExact) {
+  const Bytes jpeg = make_jpeg({.quality = 100, .colour = false}, [](int, int) { return 200; });
+  ASSERT_EQ(decode(jpeg), Status::ok);
+  EXPECT_EQ(out.row(0)[0], 200);
+  EXPECT_EQ(out.row(47)[63], 200);
+}
+
+TEST_F(GreyDecoderTest, ColourDoesNotReachTheLuma) {
+  ASSERT_EQ(decode(make_jpeg({}, slope)), Status::ok);
+  EXPECT_LE(worst_error(), 3);  // quality 95: quantisation steps of 1 to 2 in the low frequencies
+}
+
+TEST_F(GreyDecoderTest, StandardHuffmanTablesMayBeMissing) {
+  ASSERT_EQ(decode(make_jpeg({.huffman_tables = false}, slope)), Status::ok);
+  EXPECT_LE(worst_error(), 3);
+}
+
+TEST_F(GreyDecoderTest, RestartMarkersAreFollowed) {
+  ASSERT_EQ(decode(make_jpeg({.restart_rows = 1}, slope)), Status::ok);
+  EXPECT_LE(worst_error(), 3);
+}
+
+TEST_F(GreyDecoderTest, OddSizesAndStridesWork) {
+  GreyDecoder odd(61, 45);
+  luma::LumaBuffer wide(200, 45);
+  ASSERT_EQ(odd.decode(make_jpeg({.width = 61, .height = 45}, slope), wide.data(), wide.stride()),
+            Status::ok);
+  EXPECT_NEAR(wide.row(44)[60], slope(60, 44), 3);
+  EXPECT_EQ(wide.row(44)[61], 0);
+}
+
+TEST_F(GreyDecoderTest, DoubledMarkersAndTrailingBytesAreTolerated) {
+  Bytes jpeg = make_jpeg({}, slope);
+  jpeg.insert(jpeg.begin(), {0xFF, 0xD8});
+  jpeg.insert(jpeg.end(), {0xFF, 0xD9, 0, 0, 0, 0});
+  ASSERT_EQ(decode(jpeg), Status::ok);
+  EXPECT_LE(worst_error(), 3);
+}
+
+TEST_F(GreyDecoderTest, NothingAndNonsenseAreTold) {
+  EXPECT_EQ(decode({}), Status::empty);
+  EXPECT_EQ(decode(Bytes(5000, 0x55)), Status::not_jpeg);
+  EXPECT_EQ(decode(Bytes{0xFF}), Status::truncated);
+  EXPECT_EQ(decode(Bytes{0xFF, 0xD8, 0xFF}), Status::truncated);
+}
+
+TEST_F(GreyDecoderTest, EveryTruncationIsTold) {
+  const Bytes jpeg = make_jpeg({}, slope);
+  for (std::size_t keep = 1; keep < jpeg.size(); ++keep) {
+    ASSERT_EQ(decode(std::span(jpeg).first(keep)), Status::truncated) << keep;
+  }
+  EXPECT_EQ(decode(jpeg), Status::ok);  // and the decoder is none the worse
+}
+
+TEST_F(GreyDecoderTest, TruncationHiddenByAnEndMarkerIsTold) {
+  Bytes jpeg = make_jpeg({}, slope);
+  jpeg.resize(jpeg.size() / 2 + 300);
+  jpeg.insert(jpeg.end(), {0xFF, 0xD9});
+  EXPECT_EQ(decode(jpeg), Status::corrupt);
+}
+
+TEST_F(GreyDecoderTest, AnotherSizeIsTold) {
+  EXPECT_EQ(decode(make_jpeg({.width = 48, .height = 64}, slope)), Status::wrong_size);
+  Size size;
+  ASSERT_EQ(decoder.read_size(make_jpeg({.width = 48, .height = 64}, slope), size), Status::ok);
+  EXPECT_EQ(size, (Size{48, 64}));
+}
+
+TEST_F(GreyDecoderTest, ProgressiveIsUnsupported) {
+  EXPECT_EQ(decode(make_jpeg({.progressive = true}, slope)), Status::unsupported);
+  EXPECT_EQ(decode(make_jpeg({}, slope)), Status::ok);
+}
+
+TEST_F(GreyDecoderTest, FramesDoNotInheritTables) {
+  ASSERT_EQ(decode(make_jpeg({}, slope)), Status::ok);
+  Bytes jpeg = make_jpeg({}, slope);
+  // Without its quantisation tables (marker FFDB becomes a comment, FFFE) a frame means nothing.
+  for (std::size_t i = 0; i + 1 < jpeg.size(); ++i) {
+    if (jpeg[i] == 0xFF && jpeg[i + 1] == 0xDB) jpeg[i + 1] = 0xFE;
+  }
+  EXPECT_EQ(decode(jpeg), Status::corrupt);
+}
+
+TEST_F(GreyDecoderTest, FlippedBytesNeverCrashOrPoisonTheNextFrame) {
+  const Bytes good = make_jpeg({.restart_rows = 1}, slope);
+  std::minstd_rand random(7);
+  for (int i = 0; i < 3000; ++i) {
+    Bytes bad = good;
+    for (int k = 0; k < 3; ++k) {
+      bad[random() % bad.size()] = static_cast<std::uint8_t>(random() >> 8U);
+    }
+    (void)decode(bad);
+  }
+  ASSERT_EQ(decode(good), Status::ok);
+  EXPECT_LE(worst_error(), 3);
+}
+
+TEST_F(GreyDecoderTest, MovesWithItsMemory) {
+  GreyDecoder moved(std::move(decoder));
+  EXPECT_EQ(moved.decode(make_jpeg({}, slope), out.data(), out.stride()), Status::ok);
+}
+
+TEST(GreyDecoder, RefusesSizesNoCameraHas) {
+  EXPECT_THROW(GreyDecoder(0, 600), std::invalid_argument);
+  EXPECT_THROW(GreyDecoder(800, 20000), std::invalid_argument);
+}
+
+TEST(GreyDecoder, NeverAllocatesWhileDecoding) {
+  if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer brings its own malloc";
+  const Bytes good = make_jpeg({.width = 800, .height = 600},
+                               [](int x, int y) { return 60 + (x * 7 + y * 13) % 120; });
+  const Bytes bad(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(good.size() / 2));
+  GreyDecoder decoder(800, 600);
+  luma::LumaBuffer out(800, 600);
+  const std::uint64_t before = fakes::counted_allocations();
+  fakes::count_allocations(true);
+  bool as_expected = true;
+  for (int i = 0; i < 20; ++i) {
+    as_expected = as_expected && decoder.decode(good, out.data(), out.stride()) == Status::ok &&
+                  decoder.decode(bad, out.data(), out.stride()) == Status::truncated;
+  }
+  fakes::count_allocations(false);
+  EXPECT_TRUE(as_expected);
+  EXPECT_EQ(fakes::counted_allocations() - before, 0U);
+  // The counter itself works (volatile: else the compiler drops the pair).
+  fakes::count_allocations(true);
+  int* volatile made = new int(1);
+  delete made;
+  fakes::count_allocations(false);
+  EXPECT_GE(fakes::counted_allocations() - before, 1U);
+}
+
+}  // namespace
+}  // namespace dtact::hal::mjpeg

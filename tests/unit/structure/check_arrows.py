@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""Checks who includes whom, against the folder map of README.md.
+
+Each room names the rooms whose headers it may include; its own are always allowed. System and
+library headers are checked for the rooms whose point is to know none.
+"""
+import pathlib
+import re
+import sys
+
+ROOMS = {
+    "hal/base": [],
+    "hal/image": ["hal/base"],
+    "hal/luma": ["hal", "hal/base"],
+    "hal/mjpeg": ["hal", "hal/base", "hal/luma"],
+    "hal/null": ["hal", "hal/base"],
+    "hal/replay": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mjpeg"],
+    "hal/sim": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mjpeg"],
+    # The registry is the only file that names backends.
+    "hal": ["hal/base", "hal/null", "hal/replay", "hal/sim"],
+    "daemon/recon": [],
+    "daemon/calibration": ["hal/base", "hal/image", "daemon/recon"],
+    "daemon/pipeline": ["hal", "hal/base", "hal/image", "daemon/recon", "daemon/calibration"],
+    "daemon/net": ["hal", "hal/base", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
+    "daemon/app": ["hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net"],
+    "daemon": ["daemon/app"],
+    "proto": [],
+    "clients/cpp": ["hal/base", "proto"],
+    "clients/ctl/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration"],
+    "clients/ctl": ["hal/base", "hal/image", "proto", "clients/cpp", "clients/ctl/offline"],
+}
+# Only standard headers and Highway may stand in angle brackets here.
+STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}
+# The daemon links OpenCV's core module and no other.
+OPENCV_CORE = re.compile(r"^opencv2/core(\.hpp|/.*)$")
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
+
+
+def room_of(path):
+    """The deepest room that `path` (relative to the top) lies in, or None."""
+    parent = pathlib.PurePosixPath(path).parent
+    while str(parent) != ".":
+        if str(parent) in ROOMS:
+            return str(parent)
+        parent = parent.parent
+    return None
+
+
+def complaints(top):
+    for folder in ("hal", "daemon", "proto", "clients"):
+        for path in sorted((top / folder).rglob("*.[ch]pp")):
+            name = path.relative_to(top).as_posix()
+            room = room_of(name)
+            if room is None:
+                yield f"{name}: lies in no room of the folder map"
+                continue
+            for bracket, included in INCLUDE.findall(path.read_text()):
+                if bracket == "<":
+                    if included.startswith("opencv2/") and not OPENCV_CORE.match(included) \
+                            and not room.startswith("clients/"):
+                        yield f"{name}: includes <{included}>; only OpenCV's core module is linked"
+                    if room in STANDARD_ONLY and not STANDARD_ONLY[room].match(included):
+                        yield f"{name}: {room} may use the standard library and Highway only, not <{included}>"
+                    continue
+                other = room_of(included)
+                if other and other != room and other not in ROOMS[room]:
+                    yield f"{name}: {room} may not include \"{included}\" ({other})"
+
+
+def main():
+    top = pathlib.Path(sys.argv[1]).resolve()
+    found = list(complaints(top))
+    for line in found:
+        print(line)
+    print(f"{len(found)} includes against the arrows")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
