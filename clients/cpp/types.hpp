@@ -1,0 +1,188 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+// What a client sees, free of protobuf. Coordinates, units and signs are those of dtact.proto:
+// x right, y down, z towards the object, origin at the depth map's centre; indentation in
+// millimetres, positive = pressed.
+namespace dtact::client {
+
+struct Rgb {
+  std::uint8_t r = 0;
+  std::uint8_t g = 0;
+  std::uint8_t b = 0;
+  bool operator==(const Rgb&) const = default;
+};
+
+/// What the ring shows: each LED its colour, scaled by brightness / 255.
+struct Light {
+  std::uint8_t brightness = 0;
+  std::vector<Rgb> leds;  ///< Eight; LED 0 at the image's right, then clockwise.
+  bool operator==(const Light&) const = default;
+};
+
+struct Contact {
+  bool touching = false;
+  double area_mm2 = 0;
+  double x_mm = 0;  ///< Depth-weighted centroid.
+  double y_mm = 0;
+  double deepest_mm = 0;
+  double deepest_x_mm = 0;
+  double deepest_y_mm = 0;
+  double volume_mm3 = 0;
+};
+
+struct DepthMap {
+  int width = 0;   ///< Pixels.
+  int height = 0;  ///< Pixels.
+  double mm_per_px = 0;
+  double um_per_unit = 1;            ///< Micrometres a unit of `values`.
+  std::int16_t untrusted = 0;        ///< The value of a pixel not to believe. 0 is a valid depth.
+  std::vector<std::int16_t> values;  ///< Row-major.
+
+  /// One pixel in millimetres, NaN where untrusted.
+  [[nodiscard]] float millimetres(std::size_t index) const noexcept;
+  /// All pixels in millimetres, row-major, NaN where untrusted.
+  [[nodiscard]] std::vector<float> millimetres() const;
+};
+
+struct LumaMap {
+  int width = 0;
+  int height = 0;
+  std::vector<std::uint8_t> values;  ///< Row-major.
+};
+
+/// Nanoseconds in each stage.
+struct StageTimes {
+  std::uint32_t decode_ns = 0;
+  std::uint32_t rectify_ns = 0;
+  std::uint32_t smooth_ns = 0;
+  std::uint32_t list_ns = 0;
+  std::uint32_t inspect_ns = 0;
+  std::uint32_t encode_ns = 0;
+};
+
+struct Frame {
+  std::uint64_t sequence = 0;       ///< The camera's; a gap is a lost frame.
+  std::int64_t monotonic_ns = 0;    ///< Capture, CLOCK_MONOTONIC of the daemon's machine.
+  std::int64_t wall_ns = 0;         ///< The same moment since 1970, UTC.
+  std::string meaning;              ///< "start_of_exposure", "end_of_frame", "arrival".
+  std::int64_t ready_ns = 0;        ///< CLOCK_MONOTONIC: complete at the HAL.
+  std::int64_t published_ns = 0;    ///< CLOCK_MONOTONIC: depth done.
+  std::vector<std::string> health;  ///< Conditions by name: "light_unsettled", … Empty: all well.
+  Light light;                      ///< At the time of exposure.
+  Contact contact;
+  StageTimes times;
+  std::optional<DepthMap> depth;
+  std::optional<LumaMap> luma;
+  std::uint64_t dropped = 0;  ///< Frames this client has missed since it connected.
+  std::string frame_id;
+};
+
+struct ContactChanged {
+  std::uint64_t sequence = 0;
+  std::int64_t monotonic_ns = 0;
+  Contact contact;  ///< touching: made; not: lost.
+};
+struct LightChanged {
+  Light light;
+};
+struct ReferenceTaken {
+  std::uint64_t sequence = 0;
+  bool restored = false;  ///< The last good one from the state directory.
+};
+struct StateChanged {
+  std::string state;  ///< "settling", "referencing", "serving", "uncalibrated", "camera_lost".
+  std::vector<std::string> health;
+};
+struct CalibrationChanged {
+  std::string name;
+};
+using Event =
+    std::variant<ContactChanged, LightChanged, ReferenceTaken, StateChanged, CalibrationChanged>;
+
+/// Who answered.
+struct ServerInfo {
+  std::string program;  ///< "dtactd 0.1.0"
+  std::uint32_t major = 0;
+  std::uint32_t minor = 0;
+  std::string frame_id;
+};
+
+struct CalibrationFiles {
+  std::string name;
+  std::string toml;  ///< calibration.toml
+  std::string png;   ///< reference.png
+};
+
+struct Status {
+  std::string state;
+  std::vector<std::string> health;
+  std::string advice;  ///< What to do; empty when all is well.
+  struct Control {
+    std::string name;
+    std::int64_t value = 0;
+    bool locked = false;
+  };
+  struct Camera {
+    std::string backend;
+    std::string identity;
+    std::string pixel_format;
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    double fps = 0;
+    std::string condition;
+    std::string remedy;
+    std::uint64_t delivered = 0;
+    std::uint64_t lost = 0;
+    std::uint64_t skipped = 0;
+    std::uint64_t damaged = 0;
+    std::uint64_t disconnects = 0;
+    std::vector<Control> controls;
+  } camera;
+  struct Ring {
+    std::string backend;
+    std::string identity;
+    std::string message;
+  } ring;
+  Light light;
+  struct Calibration {
+    std::string name;
+    std::string method;
+    double mm_per_px = 0;
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+    double covered_from_mm = 0;
+    double covered_to_mm = 0;
+    std::string created;
+  };
+  std::optional<Calibration> calibration;
+  std::uint64_t frames = 0;
+  std::uint64_t skipped = 0;
+  double fps = 0;
+  std::vector<std::string> realtime_refused;
+  struct Stage {
+    std::string name;
+    double p50_us = 0;
+    double p99_us = 0;
+    double max_us = 0;
+  };
+  std::vector<Stage> stages;
+  struct Client {
+    std::string address;
+    std::string program;
+    std::uint64_t sent = 0;
+    std::uint64_t dropped = 0;
+  };
+  std::vector<Client> clients;
+  std::string version;
+  double uptime_s = 0;
+};
+
+}  // namespace dtact::client

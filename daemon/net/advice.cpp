@@ -1,0 +1,79 @@
+#include "daemon/net/advice.hpp"
+
+#include <array>
+#include <string_view>
+
+namespace dtact::net {
+namespace {
+
+using pipeline::Health;
+using pipeline::State;
+
+struct Remedy {
+  Health health;
+  std::string_view sentence;
+};
+
+// In the order in which one should act: without a camera or a ring nothing else can be mended.
+constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
+    {Health::camera_trouble, "The camera gives no frames."},
+    {Health::ring_trouble, "The last write to the LED ring failed."},
+    {Health::uncalibrated,
+     "No calibration: save an untouched image and one with a ball pressed in (dtactctl snapshot "
+     "--luma -o FILE.png), then run dtactctl calibrate depth --reference R.png --ball B.png "
+     "--radius-mm MM --mm-per-px S -o cal/ and dtactctl calibration upload cal/."},
+    {Health::camera_mismatch,
+     "Camera, mode or controls differ from the calibration's: restore them in the configuration "
+     "or calibrate again."},
+    {Health::light_mismatch,
+     "The ring shows another light than at calibration: depth is scaled to it, with more noise; "
+     "dtactctl led sets the light back."},
+    {Health::starting, "Starting up: keep the surface untouched until the state is serving."},
+    {Health::light_unsettled,
+     "A light change is under way: keep the surface untouched until a new reference is taken."},
+    {Health::reference_stale,
+     "The reference belongs to another light: leave the surface untouched for a second or run "
+     "dtactctl rezero."},
+    {Health::reference_restored,
+     "Something touched at start, so the last good reference is used: free the surface and run "
+     "dtactctl rezero."},
+    {Health::beyond_calibration,
+     "Pressed deeper than was calibrated: such pixels are marked untrusted; press less or "
+     "calibrate with a deeper press."},
+    {Health::frames_lost,
+     "The camera loses frames: look at the USB cable, hub and processor load."},
+    {Health::not_realtime,
+     "The capture thread runs without real-time scheduling: start dtactd from its systemd unit or "
+     "grant it LimitRTPRIO and LimitMEMLOCK."},
+}};
+
+void add(std::string& text, std::string_view sentence) {
+  if (sentence.empty()) return;
+  if (!text.empty()) text += ' ';
+  text += sentence;
+}
+
+/// The report's own sentence where there is one: it knows the device.
+std::string_view detail(const pipeline::Status& status, Health health) {
+  if (health == Health::camera_trouble) return status.camera_report.remedy;
+  if (health == Health::ring_trouble) return status.ring_message;
+  return {};
+}
+
+}  // namespace
+
+std::string advice(const pipeline::Status& status) {
+  std::string text;
+  if (status.state == State::camera_lost && !status.health.has(Health::camera_trouble)) {
+    add(text, "The camera is away.");
+    add(text, status.camera_report.remedy);
+  }
+  for (const auto& remedy : kRemedies) {
+    if (!status.health.has(remedy.health)) continue;
+    add(text, remedy.sentence);
+    add(text, detail(status, remedy.health));
+  }
+  return text;
+}
+
+}  // namespace dtact::net

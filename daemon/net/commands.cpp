@@ -1,0 +1,331 @@
+#include "daemon/net/commands.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/post.hpp>
+#include <exception>
+#include <utility>
+
+#include "daemon/net/hub.hpp"
+#include "daemon/net/light_schemes.hpp"
+#include "daemon/net/messages.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::net {
+namespace {
+
+namespace asio = boost::asio;
+
+/// GetCalibration requests that may wait for the worker at the same time.
+constexpr int kMaxReading = 16;
+
+constexpr const char* kBusy = "too many commands wait: ask again in a moment";
+
+v1::ServerMessage reply_to(std::uint64_t id) {
+  v1::ServerMessage message;
+  message.mutable_reply()->set_id(id);
+  return message;
+}
+
+v1::ErrorCode code_of(pipeline::Outcome outcome) {
+  switch (outcome) {
+    case pipeline::Outcome::done:
+      return v1::ERROR_NONE;
+    case pipeline::Outcome::refused_contact:
+      return v1::ERROR_CONTACT;
+    case pipeline::Outcome::device_error:
+    case pipeline::Outcome::camera_away:
+      return v1::ERROR_DEVICE;
+    case pipeline::Outcome::invalid:
+      return v1::ERROR_INVALID;
+  }
+  return v1::ERROR_INVALID;
+}
+
+bool valid_name(const std::string& name) {
+  return !name.empty() && name.size() <= wire::kMaxCalibrationName &&
+         std::all_of(name.begin(), name.end(), [](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                  c == '-' || c == '_';
+         });
+}
+
+/// `light` changed as `request` says, or the sentence that says what is wrong with it.
+std::string change(const v1::SetLight& request, hal::Light& light) {
+  if (request.has_brightness()) {
+    if (request.brightness() > 255) {
+      return fmt::format("set_light.brightness: {}; allowed are 0 to 255", request.brightness());
+    }
+    light.brightness = static_cast<std::uint8_t>(request.brightness());
+  }
+  if (request.has_scheme()) {
+    const auto leds = scheme_leds(request.scheme());
+    if (!leds.has_value()) {
+      return fmt::format("set_light.scheme: \"{}\" is unknown; known are {}", request.scheme(),
+                         scheme_names());
+    }
+    light.leds = *leds;
+  }
+  if (request.leds().empty()) return {};
+  if (request.leds_size() != hal::kLedCount) {
+    return fmt::format("set_light.leds: {} colours, the ring has {}: send all or none",
+                       request.leds_size(), hal::kLedCount);
+  }
+  for (int i = 0; i < hal::kLedCount; ++i) {
+    const auto& led = request.leds(i);
+    if (led.r() > 255 || led.g() > 255 || led.b() > 255) {
+      return fmt::format("set_light.leds[{}]: {}, {}, {}; allowed are 0 to 255", i, led.r(),
+                         led.g(), led.b());
+    }
+    light.leds[static_cast<std::size_t>(i)] = {static_cast<std::uint8_t>(led.r()),
+                                               static_cast<std::uint8_t>(led.g()),
+                                               static_cast<std::uint8_t>(led.b())};
+  }
+  return {};
+}
+
+/// What a step on the worker came to: a value, or the sentence that says why not.
+template <typename Value>
+struct Outcome {
+  Value value{};
+  std::string error;
+};
+
+template <typename Value, typename Step>
+Outcome<Value> attempt(Step step) {
+  try {
+    return {step(), {}};
+  } catch (const std::exception& e) {
+    return {{}, e.what()};
+  }
+}
+
+}  // namespace
+
+Commands::Commands(asio::io_context& io, asio::thread_pool& worker, const NetConfig& config,
+                   Hub& hub, pipeline::Port& port, CalibrationStore& store)
+    : io_(io), worker_(worker), config_(config), hub_(hub), port_(port), store_(store) {}
+
+void Commands::on_request(const std::shared_ptr<Session>& session,
+                          const v1::ClientMessage& message) {
+  const Who who{session, message.id()};
+  switch (message.request_case()) {
+    case v1::ClientMessage::kSubscribe:
+      return subscribe(who, message.subscribe());
+    case v1::ClientMessage::kSetLight:
+      return set_light(who, message.set_light());
+    case v1::ClientMessage::kRezero:
+      return rezero(who, message.rezero().force());
+    case v1::ClientMessage::kGetStatus:
+      return get_status(who);
+    case v1::ClientMessage::kGetCalibration:
+      return get_calibration(who);
+    case v1::ClientMessage::kUploadCalibration:
+      return upload_calibration(who, message.upload_calibration());
+    case v1::ClientMessage::kHello:
+    case v1::ClientMessage::REQUEST_NOT_SET:
+      return;  // The session's business.
+  }
+}
+
+void Commands::subscribe(const Who& who, const v1::Subscribe& request) {
+  const auto& [session, id] = who;
+  if (!v1::DepthEncoding_IsValid(request.depth()) || !v1::LumaEncoding_IsValid(request.luma())) {
+    return session->reply_error(
+        id, v1::ERROR_INVALID,
+        fmt::format("subscribe: depth encoding {} or luma encoding {} is unknown to this daemon",
+                    static_cast<int>(request.depth()), static_cast<int>(request.luma())));
+  }
+  Subscription subscription;
+  if (!request.summary()) subscription.kind = {request.depth(), request.luma()};
+  subscription.active = request.summary() || subscription.kind != FrameKind{};
+  subscription.every = std::max(request.every(), 1U);
+  session->subscribe(subscription);
+  hub_.update_want();
+  auto message = reply_to(id);
+  message.mutable_reply()->mutable_done();
+  session->send(message);
+}
+
+bool Commands::submit(const Who& who, decltype(pipeline::Command::what) command,
+                      decltype(Pending::what) what) {
+  const std::uint64_t ticket = next_ticket_++;
+  if (!port_.submit({ticket, std::move(command)})) {
+    who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+    return false;
+  }
+  pending_.emplace(ticket, Pending{who.first, who.second, std::move(what)});
+  return true;
+}
+
+void Commands::set_light(const Who& who, const v1::SetLight& request) {
+  hal::Light light = light_.has_value() ? *light_ : port_.status().light;
+  const std::string wrong = change(request, light);
+  if (!wrong.empty()) return who.first->reply_error(who.second, v1::ERROR_INVALID, wrong);
+  if (!submit(who, pipeline::SetLight{light}, light)) return;
+  light_ = light;
+  ++lights_pending_;
+}
+
+void Commands::on_light(const hal::Light& light) {
+  if (lights_pending_ == 0) light_ = light;
+}
+
+void Commands::rezero(const Who& who, bool force) {
+  (void)submit(who, pipeline::Rezero{force}, Pending::Rezero{});
+}
+
+void Commands::on_done(const pipeline::CommandDone& done) {
+  const auto entry = pending_.extract(done.ticket);
+  if (entry.empty()) return;
+  const Pending& pending = entry.mapped();
+  const bool ok = done.outcome == pipeline::Outcome::done;
+  const auto* light = std::get_if<hal::Light>(&pending.what);
+  if (light != nullptr) {
+    --lights_pending_;
+    if (!ok && lights_pending_ == 0) light_.reset();
+  }
+  const auto* files = std::get_if<std::shared_ptr<const CalibrationFiles>>(&pending.what);
+  if (files != nullptr && ok) return keep_calibration(pending, *files);
+  if (files != nullptr) uploading_ = false;
+
+  const auto session = pending.session.lock();
+  if (session == nullptr) return;
+  if (!ok) return session->reply_error(pending.id, code_of(done.outcome), done.message);
+  auto message = reply_to(pending.id);
+  if (light != nullptr) {
+    fill(*light, *message.mutable_reply()->mutable_light());
+  } else {
+    message.mutable_reply()->mutable_done();
+  }
+  session->send(message);
+}
+
+void Commands::get_status(const Who& who) {
+  auto message = reply_to(who.second);
+  auto& status = *message.mutable_reply()->mutable_status();
+  fill(port_.status(), status);
+  for (const auto& session : hub_.sessions()) {
+    if (!session->greeted()) continue;
+    auto& client = *status.add_clients();
+    client.set_address(session->address());
+    client.set_program(session->program());
+    client.set_sent(session->sent());
+    client.set_dropped(session->dropped());
+  }
+  status.set_version(config_.version);
+  const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - start_;
+  status.set_uptime_s(uptime.count());
+  who.first->send(message);
+}
+
+template <typename Work, typename Done>
+void Commands::on_worker(Work work, Done done) {
+  // The guard keeps the network thread's loop alive until the result has come back.
+  asio::post(worker_, [guard = asio::make_work_guard(io_), weak = weak_from_this(),
+                       work = std::move(work), done = std::move(done)]() mutable {
+    asio::post(guard.get_executor(),
+               [weak = std::move(weak), done = std::move(done), result = work()]() mutable {
+                 if (const auto self = weak.lock()) done(*self, std::move(result));
+               });
+  });
+}
+
+void Commands::get_calibration(const Who& who) {
+  if (port_.status().calibration == nullptr) {
+    return who.first->reply_error(who.second, v1::ERROR_UNCALIBRATED,
+                                  "there is no calibration: make one with dtactctl calibrate "
+                                  "depth and send it with dtactctl calibration upload");
+  }
+  if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+  ++reading_;
+  on_worker(
+      [&store = store_] { return attempt<CalibrationFiles>([&store] { return store.read(); }); },
+      [who](Commands& self, Outcome<CalibrationFiles> read) {
+        --self.reading_;
+        const auto& [session, id] = who;
+        if (!read.error.empty()) {
+          return session->reply_error(id, v1::ERROR_STORAGE,
+                                      "the calibration's files could not be read: " + read.error);
+        }
+        auto message = reply_to(id);
+        auto& files = *message.mutable_reply()->mutable_calibration();
+        files.set_name(std::move(read.value.name));
+        files.set_calibration_toml(std::move(read.value.toml));
+        files.set_reference_png(std::move(read.value.png));
+        session->send(message);
+      });
+}
+
+void Commands::upload_calibration(const Who& who, const v1::UploadCalibration& request) {
+  const auto& [session, id] = who;
+  if (!valid_name(request.name())) {
+    return session->reply_error(
+        id, v1::ERROR_INVALID,
+        fmt::format("upload_calibration.name: \"{}\"; allowed are 1 to {} letters, digits, '-' "
+                    "and '_'",
+                    request.name().substr(0, wire::kMaxCalibrationName),
+                    wire::kMaxCalibrationName));
+  }
+  if (request.calibration_toml().empty() || request.reference_png().empty()) {
+    return session->reply_error(id, v1::ERROR_INVALID,
+                                "upload_calibration: calibration_toml or reference_png is empty: "
+                                "send both files of the calibration folder");
+  }
+  if (uploading_) {
+    return session->reply_error(id, v1::ERROR_BUSY,
+                                "another calibration is being uploaded: ask again in a moment");
+  }
+  uploading_ = true;
+  const auto files = std::make_shared<const CalibrationFiles>(
+      CalibrationFiles{request.name(), request.calibration_toml(), request.reference_png()});
+  using Parsed = std::shared_ptr<const calibration::Calibration>;
+  on_worker([&store = store_,
+             files] { return attempt<Parsed>([&store, &files] { return store.check(*files); }); },
+            [who, files](Commands& self, Outcome<Parsed> parsed) {
+              if (parsed.error.empty()) {
+                return self.use_calibration(who, files, std::move(parsed.value));
+              }
+              self.uploading_ = false;
+              who.first->reply_error(who.second, v1::ERROR_INVALID, parsed.error);
+            });
+}
+
+void Commands::use_calibration(const Who& who, const std::shared_ptr<const CalibrationFiles>& files,
+                               std::shared_ptr<const calibration::Calibration> calibration) {
+  uploading_ = submit(who, pipeline::UseCalibration{std::move(calibration)}, files);
+}
+
+void Commands::keep_calibration(const Pending& pending,
+                                std::shared_ptr<const CalibrationFiles> files) {
+  v1::ServerMessage event;
+  event.mutable_event()->mutable_calibration()->set_name(files->name);
+  hub_.broadcast(event);
+  // It is kept only now that the pipeline has taken it, so that a calibration that does not fit
+  // this camera never replaces one that does.
+  on_worker(
+      [&store = store_, files = std::move(files)] {
+        return attempt<bool>([&store, &files] {
+          store.keep(*files);
+          return true;
+        });
+      },
+      [weak = pending.session, id = pending.id](Commands& self, const Outcome<bool>& kept) {
+        self.uploading_ = false;
+        const auto session = weak.lock();
+        if (session == nullptr) return;
+        if (!kept.error.empty()) {
+          return session->reply_error(id, v1::ERROR_STORAGE,
+                                      "the calibration is in use, but will be lost when the "
+                                      "daemon ends, since it could not be written: " +
+                                          kept.error);
+        }
+        auto message = reply_to(id);
+        message.mutable_reply()->mutable_done();
+        session->send(message);
+      });
+}
+
+}  // namespace dtact::net

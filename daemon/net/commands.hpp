@@ -1,0 +1,84 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+
+#include "daemon/net/calibration_store.hpp"
+#include "daemon/net/net_config.hpp"
+#include "daemon/net/session.hpp"
+#include "daemon/pipeline/port.hpp"
+
+namespace dtact::v1 {
+class SetLight;
+class Subscribe;
+class UploadCalibration;
+}  // namespace dtact::v1
+
+namespace dtact::net {
+
+class Hub;
+
+/// What clients may ask for: checks requests, passes them to the pipeline or to the worker (files
+/// take longer than a frame) and sends each one answer. All on the network thread.
+///
+/// The light: the last writer wins. A partial update changes the light that was asked for last,
+/// also while the ring has not shown it yet.
+class Commands : public std::enable_shared_from_this<Commands> {
+ public:
+  Commands(boost::asio::io_context& io, boost::asio::thread_pool& worker, const NetConfig& config,
+           Hub& hub, pipeline::Port& port, CalibrationStore& store);
+
+  void on_request(const std::shared_ptr<Session>& session, const v1::ClientMessage& message);
+  void on_done(const pipeline::CommandDone& done);
+  /// The ring shows another light.
+  void on_light(const hal::Light& light);
+
+ private:
+  /// A request that the pipeline is working on.
+  struct Pending {
+    std::weak_ptr<Session> session;
+    std::uint64_t id = 0;
+    struct Rezero {};
+    std::variant<Rezero, hal::Light, std::shared_ptr<const CalibrationFiles>> what;
+  };
+  using Who = std::pair<std::shared_ptr<Session>, std::uint64_t>;
+
+  void subscribe(const Who& who, const v1::Subscribe& request);
+  void set_light(const Who& who, const v1::SetLight& request);
+  void rezero(const Who& who, bool force);
+  void get_status(const Who& who);
+  void get_calibration(const Who& who);
+  void upload_calibration(const Who& who, const v1::UploadCalibration& request);
+  void use_calibration(const Who& who, const std::shared_ptr<const CalibrationFiles>& files,
+                       std::shared_ptr<const calibration::Calibration> calibration);
+  void keep_calibration(const Pending& pending, std::shared_ptr<const CalibrationFiles> files);
+  /// False, with the answer sent, when the pipeline cannot take another command.
+  [[nodiscard]] bool submit(const Who& who, decltype(pipeline::Command::what) command,
+                            decltype(Pending::what) what);
+  /// Runs `work` on the worker and then `done`(its result) here.
+  template <typename Work, typename Done>
+  void on_worker(Work work, Done done);
+
+  boost::asio::io_context& io_;
+  boost::asio::thread_pool& worker_;
+  const NetConfig& config_;
+  Hub& hub_;
+  pipeline::Port& port_;
+  CalibrationStore& store_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::map<std::uint64_t, Pending> pending_;  ///< By ticket. The pipeline bounds how many.
+  std::uint64_t next_ticket_ = 1;
+  std::optional<hal::Light> light_;  ///< Asked for last; empty: whatever the ring shows.
+  int lights_pending_ = 0;
+  bool uploading_ = false;  ///< One at a time: each may be as large as a message.
+  int reading_ = 0;
+};
+
+}  // namespace dtact::net

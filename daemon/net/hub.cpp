@@ -1,0 +1,161 @@
+#include "daemon/net/hub.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <boost/asio/post.hpp>
+#include <cerrno>
+#include <system_error>
+
+#include "daemon/net/messages.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::net {
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+/// Refused clients that are told why at the same time; more are only closed.
+constexpr std::size_t kMaxRefused = 16;
+
+/// The hub's own descriptor of the pipeline's eventfd: Asio closes what it watches.
+int duplicate(int fd) {
+  const int copy = ::fcntl(fd, F_DUPFD_CLOEXEC, 0);
+  if (copy < 0) {
+    throw std::system_error(errno, std::generic_category(), "cannot watch the pipeline's events");
+  }
+  return copy;
+}
+
+}  // namespace
+
+Hub::Hub(asio::io_context& io, const NetConfig& config, pipeline::Port& port)
+    : io_(io),
+      config_(config),
+      port_(port),
+      events_(io, duplicate(port.event_fd())),
+      encoder_(config.frame_id) {
+  events_.native_non_blocking(true);
+}
+
+void Hub::start(Handlers handlers) {
+  handlers_ = std::move(handlers);
+  update_want();
+  wait();
+}
+
+void Hub::stop() {
+  error_code ignored;
+  events_.close(ignored);
+  for (auto* list : {&sessions_, &refused_}) {
+    const auto sessions = std::exchange(*list, {});
+    for (const auto& session : sessions) session->close("the daemon ends");
+  }
+  port_.want(false, false);
+}
+
+void Hub::wait() {
+  events_.async_wait(asio::posix::stream_descriptor::wait_read,
+                     [weak = weak_from_this()](const error_code& error) {
+                       const auto self = weak.lock();
+                       if (error || self == nullptr) return;
+                       std::uint64_t count = 0;
+                       // Its value says nothing that draining does not; EAGAIN only that another
+                       // round was faster.
+                       if (::read(self->events_.native_handle(), &count, sizeof count) > 0) {
+                         self->drain();
+                       }
+                       if (self->events_.is_open()) self->wait();
+                     });
+}
+
+void Hub::drain() {
+  while (const auto event = port_.next_event()) on_event(*event);
+  const auto* frame = port_.latest();
+  if (frame == nullptr) return;
+  on_frame(*frame);
+  // There may be another one already. Requests come in between, even when encoding takes longer
+  // than a frame.
+  asio::post(io_, [weak = weak_from_this()] {
+    const auto self = weak.lock();
+    if (self != nullptr && self->events_.is_open()) self->drain();
+  });
+}
+
+void Hub::on_event(const pipeline::Event& event) {
+  if (const auto* done = std::get_if<pipeline::CommandDone>(&event)) return handlers_.done(*done);
+  if (const auto* light = std::get_if<pipeline::LightChanged>(&event)) {
+    handlers_.light(light->light);
+  }
+  v1::ServerMessage message;
+  if (fill(event, *message.mutable_event())) broadcast(message);
+}
+
+void Hub::on_frame(const pipeline::DepthFrame& frame) {
+  const std::uint64_t missed = seen_frame_ ? frame.skipped - skipped_ : 0;
+  skipped_ = frame.skipped;
+  seen_frame_ = true;
+  encoder_.begin(frame);
+  for (const auto& session : sessions_) {
+    if (!session->is_due(missed)) continue;
+    auto encoded = encoder_.encode(session->subscription().kind);
+    if (encoded != nullptr) {
+      session->send_frame(std::move(encoded));
+    } else if (!std::exchange(told_too_large_, true)) {
+      config_.log(LogLevel::warning,
+                  "a frame is above the wire's cap and is not sent: subscribe to depth or luma "
+                  "alone, or choose a smaller camera mode");
+    }
+  }
+}
+
+void Hub::admit(const std::shared_ptr<Session>& session) {
+  if (sessions_.size() < config_.max_clients) {
+    sessions_.push_back(session);
+    session->start();
+  } else if (refused_.size() < kMaxRefused) {
+    refused_.push_back(session);
+    session->refuse(v1::ERROR_BUSY,
+                    fmt::format("{} clients are connected and no more are allowed: end one or "
+                                "raise the daemon's max_clients",
+                                sessions_.size()));
+  }
+}
+
+void Hub::broadcast(const v1::ServerMessage& message) {
+  for (const auto& session : sessions_) {
+    if (session->greeted()) session->send(message);
+  }
+}
+
+void Hub::update_want() {
+  bool depth = false;
+  bool luma = false;
+  for (const auto& session : sessions_) {
+    const auto& subscription = session->subscription();
+    if (!session->greeted() || !subscription.active) continue;
+    // A summary tells of the contact, which comes from the depth.
+    depth = depth || subscription.kind.depth != 0 || subscription.kind == FrameKind{};
+    luma = luma || subscription.kind.luma != 0;
+  }
+  port_.want(depth, luma);
+}
+
+void Hub::on_request(const std::shared_ptr<Session>& session, const v1::ClientMessage& message) {
+  handlers_.request(session, message);
+}
+
+void Hub::on_closed(const Session& session) {
+  // Later, since a session may end while the list is being walked through.
+  asio::post(io_, [weak = weak_from_this(), gone = &session] {
+    const auto self = weak.lock();
+    if (self == nullptr) return;
+    const auto is_gone = [gone](const auto& other) { return other.get() == gone; };
+    std::erase_if(self->refused_, is_gone);
+    if (std::erase_if(self->sessions_, is_gone) > 0) self->update_want();
+  });
+}
+
+}  // namespace dtact::net

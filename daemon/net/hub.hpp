@@ -1,0 +1,68 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "daemon/net/frame_encoder.hpp"
+#include "daemon/net/net_config.hpp"
+#include "daemon/net/session.hpp"
+#include "daemon/pipeline/port.hpp"
+
+namespace dtact::net {
+
+/// Where the pipeline meets the clients: fetches events and frames when the pipeline says that
+/// there are any, encodes each frame once for each kind some client is due, and hands every client
+/// the same buffer. Also keeps the list of clients. All on the network thread.
+class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
+ public:
+  /// Whom the hub passes on to what it does not decide itself.
+  struct Handlers {
+    std::function<void(const std::shared_ptr<Session>&, const v1::ClientMessage&)> request;
+    std::function<void(const pipeline::CommandDone&)> done;
+    std::function<void(const hal::Light&)> light;
+  };
+
+  /// Throws std::system_error when the pipeline's event descriptor cannot be watched.
+  Hub(boost::asio::io_context& io, const NetConfig& config, pipeline::Port& port);
+
+  void start(Handlers handlers);
+  /// Ends every connection and stops watching the pipeline.
+  void stop();
+
+  /// A new client: started, or refused when there are max_clients.
+  void admit(const std::shared_ptr<Session>& session);
+  /// To every client that has been greeted.
+  void broadcast(const v1::ServerMessage& message);
+  /// After a client's subscription changed: tells the pipeline what all of them together want.
+  void update_want();
+  [[nodiscard]] const std::vector<std::shared_ptr<Session>>& sessions() const noexcept {
+    return sessions_;
+  }
+
+  void on_request(const std::shared_ptr<Session>& session,
+                  const v1::ClientMessage& message) override;
+  void on_closed(const Session& session) override;
+
+ private:
+  void wait();
+  void drain();
+  void on_event(const pipeline::Event& event);
+  void on_frame(const pipeline::DepthFrame& frame);
+
+  boost::asio::io_context& io_;
+  const NetConfig& config_;
+  pipeline::Port& port_;
+  boost::asio::posix::stream_descriptor events_;
+  FrameEncoder encoder_;
+  Handlers handlers_;
+  std::vector<std::shared_ptr<Session>> sessions_;
+  std::vector<std::shared_ptr<Session>> refused_;  ///< Being told why.
+  bool seen_frame_ = false;
+  std::uint64_t skipped_ = 0;  ///< DepthFrame::skipped of the last frame.
+  bool told_too_large_ = false;
+};
+
+}  // namespace dtact::net

@@ -1,0 +1,101 @@
+#include "daemon/net/listener.hpp"
+
+#include <fmt/format.h>
+
+#include <boost/asio/ip/v6_only.hpp>
+#include <stdexcept>
+
+namespace dtact::net {
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+using tcp = asio::ip::tcp;
+
+tcp::endpoint endpoint_of(const NetConfig& config) {
+  error_code error;
+  const auto address = asio::ip::make_address(config.address, error);
+  if (error) {
+    throw std::runtime_error(fmt::format(
+        "\"{}\" is not an IPv4 or IPv6 address to listen on: write 127.0.0.1 for this machine "
+        "only, 0.0.0.0 or :: for every interface",
+        config.address));
+  }
+  return {address, config.port};
+}
+
+const char* remedy_for(const error_code& error) {
+  if (error == asio::error::address_in_use) {
+    return "another dtactd may be running (systemctl status dtactd); stop it or choose another "
+           "port";
+  }
+  if (error == asio::error::access_denied)
+    return "ports below 1024 need a privilege; choose another";
+  if (error.value() == EADDRNOTAVAIL) return "no interface of this machine has that address";
+  return "check the configured address and port";
+}
+
+tcp::acceptor listen(asio::io_context& io, const tcp::endpoint& endpoint) {
+  tcp::acceptor acceptor(io);
+  error_code error;
+  const auto step = [&](auto call) {
+    if (!error) call();
+  };
+  step([&] { acceptor.open(endpoint.protocol(), error); });
+  // A daemon that starts again must not wait for its old connections to time out.
+  step([&] { acceptor.set_option(tcp::acceptor::reuse_address(true), error); });
+  step([&] {
+    if (endpoint.address().is_v6()) acceptor.set_option(asio::ip::v6_only(false), error);
+  });
+  step([&] { acceptor.bind(endpoint, error); });
+  step([&] { acceptor.listen(asio::socket_base::max_listen_connections, error); });
+  if (error) {
+    throw std::runtime_error(fmt::format("cannot listen on {} port {}: {}; {}",
+                                         endpoint.address().to_string(), endpoint.port(),
+                                         error.message(), remedy_for(error)));
+  }
+  return acceptor;
+}
+
+}  // namespace
+
+Listener::Listener(asio::io_context& io, const NetConfig& config, OnConnection on_connection)
+    : config_(config),
+      acceptor_(listen(io, endpoint_of(config))),
+      timer_(io),
+      on_connection_(std::move(on_connection)) {}
+
+void Listener::stop() {
+  error_code ignored;
+  acceptor_.close(ignored);
+  timer_.cancel();
+}
+
+void Listener::accept() {
+  acceptor_.async_accept([weak = weak_from_this()](const error_code& error, tcp::socket socket) {
+    const auto self = weak.lock();
+    if (self == nullptr || !self->acceptor_.is_open()) return;
+    // A client that left before it was accepted is no trouble of ours.
+    if (error && error != asio::error::connection_aborted) {
+      return self->retry_later(error.message());
+    }
+    self->told_ = false;
+    if (!error) self->on_connection_(std::move(socket));
+    self->accept();
+  });
+}
+
+/// Without descriptors every accept fails at once: wait instead of spinning, and say it once.
+void Listener::retry_later(const std::string& reason) {
+  if (!std::exchange(told_, true)) {
+    config_.log(LogLevel::warning,
+                fmt::format("cannot accept clients: {}; trying again every second", reason));
+  }
+  timer_.expires_after(std::chrono::seconds(1));
+  timer_.async_wait([weak = weak_from_this()](const error_code& error) {
+    const auto self = weak.lock();
+    if (!error && self != nullptr && self->acceptor_.is_open()) self->accept();
+  });
+}
+
+}  // namespace dtact::net

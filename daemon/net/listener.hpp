@@ -1,0 +1,37 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+#include "daemon/net/net_config.hpp"
+
+namespace dtact::net {
+
+/// Takes connections and hands each to `on_connection`.
+class Listener : public std::enable_shared_from_this<Listener> {
+ public:
+  using OnConnection = std::function<void(boost::asio::ip::tcp::socket)>;
+
+  /// Binds and listens. Throws std::runtime_error naming address, port and remedy.
+  Listener(boost::asio::io_context& io, const NetConfig& config, OnConnection on_connection);
+
+  void start() { accept(); }
+  void stop();
+  [[nodiscard]] std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
+
+ private:
+  void accept();
+  void retry_later(const std::string& reason);
+
+  const NetConfig& config_;
+  boost::asio::ip::tcp::acceptor acceptor_;
+  boost::asio::steady_timer timer_;
+  OnConnection on_connection_;
+  bool told_ = false;  ///< The present trouble has been logged.
+};
+
+}  // namespace dtact::net

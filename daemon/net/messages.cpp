@@ -1,0 +1,215 @@
+#include "daemon/net/messages.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+
+#include "daemon/net/advice.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::net {
+namespace {
+
+using pipeline::Health;
+using pipeline::State;
+
+// The wire's Health and State are the pipeline's plus one: 0 is "none" there.
+constexpr bool matches(Health ours, v1::Health theirs) {
+  return static_cast<int>(ours) + 1 == static_cast<int>(theirs);
+}
+static_assert(matches(Health::uncalibrated, v1::HEALTH_UNCALIBRATED));
+static_assert(matches(Health::light_mismatch, v1::HEALTH_LIGHT_MISMATCH));
+static_assert(matches(Health::not_realtime, v1::HEALTH_NOT_REALTIME));
+static_assert(pipeline::kHealthCount == static_cast<int>(v1::HEALTH_NOT_REALTIME));
+
+v1::State to_wire(State state) {
+  switch (state) {
+    case State::settling:
+      return v1::STATE_SETTLING;
+    case State::referencing:
+      return v1::STATE_REFERENCING;
+    case State::serving:
+      return v1::STATE_SERVING;
+    case State::uncalibrated:
+      return v1::STATE_UNCALIBRATED;
+    case State::camera_lost:
+      return v1::STATE_CAMERA_LOST;
+  }
+  return v1::STATE_UNSPECIFIED;
+}
+
+v1::TimestampMeaning to_wire(hal::TimestampMeaning meaning) {
+  switch (meaning) {
+    case hal::TimestampMeaning::start_of_exposure:
+      return v1::TIMESTAMP_START_OF_EXPOSURE;
+    case hal::TimestampMeaning::end_of_frame:
+      return v1::TIMESTAMP_END_OF_FRAME;
+    case hal::TimestampMeaning::arrival:
+      return v1::TIMESTAMP_ARRIVAL;
+  }
+  return v1::TIMESTAMP_UNSPECIFIED;
+}
+
+const char* name_of(hal::CameraState state) {
+  switch (state) {
+    case hal::CameraState::streaming:
+      return "streaming";
+    case hal::CameraState::stalled:
+      return "stalled";
+    case hal::CameraState::unplugged:
+      return "unplugged";
+    case hal::CameraState::busy:
+      return "busy";
+    case hal::CameraState::denied:
+      return "denied";
+    case hal::CameraState::ended:
+      return "ended";
+  }
+  return "";
+}
+
+const char* name_of(recon::Method method) {
+  return method == recon::Method::published ? "published" : "list";
+}
+
+std::uint32_t clamp_ns(std::int64_t ns) {
+  return static_cast<std::uint32_t>(
+      std::clamp<std::int64_t>(ns, 0, std::numeric_limits<std::uint32_t>::max()));
+}
+
+template <typename Message>
+void fill_health(pipeline::HealthSet health, Message& out) {
+  for (int i = 0; i < pipeline::kHealthCount; ++i) {
+    if (health.has(static_cast<Health>(i))) out.add_health(static_cast<v1::Health>(i + 1));
+  }
+}
+
+void fill_camera(const hal::CameraInfo& info, const hal::CameraReport& report,
+                 v1::CameraStatus& out) {
+  out.set_backend(info.backend);
+  out.set_identity(info.identity);
+  out.set_pixel_format(info.pixel_format);
+  out.set_width(static_cast<std::uint32_t>(info.width));
+  out.set_height(static_cast<std::uint32_t>(info.height));
+  out.set_fps(info.fps);
+  out.set_condition(name_of(report.state));
+  out.set_remedy(report.remedy);
+  out.set_delivered(report.delivered);
+  out.set_lost(report.lost);
+  out.set_skipped(report.skipped);
+  out.set_damaged(report.damaged);
+  out.set_disconnects(report.disconnects);
+  for (const auto& control : info.controls) {
+    auto& to = *out.add_controls();
+    to.set_name(control.name);
+    to.set_value(control.value);
+    to.set_locked(control.locked);
+  }
+}
+
+void fill_calibration(const calibration::Calibration& calibration, v1::CalibrationSummary& out) {
+  out.set_name(calibration.name);
+  out.set_created(calibration.origin.created);
+  if (calibration.model == nullptr) return;
+  const auto& model = *calibration.model;
+  out.set_method(name_of(model.method));
+  out.set_mm_per_px(model.mm_per_px);
+  out.set_width(static_cast<std::uint32_t>(model.rectify.width));
+  out.set_height(static_cast<std::uint32_t>(model.rectify.height));
+  const auto depth_at = [&list = model.list](int q6) {
+    if (list.um.empty()) return 0.0;
+    const int last = static_cast<int>(list.um.size()) - 1;
+    return list.um[static_cast<std::size_t>(std::clamp(q6 - list.first_q6, 0, last))] / 1000.0;
+  };
+  out.set_covered_from_mm(depth_at(model.list.covered_from_q6));
+  out.set_covered_to_mm(depth_at(model.list.covered_to_q6));
+}
+
+}  // namespace
+
+void fill(const hal::Light& light, v1::LightState& out) {
+  out.set_brightness(light.brightness);
+  for (const auto& led : light.leds) {
+    auto& to = *out.add_leds();
+    to.set_r(led.r);
+    to.set_g(led.g);
+    to.set_b(led.b);
+  }
+}
+
+void fill(const pipeline::ContactSummary& contact, v1::Contact& out) {
+  out.set_touching(contact.touching);
+  out.set_area_mm2(contact.area_mm2);
+  out.set_x_mm(contact.x_mm);
+  out.set_y_mm(contact.y_mm);
+  out.set_deepest_mm(contact.deepest_mm);
+  out.set_deepest_x_mm(contact.deepest_x_mm);
+  out.set_deepest_y_mm(contact.deepest_y_mm);
+  out.set_volume_mm3(contact.volume_mm3);
+}
+
+void fill(const pipeline::DepthFrame& frame, v1::Frame& out) {
+  out.set_sequence(frame.camera.sequence);
+  out.set_monotonic_ns(frame.camera.timestamp_ns);
+  out.set_wall_ns(frame.wall_ns);
+  out.set_meaning(to_wire(frame.camera.meaning));
+  out.set_ready_ns(frame.camera.ready_ns);
+  out.set_published_ns(frame.done_ns);
+  fill_health(frame.health, out);
+  fill(frame.light, *out.mutable_light());
+  fill(frame.contact, *out.mutable_contact());
+  auto& times = *out.mutable_times();
+  times.set_decode_ns(clamp_ns(frame.times.decode_ns));
+  times.set_rectify_ns(clamp_ns(frame.times.rectify_ns));
+  times.set_smooth_ns(clamp_ns(frame.times.smooth_ns));
+  times.set_list_ns(clamp_ns(frame.times.list_ns));
+  times.set_inspect_ns(clamp_ns(frame.times.inspect_ns));
+}
+
+void fill(const pipeline::Status& status, v1::Status& out) {
+  out.set_state(to_wire(status.state));
+  fill_health(status.health, out);
+  out.set_advice(advice(status));
+  fill_camera(status.camera, status.camera_report, *out.mutable_camera());
+  out.mutable_ring()->set_backend(status.ring.backend);
+  out.mutable_ring()->set_identity(status.ring.identity);
+  out.mutable_ring()->set_message(status.ring_message);
+  fill(status.light, *out.mutable_light());
+  if (status.calibration != nullptr) {
+    fill_calibration(*status.calibration, *out.mutable_calibration());
+  }
+  out.set_frames(status.frames);
+  out.set_skipped(status.skipped);
+  out.set_fps(status.fps);
+  for (const auto& refused : status.realtime) out.add_realtime_refused(refused);
+  for (const auto& stage : status.stages) {
+    auto& to = *out.add_stages();
+    to.set_stage(stage.stage);
+    to.set_p50_us(stage.p50_us);
+    to.set_p99_us(stage.p99_us);
+    to.set_max_us(stage.max_us);
+  }
+}
+
+bool fill(const pipeline::Event& event, v1::Event& out) {
+  if (const auto* contact = std::get_if<pipeline::ContactChanged>(&event)) {
+    auto& to = *out.mutable_contact();
+    to.set_sequence(contact->sequence);
+    to.set_monotonic_ns(contact->timestamp_ns);
+    fill(contact->contact, *to.mutable_contact());
+    to.mutable_contact()->set_touching(contact->touching);
+  } else if (const auto* light = std::get_if<pipeline::LightChanged>(&event)) {
+    fill(light->light, *out.mutable_light());
+  } else if (const auto* reference = std::get_if<pipeline::ReferenceTaken>(&event)) {
+    out.mutable_reference()->set_sequence(reference->sequence);
+    out.mutable_reference()->set_restored(reference->restored);
+  } else if (const auto* state = std::get_if<pipeline::StateChanged>(&event)) {
+    out.mutable_state()->set_state(to_wire(state->state));
+    fill_health(state->health, *out.mutable_state());
+  } else {
+    return false;
+  }
+  return true;
+}
+
+}  // namespace dtact::net

@@ -1,0 +1,25 @@
+#pragma once
+
+#include "daemon/pipeline/port.hpp"
+
+namespace dtact::v1 {
+class Contact;
+class Event;
+class Frame;
+class LightState;
+class Status;
+}  // namespace dtact::v1
+
+// The pipeline's types as messages. Each function fills a message that is empty.
+namespace dtact::net {
+
+void fill(const hal::Light& light, v1::LightState& out);
+void fill(const pipeline::ContactSummary& contact, v1::Contact& out);
+/// Everything but the maps, `dropped` and `times.encode_ns`.
+void fill(const pipeline::DepthFrame& frame, v1::Frame& out);
+/// With the advice; without clients, version and uptime.
+void fill(const pipeline::Status& status, v1::Status& out);
+/// False for CommandDone, which is an answer to one client and not an event.
+[[nodiscard]] bool fill(const pipeline::Event& event, v1::Event& out);
+
+}  // namespace dtact::net

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <string>
+
+#include "proto/defaults.hpp"
+
+namespace dtact::net {
+
+enum class LogLevel : std::uint8_t { info, warning };
+
+/// What the network part wants said. Called on the network thread only; must not throw.
+using Log = std::function<void(LogLevel, const std::string&)>;
+
+/// Settings of the network part.
+struct NetConfig {
+  /// IPv4 or IPv6 address to listen on. "0.0.0.0" or "::" (which takes IPv4 too) for every
+  /// interface. There is no authentication: whoever can connect can command.
+  std::string address = wire::kDefaultAddress;
+  std::uint16_t port = wire::kDefaultPort;        ///< 0: any free one, see Server::port().
+  std::size_t max_clients = 32;                   ///< More are refused with a sentence.
+  std::string frame_id = "dtact_surface";         ///< Name of the surface frame in every message.
+  std::string program = "dtactd";                 ///< What the daemon calls itself to clients.
+  std::string version;                            ///< In status and the handshake.
+  std::chrono::milliseconds hello_timeout{5000};  ///< A client silent for so long is let go.
+  /// Longest time without progress of unacknowledged or unaccepted data (TCP_USER_TIMEOUT), after
+  /// which a client counts as dead: a pulled cable, or a program that stopped reading.
+  std::chrono::milliseconds dead_after{30000};
+  Log log = [](LogLevel, const std::string&) {};
+};
+
+}  // namespace dtact::net

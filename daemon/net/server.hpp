@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "daemon/net/net_config.hpp"
+
+namespace boost::asio {
+class io_context;
+}
+
+namespace dtact::pipeline {
+class Port;
+}
+
+namespace dtact::net {
+
+class CalibrationStore;
+
+/// The network part as a whole: listens, talks to clients and is the only caller of `port` and
+/// `store`. Works on the thread that runs `io`, plus one worker thread for calibration files.
+class Server {
+ public:
+  /// Listens from here on; clients are served once `io` runs. `io`, `port` and `store` must outlive
+  /// the server. Throws std::runtime_error naming address, port and remedy.
+  Server(boost::asio::io_context& io, NetConfig config, pipeline::Port& port,
+         CalibrationStore& store);
+  /// As stop(). `io` must not be running.
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  /// The TCP port it listens on.
+  [[nodiscard]] std::uint16_t port() const;
+  /// Takes no more clients and ends every connection; then `io` has no work of ours left and run()
+  /// returns. On the thread that runs `io`, or while none does.
+  void stop();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dtact::net

@@ -1,0 +1,288 @@
+#include "daemon/net/session.hpp"
+
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/write.hpp>
+#include <utility>
+
+#include "proto/dtact.pb.h"
+
+namespace dtact::net {
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+/// Bytes of a frame that the kernel may hold unsent. Beyond that a write waits, so that an answer
+/// comes after the frame being sent and not after several that lie in the socket's buffer. Large
+/// enough to keep a gigabit link busy for a millisecond, the time in which this thread runs again.
+constexpr int kNotSentLowWater = 128 * 1024;
+/// How long an ending connection may take to fetch its last answer.
+constexpr std::chrono::milliseconds kLinger{2000};
+
+std::string printable(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
+std::string framed(const v1::ServerMessage& message) {
+  const auto length = wire::encode_length(message.ByteSizeLong());
+  std::string bytes(reinterpret_cast<const char*>(length.data()), length.size());
+  message.AppendToString(&bytes);
+  return bytes;
+}
+
+}  // namespace
+
+Session::Session(asio::ip::tcp::socket socket, const NetConfig& config,
+                 std::weak_ptr<SessionHost> host)
+    : socket_(std::move(socket)),
+      timer_(socket_.get_executor()),
+      config_(config),
+      host_(std::move(host)) {
+  prepare_socket();
+}
+
+void Session::prepare_socket() {
+  error_code error;
+  const auto peer = socket_.remote_endpoint(error);
+  // A client may be gone before its connection was accepted; reading will say so.
+  address_ = error ? "unknown" : fmt::format("{}:{}", peer.address().to_string(), peer.port());
+  const auto set = [this](int level, int option, int value) {
+    // Each is an improvement and none a condition: without it the connection is only slower to
+    // answer or to be found dead.
+    (void)::setsockopt(socket_.native_handle(), level, option, &value, sizeof value);
+  };
+  set(IPPROTO_TCP, TCP_NODELAY, 1);
+  set(IPPROTO_TCP, TCP_NOTSENT_LOWAT, kNotSentLowWater);
+  set(IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(config_.dead_after.count()));
+  // An idle client has nothing unacknowledged: probe it, so that a vanished one is let go.
+  set(SOL_SOCKET, SO_KEEPALIVE, 1);
+  set(IPPROTO_TCP, TCP_KEEPIDLE, 15);
+  set(IPPROTO_TCP, TCP_KEEPINTVL, 5);
+  set(IPPROTO_TCP, TCP_KEEPCNT, 3);
+}
+
+void Session::start() {
+  arm_timer(config_.hello_timeout, "no Hello came");
+  read();
+}
+
+void Session::refuse(int error_code_, const std::string& sentence) {
+  end_with(0, error_code_, sentence);
+  read();
+}
+
+void Session::arm_timer(std::chrono::milliseconds after, const char* reason) {
+  timer_.expires_after(after);
+  timer_.async_wait([self = shared_from_this(), reason](const error_code& error) {
+    if (!error) self->close(reason);
+  });
+}
+
+void Session::read() {
+  socket_.async_read_some(asio::buffer(input_),
+                          [self = shared_from_this()](const error_code& error, std::size_t size) {
+                            if (self->state_ == State::closed) return;
+                            if (error == asio::error::eof) return self->close("the client left");
+                            if (error) return self->close(error.message());
+                            self->take({self->input_.data(), size});
+                            if (self->state_ != State::closed) self->read();
+                          });
+}
+
+void Session::take(std::string_view input) {
+  while (state_ == State::fresh || state_ == State::greeted) {
+    switch (decoder_.feed(input)) {
+      case wire::MessageDecoder::Result::need_more:
+        return;
+      case wire::MessageDecoder::Result::message:
+        on_message(decoder_.message());
+        break;
+      case wire::MessageDecoder::Result::too_large:
+        end_with(0, v1::ERROR_TOO_LARGE,
+                 fmt::format("a message of {} bytes was announced, at most {} are allowed: check "
+                             "that the client speaks dtact.proto with big-endian lengths",
+                             decoder_.announced(), wire::kMaxMessage));
+        break;
+    }
+  }
+}
+
+void Session::on_message(const std::string& bytes) {
+  v1::ClientMessage message;
+  if (!message.ParseFromString(bytes)) {
+    return end_with(0, v1::ERROR_BAD_MESSAGE,
+                    "that was not a ClientMessage: check the client's copy of dtact.proto");
+  }
+  if (message.id() == 0) {
+    return end_with(0, v1::ERROR_BAD_MESSAGE, "the request has id 0: ids begin with 1");
+  }
+  if (message.request_case() == v1::ClientMessage::REQUEST_NOT_SET) {
+    return end_with(message.id(), v1::ERROR_BAD_MESSAGE,
+                    "the message has no request that this daemon knows: set one, or update dtactd");
+  }
+  if (state_ == State::fresh) {
+    if (!message.has_hello()) {
+      return end_with(message.id(), v1::ERROR_VERSION,
+                      "the first message was not Hello: send it to agree on a version");
+    }
+    return on_hello(message.id(), message.hello());
+  }
+  if (message.has_hello()) {
+    return reply_error(message.id(), v1::ERROR_INVALID,
+                       "hello: sent already; it is the first message only");
+  }
+  if (const auto host = host_.lock()) host->on_request(shared_from_this(), message);
+}
+
+void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
+  if (hello.major() != wire::kMajor) {
+    return end_with(id, v1::ERROR_VERSION,
+                    fmt::format("the client speaks version {} and this daemon version {}: install "
+                                "the same release on both sides",
+                                hello.major(), wire::kMajor));
+  }
+  if (hello.program().size() > wire::kMaxProgramName) {
+    return reply_error(id, v1::ERROR_INVALID,
+                       fmt::format("hello.program: {} bytes, at most {} are allowed",
+                                   hello.program().size(), wire::kMaxProgramName));
+  }
+  timer_.cancel();
+  state_ = State::greeted;
+  program_ = printable(hello.program());
+  config_.log(LogLevel::info, fmt::format("client {} ({}) connected", address_, program_));
+  v1::ServerMessage message;
+  message.mutable_reply()->set_id(id);
+  auto& reply = *message.mutable_reply()->mutable_hello();
+  reply.set_major(wire::kMajor);
+  reply.set_minor(wire::kMinor);
+  reply.set_program(fmt::format("{} {}", config_.program, config_.version));
+  auto& frame = *reply.mutable_surface_frame();
+  frame.set_frame_id(config_.frame_id);
+  frame.set_right_handed(true);
+  frame.set_mirrored_from_outside(true);
+  frame.set_origin("centre");
+  frame.set_axes("x right, y down, z towards the object, as the camera sees it");
+  send(message);
+}
+
+void Session::reply_error(std::uint64_t id, int error_code_, const std::string& sentence) {
+  v1::ServerMessage message;
+  message.mutable_reply()->set_id(id);
+  message.mutable_reply()->mutable_error()->set_code(static_cast<v1::ErrorCode>(error_code_));
+  message.mutable_reply()->mutable_error()->set_message(sentence);
+  send(message);
+}
+
+void Session::end_with(std::uint64_t id, int error_code_, const std::string& sentence) {
+  config_.log(LogLevel::warning, fmt::format("client {}: {}", address_, sentence));
+  reply_error(id, error_code_, sentence);
+  if (state_ == State::closed) return;
+  // Closing at once, with bytes unread, would reset the connection and take the answer with it: so
+  // the sending side ends first, and what still comes is read and thrown away for a while.
+  state_ = State::ending;
+  waiting_.reset();
+  arm_timer(kLinger, "ended");
+  if (!writing_) write_next();
+}
+
+void Session::send(const v1::ServerMessage& message) {
+  if (state_ == State::closed || state_ == State::ending) return;
+  if (control_.size() >= kMaxBacklogMessages || control_bytes_ > kMaxBacklogBytes) {
+    return close(
+        fmt::format("{} answers and events ({} bytes) lay unread", control_.size(), control_bytes_),
+        LogLevel::warning);
+  }
+  control_.push_back(framed(message));
+  control_bytes_ += control_.back().size();
+  if (!writing_) write_next();
+}
+
+void Session::subscribe(const Subscription& subscription) noexcept {
+  subscription_ = subscription;
+  offered_ = 0;
+  if (!subscription_.active) waiting_.reset();
+}
+
+bool Session::is_due(std::uint64_t missed) noexcept {
+  if (state_ != State::greeted || !subscription_.active) return false;
+  // The first frame is due, then every n-th.
+  const auto due = [this] { return (offered_ + subscription_.every - 1) / subscription_.every; };
+  const std::uint64_t before = due();
+  offered_ += missed;
+  dropped_ += due() - before;
+  return offered_++ % subscription_.every == 0;
+}
+
+void Session::send_frame(std::shared_ptr<const EncodedFrame> frame) {
+  if (state_ != State::greeted) return;
+  if (waiting_ != nullptr) ++dropped_;
+  waiting_ = std::move(frame);
+  if (!writing_) write_next();
+}
+
+void Session::write_next() {
+  if (!control_.empty()) return write_control();
+  if (waiting_ != nullptr) return write_frame();
+  if (state_ == State::ending) {
+    error_code ignored;
+    socket_.shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+  }
+}
+
+void Session::write_control() {
+  writing_ = true;
+  asio::async_write(socket_, asio::buffer(control_.front()),
+                    [self = shared_from_this()](const error_code& error, std::size_t) {
+                      if (self->state_ == State::closed) return;
+                      self->control_bytes_ -= self->control_.front().size();
+                      self->control_.pop_front();
+                      self->on_written(error);
+                    });
+}
+
+void Session::write_frame() {
+  writing_ = true;
+  sending_ = std::move(waiting_);
+  envelope_ = FrameEnvelope(sending_->body.size(), dropped_);
+  const std::array<asio::const_buffer, 3> parts = {
+      asio::buffer(envelope_.head.data(), envelope_.head_size), asio::buffer(sending_->body),
+      asio::buffer(envelope_.tail.data(), envelope_.tail_size)};
+  asio::async_write(socket_, parts,
+                    [self = shared_from_this()](const error_code& error, std::size_t) {
+                      if (self->state_ == State::closed) return;
+                      self->sending_.reset();
+                      if (!error) ++self->sent_;
+                      self->on_written(error);
+                    });
+}
+
+void Session::on_written(const error_code& error) {
+  writing_ = false;
+  if (error) return close(error.message());
+  write_next();
+}
+
+void Session::close(const std::string& reason, LogLevel level) {
+  if (state_ == State::closed) return;
+  const bool known = state_ == State::greeted;
+  state_ = State::closed;
+  error_code ignored;
+  socket_.close(ignored);
+  timer_.cancel();
+  control_.clear();
+  waiting_.reset();
+  if (known || level != LogLevel::info) {
+    config_.log(level, fmt::format("client {} ({}) disconnected: {}; {} frames sent, {} dropped",
+                                   address_, program_, reason, sent_, dropped_));
+  }
+  if (const auto host = host_.lock()) host->on_closed(*this);
+}
+
+}  // namespace dtact::net

@@ -1,0 +1,50 @@
+#include "daemon/net/advice.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace dtact::net {
+namespace {
+
+using pipeline::Health;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+TEST(Advice, IsEmptyWhenAllIsWell) {
+  pipeline::Status status;
+  status.state = pipeline::State::serving;
+  EXPECT_EQ(advice(status), "");
+}
+
+TEST(Advice, SaysHowToCalibrate) {
+  pipeline::Status status;
+  status.health.set(Health::uncalibrated);
+  EXPECT_THAT(advice(status), HasSubstr("dtactctl calibrate depth"));
+  EXPECT_THAT(advice(status), HasSubstr("dtactctl calibration upload"));
+}
+
+TEST(Advice, HasASentenceForEveryCondition) {
+  for (int i = 0; i < pipeline::kHealthCount; ++i) {
+    pipeline::Status status;
+    status.health.set(static_cast<Health>(i));
+    EXPECT_NE(advice(status), "") << i;
+  }
+}
+
+TEST(Advice, AddsTheDevicesOwnSentenceAndPutsItFirst) {
+  pipeline::Status status;
+  status.state = pipeline::State::camera_lost;
+  status.camera_report.remedy = "/dev/video0 is gone: plug it in.";
+  EXPECT_EQ(advice(status), "The camera is away. /dev/video0 is gone: plug it in.");
+  status.health.set(Health::camera_trouble);
+  status.health.set(Health::not_realtime);
+  EXPECT_THAT(advice(status),
+              StartsWith("The camera gives no frames. /dev/video0 is gone: plug it in. The capture "
+                         "thread"));
+  status.health.set(Health::ring_trouble);
+  status.ring_message = "the ring is gone.";
+  EXPECT_THAT(advice(status), HasSubstr("LED ring failed. the ring is gone."));
+}
+
+}  // namespace
+}  // namespace dtact::net

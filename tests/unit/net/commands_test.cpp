@@ -1,0 +1,350 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::net::test {
+namespace {
+
+using pipeline::CommandDone;
+using pipeline::Outcome;
+using testing::HasSubstr;
+
+v1::ClientMessage brightness(std::uint32_t value) {
+  v1::ClientMessage message;
+  message.mutable_set_light()->set_brightness(value);
+  return message;
+}
+
+v1::ClientMessage scheme(const std::string& name) {
+  v1::ClientMessage message;
+  message.mutable_set_light()->set_scheme(name);
+  return message;
+}
+
+v1::ClientMessage rezero(bool force) {
+  v1::ClientMessage message;
+  message.mutable_rezero()->set_force(force);
+  return message;
+}
+
+v1::ClientMessage upload(const std::string& name, const std::string& toml,
+                         const std::string& png = "png") {
+  v1::ClientMessage message;
+  message.mutable_upload_calibration()->set_name(name);
+  message.mutable_upload_calibration()->set_calibration_toml(toml);
+  message.mutable_upload_calibration()->set_reference_png(png);
+  return message;
+}
+
+v1::ClientMessage get_calibration() {
+  v1::ClientMessage message;
+  message.mutable_get_calibration();
+  return message;
+}
+
+/// Expects the request to be refused as invalid with a sentence that has `part` in it.
+void expect_invalid(RawClient& client, const v1::ClientMessage& message, const std::string& part) {
+  const auto reply = client.request(message);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_INVALID);
+  EXPECT_THAT(reply.error().message(), HasSubstr(part));
+}
+
+TEST(Subscribe, RefusesUnknownEncodings) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  message.mutable_subscribe()->set_depth(static_cast<v1::DepthEncoding>(9));
+  expect_invalid(client, message, "depth encoding 9");
+}
+
+TEST(SetLight, ChangesOnlyWhatIsSet) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  auto reply = client.request(brightness(100));
+  EXPECT_EQ(reply.light().brightness(), 100U);
+  EXPECT_EQ(reply.light().leds(3).g(), 255U);  // as the ring was
+  reply = client.request(scheme("scheme4"));
+  EXPECT_EQ(reply.light().brightness(), 100U);
+  EXPECT_EQ(reply.light().leds(0).r(), 255U);
+  EXPECT_EQ(reply.light().leds(2).r(), 0U);
+  const auto command = rig.port.wait_command(1);
+  ASSERT_TRUE(command.has_value());
+  const auto& light = std::get<pipeline::SetLight>(command->what).light;
+  EXPECT_EQ(light.brightness, 100);
+  EXPECT_EQ(light.leds[2], (hal::Rgb{0, 0, 0}));
+}
+
+TEST(SetLight, TakesEightColours) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  auto message = scheme("all");
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    auto& led = *message.mutable_set_light()->add_leds();
+    led.set_r(i);
+    led.set_b(255);
+  }
+  const auto reply = client.request(message);
+  ASSERT_EQ(reply.light().leds_size(), 8);
+  EXPECT_EQ(reply.light().leds(7).r(), 7U);
+  EXPECT_EQ(reply.light().leds(7).g(), 0U);
+  EXPECT_EQ(reply.light().leds(7).b(), 255U);
+}
+
+TEST(SetLight, NamesTheFieldThatIsWrong) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  expect_invalid(client, brightness(256), "set_light.brightness: 256; allowed are 0 to 255");
+  expect_invalid(client, scheme("disco"),
+                 "\"disco\" is unknown; known are all, scheme1, scheme2, scheme3, scheme4");
+  v1::ClientMessage message;
+  message.mutable_set_light()->add_leds();
+  expect_invalid(client, message, "1 colours, the ring has 8");
+  for (int i = 0; i < 7; ++i) message.mutable_set_light()->add_leds();
+  message.mutable_set_light()->mutable_leds(5)->set_g(1000);
+  expect_invalid(client, message, "set_light.leds[5]: 0, 1000, 0");
+}
+
+TEST(SetLight, AnswersOnlyWhenTheRingHasBeenWritten) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  auto message = brightness(10);
+  message.set_id(50);
+  client.send(message);
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  // Anything that is answered now comes before the light's answer.
+  v1::ClientMessage status;
+  status.mutable_get_status();
+  EXPECT_TRUE(client.request(status).has_status());
+  rig.port.emit(CommandDone{command->ticket, Outcome::done, ""});
+  const auto reply = client.reply();
+  EXPECT_EQ(reply.id(), 50U);
+  EXPECT_EQ(reply.light().brightness(), 10U);
+}
+
+TEST(SetLight, TheLastWriterWinsAndEveryoneIsTold) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([&port](const pipeline::Command& command) {
+      port.emit(pipeline::LightChanged{std::get<pipeline::SetLight>(command.what).light});
+      return CommandDone{command.ticket, Outcome::done, ""};
+    });
+  });
+  RawClient a(rig.tcp_port());
+  RawClient b(rig.tcp_port());
+  RawClient watcher(rig.tcp_port());
+  a.hello();
+  b.hello();
+  watcher.hello();
+  EXPECT_EQ(a.request(brightness(10)).light().brightness(), 10U);
+  EXPECT_EQ(b.request(brightness(20)).light().brightness(), 20U);
+  EXPECT_EQ(watcher.event().light().brightness(), 10U);
+  EXPECT_EQ(watcher.event().light().brightness(), 20U);
+  // The next partial change builds on the last writer's light.
+  EXPECT_EQ(a.request(scheme("scheme1")).light().brightness(), 20U);
+}
+
+TEST(SetLight, AChangeBuildsOnTheOneThatIsStillUnderWay) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  auto message = brightness(10);
+  message.set_id(50);
+  client.send(message);
+  message = scheme("scheme2");
+  message.set_id(51);
+  client.send(message);
+  const auto second = rig.port.wait_command(1);
+  ASSERT_TRUE(second.has_value());
+  EXPECT_EQ(std::get<pipeline::SetLight>(second->what).light.brightness, 10);
+}
+
+TEST(SetLight, AFailedWriteIsNotBuiltOn) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([](const pipeline::Command& command) {
+      return CommandDone{command.ticket, Outcome::device_error, "/dev/spidev0.0: check the wiring"};
+    });
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto reply = client.request(brightness(10));
+  EXPECT_EQ(reply.error().code(), v1::ERROR_DEVICE);
+  EXPECT_EQ(reply.error().message(), "/dev/spidev0.0: check the wiring");
+  (void)client.request(scheme("scheme2"));
+  const auto second = rig.port.wait_command(1);
+  ASSERT_TRUE(second.has_value());
+  EXPECT_EQ(std::get<pipeline::SetLight>(second->what).light.brightness, 255);
+}
+
+TEST(Rezero, IsRefusedUnderContactUnlessForced) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([](const pipeline::Command& command) {
+      if (std::get<pipeline::Rezero>(command.what).force) {
+        return CommandDone{command.ticket, Outcome::done, ""};
+      }
+      return CommandDone{command.ticket, Outcome::refused_contact, "something touches: free it"};
+    });
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto reply = client.request(rezero(false));
+  EXPECT_EQ(reply.error().code(), v1::ERROR_CONTACT);
+  EXPECT_EQ(reply.error().message(), "something touches: free it");
+  EXPECT_TRUE(client.request(rezero(true)).has_done());
+}
+
+TEST(Commands, AreRefusedAsBusyWhenThePipelineIsFull) {
+  Rig rig;
+  rig.port.set_full(true);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(client.request(rezero(false)).error().code(), v1::ERROR_BUSY);
+  EXPECT_EQ(client.request(brightness(1)).error().code(), v1::ERROR_BUSY);
+  EXPECT_EQ(client.request(upload("x", "good")).error().code(), v1::ERROR_BUSY);
+}
+
+TEST(Commands, OutliveTheClientThatSentThem) {
+  Rig rig;
+  auto client = std::make_unique<RawClient>(rig.tcp_port());
+  client->hello();
+  auto message = brightness(10);
+  message.set_id(9);
+  client->send(message);
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  client.reset();
+  ASSERT_TRUE(rig.wait_log("the client left"));
+  rig.port.emit(CommandDone{command->ticket, Outcome::done, ""});
+  rig.port.emit(CommandDone{999, Outcome::done, ""});  // a ticket nobody has
+  RawClient other(rig.tcp_port());
+  EXPECT_NO_THROW(other.hello());
+}
+
+TEST(Upload, IsCheckedUsedKeptAndTold) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  RawClient watcher(rig.tcp_port());
+  client.hello();
+  watcher.hello();
+  EXPECT_TRUE(client.request(upload("ball-4_mm", "good")).has_done());
+  EXPECT_EQ(watcher.event().calibration().name(), "ball-4_mm");
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  EXPECT_EQ(std::get<pipeline::UseCalibration>(command->what).calibration->name, "ball-4_mm");
+
+  pipeline::Status status;
+  status.calibration = std::make_shared<calibration::Calibration>();
+  rig.port.set_status(status);
+  const auto files = client.request(get_calibration()).calibration();
+  EXPECT_EQ(files.name(), "ball-4_mm");
+  EXPECT_EQ(files.calibration_toml(), "good");
+  EXPECT_EQ(files.reference_png(), "png");
+}
+
+TEST(Upload, NamesWhatIsWrong) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  expect_invalid(client, upload("../etc", "good"), "\"../etc\"; allowed are 1 to 64 letters");
+  expect_invalid(client, upload("", "good"), "upload_calibration.name");
+  expect_invalid(client, upload(std::string(65, 'x'), "good"), "upload_calibration.name");
+  expect_invalid(client, upload("x", ""), "calibration_toml or reference_png is empty");
+  expect_invalid(client, upload("x", "bad"), "calibration.toml:3: scale missing");
+  EXPECT_TRUE(client.request(upload("x", "good")).has_done());  // none of them is in the way
+}
+
+TEST(Upload, IsNotKeptWhenThePipelineRefusesIt) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([](const pipeline::Command& command) {
+      return CommandDone{command.ticket, Outcome::invalid, "the camera gives 640x480"};
+    });
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  expect_invalid(client, upload("x", "good"), "640x480");
+  pipeline::Status status;
+  status.calibration = std::make_shared<calibration::Calibration>();
+  rig.port.set_status(status);
+  EXPECT_EQ(client.request(get_calibration()).calibration().name(), "first");
+  expect_invalid(client, upload("x", "good"), "640x480");  // and not busy
+}
+
+TEST(Upload, SaysWhenItCouldNotBeStored) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto reply = client.request(upload("x", "unwritable"));
+  EXPECT_EQ(reply.error().code(), v1::ERROR_STORAGE);
+  EXPECT_THAT(reply.error().message(), HasSubstr("disk full"));
+}
+
+TEST(GetCalibration, NeedsOne) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto reply = client.request(get_calibration());
+  EXPECT_EQ(reply.error().code(), v1::ERROR_UNCALIBRATED);
+  EXPECT_THAT(reply.error().message(), HasSubstr("dtactctl calibration upload"));
+}
+
+TEST(GetStatus, TellsEverything) {
+  Rig rig;
+  pipeline::Status status;
+  status.state = pipeline::State::serving;
+  status.health.set(pipeline::Health::light_mismatch);
+  status.camera.backend = "sim";
+  status.camera.width = 800;
+  status.camera.controls = {{"exposure", 157, true}};
+  status.camera_report.state = hal::CameraState::stalled;
+  status.camera_report.lost = 3;
+  status.ring.backend = "null";
+  status.frames = 600;
+  status.fps = 59.9;
+  status.realtime = {"no SCHED_FIFO"};
+  status.stages = {{"smooth", 400, 900, 1200}};
+  auto calibration = std::make_shared<calibration::Calibration>();
+  calibration->name = "ball";
+  auto model = std::make_shared<recon::Model>();
+  model->mm_per_px = 0.051;
+  model->list = {-64, {-10, 0, 20, 40}, -64, -62};
+  calibration->model = model;
+  status.calibration = calibration;
+  rig.port.set_status(status);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  message.mutable_get_status();
+  const auto reply = client.request(message).status();
+  EXPECT_EQ(reply.state(), v1::STATE_SERVING);
+  EXPECT_EQ(reply.health(0), v1::HEALTH_LIGHT_MISMATCH);
+  EXPECT_THAT(reply.advice(), HasSubstr("dtactctl led"));
+  EXPECT_EQ(reply.camera().backend(), "sim");
+  EXPECT_EQ(reply.camera().width(), 800U);
+  EXPECT_EQ(reply.camera().condition(), "stalled");
+  EXPECT_EQ(reply.camera().lost(), 3U);
+  EXPECT_EQ(reply.camera().controls(0).value(), 157);
+  EXPECT_EQ(reply.ring().backend(), "null");
+  EXPECT_EQ(reply.light().brightness(), 255U);
+  EXPECT_EQ(reply.frames(), 600U);
+  EXPECT_EQ(reply.fps(), 59.9);
+  EXPECT_EQ(reply.realtime_refused(0), "no SCHED_FIFO");
+  EXPECT_EQ(reply.stages(0).p99_us(), 900.0);
+  EXPECT_EQ(reply.calibration().name(), "ball");
+  EXPECT_EQ(reply.calibration().covered_from_mm(), -0.01);
+  EXPECT_EQ(reply.calibration().covered_to_mm(), 0.02);
+  EXPECT_EQ(reply.clients_size(), 1);
+  EXPECT_EQ(reply.clients(0).program(), "raw");
+  EXPECT_EQ(reply.version(), "9.8.7");
+}
+
+}  // namespace
+}  // namespace dtact::net::test

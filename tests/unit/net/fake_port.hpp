@@ -1,0 +1,152 @@
+#pragma once
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "daemon/pipeline/port.hpp"
+#include "hal/base/unique_fd.hpp"
+
+namespace dtact::net::test {
+
+/// Longer than anything takes on the slowest machine; a wait that reaches it has failed.
+inline constexpr std::chrono::seconds kPatience{60};
+
+/// A pipeline that a test plays. The network thread sees the Port, the test the rest.
+class FakePort : public pipeline::Port {
+ public:
+  // The Port.
+  [[nodiscard]] int event_fd() const noexcept override { return fd_.get(); }
+  [[nodiscard]] const pipeline::DepthFrame* latest() noexcept override {
+    const std::lock_guard lock(mutex_);
+    if (!fresh_.has_value()) return nullptr;
+    current_ = *std::exchange(fresh_, std::nullopt);
+    changed_.notify_all();
+    return &current_;
+  }
+  [[nodiscard]] std::optional<pipeline::Event> next_event() override {
+    const std::lock_guard lock(mutex_);
+    if (events_.empty()) return std::nullopt;
+    auto event = std::move(events_.front());
+    events_.pop_front();
+    return event;
+  }
+  [[nodiscard]] bool submit(pipeline::Command command) override {
+    {
+      const std::lock_guard lock(mutex_);
+      if (full_) return false;
+      commands_.push_back(command);
+      changed_.notify_all();
+    }
+    if (answer_) {
+      if (auto done = answer_(command)) emit(*std::move(done));
+    }
+    return true;
+  }
+  void want(bool depth, bool luma) noexcept override {
+    const std::lock_guard lock(mutex_);
+    wanted_ = {depth, luma};
+    changed_.notify_all();
+  }
+  [[nodiscard]] pipeline::Status status() const override {
+    const std::lock_guard lock(mutex_);
+    ++status_calls_;
+    changed_.notify_all();
+    return status_;
+  }
+
+  // The test's side.
+  void publish(pipeline::DepthFrame frame) {
+    {
+      const std::lock_guard lock(mutex_);
+      fresh_ = std::move(frame);
+    }
+    ring();
+  }
+  void emit(pipeline::Event event) {
+    {
+      const std::lock_guard lock(mutex_);
+      events_.push_back(std::move(event));
+    }
+    ring();
+  }
+  /// How commands are answered at once; without, not at all. Before the server runs.
+  void answer(std::function<std::optional<pipeline::CommandDone>(const pipeline::Command&)> f) {
+    answer_ = std::move(f);
+  }
+  void set_full(bool full) {
+    const std::lock_guard lock(mutex_);
+    full_ = full;
+  }
+  void set_status(pipeline::Status status) {
+    const std::lock_guard lock(mutex_);
+    status_ = std::move(status);
+  }
+  /// False when it does not happen within kPatience.
+  [[nodiscard]] bool wait_fetched() {
+    return wait([this] { return !fresh_.has_value(); });
+  }
+  [[nodiscard]] bool wait_wanted(bool depth, bool luma) {
+    return wait([=, this] { return wanted_ == std::pair(depth, luma); });
+  }
+  [[nodiscard]] bool wait_status_calls(int calls) {
+    return wait([=, this] { return status_calls_ >= calls; });
+  }
+  /// The n-th command, counted from 0.
+  [[nodiscard]] std::optional<pipeline::Command> wait_command(std::size_t n) {
+    if (!wait([=, this] { return commands_.size() > n; })) return std::nullopt;
+    const std::lock_guard lock(mutex_);
+    return commands_[n];
+  }
+
+ private:
+  void ring() const {
+    const std::uint64_t one = 1;
+    (void)!::write(fd_.get(), &one, sizeof one);
+  }
+  template <typename Condition>
+  bool wait(Condition condition) {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kPatience, condition);
+  }
+
+  base::UniqueFd fd_{::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::optional<pipeline::DepthFrame> fresh_;
+  pipeline::DepthFrame current_;
+  std::deque<pipeline::Event> events_;
+  std::vector<pipeline::Command> commands_;
+  std::function<std::optional<pipeline::CommandDone>(const pipeline::Command&)> answer_;
+  bool full_ = false;
+  std::pair<bool, bool> wanted_{false, false};
+  mutable int status_calls_ = 0;
+  pipeline::Status status_;
+};
+
+/// A frame whose pixels all hold the sequence number.
+inline pipeline::DepthFrame make_frame(std::uint64_t sequence, int width = 8, int height = 4) {
+  pipeline::DepthFrame frame;
+  frame.camera.sequence = sequence;
+  frame.has_depth = true;
+  frame.width = width;
+  frame.height = height;
+  frame.mm_per_px = 0.05;
+  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  frame.depth_um.assign(pixels, static_cast<std::int16_t>(sequence));
+  frame.has_luma = true;
+  frame.luma_width = width;
+  frame.luma_height = height;
+  frame.luma.assign(pixels, static_cast<std::uint8_t>(sequence));
+  return frame;
+}
+
+}  // namespace dtact::net::test

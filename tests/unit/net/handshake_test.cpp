@@ -1,0 +1,224 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::net::test {
+namespace {
+
+using testing::HasSubstr;
+using namespace std::string_literals;
+
+v1::ClientMessage hello(std::uint32_t major) {
+  v1::ClientMessage message;
+  message.mutable_hello()->set_major(major);
+  message.mutable_hello()->set_program("raw");
+  return message;
+}
+
+TEST(Handshake, TellsVersionProgramAndSurfaceFrame) {
+  NetConfig config;
+  config.frame_id = "finger_3";
+  Rig rig(config);
+  RawClient client(rig.tcp_port());
+  const auto reply = client.request(hello(1));
+  EXPECT_EQ(reply.id(), 1U);
+  EXPECT_EQ(reply.hello().major(), 1U);
+  EXPECT_EQ(reply.hello().program(), "dtactd 9.8.7");
+  EXPECT_EQ(reply.hello().surface_frame().frame_id(), "finger_3");
+  EXPECT_TRUE(reply.hello().surface_frame().right_handed());
+  EXPECT_TRUE(reply.hello().surface_frame().mirrored_from_outside());
+  EXPECT_EQ(reply.hello().surface_frame().origin(), "centre");
+}
+
+TEST(Handshake, RefusesAnotherMajorVersionAndEnds) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  const auto reply = client.request(hello(2));
+  EXPECT_EQ(reply.id(), 1U);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_VERSION);
+  EXPECT_THAT(reply.error().message(), HasSubstr("install the same release on both sides"));
+  EXPECT_TRUE(client.ends());
+}
+
+TEST(Handshake, WantsHelloFirst) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  v1::ClientMessage message;
+  message.mutable_get_status();
+  const auto reply = client.request(message);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_VERSION);
+  EXPECT_TRUE(client.ends());
+}
+
+TEST(Handshake, WantsHelloOnlyOnce) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(client.request(hello(1)).error().code(), v1::ERROR_INVALID);
+  EXPECT_TRUE(client
+                  .request([] {
+                    v1::ClientMessage message;
+                    message.mutable_get_status();
+                    return message;
+                  }())
+                  .has_status());
+}
+
+TEST(Handshake, RefusesALongProgramName) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  auto message = hello(1);
+  message.mutable_hello()->set_program(std::string(65, 'x'));
+  EXPECT_EQ(client.request(message).error().code(), v1::ERROR_INVALID);
+  message.mutable_hello()->set_program(std::string(64, 'x'));
+  EXPECT_TRUE(client.request(message).has_hello());
+}
+
+TEST(Handshake, EndsAfterSilence) {
+  NetConfig config;
+  config.hello_timeout = std::chrono::milliseconds(50);
+  Rig rig(config);
+  RawClient client(rig.tcp_port());
+  EXPECT_TRUE(client.ends());
+}
+
+TEST(Handshake, KeepsSilentClientsAfterHello) {
+  NetConfig config;
+  config.hello_timeout = std::chrono::milliseconds(100);
+  Rig rig(config);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  v1::ClientMessage message;
+  message.mutable_get_status();
+  EXPECT_TRUE(client.request(message).has_status());
+}
+
+TEST(Handshake, RefusesMoreThanMaxClients) {
+  NetConfig config;
+  config.max_clients = 1;
+  Rig rig(config);
+  auto first = std::make_unique<RawClient>(rig.tcp_port());
+  first->hello();
+  RawClient second(rig.tcp_port());
+  const auto reply = second.reply();
+  EXPECT_EQ(reply.id(), 0U);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_BUSY);
+  EXPECT_THAT(reply.error().message(), HasSubstr("max_clients"));
+  EXPECT_TRUE(second.ends());
+
+  first.reset();
+  ASSERT_TRUE(rig.wait_log("the client left"));
+  RawClient third(rig.tcp_port());
+  EXPECT_NO_THROW(third.hello());
+}
+
+TEST(Malformed, IsAnsweredAndEnds) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  client.send_bytes("\0\0\0\3\xff\xff\xff"s);
+  const auto reply = client.reply();
+  EXPECT_EQ(reply.id(), 0U);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_TRUE(client.ends());
+}
+
+TEST(Malformed, EmptyMessagesAreNoRequests) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.send_bytes("\0\0\0\0"s);
+  EXPECT_EQ(client.reply().error().code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_TRUE(client.ends());
+}
+
+TEST(Malformed, IdZeroIsNotAllowed) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  message.mutable_get_status();
+  client.send(message);
+  const auto reply = client.reply();
+  EXPECT_EQ(reply.error().code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_THAT(reply.error().message(), HasSubstr("ids begin with 1"));
+  EXPECT_TRUE(client.ends());
+}
+
+TEST(Malformed, AnUnknownRequestIsAnsweredByItsId) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  client.send_bytes("\0\0\0\5\x08\x07\xfa\x01\x00"s);  // id 7, field 31 of a later version, empty
+  const auto reply = client.reply();
+  EXPECT_EQ(reply.id(), 7U);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_TRUE(client.ends());
+}
+
+TEST(Oversized, IsAnsweredAndEndsEvenWhileTheClientStillSends) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  client.send_bytes("\x01\x00\x00\x01"s);  // 16 MiB + 1
+  client.send_bytes(std::string(1 << 20, 'x'));
+  const auto reply = client.reply();
+  EXPECT_EQ(reply.error().code(), v1::ERROR_TOO_LARGE);
+  EXPECT_THAT(reply.error().message(), HasSubstr("16777217"));
+  EXPECT_TRUE(client.ends());
+}
+
+TEST(Server, SaysWhoMayHaveThePort) {
+  Rig rig;
+  boost::asio::io_context io;
+  FakePort port;
+  FakeStore store;
+  NetConfig config;
+  config.port = rig.tcp_port();
+  try {
+    const Server second(io, config, port, store);
+    FAIL() << "two servers on one port";
+  } catch (const std::runtime_error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("127.0.0.1 port " + std::to_string(rig.tcp_port())));
+    EXPECT_THAT(e.what(), HasSubstr("another dtactd may be running"));
+  }
+}
+
+TEST(Server, RefusesWhatIsNoAddress) {
+  boost::asio::io_context io;
+  FakePort port;
+  FakeStore store;
+  NetConfig config;
+  config.address = "localhost:7";
+  EXPECT_THROW(Server(io, config, port, store), std::runtime_error);
+}
+
+TEST(Server, ListensOnIpv6) {
+  boost::asio::io_context io;
+  FakePort port;
+  FakeStore store;
+  NetConfig config;
+  config.address = "::1";
+  config.port = 0;
+  try {
+    const Server server(io, config, port, store);
+    EXPECT_NE(server.port(), 0);
+  } catch (const std::runtime_error& e) {
+    GTEST_SKIP() << "this machine has no IPv6 loopback: " << e.what();
+  }
+}
+
+TEST(Server, EndsItsConnectionsAndItsWork) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  client.subscribe(v1::DEPTH_INT16);
+  rig.stop();  // returns only when the loop has nothing left to do
+  EXPECT_TRUE(client.ends());
+  EXPECT_TRUE(rig.port.wait_wanted(false, false));
+}
+
+}  // namespace
+}  // namespace dtact::net::test

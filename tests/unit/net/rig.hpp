@@ -1,0 +1,95 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "daemon/net/calibration_store.hpp"
+#include "daemon/net/server.hpp"
+#include "tests/unit/net/fake_port.hpp"
+
+namespace dtact::net::test {
+
+/// A store that takes everything but the text "bad", and can be told to fail.
+class FakeStore : public CalibrationStore {
+ public:
+  std::shared_ptr<const calibration::Calibration> check(const CalibrationFiles& files) override {
+    if (files.toml == "bad") throw std::runtime_error("upload: calibration.toml:3: scale missing");
+    auto calibration = std::make_shared<calibration::Calibration>();
+    calibration->name = files.name;
+    return calibration;
+  }
+  void keep(const CalibrationFiles& files) override {
+    if (files.toml == "unwritable") throw std::runtime_error("cannot write /state/x: disk full");
+    kept_ = files;
+  }
+  CalibrationFiles read() override { return kept_; }
+
+ private:
+  CalibrationFiles kept_{"first", "toml of first", "png of first"};
+};
+
+/// A server on a free loopback port with a fake pipeline, running on a thread of its own.
+class Rig {
+ public:
+  explicit Rig(NetConfig config = {}, std::function<void(FakePort&)> prepare = {}) {
+    if (prepare) prepare(port);
+    config.port = 0;
+    config.version = "9.8.7";
+    config.log = [this](LogLevel, const std::string& text) {
+      const std::lock_guard lock(mutex_);
+      log_ += text + "\n";
+    };
+    server_.emplace(io_, config, port, store);
+    thread_ = std::thread([this] { io_.run(); });
+  }
+  ~Rig() { stop(); }
+  Rig(const Rig&) = delete;
+  Rig& operator=(const Rig&) = delete;
+
+  /// Returns once the loop has run out of work by itself.
+  void stop() {
+    if (!thread_.joinable()) return;
+    boost::asio::post(io_, [this] { server_->stop(); });
+    thread_.join();
+  }
+  [[nodiscard]] std::uint16_t tcp_port() const { return server_->port(); }
+  [[nodiscard]] std::string log() {
+    const std::lock_guard lock(mutex_);
+    return log_;
+  }
+  /// Waits until the log says so.
+  [[nodiscard]] bool wait_log(const std::string& text) {
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (log().find(text) == std::string::npos) {
+      if (std::chrono::steady_clock::now() > end) return false;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return true;
+  }
+
+  FakePort port;
+  FakeStore store;
+
+ private:
+  std::mutex mutex_;
+  std::string log_;
+  boost::asio::io_context io_;
+  std::optional<Server> server_;
+  std::thread thread_;
+};
+
+/// Answers every command with "done", at once.
+inline void answer_done(FakePort& port) {
+  port.answer([](const pipeline::Command& command) {
+    return pipeline::CommandDone{command.ticket, pipeline::Outcome::done, ""};
+  });
+}
+
+}  // namespace dtact::net::test
