@@ -44,11 +44,12 @@ struct Calibration {
 /// remedy.
 [[nodiscard]] Calibration load(const std::filesystem::path& folder);
 
-/// Writes the folder so that at any moment it is either absent, the old one or the new one.
+/// Writes the folder so that at any moment it is either absent, the old one or the new one. Throws
+/// std::runtime_error, also when the folder holds files that no calibration has.
 void save(const Calibration& calibration, const std::filesystem::path& folder);
 
 /// The two files' contents checked and taken apart without a folder (an upload). `where` names the
-/// origin in error messages.
+/// origin in error messages; the calibration's name is left empty.
 [[nodiscard]] Calibration parse(const std::string& toml, const std::string& reference_png,
                                 const std::string& where);
 

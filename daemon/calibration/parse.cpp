@@ -48,7 +48,7 @@ int small(KeyReader& reader, const char* key, int low, int high) {
   return static_cast<int>(reader.integer(key, low, high));
 }
 
-void read_list(KeyReader list, recon::DepthList& out) {
+void read_list(KeyReader list, bool monotone, recon::DepthList& out) {
   constexpr int kReach = 255 * recon::kEntriesPerLevel;
   out.first_q6 = small(list, "first_q6", -kReach, kReach);
   out.covered_from_q6 = small(list, "covered_from_q6", -kReach, kReach);
@@ -58,7 +58,7 @@ void read_list(KeyReader list, recon::DepthList& out) {
   }
   list.finish();
   try {
-    recon::check(out);
+    recon::check(out, monotone);
   } catch (const std::invalid_argument& e) {
     list.fail("", e.what());
   }
@@ -161,7 +161,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   model->rectify = recon::make_crop_table(frame_width, frame_height, calibration.crop_col,
                                           calibration.crop_row, width, height);
 
-  read_list(top.table("list"), model->list);
+  read_list(top.table("list"), model->method == recon::Method::list, model->list);
   read_camera(top.table("camera"), calibration.origin);
   read_light(top.table("light"), calibration.origin);
   for (KeyReader& source : top.tables("source")) {

@@ -87,6 +87,9 @@ struct Status {
   double fps = 0;                     ///< Over the last second.
   std::vector<std::string> realtime;  ///< One sentence for each real-time setting refused.
   std::vector<StageStatistics> stages;
+  /// Why the calibration or the last good reference could not be used or kept, and what to do;
+  /// empty when all is well.
+  std::string storage_message;
 };
 
 /// The one seam between the network thread (the only caller) and the pipeline's threads. No call

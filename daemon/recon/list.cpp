@@ -8,7 +8,7 @@
 
 namespace dtact::recon {
 
-void check(const DepthList& list) {
+void check(const DepthList& list, bool monotone) {
   constexpr int kReach = 255 * kEntriesPerLevel;
   if (list.um.empty()) throw std::invalid_argument("list.um: must have at least one entry");
   if (list.um.size() > 2 * kReach + 1 || list.first_q6 < -kReach ||
@@ -20,7 +20,7 @@ void check(const DepthList& list) {
     throw std::invalid_argument("list.um: entries must be -32767 to 32767 micrometres");
   }
   const auto drop = std::ranges::adjacent_find(list.um, std::ranges::greater{});
-  if (drop != list.um.end()) {
+  if (monotone && drop != list.um.end()) {
     throw std::invalid_argument("list.um: must not fall, but entry " +
                                 std::to_string(drop - list.um.begin() + 2) +
                                 " is below the one before");

@@ -19,9 +19,9 @@ struct DepthList {
   int covered_to_q6 = 0;         ///< Greatest darkening the calibration vouches for.
 };
 
-/// Throws std::invalid_argument, naming the key as in calibration.toml, unless the list is
-/// monotone, lies within ±255 grey levels, covers a range inside itself and holds no untrusted
-/// marker.
-void check(const DepthList& list);
+/// Throws std::invalid_argument, naming the key as in calibration.toml, unless the list lies within
+/// ±255 grey levels, covers a range inside itself, holds no untrusted marker and, where `monotone`
+/// asks for it, never falls (the published list is a plain mean and may).
+void check(const DepthList& list, bool monotone);
 
 }  // namespace dtact::recon

@@ -41,7 +41,7 @@ void check(const Model& model) {
   require(model.untrusted.empty() || model.untrusted.size() == map,
           "untrusted: not the size of the depth map");
   require(model.mm_per_px > 0, "scale: mm_per_px must be positive");
-  check(model.list);
+  check(model.list, model.method == Method::list);
 }
 
 /// Splits the time of a run into steps. Reads no clock when nobody asks.

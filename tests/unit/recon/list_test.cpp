@@ -14,18 +14,24 @@ using testing::ThrowsMessage;
 
 DepthList good() { return {-2, {-20, -10, 0, 10, 20}, -2, 2}; }
 
-TEST(CheckList, AcceptsAMonotoneList) { EXPECT_NO_THROW(check(good())); }
+TEST(CheckList, AcceptsAMonotoneList) { EXPECT_NO_THROW(check(good(), true)); }
+
+TEST(CheckList, AMeanMayFall) {
+  DepthList list = good();
+  list.um[3] = -11;
+  EXPECT_NO_THROW(check(list, false));
+}
 
 TEST(CheckList, AcceptsLevelStretches) {
   DepthList list = good();
   list.um = {0, 0, 0, 0, 0};
-  EXPECT_NO_THROW(check(list));
+  EXPECT_NO_THROW(check(list, true));
 }
 
 void expect_refused(const std::function<void(DepthList&)>& spoil, const char* key) {
   DepthList list = good();
   spoil(list);
-  EXPECT_THAT([&] { check(list); }, ThrowsMessage<std::invalid_argument>(HasSubstr(key)));
+  EXPECT_THAT([&] { check(list, true); }, ThrowsMessage<std::invalid_argument>(HasSubstr(key)));
 }
 
 TEST(CheckList, RefusesWhatCannotBe) {

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "daemon/calibration/calibration.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::ctl {
+
+/// Frames of one scene, all of one size.
+struct ImageSet {
+  std::vector<image::Grey16> images;  ///< Full scale 65535.
+  std::vector<calibration::Origin::Source> sources;
+
+  [[nodiscard]] int width() const { return images.front().width; }
+  [[nodiscard]] int height() const { return images.front().height; }
+  /// As the camera gives them to the daemon: 8-bit luma.
+  [[nodiscard]] std::vector<image::Grey8> frames() const;
+  /// The mean as Q8 luma (grey level times 256).
+  [[nodiscard]] image::Grey16 mean_q8() const;
+};
+
+/// Reads PNG files; a folder stands for the PNG files in it, by name. `option` names the command
+/// line's option in errors. Throws std::runtime_error naming the file.
+[[nodiscard]] ImageSet load_images(const std::vector<std::string>& paths,
+                                   const std::string& option);
+
+/// Throws std::runtime_error when two sets are not of one size.
+void require_same_size(const ImageSet& a, const std::string& a_option, const ImageSet& b,
+                       const std::string& b_option);
+
+}  // namespace dtact::ctl

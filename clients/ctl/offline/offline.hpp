@@ -1,0 +1,24 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace dtact::ctl {
+
+// Each adds a command to `app` whose callback does the work and prints its result to standard
+// output; it throws std::runtime_error or std::invalid_argument with a sentence on failure.
+
+/// calibrate depth --reference R.png --ball B.png --radius-mm 4.0 --mm-per-px S -o cal/
+void add_calibrate(CLI::App& app);
+/// reconstruct --calibration cal/ --reference R.png --frame F.png -o depth.{npy,png,ply}
+void add_reconstruct(CLI::App& app);
+/// evaluate --calibration cal/ --reference R.png --ball B.png --radius-mm 4.0 [--json]
+void add_evaluate(CLI::App& app);
+
+/// All of the above.
+inline void add_offline_commands(CLI::App& app) {
+  add_calibrate(app);
+  add_reconstruct(app);
+  add_evaluate(app);
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,134 @@
+#include "daemon/calibration/build.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+
+#include "daemon/calibration/list_fit.hpp"
+#include "daemon/calibration/published.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+/// Part of the contact that may be black or white before the press is refused.
+constexpr double kClipped = 0.01;
+
+/// The depth map's part of the reference, to whole grey levels.
+image::Grey8 crop_reference(const image::Grey16& q8, const Crop& crop) {
+  image::Grey8 part{crop.width, crop.height, {}};
+  for (int y = crop.row; y < crop.row + crop.height; ++y) {
+    for (int x = crop.col; x < crop.col + crop.width; ++x) {
+      const int value = q8.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(q8.width) +
+                                  static_cast<std::size_t>(x)];
+      part.pixels.push_back(static_cast<std::uint8_t>(std::min(255, (value + 128) / 256)));
+    }
+  }
+  return part;
+}
+
+/// The depth map's part of the mean of the frames, to whole grey levels.
+image::Grey8 crop_mean(const std::vector<image::Grey8>& frames, const Crop& crop) {
+  image::Grey8 part{crop.width, crop.height, {}};
+  const auto count = static_cast<int>(frames.size());
+  for (int y = crop.row; y < crop.row + crop.height; ++y) {
+    for (int x = crop.col; x < crop.col + crop.width; ++x) {
+      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(frames[0].width) +
+                         static_cast<std::size_t>(x);
+      int sum = 0;
+      for (const image::Grey8& frame : frames) sum += frame.pixels[pixel];
+      part.pixels.push_back(static_cast<std::uint8_t>((sum + count / 2) / count));
+    }
+  }
+  return part;
+}
+
+void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_per_px,
+                    std::uint8_t limit, const char* message) {
+  std::size_t all = 0;
+  std::size_t clipped = 0;
+  for (int y = 0; y < part.height; ++y) {
+    for (int x = 0; x < part.width; ++x) {
+      if (std::hypot(x - contact.col, y - contact.row) * mm_per_px >= contact.radius_mm) continue;
+      ++all;
+      clipped += static_cast<std::size_t>(
+          part.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(part.width) +
+                      static_cast<std::size_t>(x)] == limit);
+    }
+  }
+  if (static_cast<double>(clipped) > kClipped * static_cast<double>(all)) {
+    throw std::runtime_error(message);
+  }
+}
+
+void check(const BallPress& press) {
+  if (press.frames.empty()) throw std::invalid_argument("no image of the ball");
+  for (const image::Grey8& frame : press.frames) {
+    if (frame.width != press.reference_q8.width || frame.height != press.reference_q8.height) {
+      throw std::invalid_argument(fmt::format(
+          "the ball's image is {}x{} but the reference is {}x{}; take both with one camera mode",
+          frame.width, frame.height, press.reference_q8.width, press.reference_q8.height));
+    }
+  }
+  if (!(press.ball_radius_mm > 0.1 && press.ball_radius_mm < 100)) {
+    throw std::invalid_argument("the ball's radius must be 0.1 to 100 mm");
+  }
+  if (!(press.mm_per_px >= 0.001 && press.mm_per_px <= 1)) {
+    throw std::invalid_argument("the scale must be 0.001 to 1 mm a pixel");
+  }
+}
+
+}  // namespace
+
+SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> reference_q8,
+                    std::span<const image::Grey8> frames, double ball_radius_mm) {
+  SettledPress press;
+  press.reference_q8.assign(reference_q8.begin(), reference_q8.end());
+  press.map = smoothed_difference(model, press.reference_q8, frames);
+  press.contact = find_contact(press.map, ball_radius_mm);
+  press.drift_levels = far_field_drift(press.map, press.contact);
+  if (press.drift_levels != 0) {
+    const auto drift_q8 = static_cast<int>(std::lround(256 * press.drift_levels));
+    for (std::uint16_t& value : press.reference_q8) {
+      value = static_cast<std::uint16_t>(std::clamp(value - drift_q8, 0, 255 * 256));
+    }
+    press.map = smoothed_difference(model, press.reference_q8, frames);
+    press.contact = find_contact(press.map, ball_radius_mm);
+  }
+  return press;
+}
+
+Calibration build(const BallPress& press) {
+  check(press);
+  const int frame_width = press.reference_q8.width;
+  const int frame_height = press.reference_q8.height;
+  const Crop crop = press.crop.value_or(Crop{0, 0, frame_width, frame_height});
+  auto model = std::make_shared<recon::Model>();
+  model->method = press.method;
+  model->rectify = recon::make_crop_table(frame_width, frame_height, crop.col, crop.row, crop.width,
+                                          crop.height);
+  model->mm_per_px = press.mm_per_px;
+  model->smoothing_px = std::min(10.0, kSmoothingMm / press.mm_per_px);
+  model->reference_q8 = press.reference_q8.pixels;
+
+  const SettledPress settled =
+      settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
+  const image::Grey8 reference = crop_reference(press.reference_q8, crop);
+  const image::Grey8 ball = crop_mean(press.frames, crop);
+  refuse_clipped(reference, settled.contact, press.mm_per_px, 255,
+                 "the reference is white at the contact; lower the exposure or the light");
+  refuse_clipped(ball, settled.contact, press.mm_per_px, 0,
+                 "the ball's image is black at the contact; raise the exposure or the light");
+  model->list = press.method == recon::Method::list
+                    ? fit_list(settled.map, settled.contact)
+                    : fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
+  Calibration calibration;
+  calibration.crop_col = crop.col;
+  calibration.crop_row = crop.row;
+  calibration.model = std::move(model);
+  return calibration;
+}
+
+}  // namespace dtact::calibration

@@ -1,0 +1,195 @@
+#include "daemon/calibration/list_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+namespace dtact::calibration {
+namespace {
+
+constexpr double kSure = 0.85;       // of the contact radius
+constexpr double kBinsPerLevel = 2;  // of the monotone fit
+constexpr double kVouched = 2;       // grey levels beyond the greatest one seen
+constexpr int kFewest = 4;           // pixels that make a grey level's vote
+constexpr std::size_t kRange = 256;  // grey levels
+
+double sag(double ball_radius, double r) {
+  return ball_radius - std::sqrt(std::max(0.0, ball_radius * ball_radius - r * r));
+}
+
+/// A point of the list: darkening, indentation, and how many pixels say so.
+struct Knot {
+  double level = 0;
+  double depth_mm = 0;
+  double weight = 0;
+};
+
+/// sag = depth − slope · level.
+struct Line {
+  double depth_mm = 0;
+  double slope = 0;  ///< Millimetres a grey level.
+};
+
+/// Means of (level, sag) over pixels within `reach_mm` of the centre, `per_level` bins a level.
+std::vector<Knot> sag_by_level(const DifferenceMap& map, const Contact& contact,
+                               const PixelFilter& use, double reach_mm, double per_level) {
+  std::vector<Knot> bins(static_cast<std::size_t>(static_cast<double>(kRange) * per_level));
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const double r = distance_mm(map, contact, x, y);
+      const double level = map.at(x, y);
+      if (r >= reach_mm || !(level >= 0) || (use && !use(x, y))) continue;
+      Knot& bin = bins[static_cast<std::size_t>(level * per_level)];
+      bin.level += level;
+      bin.depth_mm += sag(contact.ball_radius_mm, r);
+      bin.weight += 1;
+    }
+  }
+  std::erase_if(bins, [](const Knot& bin) { return bin.weight < kFewest; });
+  for (Knot& bin : bins) {
+    bin.level /= bin.weight;
+    bin.depth_mm /= bin.weight;
+  }
+  return bins;
+}
+
+/// Step 1.
+Line fit_line(const std::vector<Knot>& bins) {
+  double n = 0;
+  double x = 0;
+  double y = 0;
+  double xx = 0;
+  double xy = 0;
+  for (const Knot& bin : bins) {
+    n += 1;
+    x += bin.level;
+    y += bin.depth_mm;
+    xx += bin.level * bin.level;
+    xy += bin.level * bin.depth_mm;
+  }
+  const double spread = n * xx - x * x;
+  const double slope = spread > 0 ? -(n * xy - x * y) / spread : 0;
+  if (bins.size() < 4 || !(slope > 0)) {
+    throw std::runtime_error(
+        "the image does not darken steadily from the contact's edge to its centre; the ball's "
+        "radius or the scale may be wrong, or the press was too light");
+  }
+  return {(y + slope * x) / n, slope};
+}
+
+/// Step 2: pool adjacent violators (Ayer et al. 1955), weighted.
+void make_monotone(std::vector<Knot>& knots) {
+  std::vector<Knot> pools(knots.size());
+  std::vector<std::size_t> members(knots.size());
+  std::size_t used = 0;
+  for (const Knot& knot : knots) {
+    pools[used] = knot;
+    members[used++] = 1;
+    while (used > 1 && pools[used - 2].depth_mm > pools[used - 1].depth_mm) {
+      const Knot& last = pools[--used];
+      Knot& pool = pools[used - 1];
+      const double weight = pool.weight + last.weight;
+      pool.depth_mm = (pool.depth_mm * pool.weight + last.depth_mm * last.weight) / weight;
+      pool.weight = weight;
+      members[used - 1] += members[used];
+    }
+  }
+  std::size_t i = 0;
+  for (std::size_t pool = 0; pool < used; ++pool) {
+    for (std::size_t k = 0; k < members[pool]; ++k) knots[i++].depth_mm = pools[pool].depth_mm;
+  }
+}
+
+/// Between the origin, the knots, and level beyond the last.
+double interpolate(const std::vector<Knot>& knots, double level) {
+  const auto above = std::ranges::lower_bound(knots, level, {}, &Knot::level);
+  if (above == knots.end()) return knots.back().depth_mm;
+  const Knot below = above == knots.begin() ? Knot{} : *(above - 1);
+  return std::lerp(below.depth_mm, above->depth_mm,
+                   (level - below.level) / (above->level - below.level));
+}
+
+/// Step 3, Returns the slope at zero, millimetres a grey level.
+double hand_over(std::vector<Knot>& knots, double sure_level) {
+  const double slope = interpolate(knots, sure_level) / sure_level;
+  for (Knot& knot : knots) {
+    if (knot.level >= sure_level) break;
+    knot.depth_mm = std::lerp(slope * knot.level, knot.depth_mm, knot.level / sure_level);
+  }
+  double deepest = 0;
+  for (Knot& knot : knots) knot.depth_mm = deepest = std::max(deepest, knot.depth_mm);
+  return slope;
+}
+
+double bulge_mm(double level, double slope, double c) {
+  return -c * (1 - std::exp(slope * level / c));
+}
+
+/// Step 5: the c at which dent and bulge have the same volume, from a radial profile, so that a
+/// ring that is cut off by the image counts whole.
+double bulge_limit(const RadialProfile& profile, const std::vector<Knot>& knots, double slope) {
+  const auto volume = [&](double c) {
+    double sum = 0;
+    for (std::size_t i = 0; i < profile.levels.size(); ++i) {
+      const double level = profile.levels[i];
+      if (std::isnan(level)) continue;
+      const double depth = level > 0 ? interpolate(knots, level) : bulge_mm(level, slope, c);
+      sum += depth * (2 * static_cast<double>(i) + 1);
+    }
+    return sum;
+  };
+  // From a bulge that hardly rises to a list that is straight; the greater c, the more bulge.
+  double low = 0.02;
+  double high = 10;
+  for (int i = 0; i < 50; ++i) {
+    const double middle = std::sqrt(low * high);
+    (volume(middle) > 0 ? low : high) = middle;
+  }
+  return low;
+}
+
+}  // namespace
+
+recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
+                          const PixelFilter& use) {
+  const double sure_mm = kSure * contact.radius_mm;
+  const Line line = fit_line(sag_by_level(map, contact, use, sure_mm, 1));
+  std::vector<Knot> knots = sag_by_level(map, contact, use, contact.radius_mm, kBinsPerLevel);
+  for (Knot& knot : knots) knot.depth_mm = line.depth_mm - knot.depth_mm;
+  make_monotone(knots);
+
+  const RadialProfile profile = radial_profile(map, contact, kFarField * contact.ball_radius_mm);
+  const double slope = hand_over(knots, profile.at(sure_mm));
+  const double c = bulge_limit(profile, knots, slope);
+  const Knot deepest = knots.back();
+  const double faintest = std::ranges::min(
+      profile.levels, {}, [](double level) { return std::isnan(level) ? 0 : level; });
+
+  recon::DepthList list;
+  constexpr int kStep = recon::kEntriesPerLevel;
+  list.first_q6 = kListFirstLevel * kStep;
+  list.um.reserve(static_cast<std::size_t>((kListLastLevel - kListFirstLevel) * kStep + 1));
+  for (int q6 = kListFirstLevel * kStep; q6 <= kListLastLevel * kStep; ++q6) {
+    const double level = static_cast<double>(q6) / kStep;
+    double mm = 0;
+    if (level <= 0) {
+      mm = bulge_mm(level, slope, c);
+    } else if (level <= deepest.level) {
+      mm = interpolate(knots, level);
+    } else {
+      mm = deepest.depth_mm + line.slope * (level - deepest.level);
+    }
+    list.um.push_back(
+        static_cast<std::int16_t>(std::clamp(std::lround(1000 * mm), -32767L, 32767L)));
+  }
+  const auto covered = [](double level) {
+    return static_cast<int>(
+        std::lround(kStep * std::clamp<double>(level, kListFirstLevel, kListLastLevel)));
+  };
+  list.covered_from_q6 = covered(std::min(faintest, 0.0));
+  list.covered_to_q6 = covered(deepest.level + kVouched);
+  return list;
+}
+
+}  // namespace dtact::calibration

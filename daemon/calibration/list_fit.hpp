@@ -1,0 +1,44 @@
+#pragma once
+
+#include <functional>
+
+#include "daemon/calibration/contact.hpp"
+#include "daemon/recon/list.hpp"
+
+namespace dtact::calibration {
+
+/// Which pixels of the depth map a fit may use; empty: all.
+using PixelFilter = std::function<bool(int x, int y)>;
+
+/// The list of one press of a ball, from its image alone.
+///
+/// Inside the contact the surface is the ball: its indentation is g − sag(r) with
+/// sag(r) = R − √(R² − r²) and a depth g that nobody measured, so one press shows only the list's
+/// slope. The published list finds g by putting zero indentation at the contact's edge, which is
+/// biased: the layer's surface is still pressed there, by 0.03 … 0.2 mm depending on its thickness.
+/// What is known without any circle is that an untouched pixel (no darkening) is at zero. So:
+///
+/// 1. In the sure part of the contact (0.85 of its radius) the sag is a straight line of the
+///    darkening, fitted with one vote a grey level, since shallow and deep places count alike for a
+///    line that is extended to zero. Its value at no darkening is g.
+/// 2. Indentation g − sag over the whole contact, one mean for each half grey level, made monotone
+///    (pool adjacent violators).
+/// 3. Towards the contact's edge the bright ring's scattered light lowers the darkening, the more
+///    the deeper the press, so what one press shows there is not true of another. From the sure
+///    part's edge down to zero the fit hands over to the straight line to the origin.
+/// 4. Above the greatest darkening the list goes on along the line of 1; two grey levels of that
+/// are
+///    vouched for, so that a frame's noise is not beyond the calibration.
+/// 5. The bulge: −c·(1 − exp(s·ΔI / c)) for ΔI < 0, with the slope s that the list has at zero. A
+///    thickening layer brightens ever faster, so the list flattens; c is where the volume of the
+///    bulge equals that of the dent, since the layer is incompressible.
+///
+/// Throws std::runtime_error when the image doesn't darken from the contact's edge to its centre.
+[[nodiscard]] recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
+                                        const PixelFilter& use = {});
+
+/// What fit_list's lists span: the design's −40 to +110 grey levels.
+inline constexpr int kListFirstLevel = -40;
+inline constexpr int kListLastLevel = 110;
+
+}  // namespace dtact::calibration

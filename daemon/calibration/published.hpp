@@ -1,0 +1,43 @@
+#pragma once
+
+#include <vector>
+
+#include "daemon/recon/list.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::calibration {
+
+/// A circle in pixels.
+struct Circle {
+  double col = 0;
+  double row = 0;
+  double radius = 0;
+};
+
+struct Pixel {
+  int col = 0;
+  int row = 0;
+};
+
+/// The smallest circle that holds all points (Welzl 1991, without the recursion). No points: empty.
+[[nodiscard]] Circle enclosing_circle(std::vector<Pixel> points);
+
+/// The single-image list as it was published, with its weaknesses, to compare with:
+///
+/// - The difference is unsigned: what is brighter than the reference counts as 0.
+/// - The contact is the smallest circle about the largest patch darker than 3 grey levels, centre
+///   and radius cut to whole pixels; the indentation at its edge is put to zero.
+/// - An entry is the mean depth of the circle's pixels with that whole difference. Where none has
+///   it, the entry is interpolated. (The authors average three colour channels and keep the third
+///   of the pixels whose mean is whole; luma is whole everywhere.)
+/// - At run time the entry at the threshold of 2 grey levels is subtracted from all and nothing is
+///   below zero; both are done here once for the list. The list has 64 equal entries for each
+///   level.
+///
+/// `reference`, `ball`: the depth map's part of the images. Throws std::runtime_error when nothing
+/// is darker than the threshold or the ball is smaller than the circle.
+[[nodiscard]] recon::DepthList fit_published(const image::Grey8& reference,
+                                             const image::Grey8& ball, double ball_radius_mm,
+                                             double mm_per_px);
+
+}  // namespace dtact::calibration

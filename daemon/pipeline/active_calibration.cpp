@@ -1,0 +1,96 @@
+#include "daemon/pipeline/active_calibration.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <stdexcept>
+#include <utility>
+
+#include "daemon/calibration/mismatch.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+CellRegion cells_within(const recon::RectifyTable& table) {
+  int left = table.frame_width;
+  int right = 0;
+  int top = table.frame_height;
+  int bottom = 0;
+  for (const auto& entry : table.entries) {
+    left = std::min<int>(left, entry.x);
+    right = std::max<int>(right, entry.x + 1);
+    top = std::min<int>(top, entry.y);
+    bottom = std::max<int>(bottom, entry.y + 1);
+  }
+  const auto first = [](int pixel, int cells, int pixels) {
+    return std::min(cells, (pixel * cells + pixels - 1) / pixels);
+  };
+  CellRegion region{.x0 = first(left, kGridWidth, table.frame_width),
+                    .y0 = first(top, kGridHeight, table.frame_height),
+                    .x1 = (right + 1) * kGridWidth / table.frame_width,
+                    .y1 = (bottom + 1) * kGridHeight / table.frame_height};
+  region.x1 = std::min(region.x1, kGridWidth);
+  region.y1 = std::min(region.y1, kGridHeight);
+  return region;
+}
+
+calibration::AttachedCamera attached(const hal::CameraInfo& camera) {
+  calibration::AttachedCamera now{.identity = camera.identity,
+                                  .pixel_format = camera.pixel_format,
+                                  .width = camera.width,
+                                  .height = camera.height,
+                                  .fps = camera.fps,
+                                  .controls = {}};
+  for (const auto& control : camera.controls) now.controls.push_back({control.name, control.value});
+  return now;
+}
+
+}  // namespace
+
+std::unique_ptr<ActiveCalibration> activate(
+    std::shared_ptr<const calibration::Calibration> calibration, const hal::CameraInfo& camera) {
+  const recon::Model& model = *calibration->model;
+  const recon::RectifyTable& table = model.rectify;
+  if (table.frame_width != camera.width || table.frame_height != camera.height) {
+    throw std::invalid_argument(fmt::format(
+        "calibration \"{}\" is for frames of {}x{} pixels, the camera delivers {}x{}: set "
+        "camera.width and camera.height to the calibration's, or calibrate in this mode",
+        calibration->name, table.frame_width, table.frame_height, camera.width, camera.height));
+  }
+  const CellRegion region = cells_within(table);
+  if (region.x1 - region.x0 < 8 || region.y1 - region.y0 < 8) {
+    throw std::invalid_argument(
+        fmt::format("calibration \"{}\" covers {}x{} pixels of the frame, too little to tell light "
+                    "from touch: calibrate with a crop of at least a quarter of each side",
+                    calibration->name, table.width, table.height));
+  }
+  auto active = std::make_unique<ActiveCalibration>(ActiveCalibration{
+      .calibration = calibration,
+      .reconstructor = recon::Reconstructor(calibration->model),
+      .grid = {},
+      .region = region,
+      .camera_mismatch = !calibration::camera_mismatches(*calibration, attached(camera)).empty()});
+  measure(model.reference_q8, table.frame_width, table.frame_height, active->grid);
+  return active;
+}
+
+bool light_differs(const calibration::Calibration& calibration, const hal::Light& light) noexcept {
+  const auto& then = calibration.origin.leds;
+  if (then.empty()) return false;
+  if (then.size() != light.leds.size() * 3) return true;
+  const auto differs = [&](std::uint8_t channel, std::uint8_t recorded) {
+    const int shown = (channel * light.brightness + 127) / 255;
+    return std::abs(shown - int{recorded}) > 1;
+  };
+  for (std::size_t i = 0; i < light.leds.size(); ++i) {
+    const hal::Rgb& led = light.leds[i];
+    if (differs(led.r, then[3 * i]) || differs(led.g, then[3 * i + 1]) ||
+        differs(led.b, then[3 * i + 2])) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace dtact::pipeline

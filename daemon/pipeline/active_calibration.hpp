@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "daemon/calibration/calibration.hpp"
+#include "daemon/pipeline/luma_grid.hpp"
+#include "daemon/recon/reconstructor.hpp"
+#include "hal/camera.hpp"
+#include "hal/light_ring.hpp"
+
+namespace dtact::pipeline {
+
+/// A calibration ready for the capture thread: all that takes memory or time is done. Made and
+/// freed on the network's side, used on the capture thread.
+struct ActiveCalibration {
+  std::shared_ptr<const calibration::Calibration> calibration;
+  recon::Reconstructor reconstructor;
+  LumaGrid grid;      ///< Of the calibration's reference.
+  CellRegion region;  ///< Cells that lie wholly in the calibrated part of the frame.
+  bool camera_mismatch = false;
+  std::uint64_t generation = 0;  ///< Counts the calibrations of this run.
+};
+
+/// Throws std::invalid_argument, saying what to do, when the calibration cannot be used with frames
+/// of this camera at all (other differences are a health condition).
+[[nodiscard]] std::unique_ptr<ActiveCalibration> activate(
+    std::shared_ptr<const calibration::Calibration> calibration, const hal::CameraInfo& camera);
+
+/// The ring shows another light than at calibration: any channel, after brightness, off by more
+/// than one step. False when the calibration did not record its light. Does not allocate.
+[[nodiscard]] bool light_differs(const calibration::Calibration& calibration,
+                                 const hal::Light& light) noexcept;
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,40 @@
+#include "daemon/pipeline/camera_watch.hpp"
+
+#include <utility>
+
+namespace dtact::pipeline {
+
+bool CameraWatch::arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexcept {
+  const bool returned = std::exchange(away_, false);
+  // A camera that comes back may count from anywhere.
+  const bool gap = have_sequence_ && !returned && info.sequence > sequence_ + 1;
+  if (gap || (info.flags & hal::kFrameAfterGap) != 0) lose(now_ns);
+  sequence_ = info.sequence;
+  have_sequence_ = true;
+  last_ns_ = now_ns;
+  stalled_ = false;
+  return returned;
+}
+
+void CameraWatch::missed(hal::GrabStatus status, std::int64_t now_ns) noexcept {
+  switch (status) {
+    case hal::GrabStatus::unplugged:
+    case hal::GrabStatus::ended:
+      away_ = true;
+      break;
+    case hal::GrabStatus::damaged:
+      lose(now_ns);
+      break;
+    case hal::GrabStatus::timeout:
+    case hal::GrabStatus::ok:
+      break;
+  }
+  stalled_ = now_ns - last_ns_ > 3 * period_ns_;
+}
+
+void CameraWatch::lose(std::int64_t now_ns) noexcept {
+  lost_ = true;
+  lost_ns_ = now_ns;
+}
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+
+#include "hal/camera.hpp"
+
+namespace dtact::pipeline {
+
+/// What grab() said lately, as conditions. One thread.
+class CameraWatch {
+ public:
+  explicit CameraWatch(std::int64_t period_ns) noexcept : period_ns_(period_ns) {}
+
+  /// Silence is counted from here.
+  void started(std::int64_t now_ns) noexcept { last_ns_ = now_ns; }
+  /// A frame came. True when the camera had been away: what was known of its image is in doubt.
+  bool arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexcept;
+  /// grab() came back without one.
+  void missed(hal::GrabStatus status, std::int64_t now_ns) noexcept;
+
+  /// Unplugged or ended: no frame comes unless the device returns.
+  [[nodiscard]] bool away() const noexcept { return away_; }
+  /// Away, or silent for more than three frame periods.
+  [[nodiscard]] bool trouble() const noexcept { return away_ || stalled_; }
+  [[nodiscard]] std::int64_t silent_ns(std::int64_t now_ns) const noexcept {
+    return now_ns - last_ns_;
+  }
+  /// A frame was lost or damaged within the last second.
+  [[nodiscard]] bool lost_lately(std::int64_t now_ns) const noexcept {
+    return lost_ && now_ns - lost_ns_ < 1'000'000'000;
+  }
+
+ private:
+  void lose(std::int64_t now_ns) noexcept;
+
+  std::int64_t period_ns_;
+  std::int64_t last_ns_ = 0;
+  std::int64_t lost_ns_ = 0;
+  std::uint64_t sequence_ = 0;
+  bool have_sequence_ = false;
+  bool lost_ = false;
+  bool away_ = false;
+  bool stalled_ = false;
+};
+
+}  // namespace dtact::pipeline

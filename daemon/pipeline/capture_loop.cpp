@@ -1,0 +1,284 @@
+#include "daemon/pipeline/capture_loop.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+namespace dtact::pipeline {
+namespace {
+
+constexpr std::int64_t kSecond = 1'000'000'000;
+/// The longest wait for one frame, so that commands and stop are noticed however slow the camera.
+constexpr std::chrono::milliseconds kLongestGrab{100};
+/// Pause before a camera that is away is asked again.
+constexpr std::int64_t kAwayPauseNs = 20'000'000;
+
+constexpr const char* kTouchedSentence = "something touches: lift it and ask again, or force it";
+constexpr const char* kUnsteadySentence =
+    "the image does not hold still: lift what touches and ask again, or force it";
+constexpr const char* kDarkSentence =
+    "the image is too dark to be a reference: make the light brighter";
+constexpr const char* kUncalibratedSentence =
+    "there is no calibration, so nothing to re-zero: make one with dtactctl calibrate depth and "
+    "send it with dtactctl calibration upload";
+constexpr const char* kAwaySentence =
+    "the camera delivers no frames: see its condition in the status";
+
+}  // namespace
+
+CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config,
+                         std::unique_ptr<ActiveCalibration> active, bool unusable)
+    : camera_(parts.camera),
+      light_(parts.light),
+      writer_(parts.writer),
+      exchange_(parts.exchange),
+      clock_(parts.clock),
+      config_(config),
+      period_ns_(std::llround(1e9 / camera_.info().fps)),
+      active_(std::move(active)),
+      unusable_(unusable),
+      keeper_(camera_.info().width, camera_.info().height, config.reference),
+      contact_(config.contact),
+      watch_(period_ns_),
+      timeline_(config.light, camera_.info().light_delay_frames, period_ns_),
+      teller_(exchange_),
+      shown_(config.light) {}
+
+void CaptureLoop::restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light) {
+  keeper_.restore(reference_q8, light == config_.light);
+}
+
+void CaptureLoop::run() noexcept {
+  if (active_) {
+    keeper_.use_calibration(active_->calibration->model->reference_q8, active_->grid,
+                            active_->region);
+    light_mismatch_ = light_differs(*active_->calibration, shown_);
+  }
+  const auto timeout =
+      std::min<std::chrono::nanoseconds>(std::chrono::nanoseconds(3 * period_ns_), kLongestGrab);
+  watch_.started(clock_.monotonic_ns());
+  while (!exchange_.stop.load(std::memory_order_relaxed)) {
+    take_notes();
+    take_orders();
+    const std::int64_t asked_ns = clock_.monotonic_ns();
+    const hal::GrabStatus status = camera_.grab(frame_, timeout);
+    const std::int64_t now_ns = clock_.monotonic_ns();
+    take_notes();  // a change during the wait concerns this frame
+    if (status == hal::GrabStatus::ok) {
+      process(now_ns);
+    } else {
+      without_frame(status, asked_ns, now_ns);
+    }
+    teller_.flush();
+  }
+  frame_.reset();
+}
+
+void CaptureLoop::take_notes() noexcept {
+  LightNote note;
+  while (light_.next_note(note)) {
+    // Rewriting what is shown anyway leaves the reference as good as it was.
+    if (note.light != shown_) {
+      keeper_.light_changed(contact_.touching());
+      shown_ = note.light;
+    }
+    if (note.begins) {
+      timeline_.change_begins(note.light, note.at_ns);
+    } else {
+      timeline_.change_ends(note.light, note.at_ns);
+    }
+    light_mismatch_ = active_ && light_differs(*active_->calibration, shown_);
+  }
+}
+
+void CaptureLoop::take_orders() noexcept {
+  // One at a time, and only while its answer and a retired calibration have somewhere to go.
+  Order order;
+  while (!rezero_ && !teller_.answer_due() && exchange_.retired.room() > 0 &&
+         exchange_.orders.pop(order)) {
+    if (const auto* rezero = std::get_if<RezeroOrder>(&order)) execute(*rezero);
+    if (auto* calibration = std::get_if<CalibrationOrder>(&order)) execute(*calibration);
+    teller_.flush();
+  }
+}
+
+void CaptureLoop::execute(const RezeroOrder& order) noexcept {
+  if (!active_) {
+    teller_.answer({order.ticket, Outcome::invalid, kUncalibratedSentence});
+  } else if (watch_.away()) {
+    teller_.answer({order.ticket, Outcome::camera_away, kAwaySentence});
+  } else {
+    rezero_ = order.ticket;
+    if (const auto refused = keeper_.rezero(order.force, contact_.touching())) answer(*refused);
+  }
+}
+
+void CaptureLoop::execute(CalibrationOrder& order) noexcept {
+  std::swap(active_, order.next);
+  unusable_ = false;
+  const recon::Model& model = *active_->calibration->model;
+  keeper_.use_calibration(model.reference_q8, active_->grid, active_->region);
+  if (keeper_.ready()) active_->reconstructor.set_reference(keeper_.reference());
+  light_mismatch_ = light_differs(*active_->calibration, shown_);
+  keep_due_ = keeper_.ready() && keeper_.worth_keeping();
+  exchange_.generation.store(active_->generation, std::memory_order_release);
+  if (order.next) (void)exchange_.retired.push(std::move(order.next));  // room was made sure of
+  teller_.answer({order.ticket, Outcome::done, ""});
+}
+
+void CaptureLoop::process(std::int64_t now_ns) noexcept {
+  const hal::FrameInfo& info = frame_.info();
+  if (watch_.arrived(info, now_ns)) keeper_.begin();
+  const std::int64_t exposure_ns = exposure_start_ns(info, period_ns_);
+  const bool settled = timeline_.settled_at(exposure_ns);
+
+  DepthFrame& out = exchange_.slot.back();
+  out.camera = info;
+  out.wall_ns = clock_.wall_ns() - (clock_.monotonic_ns() - info.timestamp_ns);
+  out.light = timeline_.light_at(exposure_ns);
+  out.times = {};
+  out.times.decode_ns = info.decode_ns;
+  out.has_depth = active_ && settled && keeper_.ready();
+  beyond_ = false;
+  if (out.has_depth) {
+    reconstruct(out);
+  } else {
+    // Nothing is known of contact meanwhile; what was known stands.
+    out.contact = {};
+    out.contact.touching = contact_.touching();
+  }
+  // The health of this frame, before its image changes the reference for the next.
+  out.health = health(settled, now_ns);
+  teller_.contact(out);
+  publish(out);
+  mind_reference(settled);
+  tell(health(timeline_.settled_at(exposure_ns), now_ns), now_ns);
+  frame_.reset();
+}
+
+void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
+  const recon::Model& model = active_->reconstructor.model();
+  out.width = model.rectify.width;
+  out.height = model.rectify.height;
+  out.mm_per_px = model.mm_per_px;
+  // Within the capacity reserved at start, so this allocates nothing.
+  out.depth_um.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+  recon::StepTimes steps;
+  const hal::LumaView& luma = frame_.luma();
+  active_->reconstructor.run(luma.data, luma.stride, out.depth_um, &steps);
+  out.times.rectify_ns = steps.rectify_ns;
+  out.times.smooth_ns = steps.smooth_ns;
+  out.times.list_ns = steps.list_ns;
+  const std::int64_t began_ns = clock_.monotonic_ns();
+  out.contact = contact_.inspect(out.depth_um, out.width, out.mm_per_px);
+  beyond_ = active_->reconstructor.beyond_pixels() > config_.beyond_pixels;
+  out.times.inspect_ns = clock_.monotonic_ns() - began_ns;
+}
+
+void CaptureLoop::publish(DepthFrame& out) noexcept {
+  const bool reconstructed = out.has_depth;
+  const bool want_depth = exchange_.want_depth.load(std::memory_order_relaxed);
+  const bool want_luma = exchange_.want_luma.load(std::memory_order_relaxed);
+  out.has_depth = reconstructed && want_depth;
+  out.has_luma = want_luma;
+  if (want_luma) {
+    const hal::LumaView& luma = frame_.luma();
+    const auto width = static_cast<std::size_t>(luma.width);
+    out.luma_width = luma.width;
+    out.luma_height = luma.height;
+    out.luma.resize(width * static_cast<std::size_t>(luma.height));  // reserved at start
+    for (int y = 0; y < luma.height; ++y) {
+      std::copy_n(luma.row(y), width, out.luma.data() + std::ptrdiff_t{y} * luma.width);
+    }
+  }
+  out.skipped = exchange_.slot.replaced();
+  out.done_ns = clock_.monotonic_ns();
+  exchange_.statistics.add(out.times, reconstructed, out.camera.ready_ns, out.done_ns);
+  if (!want_depth && !want_luma) return;
+  exchange_.slot.publish();
+  exchange_.frames.fetch_add(1, std::memory_order_relaxed);
+  exchange_.wake.signal();
+}
+
+void CaptureLoop::mind_reference(bool settled) noexcept {
+  if (!active_ || !settled) return;
+  const KeeperStep step = keeper_.step(frame_.luma());
+  if (step.reference_changed) {
+    active_->reconstructor.set_reference(keeper_.reference());
+    if (keeper_.footing() != Footing::stale) {
+      teller_.reference({frame_.info().sequence, keeper_.footing() == Footing::restored});
+    }
+    keep_due_ = keeper_.worth_keeping();
+  }
+  if (step.answer) answer(*step.answer);
+  if (keep_due_ && keeper_.ready()) {
+    keep_due_ = !writer_.offer(keeper_.reference(), shown_, active_->calibration);
+  }
+}
+
+void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
+                                std::int64_t now_ns) noexcept {
+  watch_.missed(status, now_ns);
+  if (rezero_ && (watch_.away() || watch_.silent_ns(now_ns) > kSecond)) {
+    keeper_.cancel_rezero();
+    teller_.answer({*std::exchange(rezero_, std::nullopt), Outcome::camera_away, kAwaySentence});
+  }
+  tell(health(true, now_ns), now_ns);
+  // A camera that answers at once is not asked again at once, unless it had a frame.
+  if (status != hal::GrabStatus::damaged && now_ns - asked_ns < kAwayPauseNs) {
+    clock_.sleep_until(asked_ns + kAwayPauseNs);
+  }
+}
+
+void CaptureLoop::tell(HealthSet health, std::int64_t now_ns) noexcept {
+  // A press at the list's end would send an event with every frame: the condition is told to last
+  // a second longer than it does.
+  if (beyond_) beyond_until_ns_ = now_ns + kSecond;
+  health.set(Health::beyond_calibration, now_ns < beyond_until_ns_);
+  teller_.state(state(), health);
+  exchange_.state.store(state(), std::memory_order_relaxed);
+  exchange_.health.store(health.bits(), std::memory_order_relaxed);
+}
+
+void CaptureLoop::answer(RezeroResult result) noexcept {
+  const std::uint64_t ticket = *std::exchange(rezero_, std::nullopt);
+  switch (result) {
+    case RezeroResult::taken:
+      return teller_.answer({ticket, Outcome::done, ""});
+    case RezeroResult::touched:
+      return teller_.answer({ticket, Outcome::refused_contact, kTouchedSentence});
+    case RezeroResult::unsteady:
+      return teller_.answer({ticket, Outcome::refused_contact, kUnsteadySentence});
+    case RezeroResult::dark:
+      return teller_.answer({ticket, Outcome::invalid, kDarkSentence});
+  }
+}
+
+State CaptureLoop::state() const noexcept {
+  if (watch_.away()) return State::camera_lost;
+  return active_ ? keeper_.state() : State::uncalibrated;
+}
+
+HealthSet CaptureLoop::health(bool settled, std::int64_t now_ns) const noexcept {
+  HealthSet set;
+  if (active_) {
+    set.set(Health::starting, keeper_.starting());
+    set.set(Health::light_unsettled, !settled || (!keeper_.ready() && !keeper_.starting()));
+    set.set(Health::reference_stale, keeper_.footing() == Footing::stale);
+    set.set(Health::reference_restored, keeper_.footing() == Footing::restored);
+  } else {
+    set.set(Health::uncalibrated);
+    set.set(Health::light_unsettled, !settled);
+  }
+  set.set(Health::light_mismatch, light_mismatch_);
+  set.set(Health::camera_mismatch, unusable_ || (active_ && active_->camera_mismatch));
+  set.set(Health::beyond_calibration, beyond_);
+  set.set(Health::frames_lost, watch_.lost_lately(now_ns));
+  set.set(Health::camera_trouble, watch_.trouble());
+  set.set(Health::ring_trouble, light_.trouble());
+  set.set(Health::not_realtime, exchange_.not_realtime.load(std::memory_order_relaxed));
+  return set;
+}
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "daemon/pipeline/depth_frame.hpp"
+#include "daemon/pipeline/pipeline_config.hpp"
+
+namespace dtact::pipeline {
+
+/// Sees contact in a depth map, with hysteresis: made when the area deeper than `made_mm` reaches
+/// `area_mm2`, lost when the area deeper than `lost_mm` falls below it, each for `debounce_frames`
+/// frames in a row. Untrusted pixels count for nothing.
+class ContactDetector {
+ public:
+  explicit ContactDetector(const ContactRules& rules) : rules_(rules) {}
+
+  /// One depth map: micrometres, row-major, `width` pixels a row, `mm_per_px` millimetres a pixel.
+  /// The summary is in millimetres in the surface frame: origin at the map's centre, x right, y
+  /// down. Area, centroid and volume are those of the pixels deeper than `made_mm`.
+  [[nodiscard]] ContactSummary inspect(std::span<const std::int16_t> depth_um, int width,
+                                       double mm_per_px) noexcept;
+
+  [[nodiscard]] bool touching() const noexcept { return touching_; }
+  /// Nothing touches, whatever was seen before.
+  void reset() noexcept;
+
+ private:
+  void decide(double made_mm2, double lost_mm2) noexcept;
+
+  ContactRules rules_;
+  bool touching_ = false;
+  int agreeing_ = 0;  // frames in a row that speak for the other state
+};
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <variant>
+
+#include "daemon/pipeline/active_calibration.hpp"
+#include "daemon/pipeline/event_fd.hpp"
+#include "daemon/pipeline/latest_slot.hpp"
+#include "daemon/pipeline/port.hpp"
+#include "daemon/pipeline/spsc_queue.hpp"
+#include "daemon/pipeline/statistics.hpp"
+
+namespace dtact::pipeline {
+
+// Network thread → capture thread.
+struct RezeroOrder {
+  std::uint64_t ticket = 0;
+  bool force = false;
+};
+struct CalibrationOrder {
+  std::uint64_t ticket = 0;
+  std::unique_ptr<ActiveCalibration> next;
+};
+using Order = std::variant<std::monostate, RezeroOrder, CalibrationOrder>;
+
+// Capture thread → network thread. Like Event, but without strings, which would allocate.
+struct Answer {
+  std::uint64_t ticket = 0;
+  Outcome outcome = Outcome::done;
+  const char* sentence = "";  ///< A literal.
+};
+using Report = std::variant<std::monostate, Answer, ContactChanged, ReferenceTaken, StateChanged>;
+
+/// All that the capture thread and the network thread share. Each queue has one producer and one
+/// consumer; the atomics are single values that need no order among them.
+struct Exchange {
+  explicit Exchange(const DepthFrame& prototype) : slot(prototype) {}
+
+  LatestSlot<DepthFrame> slot;
+  SpscQueue<Order, 16> orders;
+  SpscQueue<Report, 64> reports;
+  /// Calibrations out of use, on their way to be freed by the network thread.
+  SpscQueue<std::unique_ptr<ActiveCalibration>, 16> retired;
+  EventFd wake;  ///< Readable when a frame or an event waits.
+  Statistics statistics;
+
+  std::atomic<bool> want_depth{false};
+  std::atomic<bool> want_luma{false};
+  std::atomic<bool> stop{false};
+  std::atomic<bool> not_realtime{false};
+  std::atomic<State> state{State::settling};
+  std::atomic<std::uint32_t> health{0};  ///< HealthSet::bits()
+  std::atomic<std::uint64_t> frames{0};
+  std::atomic<std::uint64_t> generation{0};  ///< Of the calibration in use; 0 = none.
+};
+
+}  // namespace dtact::pipeline

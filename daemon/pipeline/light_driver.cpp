@@ -1,0 +1,91 @@
+#include "daemon/pipeline/light_driver.hpp"
+
+#include <utility>
+
+namespace dtact::pipeline {
+namespace {
+
+constexpr std::int64_t kRetryNs = 5'000'000;
+
+}  // namespace
+
+LightDriver::LightDriver(std::unique_ptr<hal::LightRing> ring, const hal::Light& light,
+                         base::Clock& clock, const EventFd& wake)
+    : ring_(std::move(ring)), clock_(clock), wake_(wake), light_(light) {}
+
+void LightDriver::start() {
+  stop_ = false;
+  (void)write(light());
+  thread_ = base::RtThread({.name = "dtact-light", .cpu = {}}, [this] { run(); });
+}
+
+void LightDriver::stop() noexcept {
+  stop_ = true;
+  work_.ring();
+  thread_.join();
+}
+
+bool LightDriver::submit(std::uint64_t ticket, const hal::Light& light) {
+  if (!requests_.push({ticket, light})) return false;
+  work_.ring();
+  return true;
+}
+
+std::string LightDriver::message() const {
+  const std::scoped_lock lock(mutex_);
+  return message_;
+}
+
+hal::Light LightDriver::light() const {
+  const std::scoped_lock lock(mutex_);
+  return light_;
+}
+
+void LightDriver::run() {
+  while (!stop_) {
+    work_.wait();
+    Request request;
+    while (!stop_ && requests_.pop(request)) serve(request);
+  }
+}
+
+void LightDriver::serve(const Request& request) {
+  const hal::Light before = light();
+  const hal::ShowResult result = write(request.light);
+  if (!result.ok) {
+    tell(CommandDone{request.ticket, Outcome::device_error, result.message});
+    return;
+  }
+  tell(CommandDone{request.ticket, Outcome::done, {}});
+  if (request.light != before) tell(LightChanged{request.light});
+}
+
+hal::ShowResult LightDriver::write(const hal::Light& light) {
+  note({true, clock_.monotonic_ns(), light});
+  hal::ShowResult result = ring_->show(light);
+  trouble_ = !result.ok;
+  hal::Light shown;
+  {
+    const std::scoped_lock lock(mutex_);
+    if (result.ok) light_ = light;
+    shown = light_;
+    message_ = result.ok ? std::string() : result.message;
+  }
+  note({false, clock_.monotonic_ns(), shown});
+  return result;
+}
+
+void LightDriver::note(LightNote note) {
+  while (!notes_.push(std::move(note)) && !stop_) {
+    clock_.sleep_until(clock_.monotonic_ns() + kRetryNs);
+  }
+}
+
+void LightDriver::tell(Event event) {
+  while (!events_.push(std::move(event)) && !stop_) {
+    clock_.sleep_until(clock_.monotonic_ns() + kRetryNs);
+  }
+  wake_.signal();
+}
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "daemon/pipeline/doorbell.hpp"
+#include "daemon/pipeline/event_fd.hpp"
+#include "daemon/pipeline/port.hpp"
+#include "daemon/pipeline/spsc_queue.hpp"
+#include "hal/base/clock.hpp"
+#include "hal/base/rt_thread.hpp"
+
+namespace dtact::pipeline {
+
+/// What the capture thread has to know of a write to the ring.
+struct LightNote {
+  bool begins = false;     ///< The write is about to begin; else it is over.
+  std::int64_t at_ns = 0;  ///< CLOCK_MONOTONIC.
+  hal::Light light;        ///< What the ring is to show, or shows.
+};
+
+/// Owns the ring and the thread that writes to it, since a write blocks for a millisecond and more.
+/// Commands come from the network thread, events go back there, notes go to the capture thread;
+/// each way is a queue of its own and none ever drops (a full one makes this thread wait).
+class LightDriver {
+ public:
+  /// `wake` is signalled after every event.
+  LightDriver(std::unique_ptr<hal::LightRing> ring, const hal::Light& light, base::Clock& clock,
+              const EventFd& wake);
+  LightDriver(const LightDriver&) = delete;
+  LightDriver& operator=(const LightDriver&) = delete;
+  ~LightDriver() { stop(); }
+
+  /// Shows the first light on the calling thread, tells the capture thread when, starts the thread.
+  void start();
+  /// Ends and joins the thread, after the write it is in.
+  void stop() noexcept;
+
+  // Network thread.
+  [[nodiscard]] bool submit(std::uint64_t ticket, const hal::Light& light);
+  [[nodiscard]] bool next_event(Event& out) { return events_.pop(out); }
+  [[nodiscard]] hal::RingInfo info() const { return ring_->info(); }
+  /// The last error, empty when the last write went well.
+  [[nodiscard]] std::string message() const;
+  [[nodiscard]] hal::Light light() const;
+
+  // Capture thread.
+  [[nodiscard]] bool next_note(LightNote& out) noexcept { return notes_.pop(out); }
+  [[nodiscard]] bool trouble() const noexcept { return trouble_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Request {
+    std::uint64_t ticket = 0;
+    hal::Light light;
+  };
+  void run();
+  void serve(const Request& request);
+  hal::ShowResult write(const hal::Light& light);
+  void note(LightNote note);
+  void tell(Event event);
+
+  std::unique_ptr<hal::LightRing> ring_;
+  base::Clock& clock_;
+  const EventFd& wake_;
+  SpscQueue<Request, 16> requests_;
+  SpscQueue<Event, 64> events_;
+  SpscQueue<LightNote, 16> notes_;
+  Doorbell work_;
+  std::atomic<bool> stop_{false};
+  std::atomic<bool> trouble_{false};
+  mutable std::mutex mutex_;  // between this thread and the network thread, held for a copy
+  hal::Light light_;
+  std::string message_;
+  base::RtThread thread_;  // last: it uses all the others
+};
+
+}  // namespace dtact::pipeline

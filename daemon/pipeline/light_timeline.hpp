@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+
+#include "hal/frame.hpp"
+#include "hal/light_ring.hpp"
+
+namespace dtact::pipeline {
+
+/// When a frame's exposure began, CLOCK_MONOTONIC nanoseconds, as well as its timestamp tells: a
+/// stamp from the frame's end lies at most a frame period after it.
+[[nodiscard]] std::int64_t exposure_start_ns(const hal::FrameInfo& info,
+                                             std::int64_t period_ns) noexcept;
+
+/// Matches frames with light changes by time. A change has a beginning (the ring is about to be
+/// written) and an end (it has been); it is complete in the frames whose exposure began at least
+/// the camera's delay after the end.
+class LightTimeline {
+ public:
+  LightTimeline(const hal::Light& light, int delay_frames, std::int64_t period_ns) noexcept
+      : before_(light), now_(light), delay_ns_(delay_frames * period_ns) {}
+
+  void change_begins(const hal::Light& light, std::int64_t at_ns) noexcept;
+  /// `light` is what the ring shows now: the old one when the write failed.
+  void change_ends(const hal::Light& light, std::int64_t at_ns) noexcept;
+
+  /// What the ring showed when an exposure began.
+  [[nodiscard]] const hal::Light& light_at(std::int64_t exposure_ns) const noexcept {
+    return exposure_ns < began_ns_ ? before_ : now_;
+  }
+  /// The frame whose exposure began then shows the present light and nothing of an earlier one.
+  [[nodiscard]] bool settled_at(std::int64_t exposure_ns) const noexcept {
+    return !writing_ && exposure_ns >= settled_from_ns_;
+  }
+
+ private:
+  hal::Light before_;
+  hal::Light now_;
+  std::int64_t delay_ns_;
+  std::int64_t began_ns_ = INT64_MIN;
+  std::int64_t settled_from_ns_ = INT64_MIN;
+  bool writing_ = false;
+};
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,205 @@
+#include "daemon/pipeline/pipeline.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+#include <stdexcept>
+#include <utility>
+
+#include "daemon/pipeline/reference_store.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+hal::CameraInfo checked(const hal::CameraInfo& info) {
+  if (info.width < kLeastFrameWidth || info.height < kLeastFrameHeight) {
+    throw std::invalid_argument(
+        fmt::format("camera {} delivers {}x{} pixels; at least {}x{} are needed: choose another "
+                    "camera.width and camera.height",
+                    info.identity, info.width, info.height, kLeastFrameWidth, kLeastFrameHeight));
+  }
+  if (!(info.fps > 0)) {
+    throw std::invalid_argument(
+        fmt::format("camera {} states no frame rate: set camera.fps above 0", info.identity));
+  }
+  return info;
+}
+
+HealthSet health_of(std::uint32_t bits) noexcept {
+  HealthSet set;
+  for (int i = 0; i < kHealthCount; ++i) {
+    if ((bits >> static_cast<unsigned>(i) & 1U) != 0) set.set(static_cast<Health>(i));
+  }
+  return set;
+}
+
+std::size_t pixels(int width, int height) {
+  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+}
+
+}  // namespace
+
+Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::LightRing> ring,
+                   std::shared_ptr<const calibration::Calibration> calibration,
+                   PipelineConfig config, base::Clock& clock)
+    : config_(std::move(config)),
+      clock_(clock),
+      camera_(std::move(camera)),
+      info_(checked(camera_->info())),
+      exchange_(prototype(calibration.get())),
+      light_(std::move(ring), config_.light, clock, exchange_.wake),
+      writer_(info_.width, info_.height, config_.state_folder),
+      depth_capacity_(exchange_.slot.back().depth_um.capacity()) {
+  std::unique_ptr<ActiveCalibration> active;
+  bool unusable = false;
+  if (calibration) {
+    try {
+      active = activate(calibration, info_);
+      active->generation = ++generations_;
+      exchange_.generation = generations_;
+      calibrations_.push_back({generations_, calibration});
+    } catch (const std::invalid_argument& e) {
+      unusable = true;
+      restore_failure_ = e.what();
+    }
+  }
+  loop_ = std::make_unique<CaptureLoop>(CaptureParts{*camera_, light_, writer_, exchange_, clock_},
+                                        config_, std::move(active), unusable);
+  if (!calibrations_.empty() && !config_.state_folder.empty()) {
+    try {
+      const auto stored =
+          load_reference(*calibration, info_.width, info_.height, config_.state_folder);
+      if (stored) loop_->restore(stored->image_q8, stored->light);
+    } catch (const std::exception& e) {
+      restore_failure_ = e.what();  // the calibration's own reference does instead
+    }
+  }
+}
+
+DepthFrame Pipeline::prototype(const calibration::Calibration* calibration) const {
+  DepthFrame frame;
+  std::size_t map = pixels(info_.width, info_.height);
+  if (calibration != nullptr) {
+    const recon::RectifyTable& table = calibration->model->rectify;
+    map = std::max(map, pixels(table.width, table.height));
+  }
+  // Sized, not only reserved: copies keep the size, and its pages are touched now.
+  frame.depth_um.resize(map);
+  frame.luma.resize(pixels(info_.width, info_.height));
+  return frame;
+}
+
+void Pipeline::start() {
+  if (config_.lock_memory) {
+    if (auto refused = base::lock_memory()) realtime_.push_back(std::move(*refused));
+  }
+  light_.start();
+  camera_->start();
+  writer_.start();
+  capture_ = base::RtThread(
+      {.name = "dtact-capture", .cpu = config_.cpu, .fifo_priority = config_.fifo_priority},
+      [this] { loop_->run(); });
+  for (const std::string& refused : capture_.refused()) {
+    realtime_.push_back(refused);
+    if (refused.find("SCHED_FIFO") != std::string::npos) exchange_.not_realtime = true;
+  }
+}
+
+void Pipeline::stop() noexcept {
+  exchange_.stop = true;
+  capture_.join();
+  light_.stop();
+  writer_.stop();
+}
+
+std::optional<Event> Pipeline::next_event() {
+  free_retired();
+  if (!own_events_.empty()) {
+    Event event = std::move(own_events_.front());
+    own_events_.pop_front();
+    return event;
+  }
+  Event event;
+  if (light_.next_event(event)) return event;
+  Report report;
+  if (!exchange_.reports.pop(report)) return std::nullopt;
+  if (const auto* answer = std::get_if<Answer>(&report)) {
+    return CommandDone{answer->ticket, answer->outcome, answer->sentence};
+  }
+  if (const auto* contact = std::get_if<ContactChanged>(&report)) return *contact;
+  if (const auto* reference = std::get_if<ReferenceTaken>(&report)) return *reference;
+  return std::get<StateChanged>(report);
+}
+
+bool Pipeline::submit(Command command) {
+  free_retired();
+  if (const auto* light = std::get_if<SetLight>(&command.what)) {
+    return light_.submit(command.ticket, light->light);
+  }
+  if (const auto* rezero = std::get_if<Rezero>(&command.what)) {
+    return exchange_.orders.push(RezeroOrder{command.ticket, rezero->force});
+  }
+  return use(command.ticket, std::get<UseCalibration>(command.what));
+}
+
+bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
+  if (exchange_.orders.room() == 0) return false;
+  try {
+    if (!command.calibration) throw std::invalid_argument("no calibration was given");
+    auto active = activate(command.calibration, info_);
+    const recon::RectifyTable& table = command.calibration->model->rectify;
+    if (pixels(table.width, table.height) > depth_capacity_) {
+      throw std::invalid_argument(
+          fmt::format("a depth map of {}x{} pixels needs more memory than was taken at start: "
+                      "restart dtactd with this calibration",
+                      table.width, table.height));
+    }
+    active->generation = ++generations_;
+    calibrations_.push_back({generations_, command.calibration});
+    return exchange_.orders.push(CalibrationOrder{ticket, std::move(active)});
+  } catch (const std::invalid_argument& e) {
+    own_events_.emplace_back(CommandDone{ticket, Outcome::invalid, e.what()});
+    exchange_.wake.signal();
+    return true;
+  }
+}
+
+void Pipeline::free_retired() {
+  std::unique_ptr<ActiveCalibration> old;
+  while (exchange_.retired.pop(old)) old.reset();
+  const std::uint64_t in_use = exchange_.generation.load(std::memory_order_acquire);
+  while (!calibrations_.empty() && calibrations_.front().generation < in_use) {
+    calibrations_.pop_front();
+  }
+}
+
+void Pipeline::want(bool depth, bool luma) noexcept {
+  exchange_.want_depth.store(depth, std::memory_order_relaxed);
+  exchange_.want_luma.store(luma, std::memory_order_relaxed);
+}
+
+Status Pipeline::status() const {
+  Status status;
+  status.state = exchange_.state.load(std::memory_order_relaxed);
+  status.health = health_of(exchange_.health.load(std::memory_order_relaxed));
+  status.camera = info_;
+  status.camera_report = camera_->report();
+  status.ring = light_.info();
+  status.ring_message = light_.message();
+  status.light = light_.light();
+  const std::uint64_t in_use = exchange_.generation.load(std::memory_order_acquire);
+  for (const Known& known : calibrations_) {
+    if (known.generation == in_use) status.calibration = known.calibration;
+  }
+  status.frames = exchange_.frames.load(std::memory_order_relaxed);
+  status.skipped = exchange_.slot.replaced();
+  status.fps = exchange_.statistics.fps(clock_.monotonic_ns());
+  status.realtime = realtime_;
+  status.stages = exchange_.statistics.stages();
+  status.storage_message = writer_.message();
+  if (status.storage_message.empty()) status.storage_message = restore_failure_;
+  return status;
+}
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <optional>
+
+#include "daemon/pipeline/exchange.hpp"
+
+namespace dtact::pipeline {
+
+/// Tells the network what changed. What does not fit into the queue stays due and is told with a
+/// later frame, with that frame's numbers: a change that has been undone by then is not told.
+/// Answers to orders are all told. Capture thread only.
+class Teller {
+ public:
+  explicit Teller(Exchange& exchange) : exchange_(exchange) {}
+
+  /// Reference and answer: one of each may be due at a time.
+  void reference(const ReferenceTaken& taken) noexcept { reference_ = taken; }
+  void answer(const Answer& answer) noexcept { answer_ = answer; }
+  [[nodiscard]] bool answer_due() const noexcept { return answer_.has_value(); }
+
+  void contact(const DepthFrame& frame) noexcept;
+  void state(State state, HealthSet health) noexcept;
+  /// Tries what is due.
+  void flush() noexcept;
+
+ private:
+  [[nodiscard]] bool push(Report report) noexcept;
+
+  Exchange& exchange_;
+  bool touching_ = false;              // as told
+  std::optional<StateChanged> state_;  // as told
+  std::optional<ReferenceTaken> reference_;
+  std::optional<Answer> answer_;
+};
+
+}  // namespace dtact::pipeline

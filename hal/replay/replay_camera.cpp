@@ -1,0 +1,136 @@
+#include "hal/replay/replay_camera.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <stdexcept>
+#include <utility>
+
+namespace dtact::hal::replay {
+
+ReplayCamera::ReplayCamera(const CameraConfig& config, base::Clock& clock)
+    : config_(config), clock_(clock), recording_(load_recording(config.replay.folder)) {
+  const auto count = static_cast<double>(recording_.count());
+  if (recording_.offsets_ns.size() > 1) {
+    const auto last = static_cast<double>(recording_.offsets_ns.back());
+    fps_ = (count - 1) * 1e9 / last;
+    round_ns_ = std::llround(last * count / (count - 1));
+  } else {
+    if (!(config.fps > 0)) {
+      throw std::invalid_argument(
+          "camera.fps: a recording without timestamps.csv needs a rate "
+          "above 0");
+    }
+    fps_ = config.fps;
+    round_ns_ = std::llround(count * 1e9 / fps_);
+  }
+  if (recording_.is_jpeg()) {
+    decoder_.emplace(recording_.width, recording_.height);
+    for (auto& buffer : decoded_) {
+      buffer = luma::LumaBuffer(recording_.width, recording_.height);
+    }
+  }
+}
+
+CameraInfo ReplayCamera::info() const {
+  CameraInfo info;
+  info.backend = "replay";
+  info.identity = config_.replay.folder.string();
+  info.pixel_format = recording_.is_jpeg() ? "MJPEG" : "GREY";
+  info.width = recording_.width;
+  info.height = recording_.height;
+  info.fps = fps_;
+  info.light_delay_frames = 0;  // a recording shows no light of ours
+  return info;
+}
+
+CameraReport ReplayCamera::report() const {
+  CameraReport report;
+  report.delivered = delivered_;
+  report.skipped = skipped_;
+  report.damaged = damaged_;
+  if (ended_) {
+    report.state = CameraState::ended;
+    report.remedy = "the recording has been played: set camera.replay.loop = true to repeat it";
+  }
+  return report;
+}
+
+void ReplayCamera::start() {
+  began_ns_ = clock_.monotonic_ns();
+  next_ = 0;
+  ended_ = false;
+}
+
+std::int64_t ReplayCamera::due_ns(std::uint64_t sequence) const noexcept {
+  const std::uint64_t count = recording_.count();
+  const auto round = static_cast<std::int64_t>(sequence / count);
+  const std::uint64_t frame = sequence % count;
+  const std::int64_t offset = recording_.offsets_ns.empty()
+                                  ? std::llround(static_cast<double>(frame) * 1e9 / fps_)
+                                  : recording_.offsets_ns[frame];
+  return began_ns_ + round * round_ns_ + offset;
+}
+
+std::uint64_t ReplayCamera::newest_due(std::int64_t now_ns) const noexcept {
+  const std::uint64_t count = recording_.count();
+  const std::int64_t passed = std::max<std::int64_t>(0, now_ns - began_ns_);
+  // Begin where the round says, then step: offsets within a round are not evenly spaced.
+  std::uint64_t sequence = static_cast<std::uint64_t>(passed / round_ns_) * count;
+  while (due_ns(sequence + 1) <= now_ns) ++sequence;
+  return config_.replay.loop ? sequence : std::min<std::uint64_t>(sequence, count - 1);
+}
+
+GrabStatus ReplayCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexcept {
+  if (!config_.replay.loop && next_ >= recording_.count()) {
+    ended_ = true;
+    return GrabStatus::ended;
+  }
+  std::int64_t now_ns = clock_.monotonic_ns();
+  if (config_.replay.paced) {
+    const std::int64_t due = due_ns(next_);
+    if (due > now_ns + timeout.count()) {
+      clock_.sleep_until(now_ns + timeout.count());
+      return GrabStatus::timeout;
+    }
+    if (due > now_ns) clock_.sleep_until(due);
+    now_ns = clock_.monotonic_ns();
+    if (const std::uint64_t newest = newest_due(now_ns); newest > next_) {
+      skipped_ += newest - next_;
+      next_ = newest;
+      after_gap_ = true;
+    }
+  }
+  FrameInfo info;
+  info.sequence = next_++;
+  info.ready_ns = now_ns;
+  info.timestamp_ns = config_.replay.paced ? due_ns(info.sequence) : now_ns;
+  info.meaning = TimestampMeaning::arrival;
+  info.flags = std::exchange(after_gap_, false) ? kFrameAfterGap : kFrameNormal;
+  return lend(out, info);
+}
+
+GrabStatus ReplayCamera::lend(Frame& out, FrameInfo info) noexcept {
+  const std::size_t frame = info.sequence % recording_.count();
+  if (!recording_.is_jpeg()) {
+    ++delivered_;
+    out = Frame(*this, 0, recording_.images[frame].view(), info);
+    return GrabStatus::ok;
+  }
+  const std::string& payload = recording_.payloads[frame];
+  luma::LumaBuffer& buffer = decoded_[static_cast<std::size_t>(next_buffer_)];
+  const auto status =
+      decoder_->decode({reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size()},
+                       buffer.data(), buffer.stride());
+  if (status != mjpeg::Status::ok) {
+    ++damaged_;
+    return GrabStatus::damaged;
+  }
+  info.decode_ns = clock_.monotonic_ns() - info.ready_ns;
+  ++delivered_;
+  out = Frame(*this, next_buffer_, buffer.view(), info);
+  next_buffer_ = 1 - next_buffer_;
+  return GrabStatus::ok;
+}
+
+}  // namespace dtact::hal::replay

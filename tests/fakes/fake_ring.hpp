@@ -1,0 +1,45 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "hal/light_ring.hpp"
+
+namespace dtact::fakes {
+
+/// Remembers what it was told to show; fails when told to.
+class FakeRing final : public hal::LightRing {
+ public:
+  /// What the test keeps hold of while the pipeline owns the ring.
+  struct Handle {
+    std::atomic<bool> broken{false};
+    std::function<void(const hal::Light&)> on_show;
+    mutable std::mutex mutex;
+    std::vector<hal::Light> shown;
+
+    [[nodiscard]] std::vector<hal::Light> all() const {
+      const std::scoped_lock lock(mutex);
+      return shown;
+    }
+  };
+  explicit FakeRing(Handle& handle) : handle_(handle) {}
+
+  [[nodiscard]] hal::RingInfo info() const override { return {"fake", "fake ring"}; }
+  [[nodiscard]] hal::ShowResult show(const hal::Light& light) override {
+    if (handle_.broken) return {false, "the fake ring is broken: mend it"};
+    {
+      const std::scoped_lock lock(handle_.mutex);
+      handle_.shown.push_back(light);
+    }
+    if (handle_.on_show) handle_.on_show(light);
+    return {};
+  }
+
+ private:
+  Handle& handle_;
+};
+
+}  // namespace dtact::fakes

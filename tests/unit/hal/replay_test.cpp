@@ -1,0 +1,234 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hal/base/atomic_file.hpp"
+#include "hal/image/png.hpp"
+#include "hal/replay/replay_camera.hpp"
+#include "tests/fakes/fake_clock.hpp"
+#include "tests/fakes/jpeg_maker.hpp"
+
+namespace dtact::hal::replay {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kStart = 1'000'000;  // of the fake clock
+
+class ReplayTest : public ::testing::Test {
+ protected:
+  ReplayTest() {
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    config.backend = "replay";
+    config.fps = 100;
+    config.replay.folder = folder;
+  }
+  ~ReplayTest() override { fs::remove_all(folder); }
+
+  void png(const std::string& name, std::uint8_t grey, int width = 100, int height = 50) {
+    const image::Grey8 image{
+        width, height, std::vector<std::uint8_t>(static_cast<std::size_t>(width * height), grey)};
+    base::write_file_atomically(folder / name, image::encode_png(image));
+  }
+  std::string jpeg_bytes(std::uint8_t grey, int width = 100) {
+    const auto bytes =
+        fakes::make_jpeg({.width = width, .height = 50, .quality = 100, .colour = false},
+                         [&](int, int) { return int{grey}; });
+    return {bytes.begin(), bytes.end()};
+  }
+  void write(const std::string& name, std::string_view content) {
+    base::write_file_atomically(folder / name, content);
+  }
+  ReplayCamera& open() { return opened.emplace(config, clock); }
+  std::string failure() {
+    try {
+      (void)open();
+    } catch (const std::exception& e) {
+      return e.what();
+    }
+    return "";
+  }
+
+  fs::path folder = fs::path(::testing::TempDir()) /
+                    (std::string("dtact_replay_") +
+                     ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  CameraConfig config;
+  fakes::FakeClock clock;
+  std::optional<ReplayCamera> opened;
+  Frame frame;  // goes home before the camera
+};
+
+TEST_F(ReplayTest, PlaysInTheOrderOfNamesAndLoops) {
+  png("b.png", 20);
+  png("a.PNG", 10);
+  png("c.png", 30);
+  write("notes.txt", "not a frame");
+  ReplayCamera& camera = open();
+  EXPECT_EQ(camera.info().width, 100);
+  EXPECT_EQ(camera.info().height, 50);
+  EXPECT_EQ(camera.info().pixel_format, "GREY");
+  EXPECT_EQ(camera.info().fps, 100);
+  camera.start();
+  const std::vector<int> expected = {10, 20, 30, 10, 20, 30, 10};
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+    EXPECT_EQ(frame.luma().row(49)[99], expected[i]);
+    EXPECT_EQ(frame.info().sequence, i);
+    EXPECT_EQ(frame.info().timestamp_ns, kStart + static_cast<std::int64_t>(i) * 10 * kMs);
+    EXPECT_EQ(frame.info().flags, kFrameNormal);
+  }
+  EXPECT_EQ(camera.report().delivered, 7U);
+}
+
+TEST_F(ReplayTest, EndsWhenPlayedOnce) {
+  png("a.png", 10);
+  png("b.png", 20);
+  config.replay.loop = false;
+  ReplayCamera& camera = open();
+  camera.start();
+  ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+  ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+  EXPECT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ended);
+  EXPECT_EQ(camera.report().state, CameraState::ended);
+  EXPECT_NE(camera.report().remedy, "");
+}
+
+TEST_F(ReplayTest, FollowsItsTimestamps) {
+  png("a.png", 10);
+  png("b.png", 20);
+  png("c.png", 30);
+  write("timestamps.csv",
+        "name,timestamp_ns\na.png,5000000000\nb.png,5010000000\r\nc.png,5040000000\n");
+  ReplayCamera& camera = open();
+  EXPECT_DOUBLE_EQ(camera.info().fps, 50);  // two intervals in 40 ms
+  camera.start();
+  // A round takes the mean interval longer than the last frame's time: 60 ms.
+  for (const std::int64_t ms : {0, 10, 40, 60, 70, 100, 120}) {
+    ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+    EXPECT_EQ(frame.info().timestamp_ns, kStart + ms * kMs);
+  }
+}
+
+TEST_F(ReplayTest, TimesOutWhenTheNextIsFar) {
+  png("a.png", 10);
+  config.fps = 10;
+  ReplayCamera& camera = open();
+  camera.start();
+  ASSERT_EQ(camera.grab(frame, milliseconds(1)), GrabStatus::ok);
+  EXPECT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::timeout);
+  EXPECT_EQ(clock.now, kStart + 50 * kMs);
+  EXPECT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+}
+
+TEST_F(ReplayTest, ALateCallerGetsTheNewest) {
+  png("a.png", 10);
+  png("b.png", 20);
+  png("c.png", 30);
+  ReplayCamera& camera = open();
+  camera.start();
+  ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+  clock.now = kStart + 45 * kMs;  // frames 0 to 4 are due: 4 is b
+  ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().sequence, 4U);
+  EXPECT_EQ(frame.luma().row(0)[0], 20);
+  EXPECT_EQ(frame.info().flags, kFrameAfterGap);
+  EXPECT_EQ(camera.report().skipped, 3U);
+}
+
+TEST_F(ReplayTest, UnpacedSkipsNothing) {
+  png("a.png", 10);
+  png("b.png", 20);
+  config.replay.paced = false;
+  ReplayCamera& camera = open();
+  camera.start();
+  clock.now = kStart + 1000 * kMs;
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    ASSERT_EQ(camera.grab(frame, milliseconds(0)), GrabStatus::ok);
+    EXPECT_EQ(frame.info().sequence, i);
+    EXPECT_EQ(frame.info().timestamp_ns, clock.now);
+  }
+}
+
+TEST_F(ReplayTest, JpegIsDecodedFrameByFrame) {
+  write("a.jpg", jpeg_bytes(10));
+  write("b.jpeg", jpeg_bytes(20));
+  ReplayCamera& camera = open();
+  EXPECT_EQ(camera.info().pixel_format, "MJPEG");
+  camera.start();
+  Frame first;
+  ASSERT_EQ(camera.grab(first, milliseconds(50)), GrabStatus::ok);
+  ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+  EXPECT_EQ(first.luma().row(49)[99], 10);  // still whole: two buffers
+  EXPECT_EQ(frame.luma().row(49)[99], 20);
+}
+
+TEST_F(ReplayTest, ADamagedJpegIsADamagedFrame) {
+  write("a.jpg", jpeg_bytes(10));
+  const std::string whole = jpeg_bytes(20);
+  write("b.jpg", whole.substr(0, whole.size() - 10));
+  ReplayCamera& camera = open();
+  camera.start();
+  ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+  EXPECT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::damaged);
+  ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+  EXPECT_EQ(camera.report().damaged, 1U);
+  EXPECT_EQ(frame.luma().row(0)[0], 10);
+}
+
+TEST_F(ReplayTest, RefusesFoldersWithoutFrames) {
+  EXPECT_NE(failure().find("holds no *.png"), std::string::npos) << failure();
+  config.replay.folder = folder / "absent";
+  EXPECT_NE(failure().find("camera.replay.folder"), std::string::npos) << failure();
+}
+
+TEST_F(ReplayTest, RefusesMixedSizesAndKinds) {
+  png("a.png", 10);
+  png("b.png", 10, 60, 50);
+  EXPECT_NE(failure().find("b.png: is 60x50 pixels, the frames before it 100x50"),
+            std::string::npos)
+      << failure();
+  fs::remove(folder / "b.png");
+  write("b.jpg", jpeg_bytes(10));
+  EXPECT_NE(failure().find("both PNG (a.png) and JPEG (b.jpg)"), std::string::npos) << failure();
+  fs::remove(folder / "a.png");
+  write("c.jpg", jpeg_bytes(10, 60));
+  EXPECT_NE(failure().find("c.jpg: is 60x50"), std::string::npos) << failure();
+}
+
+TEST_F(ReplayTest, NamesUnreadableFiles) {
+  write("a.jpg", "no picture");
+  EXPECT_NE(failure().find("a.jpg: the payload is not a JPEG"), std::string::npos) << failure();
+  fs::remove(folder / "a.jpg");
+  write("a.png", "no picture");
+  EXPECT_NE(failure().find("a.png"), std::string::npos) << failure();
+}
+
+TEST_F(ReplayTest, RefusesTimestampsThatCannotBe) {
+  png("a.png", 10);
+  png("b.png", 20);
+  write("timestamps.csv", "a.png,5\nb.png,soon\n");
+  EXPECT_NE(failure().find("timestamps.csv: line 2: \"b.png,soon\""), std::string::npos)
+      << failure();
+  write("timestamps.csv", "a.png,5\n");
+  EXPECT_NE(failure().find("no line for b.png"), std::string::npos) << failure();
+  write("timestamps.csv", "a.png,5\nb.png,5\n");
+  EXPECT_NE(failure().find("b.png is not later"), std::string::npos) << failure();
+  write("timestamps.csv", "a.png,5\na.png,6\n");
+  EXPECT_NE(failure().find("line 2: a.png stands there twice"), std::string::npos) << failure();
+}
+
+TEST_F(ReplayTest, NeedsARate) {
+  png("a.png", 10);
+  config.fps = 0;
+  EXPECT_NE(failure().find("camera.fps"), std::string::npos) << failure();
+}
+
+}  // namespace
+}  // namespace dtact::hal::replay

@@ -1,0 +1,113 @@
+#include "daemon/pipeline/contact.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "daemon/recon/model.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+// 11×11 pixels of 0.5 mm: a pixel is 0.25 mm², the centre is pixel (5, 5).
+constexpr int kSide = 11;
+constexpr double kMmPerPx = 0.5;
+
+class ContactTest : public ::testing::Test {
+ protected:
+  /// Sets `count` pixels from the map's start to a depth.
+  void fill(std::int16_t um, int count) {
+    map.assign(kSide * kSide, 0);
+    for (int i = 0; i < count; ++i) map[static_cast<std::size_t>(i)] = um;
+  }
+  bool inspect() { return detector.inspect(map, kSide, kMmPerPx).touching; }
+
+  ContactDetector detector{
+      {.made_mm = 0.10, .lost_mm = 0.05, .area_mm2 = 0.5, .debounce_frames = 2}};
+  std::vector<std::int16_t> map = std::vector<std::int16_t>(kSide * kSide, 0);
+};
+
+TEST_F(ContactTest, NothingPressedIsNoContact) {
+  const ContactSummary summary = detector.inspect(map, kSide, kMmPerPx);
+  EXPECT_FALSE(summary.touching);
+  EXPECT_EQ(summary.area_mm2, 0);
+  EXPECT_EQ(summary.volume_mm3, 0);
+  EXPECT_EQ(summary.deepest_mm, 0);
+}
+
+TEST_F(ContactTest, SummaryIsInMillimetresFromTheCentre) {
+  map[7 * kSide + 8] = 300;  // 3 px right, 2 px down
+  map[7 * kSide + 9] = 900;  // 4 px right, 2 px down
+  const ContactSummary summary = detector.inspect(map, kSide, kMmPerPx);
+  EXPECT_DOUBLE_EQ(summary.area_mm2, 0.5);
+  EXPECT_DOUBLE_EQ(summary.x_mm, 1.875);  // (1.5·300 + 2.0·900) / 1200
+  EXPECT_DOUBLE_EQ(summary.y_mm, 1.0);
+  EXPECT_DOUBLE_EQ(summary.deepest_mm, 0.9);
+  EXPECT_DOUBLE_EQ(summary.deepest_x_mm, 2.0);
+  EXPECT_DOUBLE_EQ(summary.deepest_y_mm, 1.0);
+  EXPECT_DOUBLE_EQ(summary.volume_mm3, 0.3);  // 1.2 mm × 0.25 mm²
+}
+
+TEST_F(ContactTest, IsMadeAfterTheDebounceOnly) {
+  fill(101, 2);
+  EXPECT_FALSE(inspect());
+  EXPECT_TRUE(inspect());
+}
+
+TEST_F(ContactTest, AFlickerMakesNoContact) {
+  fill(500, 10);
+  EXPECT_FALSE(inspect());
+  fill(0, 0);
+  EXPECT_FALSE(inspect());
+  fill(500, 10);
+  EXPECT_FALSE(inspect());
+}
+
+TEST_F(ContactTest, NeedsTheAreaAndTheDepth) {
+  fill(500, 1);  // 0.25 mm²
+  EXPECT_FALSE(inspect());
+  EXPECT_FALSE(inspect());
+  fill(100, 50);  // not deeper than 0.10 mm
+  EXPECT_FALSE(inspect());
+  EXPECT_FALSE(inspect());
+}
+
+TEST_F(ContactTest, BetweenTheThresholdsNothingChanges) {
+  fill(70, 20);
+  EXPECT_FALSE(inspect());
+  EXPECT_FALSE(inspect());
+  fill(300, 20);
+  EXPECT_FALSE(inspect());
+  EXPECT_TRUE(inspect());
+  fill(70, 20);
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(inspect());
+  fill(50, 20);  // not deeper than 0.05 mm
+  EXPECT_TRUE(inspect());
+  EXPECT_FALSE(inspect());
+}
+
+TEST_F(ContactTest, UntrustedPixelsCountForNothing) {
+  map.assign(map.size(), recon::kUntrusted);
+  const ContactSummary none = detector.inspect(map, kSide, kMmPerPx);
+  EXPECT_EQ(none.area_mm2, 0);
+  EXPECT_EQ(none.deepest_mm, 0);
+  map[5 * kSide + 5] = -20;
+  EXPECT_DOUBLE_EQ(detector.inspect(map, kSide, kMmPerPx).deepest_mm, -0.02);
+}
+
+TEST_F(ContactTest, ResetForgets) {
+  fill(500, 20);
+  (void)inspect();
+  EXPECT_TRUE(inspect());
+  detector.reset();
+  EXPECT_FALSE(detector.touching());
+  EXPECT_FALSE(inspect());
+}
+
+TEST_F(ContactTest, AnEmptyMapIsNoContact) {
+  EXPECT_FALSE(detector.inspect({}, 0, kMmPerPx).touching);
+}
+
+}  // namespace
+}  // namespace dtact::pipeline

@@ -1,0 +1,256 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "daemon/pipeline/reference_keeper.hpp"
+#include "tests/fakes/toy_sensor.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+using fakes::ToyFrame;
+using fakes::ToyScene;
+
+/// The keeper before a sensor whose scene the test sets. 8 frames to settle, 16 in an average.
+class KeeperTest : public ::testing::Test {
+ protected:
+  KeeperTest() {
+    measure(calibration->model->reference_q8, fakes::kToyWidth, fakes::kToyHeight, grid);
+  }
+  void calibrate() { keeper.use_calibration(calibration->model->reference_q8, grid, region); }
+
+  /// Steps until something happens, at most `most` frames; what happened last stays in `last`.
+  bool run(int most) {
+    for (int i = 0; i < most; ++i) {
+      last = keeper.step(ToyFrame(scene, sequence++).view());
+      if (last.reference_changed || last.answer) return true;
+    }
+    return false;
+  }
+  /// Grey levels by which the reference in use misses the untouched image under the present light.
+  double worst_error() const {
+    ToyScene untouched = scene;
+    untouched.press_mm = 0;
+    double worst = 0;
+    for (int y = 10; y < fakes::kToyHeight - 10; ++y) {
+      for (int x = 10; x < fakes::kToyWidth - 10; ++x) {
+        const auto i = static_cast<std::size_t>(y * fakes::kToyWidth + x);
+        worst = std::max(
+            worst, std::abs(keeper.reference()[i] / 256.0 - fakes::toy_grey(untouched, x, y)));
+      }
+    }
+    return worst;
+  }
+
+  static ReferenceRules rules() {
+    return {.frames = 16, .settle_frames = 8, .settle_grey = 0.25, .patience_frames = 100};
+  }
+  std::shared_ptr<calibration::Calibration> calibration = fakes::toy_calibration();
+  LumaGrid grid;
+  CellRegion region{.x0 = 2, .y0 = 2, .x1 = 38, .y1 = 28};
+  ReferenceKeeper keeper{fakes::kToyWidth, fakes::kToyHeight, rules()};
+  ToyScene scene;
+  std::uint64_t sequence = 0;
+  KeeperStep last;
+};
+
+TEST_F(KeeperTest, TakesAReferenceOnceTheMeanHasSettled) {
+  calibrate();
+  EXPECT_TRUE(keeper.starting());
+  EXPECT_FALSE(keeper.ready());
+  EXPECT_FALSE(run(23));  // 8 to settle, 15 of 16
+  EXPECT_EQ(keeper.state(), State::referencing);
+  EXPECT_TRUE(run(1));
+  EXPECT_TRUE(last.reference_changed);
+  EXPECT_EQ(keeper.footing(), Footing::fresh);
+  EXPECT_EQ(keeper.state(), State::serving);
+  EXPECT_TRUE(keeper.worth_keeping());
+  // Rounding scatters by at most half a level; over 16 frames 0.125, five of which are 0.63.
+  EXPECT_LT(worst_error(), 0.7);
+}
+
+TEST_F(KeeperTest, WaitsWhileTheLightWarmsUp) {
+  calibrate();
+  for (int i = 0; i < 40; ++i) {
+    scene.light = 0.5 + 0.0125 * i;
+    EXPECT_FALSE(run(1));
+    EXPECT_EQ(keeper.state(), State::settling);
+  }
+  EXPECT_TRUE(run(30));
+  EXPECT_LT(worst_error(), 0.7);
+}
+
+TEST_F(KeeperTest, TouchedAtStartUsesTheLastGoodOne) {
+  const ToyScene yesterday{.light = 0.97};  // drift since
+  keeper.restore(fakes::toy_reference_q8(yesterday), true);
+  calibrate();
+  scene.press_mm = 1;
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::restored);
+  EXPECT_FALSE(keeper.worth_keeping());
+  EXPECT_LT(worst_error(), 1.0);
+  EXPECT_FALSE(run(100));  // as long as it touches nothing changes
+  scene.press_mm = 0;
+  ASSERT_TRUE(run(60));
+  EXPECT_EQ(keeper.footing(), Footing::fresh);
+}
+
+TEST_F(KeeperTest, TouchedAtStartWithoutOneScalesTheCalibrations) {
+  calibrate();
+  scene.press_mm = 1;
+  scene.light = 0.8;
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_LT(worst_error(), 1.0);
+}
+
+TEST_F(KeeperTest, ALastGoodOneFromAnotherLightIsStale) {
+  keeper.restore(fakes::toy_reference_q8({.light = 0.6}), false);
+  calibrate();
+  scene.press_mm = 1;
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_LT(worst_error(), 1.0);
+}
+
+TEST_F(KeeperTest, AMovingPressAtStartIsTouchedInTheEnd) {
+  calibrate();
+  for (int i = 0; i < 300 && !keeper.ready(); ++i) {
+    scene.press_mm = 0.5 + 0.1 * (i % 5);
+    (void)run(1);
+  }
+  EXPECT_EQ(keeper.footing(), Footing::stale);
+}
+
+TEST_F(KeeperTest, RezeroUnderContactIsRefusedAtOnce) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.rezero(false, true), RezeroResult::touched);
+}
+
+TEST_F(KeeperTest, RezeroSeesATouchThatTheDepthMissed) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  scene.press_mm = 0.3;
+  EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(last.answer, RezeroResult::touched);
+  EXPECT_FALSE(last.reference_changed);
+}
+
+TEST_F(KeeperTest, ForcedRezeroTakesTheTouchedImageButDoesNotKeepIt) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  scene.press_mm = 1;
+  EXPECT_EQ(keeper.rezero(true, true), std::nullopt);
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(last.answer, RezeroResult::taken);
+  EXPECT_TRUE(last.reference_changed);
+  EXPECT_FALSE(keeper.worth_keeping());
+  // Lifted, the surface is brighter than its reference; re-zeroing then is no touch.
+  scene.press_mm = 0;
+  EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(last.answer, RezeroResult::taken);
+  EXPECT_TRUE(keeper.worth_keeping());
+}
+
+TEST_F(KeeperTest, RezeroFollowsDrift) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  scene.light = 0.985;  // −2 grey levels
+  EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(last.answer, RezeroResult::taken);
+  EXPECT_LT(worst_error(), 0.7);
+}
+
+TEST_F(KeeperTest, RezeroOfAMovingImageIsRefused) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
+  for (int i = 0; i < 200 && !last.answer; ++i) {
+    scene.light = i % 2 == 0 ? 1 : 0.95;
+    (void)run(1);
+  }
+  EXPECT_EQ(last.answer, RezeroResult::unsteady);
+}
+
+TEST_F(KeeperTest, ALightChangeWithoutContactTakesANewOne) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  keeper.light_changed(false);
+  EXPECT_FALSE(keeper.ready());
+  EXPECT_FALSE(keeper.starting());
+  scene.light = 0.5;
+  scene.tilt = 0.2;
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::fresh);
+  EXPECT_LT(worst_error(), 0.7);
+}
+
+TEST_F(KeeperTest, ALightChangeUnderContactScalesAndWaits) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  scene.press_mm = 1;
+  keeper.light_changed(true);
+  scene.light = 0.5;
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_LT(worst_error(), 0.8);
+  scene.press_mm = 0;
+  ASSERT_TRUE(run(60));
+  EXPECT_EQ(keeper.footing(), Footing::fresh);
+}
+
+TEST_F(KeeperTest, ALongPressIsNeverAbsorbed) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  scene.press_mm = 0.5;
+  EXPECT_FALSE(run(500));
+}
+
+TEST_F(KeeperTest, InTheDarkThereIsNoReference) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  keeper.light_changed(false);
+  scene.light = 0;
+  EXPECT_FALSE(run(150));
+  EXPECT_EQ(keeper.state(), State::settling);
+  EXPECT_EQ(keeper.rezero(true, false), std::nullopt);
+  ASSERT_TRUE(run(2));
+  EXPECT_EQ(last.answer, RezeroResult::dark);
+  scene.light = 1;
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::fresh);
+}
+
+TEST_F(KeeperTest, ACameraThatCameBackIsLookedAtAnew) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  keeper.begin();
+  EXPECT_TRUE(keeper.starting());
+  EXPECT_FALSE(keeper.ready());
+  scene.press_mm = 1;
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::restored);
+}
+
+TEST_F(KeeperTest, ANewCalibrationKeepsAFreshReference) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  calibrate();
+  EXPECT_TRUE(keeper.ready());
+}
+
+TEST_F(KeeperTest, RefusesWhatCannotWork) {
+  EXPECT_THROW(ReferenceKeeper(79, 60, rules()), std::invalid_argument);
+  EXPECT_THROW(keeper.restore(std::vector<std::uint16_t>(5), true), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dtact::pipeline

@@ -1,0 +1,107 @@
+#include "daemon/pipeline/light_driver.hpp"
+
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <memory>
+#include <optional>
+#include <thread>
+#include <variant>
+
+#include "tests/fakes/fake_ring.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+hal::Light dimmed(int brightness) {
+  hal::Light light;
+  light.brightness = static_cast<std::uint8_t>(brightness);
+  return light;
+}
+
+class LightDriverTest : public ::testing::Test {
+ protected:
+  /// The next event; waits for it.
+  std::optional<Event> next() {
+    Event event;
+    for (int i = 0; i < 5000; ++i) {
+      LightNote note;
+      while (driver.next_note(note)) {
+      }
+      if (driver.next_event(event)) return event;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return std::nullopt;
+  }
+  EventFd wake;
+  fakes::FakeRing::Handle ring;
+  LightDriver driver{std::make_unique<fakes::FakeRing>(ring), dimmed(200), base::system_clock(),
+                     wake};
+};
+
+TEST_F(LightDriverTest, ShowsTheFirstLightBeforeItReturns) {
+  driver.start();
+  ASSERT_EQ(ring.all().size(), 1U);
+  EXPECT_EQ(ring.all()[0].brightness, 200);
+  LightNote note;
+  ASSERT_TRUE(driver.next_note(note));
+  EXPECT_TRUE(note.begins);
+  ASSERT_TRUE(driver.next_note(note));
+  EXPECT_FALSE(note.begins);
+  EXPECT_EQ(note.light.brightness, 200);
+}
+
+TEST_F(LightDriverTest, AnswersAndTellsEveryone) {
+  driver.start();
+  ASSERT_TRUE(driver.submit(5, dimmed(100)));
+  const auto done = next();
+  ASSERT_TRUE(done);
+  EXPECT_EQ(std::get<CommandDone>(*done).ticket, 5U);
+  EXPECT_EQ(std::get<CommandDone>(*done).outcome, Outcome::done);
+  const auto changed = next();
+  ASSERT_TRUE(changed);
+  EXPECT_EQ(std::get<LightChanged>(*changed).light.brightness, 100);
+  EXPECT_EQ(driver.light().brightness, 100);
+  pollfd poll{.fd = wake.get(), .events = POLLIN, .revents = 0};
+  EXPECT_EQ(::poll(&poll, 1, 5000), 1);
+}
+
+TEST_F(LightDriverTest, TheLastWriterWins) {
+  driver.start();
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(driver.submit(0, dimmed(i)));
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(next());
+  EXPECT_EQ(driver.light().brightness, 9);
+  EXPECT_EQ(ring.all().back().brightness, 9);
+}
+
+TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
+  driver.start();
+  ring.broken = true;
+  ASSERT_TRUE(driver.submit(6, dimmed(100)));
+  const auto done = next();
+  ASSERT_TRUE(done);
+  EXPECT_EQ(std::get<CommandDone>(*done).outcome, Outcome::device_error);
+  EXPECT_EQ(std::get<CommandDone>(*done).message, "the fake ring is broken: mend it");
+  EXPECT_TRUE(driver.trouble());
+  EXPECT_EQ(driver.message(), "the fake ring is broken: mend it");
+  EXPECT_EQ(driver.light().brightness, 200);  // what it still shows
+  ring.broken = false;
+  ASSERT_TRUE(driver.submit(7, dimmed(100)));
+  EXPECT_EQ(std::get<CommandDone>(*next()).outcome, Outcome::done);
+  EXPECT_FALSE(driver.trouble());
+  EXPECT_EQ(driver.message(), "");
+}
+
+TEST_F(LightDriverTest, RefusesWhenTooManyWait) {
+  for (int i = 0; i < 16; ++i) ASSERT_TRUE(driver.submit(1, dimmed(i)));  // not started
+  EXPECT_FALSE(driver.submit(1, dimmed(0)));
+}
+
+TEST_F(LightDriverTest, StopsWhileItsQueuesAreFull) {
+  driver.start();
+  for (int i = 0; i < 16; ++i) (void)driver.submit(1, dimmed(i));  // 32 notes for 16 places
+  driver.stop();
+}
+
+}  // namespace
+}  // namespace dtact::pipeline

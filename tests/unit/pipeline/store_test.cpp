@@ -1,0 +1,123 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "daemon/pipeline/reference_store.hpp"
+#include "daemon/pipeline/reference_writer.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "tests/fakes/toy_sensor.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+namespace fs = std::filesystem;
+
+class StoreTest : public ::testing::Test {
+ protected:
+  StoreTest() { fs::remove_all(folder); }
+  ~StoreTest() override { fs::remove_all(folder); }
+
+  StoredReference some() {
+    StoredReference reference{fakes::kToyWidth, fakes::kToyHeight, fakes::toy_reference_q8(), {}};
+    reference.light.brightness = 200;
+    reference.light.leds[3] = {1, 2, 3};
+    return reference;
+  }
+  auto load() { return load_reference(*calibration, fakes::kToyWidth, fakes::kToyHeight, folder); }
+
+  fs::path folder = fs::path(::testing::TempDir()) /
+                    (std::string("dtact_store_") +
+                     ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  std::shared_ptr<calibration::Calibration> calibration = fakes::toy_calibration();
+};
+
+TEST_F(StoreTest, GivesBackWhatWasSaved) {
+  save_reference(some(), *calibration, folder);
+  const auto back = load();
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->image_q8, some().image_q8);
+  EXPECT_EQ(back->light, some().light);
+}
+
+TEST_F(StoreTest, NothingStoredIsNoError) { EXPECT_FALSE(load()); }
+
+TEST_F(StoreTest, AnotherCalibrationsReferenceIsNotUsed) {
+  save_reference(some(), *calibration, folder);
+  calibration->origin.created = "2026-02-02T00:00:00Z";  // the same name, made anew
+  EXPECT_FALSE(load());
+  calibration = fakes::toy_calibration();
+  calibration->name = "other";
+  EXPECT_FALSE(load());
+}
+
+TEST_F(StoreTest, AnotherFrameSizeIsNotUsed) {
+  save_reference(some(), *calibration, folder);
+  EXPECT_FALSE(load_reference(*calibration, 320, 240, folder));
+}
+
+TEST_F(StoreTest, HalvesOfDifferentAgesAreNoticed) {
+  save_reference(some(), *calibration, folder);
+  const std::string old_png = base::read_file(folder / "reference.png");
+  StoredReference newer = some();
+  newer.image_q8[0] = 7;
+  save_reference(newer, *calibration, folder);
+  base::write_file_atomically(folder / "reference.png", old_png);
+  try {
+    (void)load();
+    FAIL();
+  } catch (const std::runtime_error& e) {
+    EXPECT_NE(std::string(e.what()).find("reference.png"), std::string::npos) << e.what();
+  }
+}
+
+TEST_F(StoreTest, DamageNamesFileAndRemedy) {
+  save_reference(some(), *calibration, folder);
+  std::ofstream(folder / "reference.toml") << "version = 1\nlight =\n";
+  try {
+    (void)load();
+    FAIL();
+  } catch (const std::runtime_error& e) {
+    const std::string what = e.what();
+    EXPECT_NE(what.find("reference.toml: line 2"), std::string::npos) << what;
+    EXPECT_NE(what.find("delete it"), std::string::npos) << what;
+  }
+}
+
+TEST_F(StoreTest, TheWriterWritesBehind) {
+  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder);
+  writer.start();
+  EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
+  writer.stop();  // writes what was offered
+  EXPECT_EQ(writer.message(), "");
+  ASSERT_TRUE(load());
+  EXPECT_EQ(calibration.use_count(), 1);
+}
+
+TEST_F(StoreTest, TheWriterSaysWhatFailed) {
+  std::ofstream(folder.string()) << "a file where the folder should be";
+  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder);
+  writer.start();
+  EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
+  writer.stop();
+  EXPECT_NE(writer.message().find("make the state folder writable"), std::string::npos)
+      << writer.message();
+}
+
+TEST_F(StoreTest, WithoutAFolderNothingIsKept) {
+  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, {});
+  EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
+  EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
+}
+
+TEST_F(StoreTest, ABusyWriterRefuses) {
+  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder);  // not started: stays busy
+  EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
+  EXPECT_FALSE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
+}
+
+}  // namespace
+}  // namespace dtact::pipeline

@@ -1,0 +1,169 @@
+#include <gtest/gtest.h>
+
+#include "daemon/pipeline/active_calibration.hpp"
+#include "daemon/pipeline/camera_watch.hpp"
+#include "daemon/pipeline/light_timeline.hpp"
+#include "daemon/pipeline/statistics.hpp"
+#include "tests/fakes/toy_sensor.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+constexpr std::int64_t kMs = 1'000'000;
+constexpr std::int64_t kPeriod = 10 * kMs;
+
+hal::FrameInfo numbered(std::uint64_t sequence, std::uint32_t flags = hal::kFrameNormal) {
+  hal::FrameInfo info;
+  info.sequence = sequence;
+  info.flags = flags;
+  return info;
+}
+
+TEST(CameraWatch, AGapIsRememberedForASecond) {
+  CameraWatch watch(kPeriod);
+  EXPECT_FALSE(watch.arrived(numbered(5), 0));
+  EXPECT_FALSE(watch.lost_lately(0));  // the first number means nothing
+  (void)watch.arrived(numbered(6), kPeriod);
+  EXPECT_FALSE(watch.lost_lately(kPeriod));
+  (void)watch.arrived(numbered(8), 100 * kMs);
+  EXPECT_TRUE(watch.lost_lately(100 * kMs));
+  EXPECT_TRUE(watch.lost_lately(1099 * kMs));
+  EXPECT_FALSE(watch.lost_lately(1100 * kMs));
+}
+
+TEST(CameraWatch, FlagsAndDamageCountAsLossToo) {
+  CameraWatch watch(kPeriod);
+  (void)watch.arrived(numbered(0), 0);
+  (void)watch.arrived(numbered(1, hal::kFrameAfterGap), kPeriod);
+  EXPECT_TRUE(watch.lost_lately(kPeriod));
+  watch.missed(hal::GrabStatus::damaged, 2000 * kMs);
+  EXPECT_TRUE(watch.lost_lately(2000 * kMs));
+}
+
+TEST(CameraWatch, ARepeatedNumberIsNoLoss) {
+  CameraWatch watch(kPeriod);
+  (void)watch.arrived(numbered(3), 0);
+  (void)watch.arrived(numbered(3), kPeriod);
+  EXPECT_FALSE(watch.lost_lately(kPeriod));
+}
+
+TEST(CameraWatch, SilenceOfThreePeriodsIsTrouble) {
+  CameraWatch watch(kPeriod);
+  watch.started(0);
+  watch.missed(hal::GrabStatus::timeout, 3 * kPeriod);
+  EXPECT_FALSE(watch.trouble());
+  watch.missed(hal::GrabStatus::timeout, 3 * kPeriod + 1);
+  EXPECT_TRUE(watch.trouble());
+  EXPECT_FALSE(watch.away());
+  EXPECT_FALSE(watch.arrived(numbered(0), 4 * kPeriod));
+  EXPECT_FALSE(watch.trouble());
+}
+
+TEST(CameraWatch, ReturningIsToldOnceAndIsNoGap) {
+  CameraWatch watch(kPeriod);
+  (void)watch.arrived(numbered(100), 0);
+  watch.missed(hal::GrabStatus::unplugged, kPeriod);
+  EXPECT_TRUE(watch.away());
+  EXPECT_TRUE(watch.trouble());
+  EXPECT_TRUE(watch.arrived(numbered(900), 2 * kPeriod));
+  EXPECT_FALSE(watch.lost_lately(2 * kPeriod));
+  EXPECT_FALSE(watch.arrived(numbered(901), 3 * kPeriod));
+}
+
+TEST(LightTimeline, ExposureBeginsAPeriodBeforeTheFramesEnd) {
+  hal::FrameInfo info;
+  info.timestamp_ns = 50 * kMs;
+  info.meaning = hal::TimestampMeaning::end_of_frame;
+  EXPECT_EQ(exposure_start_ns(info, kPeriod), 40 * kMs);
+  info.meaning = hal::TimestampMeaning::start_of_exposure;
+  EXPECT_EQ(exposure_start_ns(info, kPeriod), 50 * kMs);
+}
+
+TEST(LightTimeline, FramesBelongToTheLightTheyWereExposedUnder) {
+  hal::Light bright;
+  hal::Light dim;
+  dim.brightness = 100;
+  LightTimeline timeline(bright, 2, kPeriod);
+  EXPECT_TRUE(timeline.settled_at(0));
+  timeline.change_begins(dim, 100 * kMs);
+  EXPECT_EQ(timeline.light_at(99 * kMs).brightness, 255);
+  EXPECT_EQ(timeline.light_at(100 * kMs).brightness, 100);
+  EXPECT_FALSE(timeline.settled_at(1000 * kMs));  // still writing
+  timeline.change_ends(dim, 101 * kMs);
+  EXPECT_FALSE(timeline.settled_at(120 * kMs));
+  EXPECT_TRUE(timeline.settled_at(121 * kMs));  // 101 + 2 periods
+}
+
+TEST(LightTimeline, AFailedWriteLeavesTheOldLight) {
+  hal::Light bright;
+  hal::Light dim;
+  dim.brightness = 100;
+  LightTimeline timeline(bright, 0, kPeriod);
+  timeline.change_begins(dim, 100 * kMs);
+  timeline.change_ends(bright, 105 * kMs);
+  EXPECT_EQ(timeline.light_at(200 * kMs).brightness, 255);
+  EXPECT_TRUE(timeline.settled_at(105 * kMs));
+}
+
+TEST(LightDiffers, ComparesAfterBrightness) {
+  const auto calibration = fakes::toy_calibration();  // full white
+  hal::Light light;
+  EXPECT_FALSE(light_differs(*calibration, light));
+  light.brightness = 254;  // one step: not worth a word
+  EXPECT_FALSE(light_differs(*calibration, light));
+  light.brightness = 253;
+  EXPECT_TRUE(light_differs(*calibration, light));
+  light.brightness = 255;
+  light.leds[7].b = 0;
+  EXPECT_TRUE(light_differs(*calibration, light));
+  calibration->origin.leds.clear();  // not recorded
+  EXPECT_FALSE(light_differs(*calibration, light));
+}
+
+TEST(Activate, NamesAFrameSizeThatDoesNotFit) {
+  hal::CameraInfo camera;
+  camera.width = 320;
+  camera.height = 240;
+  try {
+    (void)activate(fakes::toy_calibration(), camera);
+    FAIL();
+  } catch (const std::invalid_argument& e) {
+    EXPECT_STREQ(
+        e.what(),
+        "calibration \"toy\" is for frames of 160x120 pixels, the camera delivers 320x240: "
+        "set camera.width and camera.height to the calibration's, or calibrate in this "
+        "mode");
+  }
+}
+
+TEST(Activate, KnowsTheCellsOfTheCalibratedPart) {
+  hal::CameraInfo camera;
+  camera.width = 160;
+  camera.height = 120;
+  const auto active = activate(fakes::toy_calibration(), camera);
+  EXPECT_EQ(active->region, (CellRegion{.x0 = 2, .y0 = 2, .x1 = 38, .y1 = 28}));
+  EXPECT_FALSE(active->camera_mismatch);
+  auto other = fakes::toy_calibration();
+  other->origin.camera = "another";
+  EXPECT_TRUE(activate(other, camera)->camera_mismatch);
+}
+
+TEST(Statistics, CountsFramesOfTheLastSecond) {
+  Statistics statistics;
+  EXPECT_EQ(statistics.fps(0), 0);
+  EXPECT_TRUE(statistics.stages().empty());
+  for (int i = 0; i <= 100; ++i) statistics.add({}, false, i * kPeriod, i * kPeriod + kMs);
+  EXPECT_DOUBLE_EQ(statistics.fps(1001 * kMs), 100);
+  EXPECT_EQ(statistics.fps(5000 * kMs), 0);
+  ASSERT_EQ(statistics.stages().size(), 1U);  // nothing was reconstructed
+  statistics.add({.rectify_ns = 50'000}, true, 0, 2 * kMs);
+  const auto stages = statistics.stages();
+  ASSERT_EQ(stages.size(), 6U);
+  EXPECT_EQ(stages[1].stage, "rectify");
+  EXPECT_DOUBLE_EQ(stages[1].max_us, 50);
+  EXPECT_EQ(stages[5].stage, "total");
+  EXPECT_DOUBLE_EQ(stages[5].max_us, 2000);
+}
+
+}  // namespace
+}  // namespace dtact::pipeline
