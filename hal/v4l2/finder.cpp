@@ -10,7 +10,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "hal/v4l2/device_error.hpp"
+#include "hal/v4l2/error_of.hpp"
 #include "hal/v4l2/ioctl.hpp"
 
 namespace dtact::hal::v4l2 {

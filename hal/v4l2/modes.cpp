@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "hal/v4l2/device_error.hpp"
+#include "hal/v4l2/error_of.hpp"
 #include "hal/v4l2/ioctl.hpp"
 
 namespace dtact::hal::v4l2 {
@@ -71,10 +71,11 @@ std::string name_of(std::uint32_t fourcc) {
 }  // namespace
 
 const std::vector<PixelFormat>& supported_formats() {
-  static const std::vector<PixelFormat> formats{{V4L2_PIX_FMT_GREY, "GREY", "grey"},
-                                                {V4L2_PIX_FMT_NV12, "NV12", "nv12"},
-                                                {V4L2_PIX_FMT_YUYV, "YUYV", "yuyv"},
-                                                {V4L2_PIX_FMT_MJPEG, "MJPEG", "mjpeg"}};
+  static const std::vector<PixelFormat> formats{
+      {V4L2_PIX_FMT_GREY, "GREY", "grey", live::Encoding::grey},
+      {V4L2_PIX_FMT_NV12, "NV12", "nv12", live::Encoding::nv12},
+      {V4L2_PIX_FMT_YUYV, "YUYV", "yuyv", live::Encoding::yuyv},
+      {V4L2_PIX_FMT_MJPEG, "MJPEG", "mjpeg", live::Encoding::jpeg}};
   return formats;
 }
 

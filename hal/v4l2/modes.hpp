@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "hal/config.hpp"
+#include "hal/live/source.hpp"
 
 namespace dtact::hal::v4l2 {
 
@@ -14,6 +15,7 @@ struct PixelFormat {
   std::uint32_t fourcc;
   const char* name;  ///< As in CameraInfo: "MJPEG".
   const char* key;   ///< As in the configuration: "mjpeg".
+  live::Encoding encoding;
 };
 
 /// In the order of preference of "auto": luma as it is first, lossy compression last.

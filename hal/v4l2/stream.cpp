@@ -12,12 +12,15 @@
 #include <utility>
 
 #include "hal/base/clock.hpp"
-#include "hal/v4l2/device_error.hpp"
+#include "hal/v4l2/error_of.hpp"
 #include "hal/v4l2/ioctl.hpp"
 #include "hal/v4l2/modes.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {
+
+using live::DequeueStatus;
+using live::Filled;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::uint32_t kType = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -59,8 +62,8 @@ void set_time(const v4l2_buffer& buffer, Filled& out) noexcept {
 }  // namespace
 
 Stream::Stream(base::UniqueFd fd, const std::string& node, std::uint32_t fourcc,
-               const CameraConfig& asked)
-    : fd_(std::move(fd)), node_(node) {
+               const CameraConfig& asked, const PhotometricLock& lock)
+    : fd_(std::move(fd)), node_(node), lock_(lock) {
   set_format(fourcc, asked);
   set_rate(asked.fps);
   map_buffers();
@@ -79,12 +82,14 @@ void Stream::set_format(std::uint32_t fourcc, const CameraConfig& asked) {
     throw error_of(e, "set the mode of", node_);
   }
   const v4l2_pix_format& pix = format.fmt.pix;
-  format_.fourcc = pix.pixelformat;
   format_.width = static_cast<int>(pix.width);
   format_.height = static_cast<int>(pix.height);
   format_.bytes_per_line = pix.bytesperline;
   format_.full_range = is_full_range(pix, asked.v4l2.range);
-  if (pix.pixelformat != fourcc || format_.width != asked.width || format_.height != asked.height) {
+  const PixelFormat* known = find_format(pix.pixelformat);
+  if (known != nullptr) format_.encoding = known->encoding;
+  if (known == nullptr || pix.pixelformat != fourcc || format_.width != asked.width ||
+      format_.height != asked.height) {
     throw ModeError(fmt::format(
         "{} runs {} at {}x{} when asked for {} at {}x{}: set camera.width, "
         "camera.height and camera.v4l2.pixel_format to one of: {}",
@@ -165,7 +170,7 @@ void Stream::stop() noexcept {
   (void)call(fd_.get(), VIDIOC_REQBUFS, none);
 }
 
-void Stream::wait(std::int64_t deadline_ns) const noexcept {
+void Stream::wait(std::int64_t deadline_ns) noexcept {
   const std::int64_t left =
       std::max<std::int64_t>(0, deadline_ns - base::system_clock().monotonic_ns());
   const timespec timeout{.tv_sec = left / kSecond, .tv_nsec = left % kSecond};
@@ -192,6 +197,10 @@ DequeueStatus Stream::dequeue(Filled& out) noexcept {
 bool Stream::enqueue(int index) noexcept {
   v4l2_buffer buffer = buffer_request(static_cast<std::uint32_t>(index));
   return call(fd_.get(), VIDIOC_QBUF, buffer) == 0;
+}
+
+std::string Stream::check_controls(std::vector<CameraControl>& controls) {
+  return lock_.check(fd_.get(), controls);
 }
 
 }  // namespace dtact::hal::v4l2

@@ -1,368 +1,46 @@
 #include "hal/v4l2/v4l2_camera.hpp"
 
 #include <fmt/format.h>
-#include <pthread.h>
 
-#include <algorithm>
-#include <cmath>
+#include <memory>
+#include <stdexcept>
 #include <utility>
-#include <vector>
 
-#include "hal/base/clock.hpp"
-#include "hal/v4l2/device_error.hpp"
+#include "hal/v4l2/finder.hpp"
 #include "hal/v4l2/modes.hpp"
+#include "hal/v4l2/photometry.hpp"
+#include "hal/v4l2/stream.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {
 
-constexpr std::int64_t kMillisecond = 1'000'000;
-/// Between two attempts to open a camera that is away.
-constexpr std::int64_t kRetry = 100 * kMillisecond;
-/// Silence that counts as a stall, in frame times.
-constexpr int kStallFrames = 3;
-/// From the start of the stream to its first frame cameras take up to this long; it isn't a stall.
-constexpr std::int64_t kFirstFrame = 1000 * kMillisecond;
-/// A stalled camera is closed and opened anew after this long: many come back by it.
-constexpr std::int64_t kReopenAfter = 3000 * kMillisecond;
-/// In frames; a larger step of the driver's count is a new count.
-constexpr std::uint32_t kPlausibleGap = 1U << 16U;
-constexpr std::chrono::seconds kWatchPeriod{1};
-
-std::int64_t now_ns() noexcept { return base::system_clock().monotonic_ns(); }
-
-void add(std::atomic<std::uint64_t>& counter, std::uint64_t n = 1) noexcept {
-  counter.fetch_add(n, std::memory_order_relaxed);
+live::Opened open(const CameraConfig& config, const DeviceName& name, const PhotometricLock& lock) {
+  DeviceName::Opened device = name.open();
+  const std::uint32_t fourcc = choose(list_modes(device.fd.get()), config, device.identity);
+  const auto stream =
+      std::make_shared<Stream>(std::move(device.fd), device.node, fourcc, config, lock);
+  // Before the stream begins, so that its first frame is right; and again in it, since some
+  // cameras forget when they start.
+  (void)stream->lock_controls();
+  stream->start();
+  return {stream, device.identity, find_format(fourcc)->name, stream->lock_controls()};
 }
 
-std::uint64_t get(const std::atomic<std::uint64_t>& counter) noexcept {
-  return counter.load(std::memory_order_relaxed);
-}
-
-void check(const CameraConfig& config) {
+live::Opener opener(const CameraConfig& config) {
   check_pixel_format(config.v4l2.pixel_format);
   const std::string& range = config.v4l2.range;
   if (range != "auto" && range != "full" && range != "limited") {
     throw std::runtime_error(
         fmt::format("camera.v4l2.range = \"{}\": allowed are auto, full, limited", range));
   }
-  if (!(config.fps > 0)) throw std::runtime_error("camera.fps must be positive");
+  return [config, name = DeviceName(config.v4l2.device), lock = PhotometricLock(config.v4l2)] {
+    return open(config, name, lock);
+  };
 }
 
 }  // namespace
 
 V4l2Camera::V4l2Camera(const CameraConfig& config)
-    : config_((check(config), config)),
-      name_(config.v4l2.device),
-      lock_(config.v4l2),
-      period_ns_(std::llround(1e9 / config.fps)),
-      pool_{luma::LumaBuffer(config.width, config.height),
-            luma::LumaBuffer(config.width, config.height)} {
-  info_.backend = "v4l2";
-  info_.identity = name_.text();
-  info_.width = config.width;
-  info_.height = config.height;
-  info_.fps = config.fps;
-  remedy_ = "the camera has not been started";
-  watcher_ = std::thread([this] { watch_controls(); });
-  ::pthread_setname_np(watcher_.native_handle(), "camera-watch");
-}
-
-V4l2Camera::~V4l2Camera() {
-  {
-    const std::lock_guard guard(mutex_);
-    stopping_ = true;
-  }
-  wake_watcher_.notify_one();
-  watcher_.join();
-}
-
-CameraInfo V4l2Camera::info() const {
-  const std::lock_guard guard(mutex_);
-  return info_;
-}
-
-CameraReport V4l2Camera::report() const {
-  CameraReport report;
-  report.delivered = get(counters_.delivered);
-  report.lost = get(counters_.lost);
-  report.skipped = get(counters_.skipped);
-  report.disconnects = get(counters_.disconnects);
-  report.damage = {get(counters_.flagged), get(counters_.markers), get(counters_.too_short),
-                   get(counters_.undecodable)};
-  report.damaged = report.damage.flagged + report.damage.markers + report.damage.too_short +
-                   report.damage.undecodable;
-  const std::lock_guard guard(mutex_);
-  report.state = state_.load();
-  report.remedy = remedy_;
-  report.moved = moved_;
-  return report;
-}
-
-void V4l2Camera::start() {
-  try {
-    connect();
-  } catch (const ModeError&) {
-    throw;
-  } catch (const DeviceError& e) {
-    disconnect(e.state(), e.what());
-  }
-}
-
-void V4l2Camera::connect() {
-  DeviceName::Opened opened = name_.open();
-  const std::uint32_t fourcc = choose(list_modes(opened.fd.get()), config_, opened.identity);
-  auto fresh = std::make_shared<Connection>(std::move(opened.fd), opened.node, fourcc, config_);
-  // Before the stream, so that its first frame is right; and again in it, since some cameras
-  // forget when they start.
-  (void)lock_.apply(fresh->stream.fd());
-  fresh->stream.start();
-  std::vector<CameraControl> controls = lock_.apply(fresh->stream.fd());
-
-  const PixelFormat* format = find_format(fresh->stream.format().fourcc);
-  opened_ns_ = now_ns();
-  last_buffer_ns_ = 0;
-  last_counted_.reset();
-  after_gap_ = get(counters_.delivered) > 0;
-  const std::lock_guard guard(mutex_);
-  info_.identity = opened.identity;
-  info_.pixel_format = format->name;
-  info_.controls = std::move(controls);
-  remedy_ = "the camera has been opened; its first frame is awaited";
-  connection_ = std::move(fresh);
-}
-
-bool V4l2Camera::try_connect() noexcept {
-  try {
-    connect();
-    return true;
-  } catch (const DeviceError& e) {
-    try {
-      disconnect(e.state(), e.what());
-    } catch (const std::exception&) {
-      // No memory for the sentence: the state alone has to do.
-      state_.store(e.state());
-    }
-  } catch (const std::exception&) {
-    state_.store(CameraState::unplugged);  // no memory; tried again
-  }
-  return false;
-}
-
-void V4l2Camera::disconnect(CameraState state, const std::string& remedy) {
-  std::shared_ptr<Connection> old;
-  {
-    const std::lock_guard guard(mutex_);
-    old = std::exchange(connection_, nullptr);
-    state_.store(state);
-    remedy_ = remedy;
-  }
-  // The watcher may keep the object for a moment; the device must be free at once.
-  if (old) {
-    add(counters_.disconnects);
-    old->stream.stop();
-  }
-}
-
-void V4l2Camera::lose(const char* what) noexcept {
-  try {
-    disconnect(CameraState::unplugged,
-               fmt::format("{} {}: plug it in again; it is looked for ten times a second",
-                           info_.identity, what));
-  } catch (const std::exception&) {
-    state_.store(CameraState::unplugged);
-  }
-  next_try_ns_ = now_ns() + kRetry;
-}
-
-bool V4l2Camera::wait_for_device(std::int64_t deadline_ns) noexcept {
-  for (;;) {
-    base::system_clock().sleep_until(std::min(deadline_ns, next_try_ns_));
-    if (now_ns() < next_try_ns_) return false;
-    const bool connected = try_connect();
-    next_try_ns_ = now_ns() + kRetry;
-    if (connected) return true;
-  }
-}
-
-GrabStatus V4l2Camera::grab(Frame& out, std::chrono::nanoseconds timeout) noexcept {
-  const std::int64_t deadline = now_ns() + timeout.count();
-  for (;;) {
-    if (!connection_ && !wait_for_device(deadline)) return GrabStatus::unplugged;
-    switch (collect(out)) {
-      case Collected::frame:
-        return GrabStatus::ok;
-      case Collected::damaged:
-        return GrabStatus::damaged;
-      case Collected::lost:
-        lose("was unplugged or its driver failed");
-        continue;
-      case Collected::nothing:
-        break;
-    }
-    const std::int64_t now = now_ns();
-    note_silence(now);
-    if (!connection_) continue;
-    if (now >= deadline) return GrabStatus::timeout;
-    // Awake when the silence becomes a stall, so that it is seen whatever the timeout is.
-    const std::int64_t stall = now + tolerated_silence_ns() - silence_ns(now);
-    connection_->stream.wait(stall > now ? std::min(deadline, stall) : deadline);
-  }
-}
-
-std::int64_t V4l2Camera::silence_ns(std::int64_t now) const noexcept {
-  return now - (last_buffer_ns_ == 0 ? opened_ns_ : last_buffer_ns_);
-}
-
-std::int64_t V4l2Camera::tolerated_silence_ns() const noexcept {
-  return last_buffer_ns_ == 0 ? kFirstFrame : kStallFrames * period_ns_;
-}
-
-void V4l2Camera::note_silence(std::int64_t now) noexcept {
-  const std::int64_t silent = silence_ns(now);
-  if (silent < tolerated_silence_ns()) return;
-  if (state_.load() != CameraState::stalled) {
-    const std::lock_guard guard(mutex_);
-    state_.store(CameraState::stalled);
-    try {
-      remedy_ = fmt::format(
-          "{} is attached but sends nothing: it is restarted every {} s; if that "
-          "doesn't help, plug it in again",
-          info_.identity, kReopenAfter / 1'000'000'000);
-    } catch (const std::exception&) {
-      remedy_.clear();
-    }
-  }
-  if (silent < kReopenAfter) return;
-  std::shared_ptr<Connection> old;
-  {
-    const std::lock_guard guard(mutex_);
-    old = std::exchange(connection_, nullptr);
-  }
-  old->stream.stop();
-  next_try_ns_ = now;
-}
-
-V4l2Camera::Collected V4l2Camera::collect(Frame& out) noexcept {
-  Stream& stream = connection_->stream;
-  // The newest whole frame, and the one before in case that the newest cannot be decoded.
-  std::array<std::pair<Filled, std::uint64_t>, 2> whole;  // with its sequence; oldest first
-  std::size_t count = 0;
-  bool damaged = false;
-  // Buffers go back as others come out, so the queue could be endless.
-  for (unsigned taken = 0; taken < 2 * Stream::kBuffers; ++taken) {
-    Filled filled;
-    const DequeueStatus status = stream.dequeue(filled);
-    if (status == DequeueStatus::none) break;
-    if (status == DequeueStatus::failed) return Collected::lost;
-    last_buffer_ns_ = now_ns();
-    count_gap(filled.sequence);
-    const PayloadStatus payload = connection_->decoder.inspect(filled);
-    int home = filled.index;
-    if (payload != PayloadStatus::ok) {
-      count_damage(payload);
-      damaged = true;
-    } else if (count < whole.size()) {
-      whole[count++] = {filled, sequence_};
-      continue;
-    } else {
-      home = whole[0].first.index;
-      whole[0] = std::exchange(whole[1], {filled, sequence_});
-      add(counters_.skipped);
-    }
-    if (!stream.enqueue(home)) return Collected::lost;
-  }
-  bool done = false;
-  for (std::size_t i = count; i-- > 0;) {
-    const auto& [filled, sequence] = whole[i];
-    if (done) {
-      add(counters_.skipped);
-    } else {
-      const PayloadStatus status = deliver(filled, sequence, last_buffer_ns_, out);
-      done = status == PayloadStatus::ok;
-      if (!done) count_damage(status);
-      damaged = damaged || !done;
-    }
-    // A frame that was delivered stays delivered: the next call meets the error again.
-    if (!stream.enqueue(filled.index) && !done) return Collected::lost;
-  }
-  if (done) return Collected::frame;
-  return damaged ? Collected::damaged : Collected::nothing;
-}
-
-PayloadStatus V4l2Camera::deliver(const Filled& filled, std::uint64_t sequence,
-                                  std::int64_t ready_ns, Frame& out) noexcept {
-  const int index = lent_[0].load(std::memory_order_acquire) ? 1 : 0;
-  luma::LumaBuffer& buffer = pool_[static_cast<std::size_t>(index)];
-  const std::int64_t begin = now_ns();
-  const PayloadStatus status = connection_->decoder.decode(filled, buffer);
-  if (status != PayloadStatus::ok) return status;
-
-  FrameInfo frame;
-  frame.sequence = sequence;
-  frame.timestamp_ns = filled.timestamp_ns;
-  frame.meaning = filled.meaning;
-  frame.ready_ns = ready_ns;
-  frame.decode_ns = now_ns() - begin;
-  frame.flags = std::exchange(after_gap_, false) ? kFrameAfterGap : kFrameNormal;
-  lent_[static_cast<std::size_t>(index)].store(true, std::memory_order_relaxed);
-  out = Frame(*this, index, buffer.view(), frame);
-  add(counters_.delivered);
-  if (state_.load(std::memory_order_relaxed) != CameraState::streaming) {
-    const std::lock_guard guard(mutex_);
-    state_.store(CameraState::streaming);
-    remedy_.clear();
-  }
-  return status;
-}
-
-void V4l2Camera::give_back(int index) noexcept {
-  lent_[static_cast<std::size_t>(index)].store(false, std::memory_order_release);
-}
-
-void V4l2Camera::count_gap(std::uint32_t counted) noexcept {
-  // The driver's count begins anew with every connection, and within one with some drivers; ours
-  // goes on.
-  std::uint32_t step = last_counted_ ? counted - *last_counted_ : 1;
-  if (step == 0 || step > kPlausibleGap) step = 1;
-  last_counted_ = counted;
-  sequence_ += step;
-  if (step > 1) {
-    add(counters_.lost, step - 1);
-    after_gap_ = true;
-  }
-}
-
-void V4l2Camera::count_damage(PayloadStatus status) noexcept {
-  switch (status) {
-    case PayloadStatus::flagged:
-      return add(counters_.flagged);
-    case PayloadStatus::markers:
-      return add(counters_.markers);
-    case PayloadStatus::too_short:
-      return add(counters_.too_short);
-    case PayloadStatus::undecodable:
-      return add(counters_.undecodable);
-    case PayloadStatus::ok:
-      return;
-  }
-}
-
-void V4l2Camera::watch_controls() noexcept {
-  std::unique_lock guard(mutex_);
-  while (!wake_watcher_.wait_for(guard, kWatchPeriod, [this] { return stopping_; })) {
-    std::shared_ptr<Connection> held = connection_;
-    if (!held) continue;
-    try {
-      std::vector<CameraControl> controls = info_.controls;
-      guard.unlock();
-      std::string moved = lock_.check(held->stream.fd(), controls);
-      held.reset();  // may close the device: not under the mutex
-      guard.lock();
-      moved_ = std::move(moved);
-    } catch (const std::exception&) {
-      if (!guard.owns_lock()) guard.lock();  // no memory; tried again in a second
-    }
-  }
-}
+    : LiveCamera(config, "v4l2", config.v4l2.device, opener(config)) {}
 
 }  // namespace dtact::hal::v4l2

@@ -3,7 +3,7 @@
 #
 # The kernel is User Mode Linux (a Linux kernel that runs as an ordinary program) built from
 # Debian's linux-source-6.1 with uml.config, and the modules of modules/ beside it: about 4 minutes
-# on 2 cores. It is made again when uml.config or a module changes. Nothing is installed but build
+# on 2 cores. It is made again when this, uml.config or a module changes. Nothing is installed but build
 # tools, and those only by root.
 #
 # Exit code: 0 the kernel is there; 77 it cannot be had on this machine (the reason is printed).
@@ -18,7 +18,7 @@ skip() {
   exit 77
 }
 
-stamp=$(cat "$here/uml.config" "$here"/modules/* | sha256sum | cut -c1-16)
+stamp=$(cat "$here/setup.sh" "$here/uml.config" "$here"/modules/* | sha256sum | cut -c1-16)
 is_ready() { [ -x "$cache/linux" ] && [ "$(cat "$cache/stamp" 2> /dev/null)" = "$stamp" ]; }
 
 mkdir -p "$cache"
@@ -70,7 +70,7 @@ apt-get download -q "$source_package" > "$cache/build.log" 2>&1 \
 }
 rm -rf "$cache/modules"
 mkdir "$cache/modules"
-cp modules/*.ko out/drivers/media/test-drivers/vivid/vivid.ko "$cache/modules/"
+find modules out -name '*.ko' -exec cp {} "$cache/modules/" ';'
 cp out/linux "$cache/linux.new"
 mv "$cache/linux.new" "$cache/linux"
 echo "$stamp" > "$cache/stamp"

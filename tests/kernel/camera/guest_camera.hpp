@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 
+#include "hal/v4l2/finder.hpp"
 #include "hal/v4l2/v4l2_camera.hpp"
 #include "tests/kernel/camera/played_frames.hpp"
 #include "tests/kernel/camera/usb_camera.hpp"
@@ -28,6 +29,9 @@ class GuestCamera : public testing::Test {
     c.v4l2.pixel_format = "mjpeg";
     return c;
   }
+
+  /// A camera's nodes outlive its unplugging by a moment.
+  void TearDown() override { wait_for_no_camera(); }
 
   /// The picture files, made once.
   [[nodiscard]] static const PlayedFrames& played() {

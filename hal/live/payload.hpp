@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <memory>
 
+#include "hal/live/source.hpp"
 #include "hal/luma/luma_buffer.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
-#include "hal/v4l2/stream.hpp"
 
-namespace dtact::hal::v4l2 {
+namespace dtact::hal::live {
 
 enum class PayloadStatus : std::uint8_t { ok, flagged, markers, too_short, undecodable };
 
@@ -27,4 +27,4 @@ class PayloadDecoder {
   std::unique_ptr<mjpeg::GreyDecoder> jpeg_;  // null for raw formats
 };
 
-}  // namespace dtact::hal::v4l2
+}  // namespace dtact::hal::live

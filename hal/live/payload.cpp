@@ -1,22 +1,15 @@
-#include "hal/v4l2/payload.hpp"
-
-#include <linux/videodev2.h>
+#include "hal/live/payload.hpp"
 
 #include "hal/luma/extract.hpp"
-#include "hal/v4l2/modes.hpp"
 
-namespace dtact::hal::v4l2 {
+namespace dtact::hal::live {
 namespace {
 
-bool is_jpeg(std::uint32_t fourcc) {
-  return fourcc == V4L2_PIX_FMT_MJPEG || fourcc == V4L2_PIX_FMT_JPEG;
-}
-
-luma::Layout layout_of(std::uint32_t fourcc) {
-  switch (fourcc) {
-    case V4L2_PIX_FMT_YUYV:
+luma::Layout layout_of(Encoding encoding) {
+  switch (encoding) {
+    case Encoding::yuyv:
       return luma::Layout::yuyv;
-    case V4L2_PIX_FMT_NV12:
+    case Encoding::nv12:
       return luma::Layout::nv12;
     default:
       return luma::Layout::grey;
@@ -36,7 +29,7 @@ bool has_markers(std::span<const std::uint8_t> payload) noexcept {
 
 PayloadDecoder::PayloadDecoder(const Format& format)
     : format_(format),
-      jpeg_(is_jpeg(format.fourcc)
+      jpeg_(format.encoding == Encoding::jpeg
                 ? std::make_unique<mjpeg::GreyDecoder>(format.width, format.height)
                 : nullptr) {}
 
@@ -44,14 +37,14 @@ PayloadStatus PayloadDecoder::inspect(const Filled& filled) const noexcept {
   if (filled.flagged) return PayloadStatus::flagged;
   if (filled.payload.empty()) return PayloadStatus::too_short;
   if (jpeg_) return has_markers(filled.payload) ? PayloadStatus::ok : PayloadStatus::markers;
-  const std::size_t needed = luma::payload_bytes(layout_of(format_.fourcc), format_.width,
+  const std::size_t needed = luma::payload_bytes(layout_of(format_.encoding), format_.width,
                                                  format_.height, format_.bytes_per_line);
   return filled.payload.size() < needed ? PayloadStatus::too_short : PayloadStatus::ok;
 }
 
 PayloadStatus PayloadDecoder::decode(const Filled& filled, luma::LumaBuffer& out) noexcept {
   if (!jpeg_) {
-    const auto status = luma::extract(layout_of(format_.fourcc),
+    const auto status = luma::extract(layout_of(format_.encoding),
                                       format_.full_range ? luma::Range::full : luma::Range::limited,
                                       filled.payload, format_.bytes_per_line, out);
     if (status == luma::ExtractStatus::ok) return PayloadStatus::ok;
@@ -71,4 +64,4 @@ PayloadStatus PayloadDecoder::decode(const Filled& filled, luma::LumaBuffer& out
   }
 }
 
-}  // namespace dtact::hal::v4l2
+}  // namespace dtact::hal::live

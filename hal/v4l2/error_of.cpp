@@ -1,4 +1,4 @@
-#include "hal/v4l2/device_error.hpp"
+#include "hal/v4l2/error_of.hpp"
 
 #include <fmt/format.h>
 
