@@ -85,8 +85,13 @@ void Ring::run() {
     report_.failures += error.empty() ? 0U : 1U;
     report_.ok = error.empty();
     report_.message = error;
-    if (done_ != ticket) outcome_ = std::move(error);  // a re-send is nobody's command
-    done_ = ticket;
+    if (done_ != ticket) {  // else a re-send, which is nobody's command
+      if (report_.ok) shown_ = leds;
+      // The command has failed, so that the light before it is still the one to show.
+      if (!report_.ok && shown_ && asked_ == ticket) wanted_ = *shown_;
+      outcome_ = std::move(error);
+      done_ = ticket;
+    }
     written_.notify_all();
   };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include "hal/base/rt_thread.hpp"
@@ -18,9 +19,9 @@ namespace dtact::hal::ws2812 {
 
 /// A ring of WS2812B. One thread of its own does every write: what show() asks for, which waits
 /// for the outcome, and the re-sends, by which an LED that caught a glitch finds back to its
-/// colour. A re-send that fails shows in report() and is tried again; so is a failed show(), whose
-/// light stays the one asked for. On destruction the ring goes dark, then loses its power, unless
-/// it is to be left on.
+/// colour. What is sent again is the last light that show() brought to the LEDs; when none has got
+/// there yet, the one asked for last. A re-send that fails shows in report(). On destruction the
+/// ring goes dark, then loses its power, unless it is to be left on.
 class Ring final : public LightRing {
  public:
   /// `power` may be null; else it is on already. Waits until the wire has measured itself. Throws
@@ -50,7 +51,8 @@ class Ring final : public LightRing {
   std::condition_variable wake_;     // for the thread: a new light, or stop
   std::condition_variable written_;  // for callers: a write is through
   // Guarded by mutex_:
-  Leds wanted_{};  // in chain order
+  Leds wanted_{};              // in chain order
+  std::optional<Leds> shown_;  // the last that got there
   std::uint64_t asked_ = 0, done_ = 0;
   std::string outcome_;  // of the last light that was asked for
   bool prepared_ = false, stop_ = false;

@@ -136,6 +136,19 @@ TEST(Ws2812Ring, AFailedWriteIsTheCommandsErrorAndHealsByItself) {
   EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
 }
 
+TEST(Ws2812Ring, AfterAFailedCommandTheLightBeforeItIsSentAgain) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.resend_ms = 2;
+  const auto ours = ring(record, config);
+  ASSERT_TRUE(ours->show(kRed).ok);
+  record->fail_with("the wire is cut: mend it");
+  EXPECT_FALSE(ours->show(Light{Light::all({0, 0, 9}), 255}).ok);
+  record->fail_with("");
+  ASSERT_TRUE(eventually([&] { return ours->report().ok; }));
+  EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
+}
+
 TEST(Ws2812Ring, AReSendThatFailsShowsInTheReport) {
   const auto record = std::make_shared<Record>();
   Ws2812Config config = quiet();
