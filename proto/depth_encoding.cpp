@@ -45,7 +45,7 @@ bool decode_int16(std::string_view bytes, std::size_t width, std::size_t height,
 
 struct DeltaZstdEncoder::Impl {
   struct Free {
-    void operator()(ZSTD_CCtx* context) const noexcept { ZSTD_freeCCtx(context); }
+    void operator()(ZSTD_CCtx* used) const noexcept { ZSTD_freeCCtx(used); }
   };
   std::unique_ptr<ZSTD_CCtx, Free> context{ZSTD_createCCtx()};
   std::vector<std::uint16_t> differences;

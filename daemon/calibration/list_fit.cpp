@@ -8,7 +8,7 @@
 namespace dtact::calibration {
 namespace {
 
-constexpr double kSure = 0.85;       // of the contact radius
+constexpr double kSure = 0.9;        // of the contact radius
 constexpr double kBinsPerLevel = 2;  // of the monotone fit
 constexpr double kVouched = 2;       // grey levels beyond the greatest one seen
 constexpr int kFewest = 4;           // pixels that make a grey level's vote
@@ -181,7 +181,7 @@ recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
       mm = deepest.depth_mm + line.slope * (level - deepest.level);
     }
     list.um.push_back(
-        static_cast<std::int16_t>(std::clamp(std::lround(1000 * mm), -32767L, 32767L)));
+        static_cast<std::int16_t>(std::clamp(std::lround(1000 * mm), -16383L, 16383L)));
   }
   const auto covered = [](double level) {
     return static_cast<int>(

@@ -18,7 +18,7 @@ using PixelFilter = std::function<bool(int x, int y)>;
 /// biased: the layer's surface is still pressed there, by 0.03 … 0.2 mm depending on its thickness.
 /// What is known without any circle is that an untouched pixel (no darkening) is at zero. So:
 ///
-/// 1. In the sure part of the contact (0.85 of its radius) the sag is a straight line of the
+/// 1. In the sure part of the contact (0.9 of its radius) the sag is a straight line of the
 ///    darkening, fitted with one vote a grey level, since shallow and deep places count alike for a
 ///    line that is extended to zero. Its value at no darkening is g.
 /// 2. Indentation g − sag over the whole contact, one mean for each half grey level, made monotone

@@ -53,7 +53,7 @@ void read_list(KeyReader list, bool monotone, recon::DepthList& out) {
   out.first_q6 = small(list, "first_q6", -kReach, kReach);
   out.covered_from_q6 = small(list, "covered_from_q6", -kReach, kReach);
   out.covered_to_q6 = small(list, "covered_to_q6", -kReach, kReach);
-  for (const std::int64_t um : list.integers("um", -INT16_MAX, INT16_MAX)) {
+  for (const std::int64_t um : list.integers("um", -16383, 16383)) {
     out.um.push_back(static_cast<std::int16_t>(um));
   }
   list.finish();

@@ -167,7 +167,7 @@ recon::DepthList fit_published(const image::Grey8& reference, const image::Grey8
     const int level = (q6 + kStep / 2) / kStep;
     const double mm =
         level <= kThresholdLevel ? 0 : std::max(0.0, depth[static_cast<std::size_t>(level)] - zero);
-    list.um.push_back(static_cast<std::int16_t>(std::min(32767L, std::lround(1000 * mm))));
+    list.um.push_back(static_cast<std::int16_t>(std::min(16383L, std::lround(1000 * mm))));
   }
   list.covered_to_q6 = last_level * kStep;
   return list;

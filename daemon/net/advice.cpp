@@ -73,6 +73,7 @@ std::string advice(const pipeline::Status& status) {
     add(text, remedy.sentence);
     add(text, detail(status, remedy.health));
   }
+  add(text, status.storage_message);
   return text;
 }
 

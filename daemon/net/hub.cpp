@@ -2,8 +2,8 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
+#include <boost/asio/buffer.hpp>
 #include <boost/asio/post.hpp>
 #include <cerrno>
 #include <system_error>
@@ -62,11 +62,10 @@ void Hub::wait() {
                        const auto self = weak.lock();
                        if (error || self == nullptr) return;
                        std::uint64_t count = 0;
-                       // Its value says nothing that draining does not; EAGAIN only that another
-                       // round was faster.
-                       if (::read(self->events_.native_handle(), &count, sizeof count) > 0) {
-                         self->drain();
-                       }
+                       error_code empty;
+                       // Its value says nothing that draining does not.
+                       self->events_.read_some(asio::buffer(&count, sizeof count), empty);
+                       if (!empty) self->drain();
                        if (self->events_.is_open()) self->wait();
                      });
 }

@@ -23,8 +23,8 @@ struct NetConfig {
   std::uint16_t port = wire::kDefaultPort;        ///< 0: any free one, see Server::port().
   std::size_t max_clients = 32;                   ///< More are refused with a sentence.
   std::string frame_id = "dtact_surface";         ///< Name of the surface frame in every message.
-  std::string program = "dtactd";                 ///< What the daemon calls itself to clients.
-  std::string version;                            ///< In status and the handshake.
+  std::string program = "dtactd";                 ///< "dtactd 0.1.0": in the handshake.
+  std::string version;                            ///< "0.1.0": in status.
   std::chrono::milliseconds hello_timeout{5000};  ///< A client silent for so long is let go.
   /// Longest time without progress of unacknowledged or unaccepted data (TCP_USER_TIMEOUT), after
   /// which a client counts as dead: a pulled cable, or a program that stopped reading.

@@ -162,7 +162,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   auto& reply = *message.mutable_reply()->mutable_hello();
   reply.set_major(wire::kMajor);
   reply.set_minor(wire::kMinor);
-  reply.set_program(fmt::format("{} {}", config_.program, config_.version));
+  reply.set_program(config_.program);
   auto& frame = *reply.mutable_surface_frame();
   frame.set_frame_id(config_.frame_id);
   frame.set_right_handed(true);

@@ -49,7 +49,8 @@ calibration::AttachedCamera attached(const hal::CameraInfo& camera) {
 }  // namespace
 
 std::unique_ptr<ActiveCalibration> activate(
-    std::shared_ptr<const calibration::Calibration> calibration, const hal::CameraInfo& camera) {
+    const std::shared_ptr<const calibration::Calibration>& calibration,
+    const hal::CameraInfo& camera) {
   const recon::Model& model = *calibration->model;
   const recon::RectifyTable& table = model.rectify;
   if (table.frame_width != camera.width || table.frame_height != camera.height) {

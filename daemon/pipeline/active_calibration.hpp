@@ -25,7 +25,8 @@ struct ActiveCalibration {
 /// Throws std::invalid_argument, saying what to do, when the calibration cannot be used with frames
 /// of this camera at all (other differences are a health condition).
 [[nodiscard]] std::unique_ptr<ActiveCalibration> activate(
-    std::shared_ptr<const calibration::Calibration> calibration, const hal::CameraInfo& camera);
+    const std::shared_ptr<const calibration::Calibration>& calibration,
+    const hal::CameraInfo& camera);
 
 /// The ring shows another light than at calibration: any channel, after brightness, off by more
 /// than one step. False when the calibration did not record its light. Does not allocate.

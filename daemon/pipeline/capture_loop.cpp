@@ -43,7 +43,11 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       watch_(period_ns_),
       timeline_(config.light, camera_.info().light_delay_frames, period_ns_),
       teller_(exchange_),
-      shown_(config.light) {}
+      shown_(config.light) {
+  // What the status says until the first frame.
+  exchange_.state = state();
+  exchange_.health = health(true, clock_.monotonic_ns()).bits();
+}
 
 void CaptureLoop::restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light) {
   keeper_.restore(reference_q8, light == config_.light);
@@ -220,9 +224,9 @@ void CaptureLoop::mind_reference(bool settled) noexcept {
 void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
                                 std::int64_t now_ns) noexcept {
   watch_.missed(status, now_ns);
-  if (rezero_ && (watch_.away() || watch_.silent_ns(now_ns) > kSecond)) {
+  if (watch_.away() || watch_.silent_ns(now_ns) > kSecond) {
     keeper_.cancel_rezero();
-    teller_.answer({*std::exchange(rezero_, std::nullopt), Outcome::camera_away, kAwaySentence});
+    answer(Outcome::camera_away, kAwaySentence);
   }
   tell(health(true, now_ns), now_ns);
   // A camera that answers at once is not asked again at once, unless it had a frame.
@@ -242,17 +246,21 @@ void CaptureLoop::tell(HealthSet health, std::int64_t now_ns) noexcept {
 }
 
 void CaptureLoop::answer(RezeroResult result) noexcept {
-  const std::uint64_t ticket = *std::exchange(rezero_, std::nullopt);
   switch (result) {
     case RezeroResult::taken:
-      return teller_.answer({ticket, Outcome::done, ""});
+      return answer(Outcome::done, "");
     case RezeroResult::touched:
-      return teller_.answer({ticket, Outcome::refused_contact, kTouchedSentence});
+      return answer(Outcome::refused_contact, kTouchedSentence);
     case RezeroResult::unsteady:
-      return teller_.answer({ticket, Outcome::refused_contact, kUnsteadySentence});
+      return answer(Outcome::refused_contact, kUnsteadySentence);
     case RezeroResult::dark:
-      return teller_.answer({ticket, Outcome::invalid, kDarkSentence});
+      return answer(Outcome::invalid, kDarkSentence);
   }
+}
+
+void CaptureLoop::answer(Outcome outcome, const char* sentence) noexcept {
+  if (rezero_) teller_.answer({*rezero_, outcome, sentence});
+  rezero_.reset();
 }
 
 State CaptureLoop::state() const noexcept {

@@ -55,7 +55,9 @@ class CaptureLoop {
   void mind_reference(bool settled) noexcept;
   void publish(DepthFrame& out) noexcept;
   void tell(HealthSet health, std::int64_t now_ns) noexcept;
+  /// Answers the re-zero under way, if there is one.
   void answer(RezeroResult result) noexcept;
+  void answer(Outcome outcome, const char* sentence) noexcept;
   [[nodiscard]] State state() const noexcept;
   [[nodiscard]] HealthSet health(bool settled, std::int64_t now_ns) const noexcept;
 

@@ -10,7 +10,7 @@ namespace dtact::pipeline {
 /// without copies. A pool of exactly three: one being written, one waiting, one held by the reader.
 /// Overflow policy: the newest wins; a waiting one that is replaced is counted.
 template <typename T>
-class LatestSlot {
+class LatestSlot {  // NOLINT(clang-analyzer-optin.performance.Padding): see the fields
  public:
   /// All three start as copies of `prototype`, with its buffers' sizes.
   explicit LatestSlot(const T& prototype) : pool_{prototype, prototype, prototype} {}
@@ -50,11 +50,12 @@ class LatestSlot {
   static constexpr std::uint8_t kIndex = 3;
   static constexpr std::uint8_t kFresh = 4;
 
-  std::array<T, 3> pool_;
-  std::uint8_t back_ = 0;                             // writer's
+  // What both threads write, what the writer and what the reader uses: a cache line each.
   alignas(64) std::atomic<std::uint8_t> waiting_{1};  // an index, with kFresh until it is fetched
+  alignas(64) std::uint8_t back_ = 0;
   std::atomic<std::uint64_t> replaced_{0};
-  alignas(64) std::uint8_t front_ = 2;  // reader's
+  std::array<T, 3> pool_;
+  alignas(64) std::uint8_t front_ = 2;
 };
 
 }  // namespace dtact::pipeline

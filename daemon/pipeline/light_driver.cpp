@@ -85,14 +85,14 @@ hal::ShowResult LightDriver::write(const hal::Light& light) {
   return result;
 }
 
-void LightDriver::note(LightNote note) {
-  while (!notes_.push(std::move(note)) && !stop_) {
+void LightDriver::note(const LightNote& note) {
+  while (!notes_.push(LightNote(note)) && !stop_) {
     clock_.sleep_until(clock_.monotonic_ns() + kRetryNs);
   }
 }
 
-void LightDriver::tell(Event event) {
-  while (!events_.push(std::move(event)) && !stop_) {
+void LightDriver::tell(const Event& event) {
+  while (!events_.push(Event(event)) && !stop_) {
     clock_.sleep_until(clock_.monotonic_ns() + kRetryNs);
   }
   wake_.signal();

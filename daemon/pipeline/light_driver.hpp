@@ -60,8 +60,8 @@ class LightDriver {
   void serve(const Request& request);
   void look();
   hal::ShowResult write(const hal::Light& light);
-  void note(LightNote note);
-  void tell(Event event);
+  void note(const LightNote& note);
+  void tell(const Event& event);
 
   std::unique_ptr<hal::LightRing> ring_;
   base::Clock& clock_;

@@ -50,7 +50,7 @@ float greatest_change(const LumaGrid& a, const LumaGrid& b, const CellRegion& re
   float greatest = 0;
   for (int y = region.y0; y < region.y1; ++y) {
     for (int x = region.x0; x < region.x1; ++x) {
-      const auto cell = static_cast<std::size_t>(y * kGridWidth + x);
+      const std::size_t cell = cell_at(x, y);
       greatest = std::max(greatest, std::abs(a.cells[cell] - b.cells[cell]));
     }
   }

@@ -29,6 +29,11 @@ struct LumaGrid {
   return i * pixels / cells;
 }
 
+/// Where the cell in column x, row y stands.
+[[nodiscard]] constexpr std::size_t cell_at(int x, int y) noexcept {
+  return static_cast<std::size_t>(y) * kGridWidth + static_cast<std::size_t>(x);
+}
+
 /// Frame of at least kLeastFrameWidth × kLeastFrameHeight.
 void measure(const hal::LumaView& luma, LumaGrid& grid) noexcept;
 

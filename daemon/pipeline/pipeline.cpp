@@ -41,7 +41,7 @@ std::size_t pixels(int width, int height) {
 }  // namespace
 
 Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::LightRing> ring,
-                   std::shared_ptr<const calibration::Calibration> calibration,
+                   const std::shared_ptr<const calibration::Calibration>& calibration,
                    PipelineConfig config, base::Clock& clock)
     : config_(std::move(config)),
       clock_(clock),

@@ -24,8 +24,8 @@ class Pipeline final : public Port {
   /// std::invalid_argument naming the setting and its remedy. A calibration for another frame size
   /// is a health condition, not an error.
   Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::LightRing> ring,
-           std::shared_ptr<const calibration::Calibration> calibration, PipelineConfig config,
-           base::Clock& clock = base::system_clock());
+           const std::shared_ptr<const calibration::Calibration>& calibration,
+           PipelineConfig config, base::Clock& clock = base::system_clock());
   ~Pipeline() override { stop(); }
 
   /// Ring on, camera on, threads running. Once only. Throws std::runtime_error with the remedy when

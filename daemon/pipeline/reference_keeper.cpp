@@ -14,6 +14,10 @@ constexpr float kStillGrey = 1;
 /// Local darkening that is a touch. Between two references of one sensor: at most 0.006; the
 /// lightest press of the real images: 0.05 (TouchVerdict). 0.0125 is about 0.07 mm.
 constexpr float kTouchedDarkening = 0.0125F;
+/// The same between images under different light, of which the fit leaves a little: on the
+/// simulated sensor at most 0.002 after dimming by half, 0.019 with only the LEDs of one half lit.
+/// 0.13 mm.
+constexpr float kTouchedUnderOtherLight = 0.025F;
 /// The same where nothing touched right before the light changed: then only a plain press (0.2 mm)
 /// outweighs that, and what another set of LEDs leaves of the light's shape does not.
 constexpr float kTouchedAfterUntouched = 0.04F;
@@ -46,6 +50,7 @@ void ReferenceKeeper::restore(std::span<const std::uint16_t> reference_q8, bool 
   measure(good_, width_, height_, good_grid_);
   have_good_ = true;
   good_same_light_ = same_light;
+  other_light_ = !same_light;
 }
 
 void ReferenceKeeper::use_calibration(std::span<const std::uint16_t> reference_q8,
@@ -74,6 +79,7 @@ void ReferenceKeeper::light_changed(bool touching) noexcept {
   phase_ = Phase::settling;
   footing_ = Footing::none;
   good_same_light_ = false;
+  other_light_ = true;
   averaging_ = false;
   waited_ = 0;
   settle_.reset();
@@ -165,6 +171,7 @@ KeeperStep ReferenceKeeper::take() noexcept {
   good_grid_ = candidate_grid_;
   have_good_ = true;
   good_same_light_ = true;
+  other_light_ = false;
   footing_ = Footing::fresh;
   phase_ = Phase::holding;
   averaging_ = false;
@@ -207,7 +214,8 @@ KeeperStep ReferenceKeeper::stand_in() noexcept {
 }
 
 bool ReferenceKeeper::touched(const LumaGrid& now) noexcept {
-  const float limit = untouched_before_ ? kTouchedAfterUntouched : kTouchedDarkening;
+  float limit = other_light_ ? kTouchedUnderOtherLight : kTouchedDarkening;
+  if (untouched_before_) limit = kTouchedAfterUntouched;
   // One witness is enough: the last good reference may be from before a wear of the gel, the
   // calibration's from before a change of the light's shape.
   if (have_good_ && check_.compare(good_grid_, now, region_, field_).darkening < limit) {

@@ -104,6 +104,7 @@ class ReferenceKeeper {
   bool starting_ = true;
   bool averaging_ = false;         // while holding: a new reference is being gathered
   bool untouched_before_ = false;  // nothing touched right before the light changed
+  bool other_light_ = false;       // than what is known was made under
   bool forced_ = false;
   std::optional<Rezero> request_;
   int waited_ = 0;   // frames since the sequence or the average began

@@ -1,11 +1,9 @@
 #include "daemon/pipeline/teller.hpp"
 
-#include <utility>
-
 namespace dtact::pipeline {
 
-bool Teller::push(Report report) noexcept {
-  if (!exchange_.reports.push(std::move(report))) return false;
+bool Teller::push(const Report& report) noexcept {
+  if (!exchange_.reports.push(Report(report))) return false;
   exchange_.wake.signal();
   return true;
 }

@@ -24,7 +24,7 @@ class Teller {
   void flush() noexcept;
 
  private:
-  [[nodiscard]] bool push(Report report) noexcept;
+  [[nodiscard]] bool push(const Report& report) noexcept;
 
   Exchange& exchange_;
   bool touching_ = false;              // as told

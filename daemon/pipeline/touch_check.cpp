@@ -16,7 +16,7 @@ template <typename Function>
 void for_cells(const CellRegion& region, Function function) {
   for (int y = region.y0; y < region.y1; ++y) {
     for (int x = region.x0; x < region.x1; ++x) {
-      function(static_cast<std::size_t>(y * kGridWidth + x));
+      function(cell_at(x, y));
     }
   }
 }
@@ -41,7 +41,7 @@ TouchCheck::TouchCheck() : basis_(kGridCells) {
     for (int x = 0; x < kGridWidth; ++x) {
       const auto u = chebyshev(2.0 * (x + 0.5) / kGridWidth - 1);
       std::size_t term = 0;
-      Terms& terms = basis_[static_cast<std::size_t>(y * kGridWidth + x)];
+      Terms& terms = basis_[cell_at(x, y)];
       for (std::size_t i = 0; i <= kDegree; ++i) {
         for (std::size_t j = 0; i + j <= kDegree; ++j) terms[term++] = u[i] * v[j];
       }

@@ -41,7 +41,8 @@ class TouchCheck {
   static constexpr int kTerms = 15;
   using Terms = std::array<double, kTerms>;
 
-  Terms solve(const LumaGrid& then, const LumaGrid& now, const CellRegion& region) const noexcept;
+  [[nodiscard]] Terms solve(const LumaGrid& then, const LumaGrid& now,
+                            const CellRegion& region) const noexcept;
   void reweigh(const LumaGrid& then, const LumaGrid& now, const CellRegion& region,
                const Terms& terms) noexcept;
 

@@ -22,6 +22,12 @@ std::int32_t round_shift(std::int32_t value) noexcept {
   return (value + (1 << (kBits - 1))) >> kBits;
 }
 
+/// The two pixels that share a tap. Within kSmoothable their sum is an int16, so that a product is
+/// 16 × 16 → 32 bits, which every vector unit has; 32 × 32 is missing in SSE2.
+std::int16_t pair_sum(std::int16_t a, std::int16_t b) noexcept {
+  return static_cast<std::int16_t>(a + b);
+}
+
 }  // namespace
 
 void rectify_difference_row(const std::uint8_t* luma, std::ptrdiff_t stride,
@@ -52,8 +58,8 @@ void smooth_horizontal_row(const std::int16_t* row, std::span<const std::int16_t
     std::int32_t sum[kBlock];
     for (int i = 0; i < kBlock; ++i) sum[i] = taps[0] * centre[i];
     for (int k = 1; k <= radius; ++k) {
-      const std::int32_t tap = taps[static_cast<std::size_t>(k)];
-      for (int i = 0; i < kBlock; ++i) sum[i] += tap * (centre[i - k] + centre[i + k]);
+      const std::int16_t tap = taps[static_cast<std::size_t>(k)];
+      for (int i = 0; i < kBlock; ++i) sum[i] += tap * pair_sum(centre[i - k], centre[i + k]);
     }
     for (int i = 0; i < kBlock; ++i)
       out[x + i] = static_cast<std::int16_t>(round_shift<14>(sum[i]));
@@ -68,10 +74,10 @@ void smooth_vertical_row(const std::int16_t* const* rows, std::span<const std::i
     std::int32_t sum[kBlock];
     for (int i = 0; i < kBlock; ++i) sum[i] = taps[0] * centre[i];
     for (int k = 1; k <= radius; ++k) {
-      const std::int32_t tap = taps[static_cast<std::size_t>(k)];
+      const std::int16_t tap = taps[static_cast<std::size_t>(k)];
       const std::int16_t* above = rows[radius - k] + x;
       const std::int16_t* below = rows[radius + k] + x;
-      for (int i = 0; i < kBlock; ++i) sum[i] += tap * (above[i] + below[i]);
+      for (int i = 0; i < kBlock; ++i) sum[i] += tap * pair_sum(above[i], below[i]);
     }
     for (int i = 0; i < kBlock; ++i)
       out[x + i] = static_cast<std::int16_t>(round_shift<14>(sum[i]));

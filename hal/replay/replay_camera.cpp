@@ -9,7 +9,10 @@
 namespace dtact::hal::replay {
 
 ReplayCamera::ReplayCamera(const CameraConfig& config, base::Clock& clock)
-    : config_(config), clock_(clock), recording_(load_recording(config.replay.folder)) {
+    : config_(config),
+      clock_(clock),
+      recording_(load_recording(config.replay.folder)),
+      decoder_(recording_.width, recording_.height) {
   const auto count = static_cast<double>(recording_.count());
   if (recording_.offsets_ns.size() > 1) {
     const auto last = static_cast<double>(recording_.offsets_ns.back());
@@ -25,7 +28,6 @@ ReplayCamera::ReplayCamera(const CameraConfig& config, base::Clock& clock)
     round_ns_ = std::llround(count * 1e9 / fps_);
   }
   if (recording_.is_jpeg()) {
-    decoder_.emplace(recording_.width, recording_.height);
     for (auto& buffer : decoded_) {
       buffer = luma::LumaBuffer(recording_.width, recording_.height);
     }
@@ -120,8 +122,8 @@ GrabStatus ReplayCamera::lend(Frame& out, FrameInfo info) noexcept {
   const std::string& payload = recording_.payloads[frame];
   luma::LumaBuffer& buffer = decoded_[static_cast<std::size_t>(next_buffer_)];
   const auto status =
-      decoder_->decode({reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size()},
-                       buffer.data(), buffer.stride());
+      decoder_.decode({reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size()},
+                      buffer.data(), buffer.stride());
   if (status != mjpeg::Status::ok) {
     ++damaged_;
     return GrabStatus::damaged;

@@ -3,7 +3,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <optional>
 
 #include "hal/base/clock.hpp"
 #include "hal/camera.hpp"
@@ -43,7 +42,7 @@ class ReplayCamera final : public Camera, private FrameOwner {
   Recording recording_;
   double fps_ = 0;
   std::int64_t round_ns_ = 0;  ///< From the first frame to the first of the next round.
-  std::optional<mjpeg::GreyDecoder> decoder_;
+  mjpeg::GreyDecoder decoder_;
   // The caller holds one while the other is decoded into.
   std::array<luma::LumaBuffer, 2> decoded_;
   int next_buffer_ = 0;

@@ -17,8 +17,7 @@ Device::Device(const Scene& scene, std::uint64_t seed, Output output,
       link_(std::move(link)),
       clock_(clock),
       image_(scene.camera.width, scene.camera.height),
-      seen_(static_cast<std::size_t>(scene.camera.light_delay_frames),
-            led_levels(link_->light())),
+      seen_(static_cast<std::size_t>(scene.camera.light_delay_frames), led_levels(link_->light())),
       event_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (!event_) {
     const int error = errno;

@@ -23,8 +23,8 @@ struct Payload {
   std::vector<std::uint8_t> buffer;
   std::size_t bytes = 0;
   std::uint64_t sequence = 0;
-  std::int64_t ready_ns = 0;       ///< CLOCK_MONOTONIC.
-  std::uint64_t lost_before = 0;   ///< Frames that never left the device, since start.
+  std::int64_t ready_ns = 0;      ///< CLOCK_MONOTONIC.
+  std::uint64_t lost_before = 0;  ///< Frames that never left the device, since start.
 };
 
 /// The far side of the cable: renders, packs, paces, and misbehaves as the scene says.

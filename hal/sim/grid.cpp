@@ -28,7 +28,8 @@ Grid make_grid(const Scene& scene) {
   const Place corner = pixel_place(scene.camera, 0, 0);
   const double margin = 2 * kMargin * scene.layer.thickness_mm;
   const auto side = [&](double field_mm) {
-    return cv::getOptimalDFTSize(static_cast<int>(std::ceil((field_mm + margin) / grid.spacing_mm)));
+    return cv::getOptimalDFTSize(
+        static_cast<int>(std::ceil((field_mm + margin) / grid.spacing_mm)));
   };
   grid.width = side(-2 * corner.x_mm);
   grid.height = side(-2 * corner.y_mm);
@@ -40,8 +41,7 @@ Grid make_grid(const Scene& scene) {
 }
 
 PixelMap::PixelMap(const CameraModel& camera, const Grid& grid)
-    : width_(static_cast<std::size_t>(camera.width)),
-      pitch_(static_cast<std::size_t>(grid.width)) {
+    : width_(static_cast<std::size_t>(camera.width)), pitch_(static_cast<std::size_t>(grid.width)) {
   entries_.reserve(width_ * static_cast<std::size_t>(camera.height));
   for (int row = 0; row < camera.height; ++row) {
     for (int column = 0; column < camera.width; ++column) {

@@ -26,8 +26,8 @@ class Layer {
   /// The frictionless contact with a rigid surface: indentation ≥ target everywhere, pressure ≥ 0,
   /// and no pressure where they part. `target_mm`: object's depth minus its height, grid sized,
   /// very negative where there is no object. `guess` (empty or grid sized) is a pressure to start
-  /// from. Throws std::runtime_error when no solution is found within 2,000 iterations: a press that
-  /// fills the grid has none.
+  /// from. Throws std::runtime_error when no solution is found within 2,000 iterations: a press
+  /// that fills the grid has none.
   [[nodiscard]] Pressed solve(const cv::Mat1d& target_mm, const cv::Mat1d& guess) const;
 
   /// The surface's answer to a pressure, mm.

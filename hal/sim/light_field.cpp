@@ -101,8 +101,8 @@ void LightField::compute(const LedLevels& levels, std::span<std::uint16_t> out) 
       for (std::size_t i = 0; i < n; ++i) sums[i] += (share[i] * level) >> 8U;
     }
     for (std::size_t i = 0; i < n; ++i) {
-      out[begin + i] =
-          static_cast<std::uint16_t>(std::min<std::uint32_t>((sums[i] + (1U << 11U)) >> 12U, 65535));
+      out[begin + i] = static_cast<std::uint16_t>(
+          std::min<std::uint32_t>((sums[i] + (1U << 11U)) >> 12U, 65535));
     }
   }
 }

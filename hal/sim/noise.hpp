@@ -15,7 +15,8 @@ class Noise {
   Noise(std::uint64_t seed, double read, double shot);
 
   /// For each pixel of a row, the multiplier that add() needs. `grey_q6`: 0 … 16320.
-  void amplitude(std::span<const std::uint16_t> grey_q6, std::span<std::int16_t> out) const noexcept;
+  void amplitude(std::span<const std::uint16_t> grey_q6,
+                 std::span<std::int16_t> out) const noexcept;
 
   /// Adds the noise to one row and rounds: `luma` gets `grey_q6.size()` bytes.
   void add(std::uint64_t sequence, std::uint32_t row, std::span<const std::uint16_t> grey_q6,

@@ -161,8 +161,8 @@ void Optics::add_wide(std::span<std::int16_t> loss) const noexcept {
       const std::int32_t bottom = lower[cx] * (full - wx) + lower[cx + 1] * wx;
       const std::int32_t wide = (top * (full - wy) + bottom * wy) / (full * full);
       std::int16_t& value = loss[static_cast<std::size_t>(y * width_ + x)];
-      value = static_cast<std::int16_t>(
-          (value * narrow_weight_ + wide * wide_weight + kHalf) >> 15);
+      value =
+          static_cast<std::int16_t>((value * narrow_weight_ + wide * wide_weight + kHalf) >> 15);
     }
   }
 }

@@ -128,8 +128,8 @@ PayloadEncoder::~PayloadEncoder() = default;
 
 std::size_t PayloadEncoder::capacity() const noexcept {
   const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
-  // At quality 90 a coefficient's code is at most 26 bits long: 3.25 bytes a pixel of luma, and next
-  // to nothing for constant chroma. Blocks at the border are whole.
+  // At quality 90 a coefficient's code is at most 26 bits long: 3.25 bytes a pixel of luma, and
+  // next to nothing for constant chroma. Blocks at the border are whole.
   return output_ == Output::mjpeg ? pixels * 4 + kSpare : pixels * 2;
 }
 

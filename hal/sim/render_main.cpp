@@ -63,8 +63,8 @@ void render(const Arguments& arguments) {
   light.brightness = static_cast<std::uint8_t>(arguments.brightness);
   const sim::LedLevels levels = sim::led_levels(light);
 
-  const auto pixels = static_cast<std::size_t>(scene.camera.width) *
-                      static_cast<std::size_t>(scene.camera.height);
+  const auto pixels =
+      static_cast<std::size_t>(scene.camera.width) * static_cast<std::size_t>(scene.camera.height);
   dtact::image::Grey8 image{scene.camera.width, scene.camera.height, {}};
   image.pixels.resize(pixels);
   std::vector<std::uint64_t> sums(pixels);
@@ -103,8 +103,7 @@ int main(int argc, char** argv) {
     app.add_option("--brightness", arguments.brightness, "all LEDs white at this brightness")
         ->check(CLI::Range(0, 255));
     app.add_flag("--average", arguments.average, "one 16-bit image, the mean of the frames");
-    app.add_option("-o,--output", arguments.output,
-                   "PNG file for one image, folder for several")
+    app.add_option("-o,--output", arguments.output, "PNG file for one image, folder for several")
         ->required();
     CLI11_PARSE(app, argc, argv);
     render(arguments);

@@ -19,9 +19,9 @@ namespace {
 constexpr double kDeepest = 0.9;  // of the layer's thickness
 
 const std::vector<std::string> kObjects = {
-    "ball",     "ball_array", "disc",         "cube",        "cylinder",
-    "grating",  "pin_board",  "m4_nut",       "m3_long_nut", "m5_hexagon_screw",
-    "star",     "screw_cap",  "usb_c_plug",   "key",         "three_set_screws",
+    "ball",      "ball_array", "disc",       "cube",        "cylinder",
+    "grating",   "pin_board",  "m4_nut",     "m3_long_nut", "m5_hexagon_screw",
+    "star",      "screw_cap",  "usb_c_plug", "key",         "three_set_screws",
     "height_map"};
 
 Object read_object(SceneReader& press, const std::filesystem::path& folder) {

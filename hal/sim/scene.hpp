@@ -95,8 +95,8 @@ struct Scene {
 [[nodiscard]] Scene default_scene();
 
 /// A scene file. What its tables leave out of camera, layer, optics and light is as in the built-in
-/// scene; presses, faults and the loop are its own. Throws std::runtime_error naming file, line, key
-/// and what is allowed.
+/// scene; presses, faults and the loop are its own. Throws std::runtime_error naming file, line,
+/// key and what is allowed.
 [[nodiscard]] Scene load_scene(const std::filesystem::path& file);
 
 /// The same from text; `name` stands for the file in messages. Height-map images are looked for

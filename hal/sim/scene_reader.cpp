@@ -95,9 +95,9 @@ std::vector<SceneReader> SceneReader::tables(std::string_view key) {
   if (!node->is_array()) fail(key, "must be an array of tables");
   for (const toml::node& entry : *node->as_array()) {
     if (!entry.is_table()) fail(key, "must be an array of tables");
-    readers.emplace_back(*entry.as_table(), file_,
-                         fmt::format("{}{}{}[{}]", name_, name_.empty() ? "" : ".", key,
-                                     readers.size()));
+    readers.emplace_back(
+        *entry.as_table(), file_,
+        fmt::format("{}{}{}[{}]", name_, name_.empty() ? "" : ".", key, readers.size()));
   }
   return readers;
 }

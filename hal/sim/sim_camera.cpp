@@ -87,6 +87,7 @@ GrabStatus SimCamera::Impl::grab(Frame& out, std::int64_t timeout_ns) noexcept {
   for (;;) {
     // Told once as soon as it happens; later calls wait for the device to come back.
     if (std::exchange(disconnects_seen, device.disconnects()) != disconnects_seen) {
+      (void)device.take();  // what was on the cable went with it
       return GrabStatus::unplugged;
     }
     if (const Payload* payload = device.take()) return hand_out(*payload, out);

@@ -20,8 +20,8 @@ std::optional<PressKey> state_at(const Press& press, double t) {
   const auto& keys = press.keys;
   if (t < keys.front().time_s) return std::nullopt;
   PressKey state = keys.back();
-  const auto next = std::upper_bound(keys.begin(), keys.end(), t,
-                                     [](double time, const PressKey& k) { return time < k.time_s; });
+  const auto next = std::upper_bound(
+      keys.begin(), keys.end(), t, [](double time, const PressKey& k) { return time < k.time_s; });
   if (next != keys.end()) {
     const PressKey& a = *std::prev(next);
     const double w = (t - a.time_s) / (next->time_s - a.time_s);
@@ -94,7 +94,8 @@ Truth::Truth(const Scene& scene)
 
 void Truth::solve_all() {
   const Layer layer(grid_.width, grid_.height, grid_.spacing_mm, scene_.layer.thickness_mm);
-  maps_.push_back({std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size())});
+  maps_.push_back(
+      {std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size())});
 
   // A press and its release pass through the same states: each is solved once. Lengths in
   // nanometres, so that states which differ by rounding are one.
@@ -172,9 +173,8 @@ void Truth::contact(std::uint64_t sequence, std::vector<std::uint8_t>& out) cons
   out.resize(width * static_cast<std::size_t>(scene_.camera.height));
   for (int y = 0; y < scene_.camera.height; ++y) {
     pixels_.sample_row(y, map, row);
-    std::transform(
-        row.begin(), row.end(), out.begin() + y * static_cast<std::ptrdiff_t>(width),
-        [](std::int16_t v) { return static_cast<std::uint8_t>(v >= 128 ? 255 : 0); });
+    std::transform(row.begin(), row.end(), out.begin() + y * static_cast<std::ptrdiff_t>(width),
+                   [](std::int16_t v) { return static_cast<std::uint8_t>(v >= 128 ? 255 : 0); });
   }
 }
 

@@ -46,5 +46,12 @@ TEST(Advice, AddsTheDevicesOwnSentenceAndPutsItFirst) {
   EXPECT_THAT(advice(status), HasSubstr("LED ring failed. the ring is gone."));
 }
 
+TEST(Advice, EndsWithWhatCouldNotBeKept) {
+  pipeline::Status status;
+  status.state = pipeline::State::serving;
+  status.storage_message = "The reference could not be written: free some space.";
+  EXPECT_EQ(advice(status), "The reference could not be written: free some space.");
+}
+
 }  // namespace
 }  // namespace dtact::net

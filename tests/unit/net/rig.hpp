@@ -41,6 +41,7 @@ class Rig {
   explicit Rig(NetConfig config = {}, std::function<void(FakePort&)> prepare = {}) {
     if (prepare) prepare(port);
     config.port = 0;
+    config.program = "dtactd 9.8.7";
     config.version = "9.8.7";
     config.log = [this](LogLevel, const std::string& text) {
       const std::lock_guard lock(mutex_);

@@ -274,7 +274,7 @@ TEST_F(PipelineTest, WithoutCalibrationThereIsLuma) {
   EXPECT_EQ(frame->luma_width, 160);
   EXPECT_EQ(frame->luma.size(), 160U * 120U);
   EXPECT_NEAR(frame->luma[60 * 160 + 80], 150, 1);
-  EXPECT_EQ(pipeline->status().state, State::uncalibrated);
+  ASSERT_TRUE(until_state(State::uncalibrated));
   EXPECT_EQ(pipeline->status().calibration, nullptr);
   const CommandDone refused = ask(Rezero{});
   EXPECT_EQ(refused.outcome, Outcome::invalid);
@@ -326,8 +326,8 @@ TEST_F(PipelineTest, UnpluggedAndBack) {
   EXPECT_EQ(ask(Rezero{}).outcome, Outcome::camera_away);
   camera.mode = Mode::streaming;
   ASSERT_TRUE(until_fresh());
-  EXPECT_EQ(pipeline->status().state, State::serving);
-  EXPECT_EQ(all<ReferenceTaken>().size(), 2U);
+  ASSERT_TRUE(until_state(State::serving));
+  ASSERT_TRUE(until([&] { return all<ReferenceTaken>().size() == 2U; }));
 }
 
 TEST_F(PipelineTest, ASilentCameraIsTroubleAndAnswersStillCome) {

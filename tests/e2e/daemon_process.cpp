@@ -1,0 +1,134 @@
+#include "tests/e2e/daemon_process.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+#include <thread>
+
+#include "hal/base/atomic_file.hpp"
+
+namespace dtact::e2e {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+/// Starts a program with both output streams in `output`.
+pid_t spawn(const std::vector<std::string>& arguments, const fs::path& output,
+            const std::string& notify_socket) {
+  std::vector<char*> argv;
+  argv.reserve(arguments.size() + 1);
+  for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
+  argv.push_back(nullptr);
+  const base::UniqueFd log(::open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+  const pid_t pid = ::fork();
+  if (pid < 0) throw std::runtime_error("cannot fork");
+  if (pid == 0) {
+    ::dup2(log.get(), STDOUT_FILENO);
+    ::dup2(log.get(), STDERR_FILENO);
+    if (!notify_socket.empty()) ::setenv("NOTIFY_SOCKET", notify_socket.c_str(), 1);
+    ::execv(argv[0], argv.data());
+    ::_exit(127);
+  }
+  return pid;
+}
+
+int exit_status(int status) {
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+}  // namespace
+
+TempFolder::TempFolder() {
+  std::string name = (fs::temp_directory_path() / "dtact_e2e_XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make a temp folder");
+  path_ = name;
+}
+
+TempFolder::~TempFolder() {
+  std::error_code ignored;
+  fs::remove_all(path_, ignored);
+}
+
+int run_program(const std::vector<std::string>& arguments, std::string* output) {
+  const TempFolder folder;
+  const pid_t pid = spawn(arguments, folder.path() / "log", "");
+  int status = 0;
+  ::waitpid(pid, &status, 0);
+  if (output != nullptr) *output = base::read_file(folder.path() / "log");
+  return exit_status(status);
+}
+
+DaemonProcess::DaemonProcess(const std::vector<std::string>& arguments) {
+  const std::string socket_path = (folder_.path() / "notify").string();
+  notify_.reset(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, socket_path.c_str(), sizeof address.sun_path - 1);
+  if (::bind(notify_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    throw std::runtime_error("cannot bind " + socket_path);
+  }
+  std::vector<std::string> command{DTACTD_PROGRAM};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  pid_ = spawn(command, folder_.path() / "log", socket_path);
+  wait_until_ready();
+}
+
+void DaemonProcess::wait_until_ready() {
+  const auto deadline = Clock::now() + std::chrono::seconds(60);
+  const std::string marker = "listening on 127.0.0.1:";
+  while (Clock::now() < deadline) {
+    pollfd waiting{notify_.get(), POLLIN, 0};
+    if (::poll(&waiting, 1, 100) > 0) {
+      std::array<char, 4096> buffer{};
+      const ssize_t n = ::recv(notify_.get(), buffer.data(), buffer.size() - 1, 0);
+      const std::string message(buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
+      const std::size_t at = message.find(marker);
+      if (message.find("READY=1") != std::string::npos && at != std::string::npos) {
+        port_ = static_cast<std::uint16_t>(std::stoi(message.substr(at + marker.size())));
+        return;
+      }
+    }
+    if (::waitpid(pid_, nullptr, WNOHANG) == pid_) {
+      pid_ = -1;
+      throw std::runtime_error("dtactd ended before it was ready:\n" + log());
+    }
+  }
+  throw std::runtime_error("dtactd was not ready within 60 s:\n" + log());
+}
+
+std::string DaemonProcess::log() const { return base::read_file(folder_.path() / "log"); }
+
+int DaemonProcess::stop(int signal) {
+  if (pid_ < 0) return -1;
+  ::kill(pid_, signal);
+  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  int status = 0;
+  while (::waitpid(pid_, &status, WNOHANG) != pid_) {
+    if (Clock::now() > deadline) {
+      ::kill(pid_, SIGKILL);
+      ::waitpid(pid_, &status, 0);
+      pid_ = -1;
+      return -1;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  pid_ = -1;
+  return exit_status(status);
+}
+
+DaemonProcess::~DaemonProcess() {
+  if (pid_ >= 0) stop(SIGKILL);
+}
+
+}  // namespace dtact::e2e

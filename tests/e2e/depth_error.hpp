@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "clients/cpp/types.hpp"
+#include "hal/sim/truth.hpp"
+#include "tests/e2e/sensor.hpp"
+
+namespace dtact::e2e {
+
+/// How far a streamed depth map is from the simulator's truth.
+struct DepthError {
+  double inside_mm = 0;   ///< Mean absolute error inside the true contact; NaN without contact.
+  double outside_mm = 0;  ///< The same everywhere else.
+  int inside_pixels = 0;  ///< Of the true contact.
+  int untrusted = 0;      ///< Of them, those not to be believed.
+};
+
+inline DepthError depth_error(const client::Frame& frame, const hal::sim::Truth& truth) {
+  std::vector<float> indentation;
+  std::vector<std::uint8_t> contact;
+  truth.indentation_mm(frame.sequence, indentation);
+  truth.contact(frame.sequence, contact);
+  const auto width = static_cast<std::size_t>(truth.scene().camera.width);
+
+  DepthError error;
+  double inside = 0;
+  double outside = 0;
+  int outside_pixels = 0;
+  for (std::size_t y = 0; y < kCropSide; ++y) {
+    for (std::size_t x = 0; x < kCropSide; ++x) {
+      const std::size_t at = (y + kCropRow) * width + x + kCropColumn;
+      const float depth = frame.depth->millimetres(y * kCropSide + x);
+      const bool touched = contact[at] != 0;
+      if (touched) ++error.inside_pixels;
+      if (std::isnan(depth)) {
+        if (touched) ++error.untrusted;
+        continue;
+      }
+      const double difference = std::abs(static_cast<double>(depth) - indentation[at]);
+      (touched ? inside : outside) += difference;
+      if (!touched) ++outside_pixels;
+    }
+  }
+  error.inside_mm = inside / (error.inside_pixels - error.untrusted);
+  error.outside_mm = outside / outside_pixels;
+  return error;
+}
+
+}  // namespace dtact::e2e

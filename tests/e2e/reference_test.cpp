@@ -1,0 +1,193 @@
+// The untouched image: at start, on command, and under a changed light.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+
+#include "hal/base/atomic_file.hpp"
+#include "hal/sim/scene.hpp"
+#include "tests/e2e/depth_error.hpp"
+#include "tests/e2e/sensor.hpp"
+
+namespace dtact::e2e {
+namespace {
+
+/// A ball of 5 mm pressed 1 mm deep for two seconds of every five, from second 2.5 on.
+constexpr const char* kPresses = R"(
+[loop]
+from_s = 2.0
+to_s = 7.0
+[[press]]
+object = "ball"
+radius_mm = 5.0
+keys = [ { t = 2.5, x = 1.0, y = 1.0, depth = 0.0 }, { t = 3.0, depth = 1.0 }, { t = 5.0 }, { t = 5.5, depth = 0.0 } ]
+)";
+
+std::filesystem::path write_scene(const TempFolder& folder) {
+  const std::filesystem::path file = folder.path() / "presses.toml";
+  base::write_file_atomically(file, kPresses);
+  return file;
+}
+
+/// Waits for a frame with depth in which something touches, or nothing.
+bool wait_contact(client::Client& client, bool touching) {
+  return read_until(client, [&](const Item& item) {
+    const auto* frame = std::get_if<client::Frame>(&item);
+    return frame != nullptr && frame->depth && frame->contact.touching == touching;
+  });
+}
+
+bool wait_reference(client::Client& client) {
+  return read_until(client, [](const Item& item) {
+    const auto* event = std::get_if<client::Event>(&item);
+    return event != nullptr && std::holds_alternative<client::ReferenceTaken>(*event);
+  });
+}
+
+/// Depth inside the true contact of the next fully pressed frame, and the truth's, millimetres.
+struct Pressed {
+  double depth_mm = 0;
+  double truth_mm = 0;
+};
+Pressed next_press(client::Client& client, const hal::sim::Truth& truth) {
+  Pressed pressed;
+  const bool found = read_until(client, [&](const Item& item) {
+    const auto* frame = std::get_if<client::Frame>(&item);
+    if (frame == nullptr || !frame->depth) return false;
+    const double t = truth.scene().time_s(frame->sequence);
+    if (t < 3.5 || t > 4.9) return false;
+    std::vector<float> indentation;
+    std::vector<std::uint8_t> contact;
+    truth.indentation_mm(frame->sequence, indentation);
+    truth.contact(frame->sequence, contact);
+    int n = 0;
+    for (std::size_t y = 0; y < kCropSide; ++y) {
+      for (std::size_t x = 0; x < kCropSide; ++x) {
+        const std::size_t at = (y + kCropRow) * 800 + x + kCropColumn;
+        const float depth = frame->depth->millimetres(y * kCropSide + x);
+        if (contact[at] == 0 || std::isnan(depth)) continue;
+        pressed.depth_mm += static_cast<double>(depth);
+        pressed.truth_mm += static_cast<double>(indentation[at]);
+        ++n;
+      }
+    }
+    pressed.depth_mm /= n;
+    pressed.truth_mm /= n;
+    return true;
+  });
+  EXPECT_TRUE(found);
+  return pressed;
+}
+
+TEST(Reference, HalvedLightKeepsTheMillimetres) {
+  const TempFolder folder;
+  const Sensor sensor(write_scene(folder));
+  const hal::sim::Truth truth(hal::sim::load_scene(folder.path() / "presses.toml"));
+  client::Client client = sensor.connect();
+  client.subscribe({});
+
+  const Pressed bright = next_press(client, truth);
+  ASSERT_TRUE(wait_contact(client, false));
+  client::LightChange half;
+  half.brightness = 128;
+  EXPECT_EQ(client.set_light(half).brightness, 128);
+
+  bool unsettled = false;
+  ASSERT_TRUE(read_until(client, [&](const Item& item) {
+    if (const auto* frame = std::get_if<client::Frame>(&item)) {
+      if (has(frame->health, "light_unsettled")) {
+        unsettled = true;
+        EXPECT_FALSE(frame->depth) << "depth while the light changes";
+      }
+      return false;
+    }
+    return std::holds_alternative<client::ReferenceTaken>(std::get<client::Event>(item));
+  }));
+  EXPECT_TRUE(unsettled);
+  ASSERT_TRUE(wait_contact(client, false));
+  const Pressed dim = next_press(client, truth);
+  std::printf(
+      "mean depth inside the contact: %.4f mm at full, %.4f mm at half brightness, true "
+      "%.4f mm (simulated sensor)\n",
+      bright.depth_mm, dim.depth_mm, bright.truth_mm);
+  EXPECT_NEAR(dim.depth_mm, bright.depth_mm, 0.03);
+  EXPECT_NEAR(bright.depth_mm, bright.truth_mm, 0.05);
+}
+
+TEST(Reference, RezeroIsRefusedUnderContactUnlessForced) {
+  const TempFolder folder;
+  const Sensor sensor(write_scene(folder));
+  client::Client client = sensor.connect();
+  client.subscribe({});
+  ASSERT_TRUE(wait_contact(client, true));
+  try {
+    client.rezero();
+    ADD_FAILURE() << "re-zeroed under contact";
+  } catch (const client::Refused& e) {
+    EXPECT_EQ(e.code(), client::Code::contact);
+    EXPECT_NE(std::string(e.what()).find("force"), std::string::npos) << e.what();
+  }
+  ASSERT_TRUE(wait_contact(client, false));
+  ASSERT_TRUE(wait_contact(client, true));
+  client.rezero(true);
+  EXPECT_TRUE(wait_contact(client, false)) << "the pressed image is zero now";
+}
+
+TEST(Reference, RezeroUntouchedTakesANewReference) {
+  const Sensor sensor(scene_file("nothing.toml"));
+  client::Client client = sensor.connect();
+  client.subscribe({});
+  ASSERT_TRUE(wait_contact(client, false));
+  client.rezero();
+  EXPECT_TRUE(wait_reference(client));
+}
+
+TEST(Reference, TouchedAtStartServesWithTheLastGoodOneAndSaysSo) {
+  Sensor sensor(scene_file("nothing.toml"));
+  {
+    client::Client client = sensor.connect();
+    client.subscribe({});
+    ASSERT_TRUE(wait_contact(client, false));  // its reference is in the state folder after the end
+  }
+  sensor.arguments.insert(
+      sensor.arguments.end(),
+      {"--set", "camera.sim.scene=" + scene_file("touched_at_start.toml").string()});
+  sensor.restart();
+
+  client::Client client = sensor.connect();
+  client.subscribe({});
+  ASSERT_TRUE(read_until(client, [&](const Item& item) {
+    const auto* frame = std::get_if<client::Frame>(&item);
+    return frame != nullptr && frame->depth && frame->contact.touching;
+  }));
+  EXPECT_TRUE(has(client.status().health, "reference_restored"));
+  // The press is read in millimetres all the same: 1 mm deep.
+  ASSERT_TRUE(read_until(client, [&](const Item& item) {
+    const auto* frame = std::get_if<client::Frame>(&item);
+    if (frame == nullptr || !frame->depth || !frame->contact.touching) return false;
+    EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.1);
+    return true;
+  }));
+  // The ball leaves after five seconds and a fresh reference is taken.
+  EXPECT_TRUE(read_until(client, [](const Item& item) {
+    const auto* event = std::get_if<client::Event>(&item);
+    const auto* taken = event == nullptr ? nullptr : std::get_if<client::ReferenceTaken>(event);
+    return taken != nullptr && !taken->restored;
+  }));
+  EXPECT_FALSE(has(client.status().health, "reference_restored"));
+}
+
+TEST(Reference, TouchedAtTheVeryFirstStartIsNotTakenForUntouched) {
+  const Sensor sensor(scene_file("touched_at_start.toml"));
+  client::Client client = sensor.connect();
+  client.subscribe({});
+  EXPECT_TRUE(read_until(client, [&](const Item& item) {
+    const auto* frame = std::get_if<client::Frame>(&item);
+    return frame != nullptr && frame->depth && frame->contact.touching &&
+           has(frame->health, "reference_stale");
+  }));
+}
+
+}  // namespace
+}  // namespace dtact::e2e

@@ -1,0 +1,82 @@
+#include "tests/e2e/sensor.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <stdexcept>
+
+namespace dtact::e2e {
+namespace {
+
+namespace fs = std::filesystem;
+
+void run_or_throw(const std::vector<std::string>& command) {
+  std::string output;
+  if (run_program(command, &output) != 0) throw std::runtime_error(command[0] + ":\n" + output);
+}
+
+/// Untouched until frame 120 of the scene, pressed and still from frame 180 on.
+void calibrate(const fs::path& folder) {
+  const std::string scene = scene_file("calibrate_ball.toml").string();
+  const std::string reference = (folder / "reference").string();
+  const std::string ball = (folder / "ball").string();
+  run_or_throw({SIM_RENDER_PROGRAM, "--scene", scene, "--frames", "0:32", "-o", reference});
+  run_or_throw({SIM_RENDER_PROGRAM, "--scene", scene, "--frames", "200:232", "-o", ball});
+  run_or_throw({DTACTCTL_PROGRAM, "calibrate", "depth", "--reference", reference, "--ball", ball,
+                "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400", "--crop",
+                "580,580", "-o", (folder / "calibration").string()});
+}
+
+}  // namespace
+
+fs::path scene_file(const std::string& name) {
+  return fs::path(DTACT_SOURCE_DIR) / "config/scenes" / name;
+}
+
+const fs::path& calibration_folder() {
+  static const TempFolder folder;
+  static const fs::path calibration = [] {
+    calibrate(folder.path());
+    return folder.path() / "calibration";
+  }();
+  return calibration;
+}
+
+Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::string>& settings) {
+  arguments = {"--set", "net.port=0", "--set", "state_dir=" + (folder.path() / "state").string()};
+  const auto set = [&](const std::string& setting) {
+    arguments.insert(arguments.end(), {"--set", setting});
+  };
+  if (!scene.empty()) set("camera.sim.scene=" + scene.string());
+  if (calibrated) set("calibration=" + calibration_folder().string());
+  for (const std::string& setting : settings) set(setting);
+  daemon = std::make_unique<DaemonProcess>(arguments);
+}
+
+client::Client Sensor::connect(const std::string& program) const {
+  client::Options options;
+  options.port = daemon->port();
+  options.program = program;
+  options.timeout = std::chrono::seconds(20);
+  return client::Client(options);
+}
+
+void Sensor::restart() {
+  if (daemon->stop(SIGTERM) != 0) throw std::runtime_error("the daemon ended badly");
+  daemon = std::make_unique<DaemonProcess>(arguments);
+}
+
+bool read_until(client::Client& client, const std::function<bool(const Item&)>& done,
+                std::chrono::seconds patience) {
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (std::chrono::steady_clock::now() < deadline) {
+    const auto item = client.next(std::chrono::milliseconds(500));
+    if (item && done(*item)) return true;
+  }
+  return false;
+}
+
+bool has(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+}  // namespace dtact::e2e

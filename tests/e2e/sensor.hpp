@@ -1,0 +1,51 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/client.hpp"
+#include "tests/e2e/daemon_process.hpp"
+
+namespace dtact::e2e {
+
+/// The rectangle of the simulated 800×600 image that the depth map shows.
+inline constexpr int kCropColumn = 110;
+inline constexpr int kCropRow = 10;
+inline constexpr int kCropSide = 580;
+
+/// A calibration folder of the simulated sensor, made once in a test program the way a user makes
+/// it: images of the scene calibrate_ball.toml and `dtactctl calibrate depth`. The simulator's
+/// truth has no part in it.
+const std::filesystem::path& calibration_folder();
+
+std::filesystem::path scene_file(const std::string& name);
+
+/// A daemon on the simulated sensor with a state folder, port and temp files of its own.
+struct Sensor {
+  /// `scene` empty: the built-in one. `settings`: further KEY=VALUE.
+  explicit Sensor(const std::filesystem::path& scene = {}, bool calibrated = true,
+                  const std::vector<std::string>& settings = {});
+  Sensor(const Sensor&) = delete;
+  Sensor& operator=(const Sensor&) = delete;
+
+  [[nodiscard]] client::Client connect(const std::string& program = "e2e") const;
+  /// Ends the daemon and starts it again on the same state folder.
+  void restart();
+
+  TempFolder folder;
+  std::vector<std::string> arguments;
+  std::unique_ptr<DaemonProcess> daemon;
+};
+
+/// Reads until `done` says so of a frame or event. False when that takes longer than `patience`.
+using Item = std::variant<client::Frame, client::Event>;
+bool read_until(client::Client& client, const std::function<bool(const Item&)>& done,
+                std::chrono::seconds patience = std::chrono::seconds(30));
+
+bool has(const std::vector<std::string>& names, const std::string& name);
+
+}  // namespace dtact::e2e

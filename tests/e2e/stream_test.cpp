@@ -1,0 +1,123 @@
+// Depth of the simulated sensor as a client receives it, against the simulator's truth.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+
+#include "hal/null/null_camera.hpp"
+#include "hal/sim/scene.hpp"
+#include "tests/e2e/depth_error.hpp"
+#include "tests/e2e/sensor.hpp"
+
+namespace dtact::e2e {
+namespace {
+
+TEST(Stream, SixHundredFramesOfTheRightDepth) {
+  const Sensor sensor;
+  client::Client client = sensor.connect();
+  client.subscribe({});
+  const hal::sim::Truth truth(hal::sim::default_scene());
+
+  int frames = 0;
+  int judged = 0;
+  int pressed = 0;
+  std::uint64_t last = 0;
+  std::vector<double> inside;
+  double worst_untouched = 0;
+  ASSERT_TRUE(read_until(
+      client,
+      [&](const Item& item) {
+        const auto* frame = std::get_if<client::Frame>(&item);
+        if (frame == nullptr || !frame->depth) return false;
+        EXPECT_GT(frame->sequence, last);
+        last = frame->sequence;
+        EXPECT_GE(frame->ready_ns, frame->monotonic_ns);
+        EXPECT_GE(frame->published_ns, frame->ready_ns);
+        // Every tenth is judged: the truth of a whole frame takes longer than a frame.
+        if (frames++ % 10 == 0) {
+          ++judged;
+          const DepthError error = depth_error(*frame, truth);
+          const bool ball = frame->sequence % 720 < 360;  // the loop's first press
+          if (error.inside_pixels > 5000 && ball) {
+            ++pressed;
+            inside.push_back(error.inside_mm);
+            EXPECT_LT(error.untrusted, error.inside_pixels / 100);
+          } else if (error.inside_pixels == 0) {
+            worst_untouched = std::max(worst_untouched, error.outside_mm);
+          }
+        }
+        return frames == 600;
+      },
+      std::chrono::seconds(120)));
+  EXPECT_EQ(judged, 60);
+  ASSERT_GE(pressed, 5);
+  const double worst = *std::max_element(inside.begin(), inside.end());
+  std::sort(inside.begin(), inside.end());
+  RecordProperty("median_error_inside_ball_um", static_cast<int>(1000 * inside[inside.size() / 2]));
+  std::printf(
+      "ball of 5 mm, simulated sensor: mean absolute error inside the true contact "
+      "%.4f mm (median of %d frames), worst frame %.4f mm; untouched %.4f mm\n",
+      inside[inside.size() / 2], pressed, worst, worst_untouched);
+  EXPECT_LE(worst, 0.05);
+  EXPECT_LE(worst_untouched, 0.01);
+}
+
+TEST(Stream, NullCameraReachesAClientAsConstantGrey) {
+  const Sensor sensor({}, false, {"camera.backend=null", "ring.backend=null"});
+  client::Client client = sensor.connect();
+  client::Subscription luma;
+  luma.depth = client::Depth::none;
+  luma.luma = client::Luma::grey8;
+  client.subscribe(luma);
+  int frames = 0;
+  EXPECT_TRUE(read_until(client, [&](const Item& item) {
+    const auto* frame = std::get_if<client::Frame>(&item);
+    if (frame == nullptr || !frame->luma) return false;
+    EXPECT_EQ(frame->luma->values, std::vector<std::uint8_t>(480000, hal::null::NullCamera::kGrey));
+    return ++frames == 10;
+  }));
+}
+
+TEST(Stream, CompressedDepthIsTheSameDepth) {
+  const Sensor sensor;
+  client::Client plain = sensor.connect();
+  client::Client packed = sensor.connect();
+  plain.subscribe({});
+  client::Subscription subscription;
+  subscription.depth = client::Depth::delta_zstd;
+  packed.subscribe(subscription);
+  std::vector<client::Frame> frames;
+  ASSERT_TRUE(read_until(plain, [&](const Item& item) {
+    const auto* frame = std::get_if<client::Frame>(&item);
+    if (frame != nullptr && frame->depth) frames.push_back(*frame);
+    return frames.size() == 10;
+  }));
+  bool met = false;
+  EXPECT_TRUE(read_until(packed, [&](const Item& item) {
+    const auto* frame = std::get_if<client::Frame>(&item);
+    if (frame == nullptr || !frame->depth) return false;
+    for (const client::Frame& other : frames) {
+      if (other.sequence != frame->sequence) continue;
+      met = true;
+      EXPECT_EQ(other.depth->values, frame->depth->values);
+    }
+    return met || frame->sequence > frames.back().sequence;
+  }));
+  EXPECT_TRUE(met);
+}
+
+TEST(Stream, EndsCleanlyOnSigtermWhileStreaming) {
+  const Sensor sensor;
+  client::Client client = sensor.connect();
+  client.subscribe({});
+  int frames = 0;
+  ASSERT_TRUE(read_until(client, [&](const Item& item) {
+    return std::holds_alternative<client::Frame>(item) && ++frames == 30;
+  }));
+  EXPECT_EQ(sensor.daemon->stop(SIGTERM), 0) << "not a clean end";
+  EXPECT_THROW((void)read_until(client, [](const Item&) { return false; }),
+               client::ConnectionError);
+}
+
+}  // namespace
+}  // namespace dtact::e2e

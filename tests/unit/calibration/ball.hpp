@@ -1,0 +1,57 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "daemon/calibration/difference.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::calibration {
+
+/// A ball of 4 mm pressed in by `depth_mm`, on a surface that darkens by 30 levels a millimetre and
+/// brightens by 20 in a ring between 4 and 6 mm. 0.05 mm a pixel.
+struct Ball {
+  double col = 120.25;
+  double row = 110.5;
+  double depth_mm = 1.5;
+  int width = 260;
+  int height = 240;
+
+  [[nodiscard]] double level(int x, int y) const {
+    const double r = 0.05 * std::hypot(x - col, y - row);
+    if (r > 4 && r < 6) return -20;
+    const double sag = 4 - std::sqrt(std::max(0.0, 16 - r * r));
+    return std::max(0.0, 30 * (depth_mm - sag));
+  }
+  [[nodiscard]] DifferenceMap map() const {
+    DifferenceMap map{width, height, 0.05, {}};
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) map.levels.push_back(static_cast<float>(level(x, y)));
+    }
+    return map;
+  }
+  /// As a frame over an untouched grey of 200.
+  [[nodiscard]] image::Grey8 frame() const {
+    image::Grey8 image{width, height, {}};
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        image.pixels.push_back(static_cast<std::uint8_t>(std::lround(200 - level(x, y))));
+      }
+    }
+    return image;
+  }
+  [[nodiscard]] image::Grey8 untouched() const {
+    image::Grey8 image{width, height, {}};
+    image.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 200);
+    return image;
+  }
+  [[nodiscard]] image::Grey16 untouched_q8() const {
+    image::Grey16 image{width, height, {}};
+    image.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
+                        200 * 256);
+    return image;
+  }
+};
+
+}  // namespace dtact::calibration

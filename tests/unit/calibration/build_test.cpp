@@ -1,0 +1,141 @@
+#include "daemon/calibration/build.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <stdexcept>
+
+#include "daemon/calibration/evaluate.hpp"
+#include "tests/unit/calibration/ball.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+BallPress press_of(const Ball& ball) {
+  BallPress press;
+  press.reference_q8 = ball.untouched_q8();
+  press.frames = {ball.frame()};
+  press.ball_radius_mm = 4;
+  press.mm_per_px = 0.05;
+  return press;
+}
+
+TEST(Build, ACalibrationThatReadsItsOwnBall) {
+  const BallPress press = press_of(Ball{});
+  const Calibration made = build(press);
+  EXPECT_EQ(made.model->smoothing_px, 2);
+  EXPECT_EQ(made.model->rectify.width, 260);
+  const Evaluation e = evaluate(made, press.reference_q8.pixels, press.frames, 4);
+  EXPECT_LE(e.mae_mm, 0.01);
+  EXPECT_LE(e.half_mae_mm.value_or(1), 0.012);
+  EXPECT_GE(e.half_worst_mm.value_or(0), e.half_mae_mm.value_or(1));
+  EXPECT_EQ(e.untrusted, 0U);
+  EXPECT_NEAR(static_cast<double>(e.pixels), 11600, 300) << "π·(3.04/0.05)²";
+  // The sphere is put to zero where the ball is still 0.1 mm deep.
+  EXPECT_NEAR(e.offset_mm, 0.1, 0.03);
+  EXPECT_NEAR(e.raw_mae_mm, 0.1, 0.03);
+}
+
+TEST(Build, SeveralFramesAreAveraged) {
+  BallPress press = press_of(Ball{});
+  press.frames.push_back(press.frames[0]);
+  for (std::uint8_t& v : press.frames[0].pixels) v = static_cast<std::uint8_t>(v + 1);
+  for (std::uint8_t& v : press.frames[1].pixels) v = static_cast<std::uint8_t>(v - 1);
+  const Evaluation e =
+      evaluate(build(press_of(Ball{})), press.reference_q8.pixels, press.frames, 4);
+  EXPECT_LE(e.mae_mm, 0.01);
+  EXPECT_NEAR(e.contact.peak_levels, 45, 0.5);
+}
+
+TEST(Build, ACropMovesTheMapNotTheDepth) {
+  BallPress press = press_of(Ball{});
+  press.crop = Crop{30, 20, 180, 180};
+  const Calibration made = build(press);
+  EXPECT_EQ(made.crop_col, 30);
+  EXPECT_EQ(made.crop_row, 20);
+  EXPECT_EQ(made.model->rectify.width, 180);
+  EXPECT_EQ(made.model->rectify.frame_width, 260);
+  const Evaluation e = evaluate(made, press.reference_q8.pixels, press.frames, 4);
+  EXPECT_NEAR(e.contact.col, 90.25, 0.1);
+  EXPECT_NEAR(e.contact.row, 90.5, 0.1);
+  EXPECT_LE(e.mae_mm, 0.01);
+}
+
+TEST(Build, AnotherPressIsReadToo) {
+  const Calibration made = build(press_of(Ball{}));
+  const Ball other{.col = 140, .row = 120, .depth_mm = 1.0};
+  const std::vector<image::Grey8> frames{other.frame()};
+  const Evaluation e = evaluate(made, other.untouched_q8().pixels, frames, 4);
+  EXPECT_LE(e.mae_mm, 0.015);
+  EXPECT_EQ(e.untrusted, 0U);
+}
+
+TEST(Build, DeeperThanCalibratedIsCountedUntrusted) {
+  const Calibration made = build(press_of(Ball{.depth_mm = 1.0}));
+  const Ball deeper{.depth_mm = 1.5};
+  const std::vector<image::Grey8> frames{deeper.frame()};
+  const Evaluation e = evaluate(made, deeper.untouched_q8().pixels, frames, 4);
+  EXPECT_GT(e.untrusted, 1000U);
+}
+
+TEST(Build, ADriftedLightIsFollowed) {
+  const Ball ball{.col = 250, .row = 200, .width = 500, .height = 400};
+  BallPress press = press_of(ball);
+  for (std::uint16_t& v : press.reference_q8.pixels) v = static_cast<std::uint16_t>(v + 2 * 256);
+  const Calibration made = build(press);
+  const Evaluation e = evaluate(made, press.reference_q8.pixels, press.frames, 4);
+  EXPECT_NEAR(e.drift_levels, 2, 0.1);
+  EXPECT_LE(e.mae_mm, 0.01);
+  EXPECT_NEAR(e.contact.peak_levels, 45, 0.5);
+}
+
+TEST(Build, ThePublishedMethodHasNoHalves) {
+  BallPress press = press_of(Ball{});
+  press.method = recon::Method::published;
+  const Evaluation e = evaluate(build(press), press.reference_q8.pixels, press.frames, 4);
+  EXPECT_FALSE(e.half_mae_mm.has_value());
+  EXPECT_LE(e.mae_mm, 0.03);
+}
+
+void expect_refused(const std::function<void(BallPress&)>& spoil, const char* what) {
+  BallPress press = press_of(Ball{});
+  spoil(press);
+  EXPECT_THAT([&] { (void)build(press); }, ThrowsMessage<std::exception>(HasSubstr(what)));
+}
+
+TEST(Build, SaysWhatIsWrongWithTheImages) {
+  expect_refused([](BallPress& p) { p.frames.clear(); }, "no image");
+  expect_refused([](BallPress& p) { p.frames[0].width = 10; }, "10x240");
+  expect_refused([](BallPress& p) { p.ball_radius_mm = 0; }, "radius");
+  expect_refused([](BallPress& p) { p.mm_per_px = 51; }, "scale");
+  expect_refused([](BallPress& p) { p.crop = Crop{200, 0, 100, 100}; }, "leaves the frame");
+  expect_refused([](BallPress& p) { p.crop = Crop{0, 0, 120, 120}; }, "leaves the map");
+  expect_refused([](BallPress& p) { p.frames = {Ball{}.untouched()}; }, "no contact");
+  expect_refused(
+      [](BallPress& p) {
+        for (std::uint16_t& v : p.reference_q8.pixels) v = 255 * 256;
+      },
+      "white");
+  expect_refused(
+      [](BallPress& p) {
+        for (std::uint8_t& v : p.frames[0].pixels) v = v < 170 ? 0 : v;
+      },
+      "black");
+}
+
+TEST(Evaluate, RefusesAnotherSize) {
+  const Calibration made = build(press_of(Ball{}));
+  const Ball wide{.width = 300};
+  const std::vector<image::Grey8> frames{wide.frame()};
+  EXPECT_THROW((void)evaluate(made, wide.untouched_q8().pixels, frames, 4), std::invalid_argument);
+  EXPECT_THROW((void)evaluate(made, Ball{}.untouched_q8().pixels, frames, 4),
+               std::invalid_argument);
+  EXPECT_THROW((void)evaluate(made, Ball{}.untouched_q8().pixels, {}, 4), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace dtact::calibration

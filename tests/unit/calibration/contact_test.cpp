@@ -1,0 +1,99 @@
+#include "daemon/calibration/contact.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <stdexcept>
+
+#include "tests/unit/calibration/ball.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+TEST(FindContact, CentreAndRadiusOfABall) {
+  const Contact contact = find_contact(Ball{}.map(), 4);
+  EXPECT_NEAR(contact.col, 120.25, 0.05);
+  EXPECT_NEAR(contact.row, 110.5, 0.05);
+  // Three levels are 0.1 mm, where the sag is 1.4 mm: r = √(16 − 2.6²) = 3.04.
+  EXPECT_NEAR(contact.radius_mm, 3.04, 0.02);
+  EXPECT_NEAR(contact.peak_levels, 45, 0.1);
+  EXPECT_EQ(contact.ball_radius_mm, 4);
+}
+
+TEST(FindContact, RadiusIsAtMostMostOfTheBall) {
+  EXPECT_DOUBLE_EQ(find_contact(Ball{.depth_mm = 3}.map(), 4).radius_mm, 3.4);
+}
+
+TEST(FindContact, UntrustedPixelsAreLeftOut) {
+  DifferenceMap map = Ball{}.map();
+  for (std::size_t i = 0; i < map.levels.size(); i += 11) {
+    map.levels[i] = std::numeric_limits<float>::quiet_NaN();
+  }
+  const Contact contact = find_contact(map, 4);
+  EXPECT_NEAR(contact.col, 120.25, 0.2);
+  EXPECT_NEAR(contact.radius_mm, 3.04, 0.03);
+}
+
+TEST(FindContact, ADarkSpeckElsewhereDoesNotMoveTheCentre) {
+  DifferenceMap map = Ball{}.map();
+  map.levels[5 * 260 + 5] = 40;
+  EXPECT_NEAR(find_contact(map, 4).col, 120.25, 0.05);
+}
+
+TEST(FindContact, SaysWhenNothingTouches) {
+  EXPECT_THAT([] { (void)find_contact(Ball{.depth_mm = 0.2}.map(), 4); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no contact found")));
+}
+
+TEST(FindContact, SaysWhenTheBallLeavesTheMap) {
+  EXPECT_THAT([] { (void)find_contact(Ball{.col = 30}.map(), 4); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("leaves the map of 260x240")));
+  EXPECT_THAT([] { (void)find_contact(Ball{.row = 225}.map(), 4); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("leaves the map")));
+}
+
+TEST(RadialProfile, MeansOfRings) {
+  const DifferenceMap map = Ball{}.map();
+  const RadialProfile profile = radial_profile(map, find_contact(map, 4), 8);
+  EXPECT_EQ(profile.levels.size(), 80U);
+  EXPECT_NEAR(profile.at(0), 45, 0.1);
+  EXPECT_NEAR(profile.at(5), -20, 1e-6);
+  // At 2 mm the sag is 4 − √12 = 0.5359 mm: 30 · 0.9641 levels.
+  EXPECT_NEAR(profile.at(2), 28.92, 0.1);
+  EXPECT_NEAR(profile.shown[40], 1, 0.05);
+  EXPECT_LT(profile.shown[79], 0.8) << "rings that the map cuts off show less";
+}
+
+TEST(FarFieldDrift, AnEvenShiftIsDrift) {
+  DifferenceMap map = Ball{.col = 250, .row = 200, .width = 500, .height = 400}.map();
+  const Contact contact = find_contact(map, 4);
+  EXPECT_EQ(far_field_drift(map, contact), 0);
+  for (float& level : map.levels) level -= 2;
+  EXPECT_NEAR(far_field_drift(map, contact), -2, 1e-4);
+}
+
+TEST(FarFieldDrift, AnUnevenOrFaintOneIsNot) {
+  const Ball ball{.col = 250, .row = 200, .width = 500, .height = 400};
+  DifferenceMap map = ball.map();
+  const Contact contact = find_contact(map, 4);
+  for (std::size_t i = 0; i < map.levels.size(); ++i) {
+    map.levels[i] += i % 500 < 250 ? 0.5F : 3.0F;
+  }
+  EXPECT_EQ(far_field_drift(map, contact), 0);
+  map = ball.map();
+  for (float& level : map.levels) level += 0.4F;
+  EXPECT_EQ(far_field_drift(map, contact), 0);
+}
+
+TEST(FarFieldDrift, UnsureWithoutAFarField) {
+  DifferenceMap map = Ball{}.map();
+  for (float& level : map.levels) level += 2;
+  EXPECT_EQ(far_field_drift(map, find_contact(Ball{}.map(), 4)), 0);
+}
+
+}  // namespace
+}  // namespace dtact::calibration

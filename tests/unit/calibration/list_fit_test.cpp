@@ -1,0 +1,83 @@
+#include "daemon/calibration/list_fit.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <stdexcept>
+
+#include "tests/unit/calibration/ball.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+double um_at(const recon::DepthList& list, double level) {
+  return list.um[static_cast<std::size_t>(std::lround(level * 64) - list.first_q6)];
+}
+
+recon::DepthList fit(const DifferenceMap& map) { return fit_list(map, find_contact(map, 4)); }
+
+TEST(FitList, FindsALinearResponseWithoutKnowingTheDepth) {
+  const recon::DepthList list = fit(Ball{}.map());
+  // 30 levels a millimetre.
+  for (const double level : {0.0, 3.0, 10.0, 20.0, 30.0, 44.0}) {
+    EXPECT_NEAR(um_at(list, level), level / 30 * 1000, 8) << level;
+  }
+}
+
+TEST(FitList, UntouchedReadsZero) { EXPECT_EQ(um_at(fit(Ball{}.map()), 0), 0); }
+
+TEST(FitList, SpansAndCoversWhatItSays) {
+  const recon::DepthList list = fit(Ball{}.map());
+  EXPECT_EQ(list.first_q6, -2560);
+  EXPECT_EQ(list.um.size(), 150U * 64 + 1);
+  EXPECT_NEAR(list.covered_to_q6, 47 * 64, 20) << "the peak of 45 levels and two more";
+  EXPECT_NEAR(list.covered_from_q6, -20 * 64, 1) << "the ring";
+  EXPECT_NO_THROW(recon::check(list, true));
+  EXPECT_NEAR(um_at(list, 50), 1667, 12) << "goes on along its line";
+}
+
+TEST(FitList, IsMonotoneAndStraightUnderNoise) {
+  DifferenceMap map = Ball{}.map();
+  std::mt19937 random(3);
+  std::normal_distribution<float> noise(0, 0.3F);  // what smoothing leaves of one grey level
+  for (float& level : map.levels) level += noise(random);
+  const recon::DepthList list = fit(map);
+  EXPECT_TRUE(std::ranges::is_sorted(list.um));
+  for (const double level : {5.0, 15.0, 30.0, 42.0}) {
+    EXPECT_NEAR(um_at(list, level), level / 30 * 1000, 25) << level;
+  }
+}
+
+TEST(FitList, TheBulgeHasTheDentsVolume) {
+  // Dent: a cap of 4 mm radius and 1.5 mm depth, π·1.5²·(4 − 0.5) = 24.74 mm³. The ring from 4 to
+  // 6 mm has 62.83 mm², so its 20 levels are 0.394 mm.
+  EXPECT_NEAR(um_at(fit(Ball{}.map()), -20), -394, 12);
+}
+
+TEST(FitList, TheBulgeBeginsWithTheListsOwnSlope) {
+  const recon::DepthList list = fit(Ball{}.map());
+  EXPECT_NEAR(um_at(list, -0.5), -um_at(list, 0.5), 3);
+}
+
+TEST(FitList, PartOfThePixelsWillDo) {
+  const DifferenceMap map = Ball{}.map();
+  const recon::DepthList list =
+      fit_list(map, find_contact(map, 4), [](int x, int) { return x < 120; });
+  EXPECT_NEAR(um_at(list, 30), 1000, 8);
+}
+
+TEST(FitList, SaysWhenTheImageIsNoBall) {
+  DifferenceMap map = Ball{}.map();
+  for (float& level : map.levels) level = level > 3 ? 20.0F : 0.0F;
+  EXPECT_THAT([&] { (void)fit(map); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("does not darken steadily")));
+}
+
+}  // namespace
+}  // namespace dtact::calibration

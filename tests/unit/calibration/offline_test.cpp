@@ -1,0 +1,194 @@
+#include "clients/ctl/offline/offline.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "clients/ctl/offline/depth_file.hpp"
+#include "daemon/calibration/calibration.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "hal/image/png.hpp"
+#include "tests/unit/calibration/ball.hpp"
+#include "tests/unit/calibration/sample.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+namespace fs = std::filesystem;
+using calibration::Ball;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+class Offline : public testing::Test {
+ protected:
+  Offline() {
+    write("reference.png", Ball{}.untouched());
+    write("ball.png", Ball{}.frame());
+  }
+  [[nodiscard]] std::string at(const std::string& name) const {
+    return (temp_.path() / name).string();
+  }
+  void write(const std::string& name, const image::Grey8& image) const {
+    base::write_file_atomically(at(name), image::encode_png(image));
+  }
+  /// Runs one command and returns what it printed.
+  static std::string run(std::vector<std::string> arguments) {
+    CLI::App app;
+    app.require_subcommand(1);
+    add_offline_commands(app);
+    std::ranges::reverse(arguments);
+    testing::internal::CaptureStdout();
+    try {
+      app.parse(arguments);
+    } catch (...) {
+      (void)testing::internal::GetCapturedStdout();
+      throw;
+    }
+    return testing::internal::GetCapturedStdout();
+  }
+  [[nodiscard]] std::vector<std::string> calibrate() const {
+    return {"calibrate",   "depth",        "--reference", at("reference.png"),
+            "--ball",      at("ball.png"), "--radius-mm", "4.0",
+            "--mm-per-px", "0.05",         "-o",          at("cal")};
+  }
+  [[nodiscard]] std::vector<std::string> reconstruct(const std::string& output) const {
+    return {"reconstruct", "--calibration", at("cal"), "--reference", at("reference.png"),
+            "--frame",     at("ball.png"),  "-o",      at(output)};
+  }
+  template <typename... More>
+  static std::vector<std::string> with(std::vector<std::string> arguments, More... more) {
+    (arguments.emplace_back(more), ...);
+    return arguments;
+  }
+
+ private:
+  const calibration::TempFolder temp_;
+};
+
+TEST_F(Offline, CalibratesAndSaysWhatItFound) {
+  const std::string said = run(calibrate());
+  EXPECT_THAT(said, AllOf(HasSubstr("method list"), HasSubstr("260x240 at column 0, row 0")));
+  const calibration::Calibration made = calibration::load(at("cal"));
+  EXPECT_EQ(made.model->mm_per_px, 0.05);
+  EXPECT_EQ(made.model->reference_q8[0], 200 * 256);
+  ASSERT_EQ(made.origin.sources.size(), 2U);
+  EXPECT_EQ(made.origin.sources[1].name, "ball.png");
+  EXPECT_EQ(made.origin.created.size(), 20U);
+}
+
+TEST_F(Offline, CropIsAboutTheCentre) {
+  run(with(calibrate(), "--centre", "115,125", "--crop", "200,180"));
+  const calibration::Calibration made = calibration::load(at("cal"));
+  EXPECT_EQ(made.crop_col, 35);
+  EXPECT_EQ(made.crop_row, 15);
+  EXPECT_EQ(made.model->rectify.width, 180);
+  EXPECT_EQ(made.model->rectify.height, 200);
+  run(with(calibrate(), "--crop", "200,180"));
+  EXPECT_EQ(calibration::load(at("cal")).crop_col, 40);
+  EXPECT_THAT([&] { run(with(calibrate(), "--centre", "1,2")); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("--crop")));
+}
+
+TEST_F(Offline, AFolderStandsForItsImages) {
+  fs::create_directory(at("frames"));
+  image::Grey8 image = Ball{}.untouched();
+  write("frames/1.png", image);
+  for (std::uint8_t& v : image.pixels) v = 201;
+  write("frames/2.png", image);
+  base::write_file_atomically(at("frames/notes.txt"), "not an image");
+  std::vector<std::string> arguments = calibrate();
+  arguments[3] = at("frames");
+  run(arguments);
+  const calibration::Calibration made = calibration::load(at("cal"));
+  EXPECT_EQ(made.model->reference_q8[0], 200 * 256 + 128) << "the mean keeps its fraction";
+  EXPECT_EQ(made.origin.sources.size(), 3U);
+}
+
+TEST_F(Offline, EvaluatesInSentencesAndJson) {
+  run(calibrate());
+  const std::vector<std::string> evaluate{"evaluate",     "--calibration",     at("cal"),
+                                          "--reference",  at("reference.png"), "--ball",
+                                          at("ball.png"), "--radius-mm",       "4.0"};
+  EXPECT_THAT(run(evaluate), AllOf(HasSubstr("mean absolute error"), HasSubstr("untrusted: 0 of")));
+  const std::string json = run(with(evaluate, "--json"));
+  EXPECT_THAT(json, AllOf(HasSubstr("{\"centre_row\": 110.5"), HasSubstr("\"mae_mm\": 0.00"),
+                          HasSubstr("\"untrusted_pixels\": 0}")));
+  run(with(calibrate(), "--method", "published"));
+  EXPECT_THAT(run(with(evaluate, "--json")), HasSubstr("\"half_mae_mm\": null"));
+}
+
+TEST_F(Offline, ReconstructsToNpy) {
+  run(calibrate());
+  EXPECT_THAT(run(reconstruct("depth.npy")), HasSubstr("260x240, deepest 1."));
+  const std::string npy = base::read_file(at("depth.npy"));
+  EXPECT_EQ(npy.substr(0, 8), std::string("\x93NUMPY\x01\x00", 8));
+  EXPECT_THAT(npy, HasSubstr("'shape': (240, 260)"));
+  EXPECT_EQ(npy.size(), 128U + 240U * 260U * 4U);
+}
+
+TEST_F(Offline, ReconstructsToPictureAndPoints) {
+  run(calibrate());
+  run(reconstruct("depth.png"));
+  const image::Grey8 picture = image::read_png_grey8(at("depth.png"));
+  EXPECT_GT(picture.width, 260);
+  EXPECT_GT(picture.height, 240);
+  run(reconstruct("depth.ply"));
+  EXPECT_THAT(base::read_file(at("depth.ply")), HasSubstr("element vertex 62400\n"));
+}
+
+TEST_F(Offline, NamesWhatIsWrong) {
+  EXPECT_THAT([&] { run(reconstruct("depth.npy")); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no such folder")));
+  run(calibrate());
+  EXPECT_THAT([&] { run(reconstruct("depth.tif")); },
+              ThrowsMessage<std::runtime_error>(HasSubstr(".npy, .png or .ply")));
+  std::vector<std::string> missing = calibrate();
+  missing[3] = at("none.png");
+  EXPECT_THAT([&] { run(missing); }, ThrowsMessage<std::runtime_error>(HasSubstr("none.png")));
+  write("wide.png", Ball{.width = 300}.frame());
+  std::vector<std::string> sizes = calibrate();
+  sizes[5] = at("wide.png");
+  EXPECT_THAT([&] { run(sizes); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("300x240"), HasSubstr("--ball"))));
+  fs::create_directory(at("empty"));
+  std::vector<std::string> empty = calibrate();
+  empty[3] = at("empty");
+  EXPECT_THAT([&] { run(empty); }, ThrowsMessage<std::runtime_error>(HasSubstr("no .png file")));
+  write("wide_reference.png", Ball{.width = 300}.untouched());
+  std::vector<std::string> other = reconstruct("depth.npy");
+  other[4] = at("wide_reference.png");
+  other[6] = at("wide.png");
+  EXPECT_THAT([&] { run(other); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("calibration is for 260x240")));
+  EXPECT_THROW(run(with(calibrate(), "--method", "magic")), CLI::ParseError);
+}
+
+TEST(DepthFile, NpyIsLittleEndianFloats) {
+  const std::vector<float> mm{0.0F, 1.5F, -0.25F, std::numeric_limits<float>::quiet_NaN()};
+  const std::string npy = encode_npy({2, 2, 0.05, mm});
+  ASSERT_EQ(npy.size(), 128U + 16U);
+  EXPECT_EQ(npy[127], '\n');
+  EXPECT_EQ(npy.substr(128, 12), std::string("\0\0\0\0\0\0\xC0\x3F\0\0\x80\xBE", 12));
+}
+
+TEST(DepthFile, PlyLeavesUntrustedOutAndPressesDown) {
+  const std::vector<float> mm{std::numeric_limits<float>::quiet_NaN(), 0.5F};
+  const std::string ply = encode_ply({2, 1, 0.1, mm});
+  EXPECT_THAT(ply, AllOf(HasSubstr("binary_little_endian"), HasSubstr("element vertex 1\n")));
+  const std::string point = ply.substr(ply.size() - 12);
+  EXPECT_EQ(point, std::string("\xCD\xCC\x4C\x3D\0\0\0\0\0\0\0\xBF", 12)) << "0.05, 0, -0.5";
+}
+
+TEST(DepthFile, APictureOfNothingStillHasItsLegend) {
+  const std::vector<float> mm(4, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_GT(encode_colour_png({2, 2, 0.1, mm}).size(), 100U);
+}
+
+}  // namespace
+}  // namespace dtact::ctl

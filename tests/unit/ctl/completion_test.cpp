@@ -1,0 +1,94 @@
+// The completion file in a real bash, and against what the program says of itself.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdio>
+#include <regex>
+#include <set>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "clients/ctl/ctl.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using testing::IsSubsetOf;
+using testing::UnorderedElementsAre;
+
+/// What bash offers for the last of `words`, which are separated by blanks ("" for an empty one).
+std::set<std::string> complete(const std::string& words) {
+  const std::string script = "source '" DTACT_SOURCE_DIR
+                             "/clients/ctl/dtactctl.bash-completion'; COMP_WORDS=(dtactctl " +
+                             words +
+                             "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _dtactctl; "
+                             "printf '%s\\n' \"${COMPREPLY[@]}\"";
+  std::string quoted;
+  for (const char c : script) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  FILE* pipe = ::popen(("bash --norc -c '" + quoted + "'").c_str(), "r");
+  if (pipe == nullptr) throw std::runtime_error("no bash");
+  std::string text;
+  std::array<char, 4096> buffer{};
+  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) text += buffer.data();
+  ::pclose(pipe);
+  std::istringstream lines(text);
+  std::set<std::string> found;
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.empty()) found.insert(line);
+  }
+  return found;
+}
+
+/// The long options that the program's help for a command names.
+std::set<std::string> options_of(std::vector<std::string> command) {
+  command.emplace_back("--help");
+  std::ostringstream out;
+  std::ostringstream error;
+  EXPECT_EQ(run(command, out, error), 0);
+  const std::string help = out.str();
+  // Options begin a line of the help; others are only mentioned.
+  const std::regex option(R"(\n  (?:-\w,)?(--[a-z-]+))");
+  std::set<std::string> found;
+  for (std::sregex_iterator match(help.begin(), help.end(), option), end; match != end; ++match) {
+    found.insert((*match)[1]);
+  }
+  return found;
+}
+
+TEST(Completion, OffersCommands) {
+  EXPECT_THAT(complete("re"), UnorderedElementsAre("rezero", "reconstruct"));
+  EXPECT_THAT(complete("--port 7 s"), UnorderedElementsAre("status", "snapshot"));
+  EXPECT_THAT(complete("calibration \"\""), UnorderedElementsAre("upload", "show", "--help"));
+}
+
+TEST(Completion, OffersValues) {
+  EXPECT_THAT(complete("led --scheme scheme"),
+              UnorderedElementsAre("scheme1", "scheme2", "scheme3", "scheme4"));
+  EXPECT_THAT(complete("calibrate depth --method p"), UnorderedElementsAre("published"));
+  EXPECT_THAT(complete("led --brightness \"\""), UnorderedElementsAre());
+}
+
+TEST(Completion, KnowsEveryOptionOfEveryCommand) {
+  EXPECT_THAT(options_of({}), IsSubsetOf(complete("--")));
+  const std::vector<std::vector<std::string>> commands = {{"status"},
+                                                          {"watch"},
+                                                          {"led"},
+                                                          {"rezero"},
+                                                          {"snapshot"},
+                                                          {"calibration", "upload"},
+                                                          {"calibration", "show"},
+                                                          {"calibrate", "depth"},
+                                                          {"reconstruct"},
+                                                          {"evaluate"}};
+  for (const auto& command : commands) {
+    std::string words;
+    for (const auto& word : command) words += word + " ";
+    EXPECT_THAT(options_of(command), IsSubsetOf(complete(words + "--"))) << words;
+    EXPECT_FALSE(options_of(command).empty()) << words;
+  }
+}
+
+}  // namespace
+}  // namespace dtact::ctl

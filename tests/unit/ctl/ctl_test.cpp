@@ -1,0 +1,278 @@
+// The program against the server with a pipeline that the tests play.
+#include "clients/ctl/ctl.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <filesystem>
+#include <sstream>
+#include <thread>
+
+#include "hal/base/atomic_file.hpp"
+#include "hal/image/png.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+namespace fs = std::filesystem;
+using net::test::answer_done;
+using net::test::FakePort;
+using net::test::make_frame;
+using net::test::Rig;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+struct Result {
+  int code = 0;
+  std::string out;
+  std::string error;
+};
+
+Result ctl(std::vector<std::string> arguments) {
+  std::ostringstream out;
+  std::ostringstream error;
+  const int code = run(arguments, out, error);
+  return {code, out.str(), error.str()};
+}
+
+/// With the rig's port.
+Result ctl(const Rig& rig, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {"--port", std::to_string(rig.tcp_port())});
+  return ctl(std::move(arguments));
+}
+
+TEST(Ctl, ExplainsItself) {
+  const auto help = ctl({"--help"});
+  EXPECT_EQ(help.code, 0);
+  EXPECT_THAT(help.out,
+              AllOf(HasSubstr("status"), HasSubstr("watch"), HasSubstr("led"), HasSubstr("rezero"),
+                    HasSubstr("calibration"), HasSubstr("3 no connection")));
+  const auto version = ctl({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_THAT(version.out, StartsWith("dtactctl "));
+}
+
+TEST(Ctl, ReturnsTwoForWrongUsage) {
+  EXPECT_EQ(ctl({}).code, 2);
+  EXPECT_EQ(ctl({"dance"}).code, 2);
+  EXPECT_EQ(ctl({"status", "--frobnicate"}).code, 2);
+  EXPECT_EQ(ctl({"--port", "0", "status"}).code, 2);
+  EXPECT_EQ(ctl({"led", "--brightness", "256"}).code, 2);
+  EXPECT_EQ(ctl({"led", "--led", "9:ffffff"}).code, 2);
+  EXPECT_EQ(ctl({"watch", "--seconds", "-1"}).code, 2);
+  EXPECT_EQ(ctl({"calibration"}).code, 2);
+  EXPECT_EQ(ctl({"calibration", "upload", "/no/such/folder"}).code, 2);
+}
+
+TEST(Ctl, ReturnsThreeWithoutADaemon) {
+  std::uint16_t port = 0;
+  {
+    const Rig rig;
+    port = rig.tcp_port();
+  }
+  const auto result = ctl({"--port", std::to_string(port), "status"});
+  EXPECT_EQ(result.code, 3);
+  EXPECT_THAT(result.error, AllOf(StartsWith("dtactctl: nothing listens on 127.0.0.1"),
+                                  HasSubstr("systemctl status dtactd")));
+}
+
+TEST(Status, IsPrinted) {
+  Rig rig;
+  pipeline::Status status;
+  status.state = pipeline::State::serving;
+  status.health.set(pipeline::Health::not_realtime);
+  status.camera.backend = "sim";
+  rig.port.set_status(status);
+  const auto result = ctl(rig, {"status"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_THAT(result.out, AllOf(StartsWith("state        serving\nhealth       not_realtime\n"),
+                                HasSubstr("LimitRTPRIO"), HasSubstr("camera       sim"),
+                                HasSubstr("calibration  none"), HasSubstr("brightness 255")));
+}
+
+TEST(Status, IsOneLineOfJson) {
+  Rig rig;
+  const auto result = ctl(rig, {"status", "--json"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_THAT(result.out, StartsWith(R"({"state":"settling","health":[],"advice":"","camera":{)"));
+  EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 1);
+  EXPECT_THAT(result.out, HasSubstr(R"("calibration":null)"));
+}
+
+TEST(Led, ShowsAndChanges) {
+  Rig rig({}, answer_done);
+  EXPECT_EQ(ctl(rig, {"led"}).out,
+            "brightness 255, LEDs ffffff ffffff ffffff ffffff ffffff ffffff ffffff ffffff\n");
+  EXPECT_EQ(ctl(rig, {"led", "--brightness", "128", "--json"}).out,
+            R"({"brightness":128,"leds":["ffffff","ffffff","ffffff","ffffff","ffffff","ffffff",)"
+            R"("ffffff","ffffff"]})"
+            "\n");
+  EXPECT_EQ(ctl(rig, {"led", "--scheme", "scheme1"}).out,
+            "brightness 128, LEDs ffffff 000000 ffffff 000000 ffffff 000000 ffffff 000000\n");
+}
+
+TEST(Led, ChangesSingleOnes) {
+  Rig rig({}, answer_done);
+  const auto result = ctl(rig, {"led", "--led", "0:ff0000", "--led", "7:0000ff"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_EQ(result.out,
+            "brightness 255, LEDs ff0000 ffffff ffffff ffffff ffffff ffffff ffffff 0000ff\n");
+}
+
+TEST(Led, PassesRefusalsOn) {
+  Rig rig({}, answer_done);
+  const auto result = ctl(rig, {"led", "--scheme", "disco"});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.error, HasSubstr("known are all, scheme1"));
+}
+
+TEST(Rezero, IsRefusedUnlessForced) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([](const pipeline::Command& command) {
+      const bool force = std::get<pipeline::Rezero>(command.what).force;
+      return pipeline::CommandDone{
+          command.ticket, force ? pipeline::Outcome::done : pipeline::Outcome::refused_contact,
+          force ? "" : "something touches"};
+    });
+  });
+  const auto refused = ctl(rig, {"rezero"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_EQ(refused.error, "dtactctl: something touches\n");
+  EXPECT_EQ(ctl(rig, {"rezero", "--force"}).code, 0);
+}
+
+TEST(Calibration, GoesUpAndComesBack) {
+  Rig rig({}, answer_done);
+  pipeline::Status status;
+  status.calibration = std::make_shared<calibration::Calibration>();
+  rig.port.set_status(status);
+  std::string name = (fs::temp_directory_path() / "dtact-ctl-XXXXXX").string();
+  const fs::path temporary = ::mkdtemp(name.data());
+  const fs::path folder = temporary / "ball";
+  fs::create_directory(folder);
+  base::write_file_atomically(folder / "calibration.toml", "version = 1\n");
+  base::write_file_atomically(folder / "reference.png", "png");
+
+  auto result = ctl(rig, {"calibration", "upload", folder.string() + "/"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_EQ(result.out, "the daemon uses calibration ball from now on\n");
+  const fs::path copy = temporary / "copy";
+  result = ctl(rig, {"calibration", "show", "-o", copy.string()});
+  EXPECT_EQ(result.out, "# calibration ball\nversion = 1\n");
+  EXPECT_EQ(base::read_file(copy / "reference.png"), "png");
+  result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "other", "--json"});
+  EXPECT_EQ(result.out, "{\"name\":\"other\"}\n");
+  result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "no good"});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_EQ(ctl(rig, {"calibration", "upload", temporary.string()}).code, 1);
+  fs::remove_all(temporary);
+}
+
+/// Publishes frames until it is told to end.
+class Stream {
+ public:
+  explicit Stream(Rig& rig)
+      : thread_([this, &rig] {
+          for (std::uint64_t sequence = 1; !end_; ++sequence) {
+            rig.port.publish(make_frame(sequence));
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+          }
+        }) {}
+  ~Stream() {
+    end_ = true;
+    thread_.join();
+  }
+  Stream(const Stream&) = delete;
+  Stream& operator=(const Stream&) = delete;
+
+ private:
+  std::atomic<bool> end_ = false;
+  std::thread thread_;
+};
+
+TEST(Snapshot, SavesDepthAndLuma) {
+  Rig rig;
+  const Stream stream(rig);
+  std::string name = (fs::temp_directory_path() / "dtact-ctl-XXXXXX").string();
+  const fs::path folder = ::mkdtemp(name.data());
+  const std::vector<std::pair<std::string, std::string>> files = {
+      {"depth.npy", "\x93NUMPY"}, {"depth.png", "\x89PNG"}, {"depth.ply", "ply\n"}};
+  for (const auto& [file, begin] : files) {
+    const std::string path = (folder / file).string();
+    const auto result = ctl(rig, {"snapshot", "-o", path, "--timeout", "60"});
+    EXPECT_EQ(result.code, 0) << result.error;
+    EXPECT_THAT(result.out, StartsWith(path + ": frame "));
+    EXPECT_THAT(base::read_file(path), StartsWith(begin));
+  }
+  const std::string path = (folder / "luma.png").string();
+  const auto result = ctl(rig, {"snapshot", "--luma", "-o", path, "--timeout", "60", "--json"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_THAT(result.out, StartsWith("{\"file\":\"" + path + "\",\"sequence\":"));
+  EXPECT_EQ(image::read_png_grey8(path).width, 8);
+  fs::remove_all(folder);
+}
+
+TEST(Snapshot, WantsAFormatItKnows) {
+  EXPECT_EQ(ctl({"snapshot", "-o", "depth.tiff"}).code, 2);
+  EXPECT_EQ(ctl({"snapshot", "--luma", "-o", "luma.npy"}).code, 2);
+  EXPECT_EQ(ctl({"snapshot"}).code, 2);
+}
+
+TEST(Snapshot, SaysWhyNothingCame) {
+  Rig rig;
+  pipeline::Status status;
+  status.state = pipeline::State::uncalibrated;
+  status.health.set(pipeline::Health::uncalibrated);
+  rig.port.set_status(status);
+  const auto result = ctl(rig, {"snapshot", "-o", "depth.npy", "--timeout", "0.05"});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.error,
+              AllOf(HasSubstr("no depth came within 0.05 s"), HasSubstr("calibrate depth")));
+}
+
+TEST(Watch, PrintsLinesAndASummary) {
+  Rig rig;
+  const Stream stream(rig);
+  const auto result = ctl(rig, {"watch", "--seconds", "1.5", "--min-fps", "0.5"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_THAT(result.out, AllOf(HasSubstr(" fps  contact "), HasSubstr("latency p50"),
+                                HasSubstr("\nwatched 1.5 s: "), HasSubstr("conditions: none\n")));
+}
+
+TEST(Watch, PrintsJson) {
+  Rig rig;
+  const Stream stream(rig);
+  const auto result = ctl(rig, {"watch", "--seconds", "1.5", "--json", "--summary"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_THAT(result.out, AllOf(StartsWith("{\"sequence\":"), HasSubstr("\n{\"summary\":true,")));
+}
+
+TEST(Watch, ReturnsFourWhenDepthIsTooSlow) {
+  Rig rig;
+  pipeline::Status status;
+  status.state = pipeline::State::camera_lost;
+  rig.port.set_status(status);
+  const auto result = ctl(rig, {"watch", "--seconds", "1.2", "--min-fps", "57"});
+  EXPECT_EQ(result.code, 4);
+  EXPECT_THAT(result.out, HasSubstr("no frames: camera_lost"));
+  EXPECT_THAT(result.error, HasSubstr("57 were asked for"));
+}
+
+TEST(Watch, ReturnsThreeWhenTheDaemonEnds) {
+  Rig rig;
+  std::thread end([&rig] {
+    (void)rig.port.wait_wanted(true, false);
+    rig.stop();
+  });
+  const auto result = ctl(rig, {"watch"});
+  end.join();
+  EXPECT_EQ(result.code, 3);
+  EXPECT_THAT(result.error, HasSubstr("ended the connection"));
+}
+
+}  // namespace
+}  // namespace dtact::ctl

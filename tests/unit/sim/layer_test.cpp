@@ -1,0 +1,137 @@
+#include "hal/sim/layer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace dtact::hal::sim {
+namespace {
+
+constexpr int kSize = 320;
+constexpr double kSpacing = 0.125;
+
+// A ball of radius 4 mm in the middle of a 40 mm square.
+cv::Mat1d ball_target(double depth_mm) {
+  cv::Mat1d target(kSize, kSize, -1e3);
+  for (int i = 0; i < kSize; ++i) {
+    for (int j = 0; j < kSize; ++j) {
+      const double r = std::hypot(i - kSize / 2, j - kSize / 2) * kSpacing;
+      if (r < 4) target(i, j) = depth_mm - (4 - std::sqrt(16 - r * r));
+    }
+  }
+  return target;
+}
+
+struct Radii {
+  double contact = 0;
+  double zero = 0;
+  double bulge = 0;
+};
+
+Radii radii_of(const Pressed& pressed) {
+  Radii radii;
+  double lowest = 0;
+  for (int j = kSize / 2; j < kSize; ++j) {
+    const double r = (j - kSize / 2) * kSpacing;
+    const double u = pressed.indentation_mm(kSize / 2, j);
+    if (pressed.pressure(kSize / 2, j) > 0) radii.contact = r;
+    if (radii.zero == 0 && u < 0) {
+      const double before = pressed.indentation_mm(kSize / 2, j - 1);
+      radii.zero = r - kSpacing * u / (u - before);
+    }
+    if (u < lowest) {
+      lowest = u;
+      radii.bulge = r;
+    }
+  }
+  return radii;
+}
+
+// physics.md: a ball of 4 mm pressed 1.7 mm into h = 2.0…2.5 mm puts the zero at 3.3–3.4 mm and the
+// bulge's maximum at 4.2–4.5 mm.
+TEST(Layer, BulgesWhereTheRealSensorDoes) {
+  const Layer layer(kSize, kSize, kSpacing, 2.5);
+  const Radii radii = radii_of(layer.solve(ball_target(1.7), {}));
+  EXPECT_NEAR(radii.zero, 3.35, 0.05);
+  EXPECT_GE(radii.bulge, 4.2);
+  EXPECT_LE(radii.bulge, 4.5);
+}
+
+// physics.md: at 1.5 mm the contact's radius is 3.04 mm, the geometric circle's 3.12.
+TEST(Layer, ContactRadiusIsNearTheGeometricCircle) {
+  const Layer layer(kSize, kSize, kSpacing, 2.0);
+  EXPECT_NEAR(radii_of(layer.solve(ball_target(1.5), {})).contact, 3.04, kSpacing);
+}
+
+TEST(Layer, KeepsItsVolume) {
+  const Layer layer(kSize, kSize, kSpacing, 2.0);
+  const Pressed pressed = layer.solve(ball_target(1.0), {});
+  EXPECT_NEAR(cv::sum(pressed.indentation_mm)[0], 0, 1e-6);
+}
+
+TEST(Layer, ContactPushesAndNeverPulls) {
+  const Layer layer(kSize, kSize, kSpacing, 2.0);
+  const cv::Mat1d target = ball_target(1.0);
+  const Pressed pressed = layer.solve(target, {});
+  int touching = 0;
+  for (int i = 0; i < kSize; ++i) {
+    for (int j = 0; j < kSize; ++j) {
+      ASSERT_GE(pressed.pressure(i, j), 0);
+      const double gap = pressed.indentation_mm(i, j) - target(i, j);
+      ASSERT_GT(gap, -1e-4);
+      if (pressed.pressure(i, j) > 0) {
+        ASSERT_LT(gap, 1e-4);
+        ++touching;
+      }
+    }
+  }
+  EXPECT_GT(touching, 1000);
+}
+
+TEST(Layer, IsLinear) {
+  const Layer layer(64, 64, 0.25, 2.0);
+  cv::Mat1d a(64, 64, 0.0);
+  cv::Mat1d b(64, 64, 0.0);
+  a(20, 30) = 1;
+  b(40, 10) = 2;
+  const cv::Mat1d both = layer.indentation(cv::Mat1d(a + b));
+  const cv::Mat1d apart = cv::Mat1d(layer.indentation(a) + layer.indentation(b));
+  EXPECT_LT(cv::norm(both, apart, cv::NORM_INF), 1e-12);
+}
+
+// C(k) = 3/(2k) · (sinh 4 − 4)/(cosh 4 + 1 + 8) at kh = 2, computed by hand: 27.2899 − 4 over
+// 27.3082 + 9 is 0.64145; h = 2 mm, so k = 1 per mm.
+TEST(Layer, AnswersACosineWithItsCompliance) {
+  constexpr int kN = 64;
+  const double spacing = 2 * 3.14159265358979 * 4 / kN;  // four waves of k = 1 per mm
+  const Layer layer(kN, kN, spacing, 2.0);
+  cv::Mat1d p(kN, kN);
+  for (int i = 0; i < kN; ++i) {
+    for (int j = 0; j < kN; ++j) p(i, j) = std::cos(j * spacing);
+  }
+  EXPECT_NEAR(layer.indentation(p)(5, 0), 1.5 * 0.64145, 1e-4);
+  EXPECT_NEAR(layer.indentation(cv::Mat1d(p.t()))(0, 5), 1.5 * 0.64145, 1e-4);
+}
+
+TEST(Layer, StaysFlatWhenNothingTouches) {
+  const Layer layer(64, 64, 0.25, 2.0);
+  const Pressed pressed = layer.solve(cv::Mat1d(64, 64, -1.0), {});
+  EXPECT_EQ(cv::norm(pressed.indentation_mm, cv::NORM_INF), 0);
+}
+
+TEST(Layer, RefusesAPressThatFillsTheGrid) {
+  const Layer layer(32, 32, 0.25, 2.0);
+  EXPECT_THROW((void)layer.solve(cv::Mat1d(32, 32, 1.0), {}), std::runtime_error);
+}
+
+TEST(Layer, FindsTheSameContactFromAnyStart) {
+  const Layer layer(kSize, kSize, kSpacing, 2.0);
+  const Pressed shallow = layer.solve(ball_target(0.5), {});
+  const Pressed warm = layer.solve(ball_target(1.0), shallow.pressure);
+  const Pressed cold = layer.solve(ball_target(1.0), {});
+  EXPECT_LT(cv::norm(warm.indentation_mm, cold.indentation_mm, cv::NORM_INF), 1e-3);
+}
+
+}  // namespace
+}  // namespace dtact::hal::sim

@@ -1,0 +1,92 @@
+#include "hal/sim/optics.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "hal/sim/truth.hpp"
+#include "tests/unit/sim/small_scene.hpp"
+
+namespace dtact::hal::sim {
+namespace {
+
+constexpr int kN = 200;
+const Grid kGrid = {kN, kN, 0.125, -12.5, -12.5};
+
+OpticsModel model() {
+  OpticsModel optics;
+  optics.pressed_slope = 0.2;
+  optics.pressed_curve = -0.02;
+  optics.bulged_slope = 0.6;
+  optics.bulged_curve = -1.0;
+  optics.narrow_mm = 0.3;
+  optics.wide_mm = 1.8;
+  optics.narrow_weight = 0.7;
+  return optics;
+}
+
+TEST(Optics, ResponseHasTwoSides) {
+  EXPECT_DOUBLE_EQ(response(model(), 1.0), 0.18);
+  EXPECT_DOUBLE_EQ(response(model(), -0.2), -0.16);
+  EXPECT_DOUBLE_EQ(response(model(), 0.0), 0.0);
+}
+
+TEST(Optics, EvenIndentationIsNotChangedByScattering) {
+  Optics optics(model(), kGrid);
+  const std::vector<std::int16_t> indentation(kN * kN, Truth::kPerMm);  // 1 mm
+  std::vector<std::int16_t> loss(kN * kN);
+  optics.run(indentation, loss);
+  for (const std::int16_t value : loss) ASSERT_NEAR(value, 0.18 * 32768, 2);
+}
+
+TEST(Optics, ScatteringKeepsTheSumAndHasTheTwoWidths) {
+  Optics optics(model(), kGrid);
+  std::vector<std::int16_t> indentation(kN * kN, 0);
+  std::vector<std::int16_t> loss(kN * kN);
+  for (int y = 96; y < 104; ++y) {
+    for (int x = 96; x < 104; ++x) indentation[static_cast<std::size_t>(y * kN + x)] = 16000;
+  }
+  optics.run(indentation, loss);
+  // 64 points of 2 mm: 0.4 − 0.08 = 0.32 of the light each.
+  const double sum = std::accumulate(loss.begin(), loss.end(), 0.0);
+  EXPECT_NEAR(sum / (64 * 0.32 * 32768), 1, 0.01);
+  // Variance across: 0.7·0.3² + 0.3·1.8² mm², and (1 mm)²/12 of the square itself.
+  double variance = 0;
+  for (int y = 0; y < kN; ++y) {
+    for (int x = 0; x < kN; ++x) {
+      variance += loss[static_cast<std::size_t>(y * kN + x)] * std::pow((x - 99.5) * 0.125, 2);
+    }
+  }
+  EXPECT_NEAR(variance / sum, 0.063 + 0.972 + 0.0833, 0.06);
+}
+
+TEST(Optics, WithoutScatteringItIsTheResponse) {
+  OpticsModel sharp = model();
+  sharp.narrow_mm = 0;
+  sharp.narrow_weight = 1;
+  Optics optics(sharp, kGrid);
+  std::vector<std::int16_t> indentation(kN * kN, 0);
+  std::vector<std::int16_t> loss(kN * kN);
+  indentation[kN * 50 + 50] = 8000;
+  indentation[kN * 60 + 50] = -1600;
+  optics.run(indentation, loss);
+  EXPECT_NEAR(loss[kN * 50 + 50], 0.18 * 32768, 1);
+  EXPECT_NEAR(loss[kN * 60 + 50], -0.16 * 32768, 1);
+  EXPECT_EQ(loss[kN * 50 + 51], 0);
+}
+
+TEST(Optics, BuiltInResponseRises) {
+  const Scene scene = default_scene();
+  double last = -1;
+  for (double d = -0.4; d <= 1.8; d += 0.01) {
+    const double now = response(scene.optics, d);
+    ASSERT_GT(now, last) << d;
+    last = now;
+  }
+}
+
+}  // namespace
+}  // namespace dtact::hal::sim

@@ -1,0 +1,140 @@
+#include "hal/sim/scene.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+#include "tests/unit/sim/small_scene.hpp"
+
+namespace dtact::hal::sim {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+std::string error_of(const std::string& toml) {
+  try {
+    (void)parse_scene(toml, "scenes/x.toml");
+  } catch (const std::runtime_error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(Scene, DefaultIsThePapersField) {
+  const Scene scene = default_scene();
+  EXPECT_EQ(scene.camera.width, 800);
+  EXPECT_EQ(scene.camera.height, 600);
+  EXPECT_EQ(scene.camera.fps, 60);
+  EXPECT_NEAR(scene.camera.mm_per_px * 580, 24, 1e-4);
+  EXPECT_EQ(scene.layer.thickness_mm, 2);
+  ASSERT_EQ(scene.presses.size(), 3U);
+  EXPECT_EQ(scene.presses[0].object.kind, "ball");
+  EXPECT_GE(scene.presses[0].keys.front().time_s, 2.5);
+}
+
+TEST(Scene, EverySceneOfTheFolderLoads) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(DTACT_SOURCE_DIR "/config/scenes")) {
+    if (entry.path().extension() != ".toml") continue;
+    EXPECT_NO_THROW((void)load_scene(entry.path())) << entry.path();
+    ++count;
+  }
+  EXPECT_GE(count, 5);
+}
+
+TEST(Scene, WhatIsLeftOutIsTheBuiltInSensorsButNotItsPresses) {
+  const Scene scene = parse_scene("[layer]\nthickness_mm = 1.5\n", "x.toml");
+  EXPECT_EQ(scene.layer.thickness_mm, 1.5);
+  EXPECT_EQ(scene.camera.width, 800);
+  EXPECT_EQ(scene.optics.pressed_slope, default_scene().optics.pressed_slope);
+  EXPECT_TRUE(scene.presses.empty());
+  EXPECT_EQ(scene.loop_to_s, 0);
+}
+
+TEST(Scene, KeysInheritFromTheOneBefore) {
+  const Scene scene = parse_scene(
+      "[[press]]\nobject = \"disc\"\nradius_mm = 2.0\n"
+      "keys = [ { t = 1.0, x = 3.0, rotation = 10.0 }, { t = 2.0, depth = 0.5 } ]\n",
+      "x.toml");
+  const PressKey& key = scene.presses.at(0).keys.at(1);
+  EXPECT_EQ(key.x_mm, 3);
+  EXPECT_EQ(key.rotation_deg, 10);
+  EXPECT_EQ(key.depth_mm, 0.5);
+}
+
+TEST(Scene, ErrorsNameFileLineKeyAndWhatIsAllowed) {
+  EXPECT_THAT(error_of("[camera]\nwidth = 10\n"),
+              AllOf(HasSubstr("scenes/x.toml:2: camera.width"), HasSubstr("from 64 to 4096")));
+  EXPECT_THAT(error_of("\n\n[optics]\nnarrow_weight = 1.5\n"),
+              AllOf(HasSubstr("scenes/x.toml:4: optics.narrow_weight"), HasSubstr("from 0 to 1")));
+  EXPECT_THAT(error_of("[camera]\nfps = \"fast\"\n"),
+              AllOf(HasSubstr("x.toml:2: camera.fps"), HasSubstr("a number from 1 to 240")));
+  EXPECT_THAT(error_of("[light]\narrangement = \"top\"\n"),
+              AllOf(HasSubstr("x.toml:2: light.arrangement"), HasSubstr("\"ring\", \"sides\"")));
+  EXPECT_THAT(error_of("[[press]]\nobject = \"brick\"\n"),
+              AllOf(HasSubstr("x.toml:2: press[0].object"), HasSubstr("usb_c_plug")));
+  EXPECT_THAT(error_of("[[fault]]\nkind = \"drop\"\n"),
+              AllOf(HasSubstr("x.toml:1: fault[0].frame"), HasSubstr("missing")));
+  EXPECT_THAT(error_of("a = [\n"), HasSubstr("scenes/x.toml:"));
+}
+
+TEST(Scene, UnknownKeysAreErrorsEverywhere) {
+  EXPECT_THAT(error_of("colour = 1\n"),
+              AllOf(HasSubstr("x.toml:1: colour"), HasSubstr("camera, fault, layer")));
+  EXPECT_THAT(error_of("[layer]\nthickness = 2.0\n"),
+              AllOf(HasSubstr("x.toml:2: layer.thickness:"), HasSubstr("thickness_mm")));
+  EXPECT_THAT(error_of("[[press]]\nobject = \"m4_nut\"\nradius_mm = 2.0\nkeys = [ { t = 1.0 } ]\n"),
+              HasSubstr("x.toml:3: press[0].radius_mm"));
+  EXPECT_THAT(error_of("[[press]]\nobject = \"m4_nut\"\nkeys = [ { t = 1.0, z = 2.0 } ]\n"),
+              HasSubstr("x.toml:3: press[0].keys[0].z"));
+}
+
+TEST(Scene, RefusesWhatCannotBe) {
+  const std::string nut = "[[press]]\nobject = \"m4_nut\"\n";
+  EXPECT_THAT(error_of(nut + "keys = [ { t = 1.0, depth = 0.5 } ]\n"),
+              HasSubstr("must begin at the surface"));
+  EXPECT_THAT(error_of(nut + "keys = [ { t = 1.0 }, { t = 1.0, depth = 0.5 } ]\n"),
+              HasSubstr("must be later"));
+  EXPECT_THAT(error_of(nut + "keys = [ { t = 0.0, depth = 1.9 } ]\n"),
+              HasSubstr("from -10 to 1.8"));  // nine tenths of 2 mm
+  EXPECT_THAT(error_of(nut + "keys = []\n"), HasSubstr("at least one key"));
+  EXPECT_THAT(error_of("[optics]\npressed_slope = 0.1\npressed_curve = -0.1\n"),
+              AllOf(HasSubstr("x.toml:3: optics.pressed_curve"), HasSubstr("response fall")));
+  EXPECT_THAT(error_of("[loop]\nfrom_s = 3.0\nto_s = 2.0\n"), HasSubstr("later than from_s"));
+  EXPECT_THAT(error_of("[[press]]\nobject = \"height_map\"\nimage = \"none.png\"\n"
+                       "mm_per_px = 0.1\nrelief_mm = 1.0\nkeys = [ { t = 1.0 } ]\n"),
+              AllOf(HasSubstr("x.toml:3: press[0].image"), HasSubstr("none.png")));
+}
+
+TEST(Scene, TimeRunsThenLoops) {
+  Scene scene = small_scene("[loop]\nfrom_s = 2.0\nto_s = 5.0\n");  // 10 frames a second
+  EXPECT_DOUBLE_EQ(scene.time_s(0), 0);
+  EXPECT_DOUBLE_EQ(scene.time_s(49), 4.9);
+  EXPECT_DOUBLE_EQ(scene.time_s(50), 2.0);
+  EXPECT_NEAR(scene.time_s(81), 2.1, 1e-9);
+  scene.loop_to_s = 0;
+  EXPECT_DOUBLE_EQ(scene.time_s(81), 8.1);
+}
+
+TEST(Scene, FaultsStrikeTheirFrames) {
+  const Scene scene = small_scene("[[fault]]\nkind = \"stall\"\nframe = 5\nframes = 2\n");
+  EXPECT_EQ(scene.fault_at(4), nullptr);
+  ASSERT_NE(scene.fault_at(5), nullptr);
+  EXPECT_EQ(scene.fault_at(6)->kind, FaultKind::stall);
+  EXPECT_EQ(scene.fault_at(7), nullptr);
+}
+
+TEST(Scene, AnotherModeKeepsTheFieldOfView) {
+  const Scene scene = at_mode(default_scene(), 400, 300, 30);
+  EXPECT_EQ(scene.camera.height, 300);
+  EXPECT_EQ(scene.camera.fps, 30);
+  EXPECT_NEAR(scene.camera.mm_per_px, 2 * 0.0413793, 1e-9);
+  EXPECT_THROW((void)at_mode(default_scene(), 0, 300, 30), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace dtact::hal::sim

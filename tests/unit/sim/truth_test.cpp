@@ -1,0 +1,127 @@
+#include "hal/sim/truth.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "tests/unit/sim/small_scene.hpp"
+
+namespace dtact::hal::sim {
+namespace {
+
+float deepest(const Truth& truth, std::uint64_t sequence) {
+  std::vector<float> map;
+  truth.indentation_mm(sequence, map);
+  return *std::max_element(map.begin(), map.end());
+}
+
+TEST(Truth, FollowsTheDepthOverTime) {
+  const Truth truth(small_scene());  // 10 frames a second, down from 1 s to 2 s
+  EXPECT_EQ(deepest(truth, 0), 0);
+  EXPECT_EQ(deepest(truth, 10), 0);
+  EXPECT_NEAR(deepest(truth, 15), 0.5, 0.01);
+  EXPECT_NEAR(deepest(truth, 20), 1.0, 0.01);  // the pixels lie beside the lowest point
+  EXPECT_NEAR(deepest(truth, 5000), 1.0, 0.01);
+}
+
+TEST(Truth, IsPure) {
+  const Truth a(small_scene());
+  const Truth b(small_scene());
+  std::vector<float> forwards;
+  std::vector<float> again;
+  a.indentation_mm(14, forwards);
+  (void)deepest(b, 30);
+  b.indentation_mm(14, again);
+  EXPECT_EQ(forwards, again);
+}
+
+TEST(Truth, IsABallWhereItTouchesAndBulgesOutside) {
+  const Truth truth(small_scene());
+  std::vector<float> map;
+  std::vector<std::uint8_t> contact;
+  truth.indentation_mm(30, map);
+  truth.contact(30, contact);
+  ASSERT_EQ(map.size(), 160U * 120U);
+  ASSERT_EQ(contact.size(), map.size());
+  int touching = 0;
+  float lowest = 0;
+  for (int y = 0; y < 120; ++y) {
+    for (int x = 0; x < 160; ++x) {
+      const auto i = static_cast<std::size_t>(y * 160 + x);
+      lowest = std::min(lowest, map[i]);
+      const double r = std::hypot(x - 79.5, y - 59.5) * 0.2;
+      if (contact[i] == 255 && r < 2) {
+        ++touching;
+        // Sphere of radius 4, 1 mm deep; 0.006 for straight lines between points 0.25 mm apart.
+        ASSERT_NEAR(map[i], 1 - (4 - std::sqrt(16 - r * r)), 0.006);
+      }
+      if (r > 4) {
+        ASSERT_EQ(contact[i], 0);
+      }
+    }
+  }
+  EXPECT_GT(touching, 300);  // π 2² / 0.2² = 314
+  EXPECT_LT(lowest, -0.02F);
+}
+
+TEST(Truth, SolvesAStateOnceForPressAndRelease) {
+  const Scene scene = small_scene(R"(
+[[press]]
+object = "ball"
+radius_mm = 4.0
+keys = [ { t = 1.0 }, { t = 2.0, depth = 0.6 }, { t = 3.0 }, { t = 4.0, depth = 0.0 } ]
+)");
+  EXPECT_EQ(Truth(scene).map_count(), 3U);  // untouched, 0.3 mm, 0.6 mm
+}
+
+TEST(Truth, PlaceAndRotationAreTheSenses) {
+  const Scene scene = small_scene(R"(
+[[press]]
+object = "cylinder"
+radius_mm = 2.0
+length_mm = 10.0
+keys = [ { t = 0.0, x = 4.0, y = -3.0, depth = 0.5, rotation = 45.0 } ]
+)");
+  std::vector<float> map;
+  Truth(scene).indentation_mm(0, map);
+  const auto at = [&](double x_mm, double y_mm) {
+    return map[static_cast<std::size_t>(std::lround(59.5 + y_mm / 0.2) * 160 +
+                                        std::lround(79.5 + x_mm / 0.2))];
+  };
+  EXPECT_GT(at(4, -3), 0.4F);
+  // Clockwise with y downwards: the axis turns from the right towards the lower right.
+  EXPECT_GT(at(4 + 2.5, -3 + 2.5), 0.4F);
+  EXPECT_LT(at(4 + 2.5, -3 - 2.5), 0.05F);
+}
+
+TEST(Truth, BarrelPutsTheBorderFartherOut) {
+  CameraModel camera = small_scene().camera;
+  camera.barrel = 0.25;
+  EXPECT_NEAR(pixel_place(camera, 159, 119).x_mm, 79.5 * 0.2 * 1.25, 1e-9);
+  EXPECT_NEAR(pixel_place(camera, 79.5, 59.5).x_mm, 0, 1e-9);
+  Scene scene = small_scene();
+  scene.camera.barrel = 0.25;
+  EXPECT_GE(-make_grid(scene).x0_mm, 79.5 * 0.2 * 1.25 + 4 * 2.0 - 0.25);
+}
+
+TEST(Truth, TwoObjectsShareTheLayer) {
+  const Scene scene = small_scene(R"(
+[[press]]
+object = "ball"
+radius_mm = 3.0
+keys = [ { t = 0.0, x = -6.0, depth = 0.6 } ]
+[[press]]
+object = "ball"
+radius_mm = 3.0
+keys = [ { t = 0.0, x = 6.0, depth = 0.4 } ]
+)");
+  std::vector<float> map;
+  Truth(scene).indentation_mm(0, map);
+  EXPECT_NEAR(*std::max_element(map.begin() + 59 * 160, map.begin() + 59 * 160 + 80), 0.6, 0.01);
+  EXPECT_NEAR(*std::max_element(map.begin() + 59 * 160 + 80, map.begin() + 60 * 160), 0.4, 0.01);
+}
+
+}  // namespace
+}  // namespace dtact::hal::sim
