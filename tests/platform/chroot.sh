@@ -1,3 +1,4 @@
+# shellcheck shell=bash disable=SC2154
 # Sourced by debian13.sh and arm64.sh: a Debian of its own in a folder, kept from run to run.
 #
 # Each script sets before sourcing:
@@ -13,6 +14,7 @@ source_folder=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 
 # inside COMMAND: runs a shell command in the chroot, with /proc and /sys, which are gone afterwards.
 inside() {
+  # shellcheck disable=SC2016  # the inner shell expands it
   unshare --mount bash -c '
     mount -t proc proc "$1/proc"
     mount --rbind /sys "$1/sys"

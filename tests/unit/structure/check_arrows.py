@@ -27,7 +27,7 @@ ROOMS = {
     "daemon/net": ["hal", "hal/base", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/ws2812"],
     "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net"],
-    "daemon": ["daemon/app"],
+    "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
     "clients/ctl/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration"],
