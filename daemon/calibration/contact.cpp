@@ -123,7 +123,8 @@ Contact find_contact(const DifferenceMap& map, double ball_radius_mm) {
     const double level = map.levels[pixel];
     weight += level;
     contact.col += level * static_cast<double>(pixel % width);
-    contact.row += level * static_cast<double>(pixel / width);
+    const std::size_t row = pixel / width;
+    contact.row += level * static_cast<double>(row);
   }
   contact.col /= weight;
   contact.row /= weight;

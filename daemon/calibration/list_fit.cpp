@@ -110,9 +110,11 @@ double interpolate(const std::vector<Knot>& knots, double level) {
                    (level - below.level) / (above->level - below.level));
 }
 
-/// Step 3, Returns the slope at zero, millimetres a grey level.
-double hand_over(std::vector<Knot>& knots, double sure_level) {
-  const double slope = interpolate(knots, sure_level) / sure_level;
+/// Step 3. Returns the slope at zero, millimetres a grey level: that of the line to the origin, but
+/// within a factor of four of the contact's own, should a lopsided press put the edge at nothing.
+double hand_over(std::vector<Knot>& knots, double sure_level, double line_slope) {
+  const double slope =
+      std::clamp(interpolate(knots, sure_level) / sure_level, line_slope / 4, line_slope * 4);
   for (Knot& knot : knots) {
     if (knot.level >= sure_level) break;
     knot.depth_mm = std::lerp(slope * knot.level, knot.depth_mm, knot.level / sure_level);
@@ -160,7 +162,7 @@ recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
   make_monotone(knots);
 
   const RadialProfile profile = radial_profile(map, contact, kFarField * contact.ball_radius_mm);
-  const double slope = hand_over(knots, profile.at(sure_mm));
+  const double slope = hand_over(knots, std::max(1.0, profile.at(sure_mm)), line.slope);
   const double c = bulge_limit(profile, knots, slope);
   const Knot deepest = knots.back();
   const double faintest = std::ranges::min(
@@ -169,7 +171,6 @@ recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
   recon::DepthList list;
   constexpr int kStep = recon::kEntriesPerLevel;
   list.first_q6 = kListFirstLevel * kStep;
-  list.um.reserve(static_cast<std::size_t>((kListLastLevel - kListFirstLevel) * kStep + 1));
   for (int q6 = kListFirstLevel * kStep; q6 <= kListLastLevel * kStep; ++q6) {
     const double level = static_cast<double>(q6) / kStep;
     double mm = 0;

@@ -50,7 +50,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
 }
 
 void CaptureLoop::restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light) {
-  keeper_.restore(reference_q8, light == config_.light);
+  keeper_.restore(reference_q8, light == config_.light, light.leds == config_.light.leds);
 }
 
 void CaptureLoop::run() noexcept {
@@ -84,7 +84,7 @@ void CaptureLoop::take_notes() noexcept {
   while (light_.next_note(note)) {
     // Rewriting what is shown anyway leaves the reference as good as it was.
     if (note.light != shown_) {
-      keeper_.light_changed(contact_.touching());
+      keeper_.light_changed(contact_.touching(), note.light.leds == shown_.leds);
       shown_ = note.light;
     }
     if (note.begins) {

@@ -38,8 +38,8 @@ class ReferenceKeeper {
   ReferenceKeeper(int width, int height, const ReferenceRules& rules);
 
   /// The last good reference of an earlier run (Q8, frame sized). `same_light`: made under the
-  /// light of now.
-  void restore(std::span<const std::uint16_t> reference_q8, bool same_light);
+  /// light of now; `same_shape`: under the same colours, whatever the brightness.
+  void restore(std::span<const std::uint16_t> reference_q8, bool same_light, bool same_shape);
   /// What the calibration knows; the span and the grid must outlive their use here. A fresh
   /// reference stays, whatever else is known is forgotten and the sequence begins again.
   void use_calibration(std::span<const std::uint16_t> reference_q8, const LumaGrid& grid,
@@ -47,8 +47,8 @@ class ReferenceKeeper {
   /// The camera has (re)started: begins the sequence.
   void begin() noexcept;
   /// The light is about to change or has just changed: no depth until the next reference.
-  /// `touching`: what the depth said last.
-  void light_changed(bool touching) noexcept;
+  /// `touching`: what the depth said last; `same_shape`: only the brightness changes.
+  void light_changed(bool touching, bool same_shape) noexcept;
   /// Asks for the present image as reference. An answer means that it is refused at once, else it
   /// comes out of step().
   [[nodiscard]] std::optional<RezeroResult> rezero(bool force, bool touching) noexcept;
@@ -105,6 +105,7 @@ class ReferenceKeeper {
   bool averaging_ = false;         // while holding: a new reference is being gathered
   bool untouched_before_ = false;  // nothing touched right before the light changed
   bool other_light_ = false;       // than what is known was made under
+  bool same_shape_ = true;         // the light differs from it by a factor only
   bool forced_ = false;
   std::optional<Rezero> request_;
   int waited_ = 0;   // frames since the sequence or the average began

@@ -6,7 +6,7 @@
 namespace dtact::pipeline {
 namespace {
 
-constexpr int kDegree = 4;
+constexpr int kDegree = TouchCheck::kAnyShape;
 constexpr int kRounds = 8;
 /// Below this no residual counts as disagreement: noise of a cell and its quantisation.
 constexpr double kLeastScaleGrey = 0.3;
@@ -42,30 +42,32 @@ TouchCheck::TouchCheck() : basis_(kGridCells) {
       const auto u = chebyshev(2.0 * (x + 0.5) / kGridWidth - 1);
       std::size_t term = 0;
       Terms& terms = basis_[cell_at(x, y)];
-      for (std::size_t i = 0; i <= kDegree; ++i) {
-        for (std::size_t j = 0; i + j <= kDegree; ++j) terms[term++] = u[i] * v[j];
+      // By degree, so that a lower one uses the first terms only.
+      for (std::size_t degree = 0; degree <= kDegree; ++degree) {
+        for (std::size_t i = 0; i <= degree; ++i) terms[term++] = u[i] * v[degree - i];
       }
     }
   }
 }
 
 TouchCheck::Terms TouchCheck::solve(const LumaGrid& then, const LumaGrid& now,
-                                    const CellRegion& region) const noexcept {
+                                    const CellRegion& region, int count) const noexcept {
   // Weighted normal equations, lower triangle, then Cholesky. The small diagonal keeps a region
   // that does not determine every term solvable.
+  const auto terms = static_cast<std::size_t>(count);
   std::array<Terms, kTerms> a{};
   Terms b{};
   for_cells(region, [&](std::size_t cell) {
     const double light = then.cells[cell];
     const double weight = weight_[cell] * light;
-    for (std::size_t i = 0; i < kTerms; ++i) {
+    for (std::size_t i = 0; i < terms; ++i) {
       const double scaled = weight * basis_[cell][i];
       b[i] += scaled * now.cells[cell];
       for (std::size_t j = 0; j <= i; ++j) a[i][j] += scaled * light * basis_[cell][j];
     }
   });
   const double ridge = 1e-9 * a[0][0] + 1e-9;
-  for (std::size_t i = 0; i < kTerms; ++i) {
+  for (std::size_t i = 0; i < terms; ++i) {
     a[i][i] += ridge;
     for (std::size_t j = 0; j <= i; ++j) {
       double sum = a[i][j];
@@ -73,12 +75,12 @@ TouchCheck::Terms TouchCheck::solve(const LumaGrid& then, const LumaGrid& now,
       a[i][j] = i == j ? std::sqrt(std::max(sum, ridge)) : sum / a[j][j];
     }
   }
-  for (std::size_t i = 0; i < kTerms; ++i) {
+  for (std::size_t i = 0; i < terms; ++i) {
     for (std::size_t k = 0; k < i; ++k) b[i] -= a[i][k] * b[k];
     b[i] /= a[i][i];
   }
-  for (std::size_t i = kTerms; i-- > 0;) {
-    for (std::size_t k = i + 1; k < kTerms; ++k) b[i] -= a[k][i] * b[k];
+  for (std::size_t i = terms; i-- > 0;) {
+    for (std::size_t k = i + 1; k < terms; ++k) b[i] -= a[k][i] * b[k];
     b[i] /= a[i][i];
   }
   return b;
@@ -106,7 +108,7 @@ void TouchCheck::reweigh(const LumaGrid& then, const LumaGrid& now, const CellRe
 }
 
 TouchVerdict TouchCheck::compare(const LumaGrid& then, const LumaGrid& now,
-                                 const CellRegion& region, LightField& field) noexcept {
+                                 const CellRegion& region, int degree, LightField& field) noexcept {
   // Start from the median ratio, which a press on less than half the field cannot move far.
   std::size_t count = 0;
   for_cells(region, [&](std::size_t cell) {
@@ -119,9 +121,10 @@ TouchVerdict TouchCheck::compare(const LumaGrid& then, const LumaGrid& now,
                      scratch_.begin() + static_cast<std::ptrdiff_t>(count));
     terms[0] = *middle;
   }
+  const int terms_of_degree = (degree + 1) * (degree + 2) / 2;
   for (int round = 0; round < kRounds; ++round) {
     reweigh(then, now, region, terms);
-    terms = solve(then, now, region);
+    terms = solve(then, now, region, terms_of_degree);
   }
 
   for (std::size_t cell = 0; cell < kGridCells; ++cell) {

@@ -25,24 +25,31 @@ struct TouchVerdict {
 
 /// Tells a press from a change of light, without depth: light and drift multiply the image by a
 /// field that is smooth and wide, a press darkens a compact spot and brightens the ring around it.
-/// The field is a polynomial of degree 4 in both directions, fitted with weights that fall off for
-/// cells that disagree (Geman–McClure), so that a press does not pull it.
+/// The field is a polynomial, fitted with weights that fall off for cells that disagree
+/// (Geman–McClure), so that a press does not pull it far.
 class TouchCheck {
  public:
   TouchCheck();
 
+  /// Degrees of the field. A dimmed ring and drift need one number; another set of LEDs needs a
+  /// shape, which also bends a little after what touches: on the simulated sensor, under a ball
+  /// pressed 1 mm, by up to 3 % or 0.15 mm.
+  static constexpr int kSameShape = 0;
+  static constexpr int kAnyShape = 4;
+
   /// Compares within `region` only (the calibrated part: beyond it may lie the housing). `field`
-  /// receives the fitted light for all cells, 1/16 … 16. Takes about a millisecond and does not
-  /// allocate.
+  /// receives the fitted light for all cells, 1/16 … 16. Takes up to half a millisecond and does
+  /// not allocate.
   [[nodiscard]] TouchVerdict compare(const LumaGrid& then, const LumaGrid& now,
-                                     const CellRegion& region, LightField& field) noexcept;
+                                     const CellRegion& region, int degree,
+                                     LightField& field) noexcept;
 
  private:
   static constexpr int kTerms = 15;
   using Terms = std::array<double, kTerms>;
 
-  [[nodiscard]] Terms solve(const LumaGrid& then, const LumaGrid& now,
-                            const CellRegion& region) const noexcept;
+  [[nodiscard]] Terms solve(const LumaGrid& then, const LumaGrid& now, const CellRegion& region,
+                            int count) const noexcept;
   void reweigh(const LumaGrid& then, const LumaGrid& now, const CellRegion& region,
                const Terms& terms) noexcept;
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 
@@ -50,7 +51,7 @@ image::Grey16 ImageSet::mean_q8() const {
   for (std::size_t i = 0; i < mean.pixels.size(); ++i) {
     double sum = 0;
     for (const image::Grey16& wide : images) sum += wide.pixels[i];
-    mean.pixels[i] = static_cast<std::uint16_t>(sum * 256 / divisor + 0.5);
+    mean.pixels[i] = static_cast<std::uint16_t>(std::lround(sum * 256 / divisor));
   }
   return mean;
 }

@@ -31,7 +31,9 @@ TEST(Drawing, TextIsAsWideAsItSays) {
   draw_text(image, 0, 0, "8888", kBlack);
   for (int y = 0; y < image.height; ++y) {
     for (int x = text_width("8888"); x < image.width; ++x) {
-      ASSERT_EQ(image.pixels[static_cast<std::size_t>(3 * (y * image.width + x))], 255);
+      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +
+                         static_cast<std::size_t>(x);
+      ASSERT_EQ(image.pixels[3 * pixel], 255);
     }
   }
   EXPECT_EQ(black(image), 4L * 17 * 4) << "an 8 has 17 dots of 2 x 2 pixels";

@@ -86,7 +86,7 @@ TEST_F(KeeperTest, WaitsWhileTheLightWarmsUp) {
 
 TEST_F(KeeperTest, TouchedAtStartUsesTheLastGoodOne) {
   const ToyScene yesterday{.light = 0.97};  // drift since
-  keeper.restore(fakes::toy_reference_q8(yesterday), true);
+  keeper.restore(fakes::toy_reference_q8(yesterday), true, true);
   calibrate();
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
@@ -109,7 +109,7 @@ TEST_F(KeeperTest, TouchedAtStartWithoutOneScalesTheCalibrations) {
 }
 
 TEST_F(KeeperTest, ALastGoodOneFromAnotherLightIsStale) {
-  keeper.restore(fakes::toy_reference_q8({.light = 0.6}), false);
+  keeper.restore(fakes::toy_reference_q8({.light = 0.6}), false, true);
   calibrate();
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
@@ -183,7 +183,7 @@ TEST_F(KeeperTest, RezeroOfAMovingImageIsRefused) {
 TEST_F(KeeperTest, ALightChangeWithoutContactTakesANewOne) {
   calibrate();
   ASSERT_TRUE(run(40));
-  keeper.light_changed(false);
+  keeper.light_changed(false, false);
   EXPECT_FALSE(keeper.ready());
   EXPECT_FALSE(keeper.starting());
   scene.light = 0.5;
@@ -197,7 +197,7 @@ TEST_F(KeeperTest, ALightChangeUnderContactScalesAndWaits) {
   calibrate();
   ASSERT_TRUE(run(40));
   scene.press_mm = 1;
-  keeper.light_changed(true);
+  keeper.light_changed(true, true);
   scene.light = 0.5;
   ASSERT_TRUE(run(40));
   EXPECT_EQ(keeper.footing(), Footing::stale);
@@ -217,7 +217,7 @@ TEST_F(KeeperTest, ALongPressIsNeverAbsorbed) {
 TEST_F(KeeperTest, InTheDarkThereIsNoReference) {
   calibrate();
   ASSERT_TRUE(run(40));
-  keeper.light_changed(false);
+  keeper.light_changed(false, true);
   scene.light = 0;
   EXPECT_FALSE(run(150));
   EXPECT_EQ(keeper.state(), State::settling);
@@ -249,7 +249,7 @@ TEST_F(KeeperTest, ANewCalibrationKeepsAFreshReference) {
 
 TEST_F(KeeperTest, RefusesWhatCannotWork) {
   EXPECT_THROW(ReferenceKeeper(79, 60, rules()), std::invalid_argument);
-  EXPECT_THROW(keeper.restore(std::vector<std::uint16_t>(5), true), std::invalid_argument);
+  EXPECT_THROW(keeper.restore(std::vector<std::uint16_t>(5), true, true), std::invalid_argument);
 }
 
 }  // namespace

@@ -95,7 +95,7 @@ class TouchTest : public ::testing::Test {
     return grid;
   }
   float darkening(const ToyScene& now) {
-    return check.compare(grid_of({}), grid_of(now), region, field).darkening;
+    return check.compare(grid_of({}), grid_of(now), region, TouchCheck::kAnyShape, field).darkening;
   }
   TouchCheck check;
   LightField field{};
@@ -119,6 +119,13 @@ TEST_F(TouchTest, TheFitSeesTheLightThroughAPress) {
   (void)darkening({.light = 0.5, .press_mm = 1.5});
   EXPECT_NEAR(field[15 * kGridWidth + 20], 0.5, 0.02);  // under the press
   EXPECT_NEAR(field[5 * kGridWidth + 5], 0.5, 0.01);
+}
+
+TEST_F(TouchTest, OneNumberSeesADimmedRingThroughALargePress) {
+  const LumaGrid now = grid_of({.light = 0.5, .press_mm = 1.5});
+  (void)check.compare(grid_of({}), now, region, TouchCheck::kSameShape, field);
+  EXPECT_NEAR(field[15 * kGridWidth + 20], 0.5, 0.003);
+  EXPECT_EQ(field[15 * kGridWidth + 20], field[0]);
 }
 
 TEST_F(TouchTest, RelightingBringsAReferenceToTheLightOfNow) {
@@ -161,7 +168,8 @@ TEST_P(RealTouch, IsToldFromDrift) {
   LightField field{};
   // The published crop of 460×345 pixels about the middle, in cells of 16 pixels.
   const CellRegion crop{.x0 = 7, .y0 = 5, .x1 = 34, .y1 = 25};
-  const TouchVerdict verdict = check.compare(load(pair.then), load(pair.now), crop, field);
+  const TouchVerdict verdict =
+      check.compare(load(pair.then), load(pair.now), crop, TouchCheck::kAnyShape, field);
   RecordProperty("darkening", std::to_string(verdict.darkening));
   if (pair.touched) {
     EXPECT_GT(verdict.darkening, 0.04F);
