@@ -14,7 +14,8 @@ struct CameraControl {
   std::string name;        ///< "exposure_absolute", ...
   std::int64_t value = 0;  ///< In the camera's own unit, as read back.
   bool locked = false;     ///< Manual and equal to what was asked for.
-  std::string note{};  ///< When not locked: what the camera refused. Else what to know, or empty.
+  std::string note =
+      {};  ///< When not locked: what the camera refused. Else what to know, or empty.
 };
 
 /// Who the camera is and how it runs. Size and rate are fixed from construction on; the other

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -22,6 +23,29 @@ struct ReplayConfig {
   bool paced = true;  ///< false: as fast as they are asked for.
 };
 
+/// The photometric controls that V4l2Config::controls may name.
+inline constexpr std::array kV4l2Controls{"auto_exposure",
+                                          "exposure_dynamic_framerate",
+                                          "gain_automatic",
+                                          "white_balance_automatic",
+                                          "focus_automatic_continuous",
+                                          "power_line_frequency",
+                                          "backlight_compensation",
+                                          "exposure_time_absolute",
+                                          "gain",
+                                          "white_balance_temperature",
+                                          "focus_absolute",
+                                          "gamma",
+                                          "contrast",
+                                          "brightness",
+                                          "saturation",
+                                          "hue",
+                                          "sharpness"};
+/// Those that LibcameraConfig::controls may name.
+inline constexpr std::array kLibcameraControls{"auto_exposure", "auto_white_balance", "auto_focus",
+                                               "analogue_gain", "lens_position",      "brightness",
+                                               "contrast",      "saturation",         "sharpness"};
+
 /// A camera behind a V4L2 driver, as USB cameras are.
 struct V4l2Config {
   /// Which camera: a path below /dev/v4l/by-path or by-id, "serial:NUMBER", "bus:NAME" (the
@@ -38,6 +62,18 @@ struct V4l2Config {
   std::map<std::string, std::int64_t> controls;
 };
 
+/// A camera reached by libcamera, as CSI cameras are.
+struct LibcameraConfig {
+  std::string device;  ///< libcamera's id of the camera. Empty = the only camera attached.
+  std::string pixel_format = "auto";  ///< "auto", "grey", "nv12", "yuv420", "yuyv" or "mjpeg".
+  double exposure_us = 0;             ///< 0 = the camera's default.
+  int exposure_pwm_periods = 0;       ///< As V4l2Config's.
+  double pwm_hz = 0;                  ///< As V4l2Config's.
+  /// "analogue_gain", "brightness", ... in libcamera's units. What is not named is locked at the
+  /// camera's default.
+  std::map<std::string, double> controls;
+};
+
 struct CameraConfig {
   std::string backend = "sim";  ///< A name the registry knows.
   int width = 800;              ///< Pixels.
@@ -46,6 +82,7 @@ struct CameraConfig {
   SimConfig sim;
   ReplayConfig replay;
   V4l2Config v4l2;
+  LibcameraConfig libcamera;
 };
 
 /// One line of a GPIO chip.

@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 
+#include "hal/libcamera/libcamera_camera.hpp"
 #include "hal/null/null_camera.hpp"
 #include "hal/null/null_ring.hpp"
 #include "hal/replay/replay_camera.hpp"
@@ -15,7 +16,7 @@
 
 namespace dtact::hal {
 
-std::vector<std::string> camera_backends() { return {"null", "replay", "sim", "v4l2"}; }
+std::vector<std::string> camera_backends() { return {"null", "replay", "sim", "v4l2", "libcamera"}; }
 std::vector<std::string> ring_backends() { return {"null", "sim", "ws2812_gpio", "ws2812_spi"}; }
 
 Devices open_devices(const Config& config) {
@@ -44,6 +45,8 @@ Devices open_devices(const Config& config) {
     devices.camera = std::make_unique<sim::SimCamera>(config.camera, light);
   } else if (config.camera.backend == "v4l2") {
     devices.camera = std::make_unique<v4l2::V4l2Camera>(config.camera);
+  } else if (config.camera.backend == "libcamera") {
+    devices.camera = libcamera_backend::make_camera(config.camera);
   } else {
     throw std::runtime_error(fmt::format("camera.backend = \"{}\": allowed are {}",
                                          config.camera.backend,

@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <optional>
 #include <sstream>
+#include <type_traits>
 
 #include "daemon/net/light_schemes.hpp"
 #include "hal/registry.hpp"
@@ -142,6 +145,57 @@ Key milliseconds(std::string path, std::chrono::milliseconds& field, std::int64_
           [&field] { return fmt::format("{}", field.count()); }};
 }
 
+/// An entry of a table of controls: a number, or "default" for none.
+template <typename Number>
+Key control(const std::string& table, const char* name, std::map<std::string, Number>& controls) {
+  return {fmt::format("{}.{}", table, name), "a number in the camera's own units, or \"default\"",
+          [&controls, name](const toml::node& node, const fs::path&) {
+            if (node.value_exact<std::string>() == "default") {
+              controls.erase(name);
+              return true;
+            }
+            const bool fits = std::is_integral_v<Number> ? node.is_integer() : node.is_number();
+            if (fits) controls[name] = *node.value<Number>();
+            return fits;
+          },
+          [&controls, name] {
+            const auto it = controls.find(name);
+            return it == controls.end() ? "\"default\"" : fmt::format("{}", it->second);
+          }};
+}
+
+constexpr const char* kPwmUnit = "(Hz, 0 = not known)";
+constexpr const char* kExposureUnit = "(microseconds, 0 = the camera's default)";
+constexpr const char* kPeriodsUnit = "(periods, 0 = not used)";
+
+void append_v4l2(hal::V4l2Config& c, std::vector<Key>& keys) {
+  keys.push_back(text("camera.v4l2.device", c.device,
+                      "a path below /dev, \"serial:NUMBER\", \"bus:NAME\", or \"\""));
+  keys.push_back(choice("camera.v4l2.pixel_format", c.pixel_format,
+                        {"auto", "grey", "nv12", "yuyv", "mjpeg"}));
+  keys.push_back(choice("camera.v4l2.range", c.range, {"auto", "full", "limited"}));
+  keys.push_back(real("camera.v4l2.exposure_us", c.exposure_us, 0, 1e6, kExposureUnit));
+  keys.push_back(
+      integer("camera.v4l2.exposure_pwm_periods", c.exposure_pwm_periods, 0, 1000, kPeriodsUnit));
+  keys.push_back(real("camera.v4l2.pwm_hz", c.pwm_hz, 0, 1e5, kPwmUnit));
+  for (const char* name : hal::kV4l2Controls) {
+    keys.push_back(control("camera.v4l2.controls", name, c.controls));
+  }
+}
+
+void append_libcamera(hal::LibcameraConfig& c, std::vector<Key>& keys) {
+  keys.push_back(text("camera.libcamera.device", c.device, "libcamera's id of a camera, or \"\""));
+  keys.push_back(choice("camera.libcamera.pixel_format", c.pixel_format,
+                        {"auto", "grey", "nv12", "yuv420", "yuyv", "mjpeg"}));
+  keys.push_back(real("camera.libcamera.exposure_us", c.exposure_us, 0, 1e6, kExposureUnit));
+  keys.push_back(integer("camera.libcamera.exposure_pwm_periods", c.exposure_pwm_periods, 0, 1000,
+                         kPeriodsUnit));
+  keys.push_back(real("camera.libcamera.pwm_hz", c.pwm_hz, 0, 1e5, kPwmUnit));
+  for (const char* name : hal::kLibcameraControls) {
+    keys.push_back(control("camera.libcamera.controls", name, c.controls));
+  }
+}
+
 /// LEDs by the name of a scheme.
 Key scheme(std::string path, std::string& field) {
   return {std::move(path), fmt::format("one of {}", net::scheme_names()),
@@ -161,7 +215,7 @@ std::vector<Key> bind_keys(Config& c) {
   hal::CameraConfig& camera = c.hal.camera;
   hal::Ws2812Config& ws2812 = c.hal.ring.ws2812;
   pipeline::PipelineConfig& p = c.pipeline;
-  return {
+  std::vector<Key> keys{
       choice("log_level", c.log_level, {"trace", "debug", "info", "warn", "error"}),
       path("calibration", c.calibration, "a folder with calibration.toml, or \"\""),
       path("state_dir", c.state_dir, "a folder, or \"\""),
@@ -177,7 +231,10 @@ std::vector<Key> bind_keys(Config& c) {
       path("camera.replay.folder", camera.replay.folder, "a folder with PNG or JPEG frames"),
       boolean("camera.replay.loop", camera.replay.loop),
       boolean("camera.replay.paced", camera.replay.paced),
-
+  };
+  append_v4l2(camera.v4l2, keys);
+  append_libcamera(camera.libcamera, keys);
+  std::vector<Key> rest{
       choice("ring.backend", c.hal.ring.backend, hal::ring_backends()),
       integer("ring.brightness", p.light.brightness, 0, 255, ""),
       scheme("ring.scheme", c.ring_scheme),
@@ -223,6 +280,9 @@ std::vector<Key> bind_keys(Config& c) {
       milliseconds("net.hello_timeout_ms", c.net.hello_timeout, 100, 600000),
       milliseconds("net.dead_after_ms", c.net.dead_after, 1000, 600000),
   };
+  keys.insert(keys.end(), std::make_move_iterator(rest.begin()),
+              std::make_move_iterator(rest.end()));
+  return keys;
 }
 
 }  // namespace dtact::app

@@ -371,9 +371,12 @@ void LiveCamera::watch_controls() noexcept {
       std::vector<CameraControl> controls = info_.controls;
       guard.unlock();
       std::string moved = held->source->check_controls(controls);
+      const Connection* checked = held.get();
       held.reset();  // may close the device: not under the mutex
       guard.lock();
+      const bool same = checked == connection_.get();
       moved_ = std::move(moved);
+      if (same) info_.controls = std::move(controls);
     } catch (const std::exception&) {
       if (!guard.owns_lock()) guard.lock();  // no memory; tried again in a second
     }

@@ -63,11 +63,6 @@ void list_sizes(int fd, std::uint32_t fourcc, std::vector<Mode>& modes) {
   }
 }
 
-std::string name_of(std::uint32_t fourcc) {
-  const PixelFormat* format = find_format(fourcc);
-  return format != nullptr ? format->name : fourcc_text(fourcc);
-}
-
 }  // namespace
 
 const std::vector<PixelFormat>& supported_formats() {
@@ -94,6 +89,11 @@ void check_pixel_format(const std::string& key) {
   }
   throw std::runtime_error(fmt::format(
       "camera.v4l2.pixel_format = \"{}\": allowed are auto, grey, nv12, yuyv, mjpeg", key));
+}
+
+std::string Mode::format_name() const {
+  const PixelFormat* format = find_format(fourcc);
+  return format != nullptr ? format->name : fourcc_text(fourcc);
 }
 
 bool Mode::offers(int w, int h, double rate) const noexcept {
@@ -139,7 +139,7 @@ std::string describe(const std::vector<Mode>& modes) {
   std::string text;
   for (const Mode& mode : modes) {
     if (!text.empty()) text += "; ";
-    text += name_of(mode.fourcc) + " ";
+    text += mode.format_name() + " ";
     if (mode.min_width != mode.width)
       text += fmt::format("{}x{}...", mode.min_width, mode.min_height);
     text += fmt::format("{}x{}", mode.width, mode.height);

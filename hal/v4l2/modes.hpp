@@ -35,6 +35,9 @@ struct Mode {
   std::vector<double> fps;    ///< Frames a second, highest first. Empty: the driver doesn't say.
   bool fps_is_range = false;  ///< `fps` is the highest and the lowest of a range.
 
+  /// As in CameraInfo, or the four letters of a format that the HAL cannot read.
+  [[nodiscard]] std::string format_name() const;
+  [[nodiscard]] bool usable() const noexcept { return find_format(fourcc) != nullptr; }
   [[nodiscard]] bool offers(int w, int h, double rate) const noexcept;
 };
 

@@ -11,6 +11,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "hal/live/exposure.hpp"
 #include "hal/v4l2/ioctl.hpp"
 
 namespace dtact::hal::v4l2 {
@@ -121,7 +122,9 @@ std::vector<OfferedControl> list_controls(int fd) {
 }
 
 PhotometricLock::PhotometricLock(const V4l2Config& config)
-    : config_(config), exposure_us_(config.exposure_us) {
+    : config_(config),
+      exposure_us_(live::exposure_us("camera.v4l2", config.exposure_us, config.exposure_pwm_periods,
+                                     config.pwm_hz)) {
   for (const auto& [name, value] : config.controls) {
     if (find(name) == nullptr) {
       std::string names;
@@ -131,25 +134,11 @@ PhotometricLock::PhotometricLock(const V4l2Config& config)
           "camera.v4l2.controls.{}: not a control of the lock; allowed are {}", name, names));
     }
   }
-  if (config.exposure_us < 0) {
+  if (exposure_us_ > 0 && config.controls.contains(kExposure)) {
     throw std::runtime_error(
-        "camera.v4l2.exposure_us must be positive, or 0 for the camera's default");
+        "camera.v4l2: give the exposure by exposure_us, by exposure_pwm_periods or by "
+        "controls.exposure_time_absolute, not by several");
   }
-  if (config.exposure_pwm_periods < 0) {
-    throw std::runtime_error("camera.v4l2.exposure_pwm_periods must be positive, or 0");
-  }
-  const bool in_periods = config.exposure_pwm_periods > 0;
-  if (int{in_periods} + int{config.exposure_us > 0} + int(config.controls.count(kExposure)) > 1) {
-    throw std::runtime_error(
-        "camera.v4l2: give one of exposure_us, exposure_pwm_periods and "
-        "controls.exposure_time_absolute, not several");
-  }
-  if (in_periods && !(config.pwm_hz > 0)) {
-    throw std::runtime_error(
-        "camera.v4l2.exposure_pwm_periods needs camera.v4l2.pwm_hz, the LEDs' PWM frequency "
-        "(about 430 Hz for old WS2812B, 2000 Hz for new ones)");
-  }
-  if (in_periods) exposure_us_ = config.exposure_pwm_periods * 1e6 / config.pwm_hz;
 }
 
 std::vector<CameraControl> PhotometricLock::apply(int fd) const {
@@ -171,12 +160,9 @@ std::vector<CameraControl> PhotometricLock::apply(int fd) const {
     if (configured != config_.controls.end()) value = configured->second;
     if (exposure) value = std::max<std::int64_t>(1, std::llround(exposure_us_ / kExposureUnitUs));
     controls.push_back(lock(fd, control, *offered, value));
-    const double rounded_us = static_cast<double>(value) * kExposureUnitUs;
-    // An exposure that misses whole PWM periods by a hundredth leaves bands of about that depth.
-    if (exposure && controls.back().locked &&
-        std::abs(rounded_us - exposure_us_) > 0.01 * exposure_us_) {
-      controls.back().note = fmt::format("{:.0f} us is the nearest this camera has to {:.1f} us",
-                                         rounded_us, exposure_us_);
+    if (exposure && controls.back().locked) {
+      controls.back().note =
+          live::rounding_note(exposure_us_, static_cast<double>(value) * kExposureUnitUs);
     }
   }
   return controls;

@@ -42,9 +42,19 @@ TEST(PhotometricLock, RefusesImpossibleConfigurations) {
   c.pwm_hz = 2000;
   EXPECT_EQ(error_of(c), "");
   c.exposure_us = 1000;
+  EXPECT_EQ(error_of(c), "camera.v4l2: give exposure_us or exposure_pwm_periods, not both");
+  c = {};
+  c.exposure_us = 1000;
+  c.controls["exposure_time_absolute"] = 10;
   EXPECT_EQ(error_of(c),
-            "camera.v4l2: give one of exposure_us, exposure_pwm_periods and "
-            "controls.exposure_time_absolute, not several");
+            "camera.v4l2: give the exposure by exposure_us, by exposure_pwm_periods or by "
+            "controls.exposure_time_absolute, not by several");
+}
+
+TEST(PhotometricLock, KnowsEveryControlThatMayBeConfigured) {
+  V4l2Config c;
+  for (const char* name : kV4l2Controls) c.controls[name] = 1;
+  EXPECT_EQ(error_of(c), "");
 }
 
 TEST(PhotometricLock, ExposesForWholePwmPeriods) {
