@@ -14,9 +14,12 @@ struct CameraControl {
   std::string name;        ///< "exposure_absolute", ...
   std::int64_t value = 0;  ///< In the camera's own unit, as read back.
   bool locked = false;     ///< Manual and equal to what was asked for.
+  std::string note =
+      {};  ///< When not locked: what the camera refused. Else what to know, or empty.
 };
 
-/// Who the camera is and how it runs. Fixed from construction on.
+/// Who the camera is and how it runs. Size and rate are fixed from construction on; the other
+/// fields are those of the device last attached.
 struct CameraInfo {
   std::string backend;       ///< "null", "sim", "replay", ...
   std::string identity;      ///< Stable name: by-path, serial, scene file, folder.
@@ -32,6 +35,14 @@ struct CameraInfo {
 
 enum class CameraState : std::uint8_t { streaming, stalled, unplugged, busy, denied, ended };
 
+/// Why payloads were damaged.
+struct DamageCounts {
+  std::uint64_t flagged = 0;      ///< The driver marked the buffer (V4L2_BUF_FLAG_ERROR).
+  std::uint64_t markers = 0;      ///< A JPEG without its first or last marker.
+  std::uint64_t too_short = 0;    ///< Fewer bytes than the image has.
+  std::uint64_t undecodable = 0;  ///< Whole, but broken inside or another size.
+};
+
 /// Run-time condition of a camera. Any thread may ask.
 struct CameraReport {
   CameraState state = CameraState::streaming;
@@ -40,7 +51,11 @@ struct CameraReport {
   std::uint64_t lost = 0;         ///< Gaps in the sequence.
   std::uint64_t skipped = 0;      ///< Whole frames passed over for a newer one.
   std::uint64_t damaged = 0;      ///< Truncated or undecodable payloads.
+  DamageCounts damage;            ///< The same by cause.
   std::uint64_t disconnects = 0;  ///< Times the device went away.
+  /// Controls that moved by themselves within the last seconds, and were set again; empty when
+  /// none.
+  std::string moved;
 };
 
 enum class GrabStatus : std::uint8_t {

@@ -5,16 +5,19 @@
 
 #include <stdexcept>
 
+#include "hal/libcamera/libcamera_camera.hpp"
 #include "hal/null/null_camera.hpp"
 #include "hal/null/null_ring.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_ring.hpp"
+#include "hal/v4l2/v4l2_camera.hpp"
+#include "hal/ws2812/ring.hpp"
 
 namespace dtact::hal {
 
-std::vector<std::string> camera_backends() { return {"null", "replay", "sim"}; }
-std::vector<std::string> ring_backends() { return {"null", "sim"}; }
+std::vector<std::string> camera_backends() { return {"null", "replay", "sim", "v4l2", "libcamera"}; }
+std::vector<std::string> ring_backends() { return {"null", "sim", "ws2812_gpio", "ws2812_spi"}; }
 
 Devices open_devices(const Config& config) {
   // The one thing camera and ring share is the light in the simulated sensor.
@@ -25,6 +28,10 @@ Devices open_devices(const Config& config) {
     devices.ring = std::make_unique<null::NullRing>();
   } else if (config.ring.backend == "sim") {
     devices.ring = std::make_unique<sim::SimRing>(light);
+  } else if (config.ring.backend == "ws2812_gpio") {
+    devices.ring = ws2812::open_gpio_ring(config.ring.ws2812);
+  } else if (config.ring.backend == "ws2812_spi") {
+    devices.ring = ws2812::open_spi_ring(config.ring.ws2812);
   } else {
     throw std::runtime_error(fmt::format("ring.backend = \"{}\": allowed are {}",
                                          config.ring.backend, fmt::join(ring_backends(), ", ")));
@@ -36,6 +43,10 @@ Devices open_devices(const Config& config) {
     devices.camera = std::make_unique<replay::ReplayCamera>(config.camera);
   } else if (config.camera.backend == "sim") {
     devices.camera = std::make_unique<sim::SimCamera>(config.camera, light);
+  } else if (config.camera.backend == "v4l2") {
+    devices.camera = std::make_unique<v4l2::V4l2Camera>(config.camera);
+  } else if (config.camera.backend == "libcamera") {
+    devices.camera = libcamera_backend::make_camera(config.camera);
   } else {
     throw std::runtime_error(fmt::format("camera.backend = \"{}\": allowed are {}",
                                          config.camera.backend,

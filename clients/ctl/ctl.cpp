@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "clients/cpp/errors.hpp"
+#include "clients/ctl/cameras.hpp"
 #include "clients/ctl/exit_codes.hpp"
 #include "clients/ctl/offline/offline.hpp"
 #include "clients/ctl/online.hpp"
@@ -51,6 +52,7 @@ int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostre
   add_rezero(app, context);
   add_calibration(app, context);
   add_snapshot(app, context);
+  add_cameras(app, context);
   add_offline_commands(app);
 
   const auto fail = [&](const std::exception& e, ExitCode code) {

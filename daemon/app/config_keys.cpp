@@ -5,9 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <optional>
 #include <sstream>
+#include <type_traits>
 
 #include "daemon/net/light_schemes.hpp"
 #include "hal/registry.hpp"
@@ -33,6 +36,20 @@ Key integer(std::string path, Integer& field, std::int64_t least, std::int64_t m
             const auto value = node.value_exact<std::int64_t>();
             if (!value || *value < least || *value > most) return false;
             field = static_cast<Integer>(*value);
+            return true;
+          },
+          [&field] { return fmt::format("{}", field); }};
+}
+
+Key one_of(std::string path, int& field, std::vector<std::int64_t> allowed) {
+  const std::string words = fmt::format("one of {}", fmt::join(allowed, ", "));
+  return {std::move(path), words,
+          [&field, allowed = std::move(allowed)](const toml::node& node, const fs::path&) {
+            const auto value = node.value_exact<std::int64_t>();
+            if (!value || std::find(allowed.begin(), allowed.end(), *value) == allowed.end()) {
+              return false;
+            }
+            field = static_cast<int>(*value);
             return true;
           },
           [&field] { return fmt::format("{}", field); }};
@@ -128,6 +145,57 @@ Key milliseconds(std::string path, std::chrono::milliseconds& field, std::int64_
           [&field] { return fmt::format("{}", field.count()); }};
 }
 
+/// An entry of a table of controls: a number, or "default" for none.
+template <typename Number>
+Key control(const std::string& table, const char* name, std::map<std::string, Number>& controls) {
+  return {fmt::format("{}.{}", table, name), "a number in the camera's own units, or \"default\"",
+          [&controls, name](const toml::node& node, const fs::path&) {
+            if (node.value_exact<std::string>() == "default") {
+              controls.erase(name);
+              return true;
+            }
+            const bool fits = std::is_integral_v<Number> ? node.is_integer() : node.is_number();
+            if (fits) controls[name] = *node.value<Number>();
+            return fits;
+          },
+          [&controls, name] {
+            const auto it = controls.find(name);
+            return it == controls.end() ? "\"default\"" : fmt::format("{}", it->second);
+          }};
+}
+
+constexpr const char* kPwmUnit = "(Hz, 0 = not known)";
+constexpr const char* kExposureUnit = "(microseconds, 0 = the camera's default)";
+constexpr const char* kPeriodsUnit = "(periods, 0 = not used)";
+
+void append_v4l2(hal::V4l2Config& c, std::vector<Key>& keys) {
+  keys.push_back(text("camera.v4l2.device", c.device,
+                      "a path below /dev, \"serial:NUMBER\", \"bus:NAME\", or \"\""));
+  keys.push_back(choice("camera.v4l2.pixel_format", c.pixel_format,
+                        {"auto", "grey", "nv12", "yuyv", "mjpeg"}));
+  keys.push_back(choice("camera.v4l2.range", c.range, {"auto", "full", "limited"}));
+  keys.push_back(real("camera.v4l2.exposure_us", c.exposure_us, 0, 1e6, kExposureUnit));
+  keys.push_back(
+      integer("camera.v4l2.exposure_pwm_periods", c.exposure_pwm_periods, 0, 1000, kPeriodsUnit));
+  keys.push_back(real("camera.v4l2.pwm_hz", c.pwm_hz, 0, 1e5, kPwmUnit));
+  for (const char* name : hal::kV4l2Controls) {
+    keys.push_back(control("camera.v4l2.controls", name, c.controls));
+  }
+}
+
+void append_libcamera(hal::LibcameraConfig& c, std::vector<Key>& keys) {
+  keys.push_back(text("camera.libcamera.device", c.device, "libcamera's id of a camera, or \"\""));
+  keys.push_back(choice("camera.libcamera.pixel_format", c.pixel_format,
+                        {"auto", "grey", "nv12", "yuv420", "yuyv", "mjpeg"}));
+  keys.push_back(real("camera.libcamera.exposure_us", c.exposure_us, 0, 1e6, kExposureUnit));
+  keys.push_back(integer("camera.libcamera.exposure_pwm_periods", c.exposure_pwm_periods, 0, 1000,
+                         kPeriodsUnit));
+  keys.push_back(real("camera.libcamera.pwm_hz", c.pwm_hz, 0, 1e5, kPwmUnit));
+  for (const char* name : hal::kLibcameraControls) {
+    keys.push_back(control("camera.libcamera.controls", name, c.controls));
+  }
+}
+
 /// LEDs by the name of a scheme.
 Key scheme(std::string path, std::string& field) {
   return {std::move(path), fmt::format("one of {}", net::scheme_names()),
@@ -143,9 +211,11 @@ Key scheme(std::string path, std::string& field) {
 }  // namespace
 
 std::vector<Key> bind_keys(Config& c) {
+  constexpr const char* kChip = "a GPIO chip's path, name or label, or \"\"";
   hal::CameraConfig& camera = c.hal.camera;
+  hal::Ws2812Config& ws2812 = c.hal.ring.ws2812;
   pipeline::PipelineConfig& p = c.pipeline;
-  return {
+  std::vector<Key> keys{
       choice("log_level", c.log_level, {"trace", "debug", "info", "warn", "error"}),
       path("calibration", c.calibration, "a folder with calibration.toml, or \"\""),
       path("state_dir", c.state_dir, "a folder, or \"\""),
@@ -161,10 +231,32 @@ std::vector<Key> bind_keys(Config& c) {
       path("camera.replay.folder", camera.replay.folder, "a folder with PNG or JPEG frames"),
       boolean("camera.replay.loop", camera.replay.loop),
       boolean("camera.replay.paced", camera.replay.paced),
-
+  };
+  append_v4l2(camera.v4l2, keys);
+  append_libcamera(camera.libcamera, keys);
+  std::vector<Key> rest{
       choice("ring.backend", c.hal.ring.backend, hal::ring_backends()),
       integer("ring.brightness", p.light.brightness, 0, 255, ""),
       scheme("ring.scheme", c.ring_scheme),
+      real("ring.ws2812.gamma", ws2812.gamma, 0.2, 5, ""),
+      real("ring.ws2812.current_budget_ma", ws2812.current_budget_ma, 8, 10000, "(milliamperes)"),
+      integer("ring.ws2812.resend_ms", ws2812.resend_ms, 0, 3600000, "(milliseconds; 0 = never)"),
+      boolean("ring.ws2812.leave_on", ws2812.leave_on),
+      integer("ring.ws2812.first_led", ws2812.first_led, 0, hal::kLedCount - 1, ""),
+      boolean("ring.ws2812.clockwise", ws2812.clockwise),
+      text("ring.ws2812.spi_device", ws2812.spi_device, "a device such as \"/dev/spidev0.0\""),
+      integer("ring.ws2812.spi_hz", ws2812.spi_hz, 1000000, 20000000, "(hertz)"),
+      one_of("ring.ws2812.spi_bits", ws2812.spi_bits, {3, 4, 8}),
+      boolean("ring.ws2812.spi_check_rate", ws2812.spi_check_rate),
+      integer("ring.ws2812.gpio_priority", ws2812.gpio_priority, 0, 99, "(0 = normal scheduling)"),
+      integer("ring.ws2812.gpio_retries", ws2812.gpio_retries, 0, 100, ""),
+      integer("ring.ws2812.power_settle_ms", ws2812.power_settle_ms, 0, 10000, "(milliseconds)"),
+      text("ring.ws2812.power.chip", ws2812.power.chip, kChip),
+      integer("ring.ws2812.power.line", ws2812.power.line, -1, 4095, "(offset on the chip)"),
+      boolean("ring.ws2812.power.active_low", ws2812.power.active_low),
+      text("ring.ws2812.data.chip", ws2812.data.chip, kChip),
+      integer("ring.ws2812.data.line", ws2812.data.line, -1, 4095, "(offset on the chip)"),
+      boolean("ring.ws2812.data.active_low", ws2812.data.active_low),
 
       optional_integer("capture.cpu", p.cpu, 0, 1023, ""),
       integer("capture.fifo_priority", p.fifo_priority, 0, 99, "(0 = normal scheduling)"),
@@ -188,6 +280,9 @@ std::vector<Key> bind_keys(Config& c) {
       milliseconds("net.hello_timeout_ms", c.net.hello_timeout, 100, 600000),
       milliseconds("net.dead_after_ms", c.net.dead_after, 1000, 600000),
   };
+  keys.insert(keys.end(), std::make_move_iterator(rest.begin()),
+              std::make_move_iterator(rest.end()));
+  return keys;
 }
 
 }  // namespace dtact::app

@@ -117,6 +117,9 @@ void run_daemon(const Config& config) {
   net::FolderCalibrationStore store(state, start.folder);
 
   hal::Devices devices = hal::open_devices(config.hal);
+  if (const std::string note = devices.ring->report().note; !note.empty()) {
+    spdlog::warn("ring: {}", note);
+  }
   pipeline::PipelineConfig settings = config.pipeline;
   settings.state_folder = state;
   settings.light.leds = *net::scheme_leds(config.ring_scheme);

@@ -66,10 +66,25 @@ TEST_F(ConfigFile, SetsEveryKind) {
   EXPECT_EQ(config.net.hello_timeout.count(), 250);
 }
 
+TEST_F(ConfigFile, ReadsTheCamerasControls) {
+  const Config config = load(
+      "[camera]\nbackend = 'v4l2'\n[camera.v4l2]\ndevice = 'serial:7'\nexposure_us = 5000\n"
+      "[camera.v4l2.controls]\ngain = 10\ngamma = 'default'\n[camera.libcamera.controls]\n"
+      "analogue_gain = 1.5\n");
+  EXPECT_EQ(config.hal.camera.v4l2.device, "serial:7");
+  EXPECT_EQ(config.hal.camera.v4l2.exposure_us, 5000);
+  EXPECT_EQ(config.hal.camera.v4l2.controls, (std::map<std::string, std::int64_t>{{"gain", 10}}));
+  EXPECT_EQ(config.hal.camera.libcamera.controls,
+            (std::map<std::string, double>{{"analogue_gain", 1.5}}));
+  EXPECT_THAT(error("[camera.v4l2.controls]\ngain = 1.5\n"),
+              HasSubstr("camera.v4l2.controls.gain"));
+  EXPECT_THAT(error("[camera.v4l2.controls]\nzoom = 1\n"), HasSubstr("zoom"));
+}
+
 TEST_F(ConfigFile, UnknownKeyNamesFileLineAndWhatIsAllowed) {
   EXPECT_THAT(error("[camera]\nwidht = 640\n"),
               AllOf(HasSubstr("c.toml:2:"), HasSubstr("\"camera.widht\""),
-                    HasSubstr("width, height, fps, [sim], [replay]")));
+                    HasSubstr("width, height, fps, [sim], [replay], [v4l2], [libcamera]")));
   EXPECT_THAT(error("[camra]\n"), AllOf(HasSubstr("c.toml:1:"), HasSubstr("[camera]")));
 }
 

@@ -73,6 +73,7 @@ TEST(Completion, OffersValues) {
 TEST(Completion, KnowsEveryOptionOfEveryCommand) {
   EXPECT_THAT(options_of({}), IsSubsetOf(complete("--")));
   const std::vector<std::vector<std::string>> commands = {{"status"},
+                                                          {"cameras"},
                                                           {"watch"},
                                                           {"led"},
                                                           {"rezero"},

@@ -94,6 +94,21 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   EXPECT_EQ(driver.message(), "");
 }
 
+TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
+  driver.start();
+  const auto eventually = [](auto condition) {
+    for (int i = 0; i < 1000 && !condition(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return condition();
+  };
+  ring.tell({.ok = false, .message = "the wire is cut", .note = {}, .writes = 2, .failures = 1});
+  EXPECT_TRUE(eventually([&] { return driver.trouble(); }));
+  EXPECT_TRUE(eventually([&] { return driver.message() == "the wire is cut"; }));
+  ring.tell({.ok = true, .message = {}, .note = {}, .writes = 3, .failures = 1});
+  EXPECT_TRUE(eventually([&] { return !driver.trouble() && driver.message().empty(); }));
+}
+
 TEST_F(LightDriverTest, RefusesWhenTooManyWait) {
   for (int i = 0; i < 16; ++i) ASSERT_TRUE(driver.submit(1, dimmed(i)));  // not started
   EXPECT_FALSE(driver.submit(1, dimmed(0)));

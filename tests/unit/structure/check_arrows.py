@@ -16,18 +16,24 @@ ROOMS = {
     "hal/null": ["hal", "hal/base"],
     "hal/replay": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mjpeg"],
     "hal/sim": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mjpeg"],
+    "hal/live": ["hal", "hal/base", "hal/luma", "hal/mjpeg"],
+    "hal/v4l2": ["hal", "hal/base", "hal/live"],
+    "hal/libcamera": ["hal", "hal/base", "hal/live"],
+    "hal/gpiod": ["hal", "hal/base"],
+    "hal/ws2812": ["hal", "hal/base", "hal/gpiod"],
     # The registry is the only file that names backends.
-    "hal": ["hal/base", "hal/null", "hal/replay", "hal/sim"],
+    "hal": ["hal/base", "hal/null", "hal/replay", "hal/sim", "hal/v4l2", "hal/libcamera", "hal/ws2812"],
     "daemon/recon": [],
     "daemon/calibration": ["hal/base", "hal/image", "daemon/recon"],
     "daemon/pipeline": ["hal", "hal/base", "hal/image", "daemon/recon", "daemon/calibration"],
     "daemon/net": ["hal", "hal/base", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
-    "daemon/app": ["hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net"],
-    "daemon": ["daemon/app"],
+    "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/ws2812"],
+    "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net"],
+    "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
     "clients/ctl/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration"],
-    "clients/ctl": ["hal/base", "hal/image", "proto", "clients/cpp", "clients/ctl/offline"],
+    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/cpp", "clients/ctl/offline"],
 }
 # Only standard headers and Highway may stand in angle brackets here.
 STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}

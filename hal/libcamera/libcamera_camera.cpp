@@ -1,0 +1,81 @@
+#include "hal/libcamera/libcamera_camera.hpp"
+
+#include <fmt/format.h>
+#include <libcamera/camera_manager.h>
+
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "hal/libcamera/formats.hpp"
+#include "hal/libcamera/photometry.hpp"
+#include "hal/libcamera/session.hpp"
+#include "hal/live/device_error.hpp"
+#include "hal/live/live_camera.hpp"
+
+namespace dtact::hal::libcamera_backend {
+namespace {
+
+namespace lc = libcamera;
+using live::DeviceError;
+
+/// libcamera allows one manager a process; it lives as long as a camera does.
+std::shared_ptr<lc::CameraManager> shared_manager() {
+  static std::mutex mutex;
+  static std::weak_ptr<lc::CameraManager> present;
+  const std::lock_guard guard(mutex);
+  if (auto manager = present.lock()) return manager;
+  auto manager = std::make_shared<lc::CameraManager>();
+  if (const int e = manager->start(); e != 0) {
+    throw DeviceError(CameraState::unplugged,
+                      fmt::format("libcamera does not start ({})", std::strerror(-e)));
+  }
+  present = manager;
+  return manager;
+}
+
+std::shared_ptr<lc::Camera> find(lc::CameraManager& manager, const std::string& id) {
+  const std::vector<std::shared_ptr<lc::Camera>> cameras = manager.cameras();
+  std::string names;
+  for (const auto& camera : cameras) {
+    if (camera->id() == id) return camera;
+    names += (names.empty() ? "attached: " : ", ") + camera->id();
+  }
+  if (id.empty() && cameras.size() == 1) return cameras.front();
+  if (names.empty()) names = "libcamera sees no camera";
+  throw DeviceError(CameraState::unplugged,
+                    id.empty() && !cameras.empty()
+                        ? fmt::format("several cameras are attached: set camera.libcamera.device "
+                                      "to one of them ({})",
+                                      names)
+                        : fmt::format("no camera {} is attached: plug it in, or set "
+                                      "camera.libcamera.device ({})",
+                                      id, names));
+}
+
+live::Opener opener(const CameraConfig& config) {
+  check_pixel_format(config.libcamera.pixel_format);
+  return [config, lock = PhotometricLock(config.libcamera, config.fps),
+          manager = std::shared_ptr<lc::CameraManager>()]() mutable -> live::Opened {
+    if (!manager) manager = shared_manager();
+    const std::shared_ptr<lc::Camera> camera = find(*manager, config.libcamera.device);
+    const auto session = std::make_shared<Session>(camera, config, lock);
+    return {session, camera->id(), session->pixel_format(), session->controls()};
+  };
+}
+
+}  // namespace
+
+std::unique_ptr<Camera> make_camera(const CameraConfig& config) {
+  // libcamera's chatter is for its developers. It reads this at its first line, and has no call for
+  // it that works for all its parts.
+  ::setenv("LIBCAMERA_LOG_LEVELS", "*:ERROR", /*overwrite=*/0);
+  return std::make_unique<live::LiveCamera>(config, "libcamera", config.libcamera.device,
+                                            opener(config));
+}
+
+}  // namespace dtact::hal::libcamera_backend

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <libcamera/controls.h>
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "hal/camera.hpp"
+#include "hal/config.hpp"
+
+namespace dtact::hal::libcamera_backend {
+
+/// What a camera's frames say about the controls they were taken with, by control id; reals in
+/// thousandths.
+using Readings = std::map<unsigned, std::int64_t>;
+
+/// The photometric lock over libcamera: the automatics off, the rest set to the configured value or
+/// the camera's default. Values in CameraControl are libcamera's, reals in thousandths.
+class PhotometricLock {
+ public:
+  /// Throws std::runtime_error naming the key.
+  explicit PhotometricLock(const LibcameraConfig& config, double fps);
+
+  /// What to hand to the camera at its start, and the controls as they are reported until the first
+  /// frames say what came of it.
+  struct Wishes {
+    libcamera::ControlList list;
+    std::vector<CameraControl> controls;
+  };
+  [[nodiscard]] Wishes wishes(const libcamera::ControlInfoMap& offered) const;
+
+  /// The readings of the controls that matter, out of a frame's metadata.
+  static void read(const libcamera::ControlList& metadata, Readings& readings);
+
+  /// Compares the frames' readings with what was asked for and notes it in `controls`. Returns the
+  /// sentence that says which locked ones have moved; empty when none.
+  [[nodiscard]] static std::string compare(const Readings& readings,
+                                           std::vector<CameraControl>& controls);
+
+ private:
+  LibcameraConfig config_;
+  double exposure_us_;
+  double fps_;
+};
+
+}  // namespace dtact::hal::libcamera_backend

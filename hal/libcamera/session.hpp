@@ -1,0 +1,73 @@
+#pragma once
+
+#include <libcamera/camera.h>
+#include <libcamera/framebuffer_allocator.h>
+
+#include <array>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "hal/config.hpp"
+#include "hal/libcamera/photometry.hpp"
+#include "hal/live/source.hpp"
+
+namespace dtact::hal::libcamera_backend {
+
+/// A camera that libcamera has given to us and that streams. Requests go round: completed, lent or
+/// decoded, queued again, never made anew.
+class Session final : public live::Source {
+ public:
+  /// Configures the camera and starts it. Throws live::ModeError when it lacks the mode asked for,
+  /// live::DeviceError when it is busy or fails.
+  Session(std::shared_ptr<libcamera::Camera> camera, const CameraConfig& config,
+          const PhotometricLock& lock);
+  ~Session() override;
+
+  [[nodiscard]] const std::string& pixel_format() const noexcept { return pixel_format_; }
+  [[nodiscard]] const std::vector<CameraControl>& controls() const noexcept { return controls_; }
+
+  [[nodiscard]] live::Format format() const noexcept override { return format_; }
+  void wait(std::int64_t deadline_ns) noexcept override;
+  [[nodiscard]] live::DequeueStatus dequeue(live::Filled& out) noexcept override;
+  [[nodiscard]] bool enqueue(int index) noexcept override;
+  void stop() noexcept override;
+  [[nodiscard]] std::string check_controls(std::vector<CameraControl>& controls) override;
+
+ private:
+  /// A request for life, with its buffer's memory.
+  struct Slot {
+    std::unique_ptr<libcamera::Request> request;
+    libcamera::FrameBuffer* buffer = nullptr;
+    int fd = -1;  ///< The buffer's own.
+    std::span<const std::uint8_t> mapping;
+    std::size_t offset = 0;  ///< Of the first plane within the mapping.
+    std::size_t length = 0;  ///< Of the first plane.
+  };
+
+  void make_requests();
+  void start(const PhotometricLock& lock);
+  void on_completed(libcamera::Request* request);
+  void on_disconnected();
+
+  std::shared_ptr<libcamera::Camera> camera_;
+  std::unique_ptr<libcamera::CameraConfiguration> configuration_;
+  std::unique_ptr<libcamera::FrameBufferAllocator> allocator_;
+  live::Format format_;
+  std::string pixel_format_;
+  std::vector<CameraControl> controls_;
+  std::vector<Slot> slots_;
+  bool acquired_ = false;
+
+  // Shared with libcamera's thread and the watching thread; held for copies only.
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::array<int, 16> completed_{};  // slot indices, oldest first; never more than there are slots
+  std::size_t completed_count_ = 0;
+  bool gone_ = false;
+  Readings readings_;
+};
+
+}  // namespace dtact::hal::libcamera_backend

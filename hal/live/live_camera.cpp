@@ -1,0 +1,386 @@
+#include "hal/live/live_camera.hpp"
+
+#include <fmt/format.h>
+#include <pthread.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "hal/base/clock.hpp"
+#include "hal/live/device_error.hpp"
+
+namespace dtact::hal::live {
+namespace {
+
+constexpr std::int64_t kMillisecond = 1'000'000;
+/// Between two attempts to open a camera that is away.
+constexpr std::int64_t kRetry = 100 * kMillisecond;
+/// Frame indices from here on are buffers of the source; below, of the pool.
+constexpr int kLentPayload = 2;
+/// Silence that counts as a stall, in frame times.
+constexpr int kStallFrames = 3;
+/// From the start of the stream to its first frame cameras take up to this long; it isn't a stall.
+constexpr std::int64_t kFirstFrame = 1000 * kMillisecond;
+/// A stalled camera is closed and opened anew after this long: many come back by it.
+constexpr std::int64_t kReopenAfter = 3000 * kMillisecond;
+/// Buffers looked at in one call: they go back as others come out, so there could be no end.
+constexpr unsigned kMaxTaken = 8;
+/// In frames; a larger step of the driver's count is a new count.
+constexpr std::uint32_t kPlausibleGap = 1U << 16U;
+constexpr std::chrono::seconds kWatchPeriod{1};
+
+std::int64_t now_ns() noexcept { return base::system_clock().monotonic_ns(); }
+
+void add(std::atomic<std::uint64_t>& counter, std::uint64_t n = 1) noexcept {
+  counter.fetch_add(n, std::memory_order_relaxed);
+}
+
+std::uint64_t get(const std::atomic<std::uint64_t>& counter) noexcept {
+  return counter.load(std::memory_order_relaxed);
+}
+
+}  // namespace
+
+LiveCamera::LiveCamera(const CameraConfig& config, const std::string& backend,
+                       const std::string& identity, Opener opener)
+    : open_(std::move(opener)),
+      period_ns_(std::llround(1e9 / config.fps)),
+      pool_{luma::LumaBuffer(config.width, config.height),
+            luma::LumaBuffer(config.width, config.height)} {
+  if (!(config.fps > 0)) throw std::runtime_error("camera.fps must be positive");
+  info_.backend = backend;
+  info_.identity = identity;
+  info_.width = config.width;
+  info_.height = config.height;
+  info_.fps = config.fps;
+  remedy_ = "the camera has not been started";
+  watcher_ = std::thread([this] { watch_controls(); });
+  ::pthread_setname_np(watcher_.native_handle(), "camera-watch");
+}
+
+LiveCamera::~LiveCamera() {
+  {
+    const std::lock_guard guard(mutex_);
+    stopping_ = true;
+  }
+  wake_watcher_.notify_one();
+  watcher_.join();
+}
+
+CameraInfo LiveCamera::info() const {
+  const std::lock_guard guard(mutex_);
+  return info_;
+}
+
+CameraReport LiveCamera::report() const {
+  CameraReport report;
+  report.delivered = get(counters_.delivered);
+  report.lost = get(counters_.lost);
+  report.skipped = get(counters_.skipped);
+  report.disconnects = get(counters_.disconnects);
+  report.damage = {get(counters_.flagged), get(counters_.markers), get(counters_.too_short),
+                   get(counters_.undecodable)};
+  report.damaged = report.damage.flagged + report.damage.markers + report.damage.too_short +
+                   report.damage.undecodable;
+  const std::lock_guard guard(mutex_);
+  report.state = state_.load();
+  report.remedy = remedy_;
+  report.moved = moved_;
+  return report;
+}
+
+void LiveCamera::start() {
+  try {
+    connect();
+  } catch (const ModeError&) {
+    throw;
+  } catch (const DeviceError& e) {
+    disconnect(e.state(), e.what());
+  }
+}
+
+void LiveCamera::connect() {
+  Opened opened = open_();
+  auto fresh = std::make_shared<Connection>(opened.source);
+  opened_ns_ = now_ns();
+  last_buffer_ns_ = 0;
+  last_counted_.reset();
+  after_gap_ = get(counters_.delivered) > 0;
+  const std::lock_guard guard(mutex_);
+  info_.identity = std::move(opened.identity);
+  info_.pixel_format = std::move(opened.pixel_format);
+  info_.controls = std::move(opened.controls);
+  remedy_ = "the camera has been opened; its first frame is awaited";
+  connection_ = std::move(fresh);
+}
+
+bool LiveCamera::try_connect() noexcept {
+  try {
+    connect();
+    return true;
+  } catch (const DeviceError& e) {
+    try {
+      disconnect(e.state(), e.what());
+    } catch (const std::exception&) {
+      // No memory for the sentence: the state alone has to do.
+      state_.store(e.state());
+    }
+  } catch (const std::exception&) {
+    state_.store(CameraState::unplugged);  // no memory; tried again
+  }
+  return false;
+}
+
+void LiveCamera::disconnect(CameraState state, const std::string& remedy) {
+  std::shared_ptr<Connection> old;
+  {
+    const std::lock_guard guard(mutex_);
+    old = std::exchange(connection_, nullptr);
+    state_.store(state);
+    remedy_ = remedy;
+  }
+  // The watcher may keep the object for a moment; the device must be free at once.
+  if (old) {
+    add(counters_.disconnects);
+    old->source->stop();
+  }
+}
+
+void LiveCamera::lose(const char* what) noexcept {
+  try {
+    disconnect(CameraState::unplugged,
+               fmt::format("{} {}: plug it in again; it is looked for ten times a second",
+                           info_.identity, what));
+  } catch (const std::exception&) {
+    state_.store(CameraState::unplugged);
+  }
+  next_try_ns_ = now_ns() + kRetry;
+}
+
+bool LiveCamera::wait_for_device(std::int64_t deadline_ns) noexcept {
+  for (;;) {
+    base::system_clock().sleep_until(std::min(deadline_ns, next_try_ns_));
+    if (now_ns() < next_try_ns_) return false;
+    const bool connected = try_connect();
+    next_try_ns_ = now_ns() + kRetry;
+    if (connected) return true;
+  }
+}
+
+GrabStatus LiveCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexcept {
+  const std::int64_t deadline = now_ns() + timeout.count();
+  for (;;) {
+    if (!connection_ && !wait_for_device(deadline)) return GrabStatus::unplugged;
+    switch (collect(out)) {
+      case Collected::frame:
+        return GrabStatus::ok;
+      case Collected::damaged:
+        return GrabStatus::damaged;
+      case Collected::lost:
+        lose("was unplugged or its driver failed");
+        continue;
+      case Collected::nothing:
+        break;
+    }
+    const std::int64_t now = now_ns();
+    note_silence(now);
+    if (!connection_) continue;
+    if (now >= deadline) return GrabStatus::timeout;
+    // Awake when the silence becomes a stall, so that it is seen whatever the timeout is.
+    const std::int64_t stall = now + tolerated_silence_ns() - silence_ns(now);
+    connection_->source->wait(stall > now ? std::min(deadline, stall) : deadline);
+  }
+}
+
+std::int64_t LiveCamera::silence_ns(std::int64_t now) const noexcept {
+  return now - (last_buffer_ns_ == 0 ? opened_ns_ : last_buffer_ns_);
+}
+
+std::int64_t LiveCamera::tolerated_silence_ns() const noexcept {
+  return last_buffer_ns_ == 0 ? kFirstFrame : kStallFrames * period_ns_;
+}
+
+void LiveCamera::note_silence(std::int64_t now) noexcept {
+  const std::int64_t silent = silence_ns(now);
+  if (silent < tolerated_silence_ns()) return;
+  if (state_.load() != CameraState::stalled) {
+    const std::lock_guard guard(mutex_);
+    state_.store(CameraState::stalled);
+    try {
+      remedy_ = fmt::format(
+          "{} is attached but sends nothing: it is restarted every {} s; if that "
+          "doesn't help, plug it in again",
+          info_.identity, kReopenAfter / 1'000'000'000);
+    } catch (const std::exception&) {
+      remedy_.clear();
+    }
+  }
+  if (silent < kReopenAfter) return;
+  std::shared_ptr<Connection> old;
+  {
+    const std::lock_guard guard(mutex_);
+    old = std::exchange(connection_, nullptr);
+  }
+  old->source->stop();
+  next_try_ns_ = now;
+}
+
+LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
+  Source& source = *connection_->source;
+  // The newest whole frame, and the one before in case that the newest cannot be decoded.
+  std::array<std::pair<Filled, std::uint64_t>, 2> whole;  // with its sequence; oldest first
+  std::size_t count = 0;
+  bool damaged = false;
+  for (unsigned taken = 0; taken < kMaxTaken; ++taken) {
+    Filled filled;
+    const DequeueStatus status = source.dequeue(filled);
+    if (status == DequeueStatus::none) break;
+    if (status == DequeueStatus::failed) return Collected::lost;
+    last_buffer_ns_ = now_ns();
+    count_gap(filled.sequence);
+    const PayloadStatus payload = connection_->decoder.inspect(filled);
+    int home = filled.index;
+    if (payload != PayloadStatus::ok) {
+      count_damage(payload);
+      damaged = true;
+    } else if (count < whole.size()) {
+      whole[count++] = {filled, sequence_};
+      continue;
+    } else {
+      home = whole[0].first.index;
+      whole[0] = std::exchange(whole[1], {filled, sequence_});
+      add(counters_.skipped);
+    }
+    if (!source.enqueue(home)) return Collected::lost;
+  }
+  bool done = false;
+  for (std::size_t i = count; i-- > 0;) {
+    const auto& [filled, sequence] = whole[i];
+    if (done) {
+      add(counters_.skipped);
+    } else {
+      bool kept = false;
+      const PayloadStatus status = deliver(filled, sequence, out, kept);
+      done = status == PayloadStatus::ok;
+      if (!done) count_damage(status);
+      damaged = damaged || !done;
+      if (kept) continue;
+    }
+    // A frame that was delivered stays delivered: the next call meets the error again.
+    if (!source.enqueue(filled.index) && !done) return Collected::lost;
+  }
+  if (done) return Collected::frame;
+  return damaged ? Collected::damaged : Collected::nothing;
+}
+
+PayloadStatus LiveCamera::deliver(const Filled& filled, std::uint64_t sequence, Frame& out,
+                                  bool& kept) noexcept {
+  FrameInfo frame;
+  frame.sequence = sequence;
+  frame.timestamp_ns = filled.timestamp_ns;
+  frame.meaning = filled.meaning;
+  frame.ready_ns = last_buffer_ns_;
+  const Format format = connection_->source->format();
+  const auto place = static_cast<std::size_t>(filled.index);
+  kept = format.lendable && format.full_range && format.encoding == Encoding::grey &&
+         place < lenders_.size();
+  if (kept) {
+    lenders_[place] = connection_->source;
+    frame.flags = take_flags();
+    const std::ptrdiff_t stride = format.bytes_per_line > 0 ? format.bytes_per_line : format.width;
+    out = Frame(*this, kLentPayload + filled.index,
+                {filled.payload.data(), format.width, format.height, stride}, frame);
+    note_delivery();
+    return PayloadStatus::ok;
+  }
+
+  const int index = lent_[0].load(std::memory_order_acquire) ? 1 : 0;
+  luma::LumaBuffer& buffer = pool_[static_cast<std::size_t>(index)];
+  const std::int64_t begin = now_ns();
+  const PayloadStatus status = connection_->decoder.decode(filled, buffer);
+  if (status != PayloadStatus::ok) return status;
+  frame.decode_ns = now_ns() - begin;
+  frame.flags = take_flags();
+  lent_[static_cast<std::size_t>(index)].store(true, std::memory_order_relaxed);
+  out = Frame(*this, index, buffer.view(), frame);
+  note_delivery();
+  return status;
+}
+
+std::uint32_t LiveCamera::take_flags() noexcept {
+  return std::exchange(after_gap_, false) ? kFrameAfterGap : kFrameNormal;
+}
+
+void LiveCamera::note_delivery() noexcept {
+  add(counters_.delivered);
+  if (state_.load(std::memory_order_relaxed) == CameraState::streaming) return;
+  const std::lock_guard guard(mutex_);
+  state_.store(CameraState::streaming);
+  remedy_.clear();
+}
+
+void LiveCamera::give_back(int index) noexcept {
+  if (index < kLentPayload) {
+    lent_[static_cast<std::size_t>(index)].store(false, std::memory_order_release);
+    return;
+  }
+  index -= kLentPayload;
+  const std::shared_ptr<Source> lender =
+      std::exchange(lenders_[static_cast<std::size_t>(index)], nullptr);
+  // Of a source that has been let go, nobody waits for the buffer. An error is met by the next
+  // call of dequeue().
+  if (connection_ && lender == connection_->source) (void)lender->enqueue(index);
+}
+
+void LiveCamera::count_gap(std::uint32_t counted) noexcept {
+  // The driver's count begins anew with every connection, and within one with some drivers; ours
+  // goes on.
+  std::uint32_t step = last_counted_ ? counted - *last_counted_ : 1;
+  if (step == 0 || step > kPlausibleGap) step = 1;
+  last_counted_ = counted;
+  sequence_ += step;
+  if (step > 1) {
+    add(counters_.lost, step - 1);
+    after_gap_ = true;
+  }
+}
+
+void LiveCamera::count_damage(PayloadStatus status) noexcept {
+  switch (status) {
+    case PayloadStatus::flagged:
+      return add(counters_.flagged);
+    case PayloadStatus::markers:
+      return add(counters_.markers);
+    case PayloadStatus::too_short:
+      return add(counters_.too_short);
+    case PayloadStatus::undecodable:
+      return add(counters_.undecodable);
+    case PayloadStatus::ok:
+      return;
+  }
+}
+
+void LiveCamera::watch_controls() noexcept {
+  std::unique_lock guard(mutex_);
+  while (!wake_watcher_.wait_for(guard, kWatchPeriod, [this] { return stopping_; })) {
+    std::shared_ptr<Connection> held = connection_;
+    if (!held) continue;
+    try {
+      std::vector<CameraControl> controls = info_.controls;
+      guard.unlock();
+      std::string moved = held->source->check_controls(controls);
+      const Connection* checked = held.get();
+      held.reset();  // may close the device: not under the mutex
+      guard.lock();
+      const bool same = checked == connection_.get();
+      moved_ = std::move(moved);
+      if (same) info_.controls = std::move(controls);
+    } catch (const std::exception&) {
+      if (!guard.owns_lock()) guard.lock();  // no memory; tried again in a second
+    }
+  }
+}
+
+}  // namespace dtact::hal::live

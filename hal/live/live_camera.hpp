@@ -1,0 +1,106 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "hal/camera.hpp"
+#include "hal/config.hpp"
+#include "hal/live/payload.hpp"
+#include "hal/live/source.hpp"
+#include "hal/luma/luma_buffer.hpp"
+
+namespace dtact::hal::live {
+
+/// What is the same for every real camera, whatever library it is reached by. It may be absent,
+/// busy or forbidden, at the start and later: then grab() returns `unplugged`, the report says why,
+/// and the camera is looked for ten times a second until it streams again, with its controls
+/// locked.
+///
+/// A second thread reads the locked controls once a second (a USB transfer each, too slow for the
+/// capture thread) and sets back what has moved.
+class LiveCamera : public Camera, private FrameOwner {
+ public:
+  /// `opener` is called by start() and then whenever the camera is away. `identity` stands in
+  /// messages until it has succeeded. Throws std::runtime_error for an impossible size or rate.
+  LiveCamera(const CameraConfig& config, const std::string& backend, const std::string& identity,
+             Opener opener);
+  ~LiveCamera() override;
+
+  [[nodiscard]] CameraInfo info() const override;
+  [[nodiscard]] CameraReport report() const override;
+  /// Throws only when the attached camera lacks the mode asked for. A camera that is away, busy or
+  /// forbidden is a state of the report, since it may come back.
+  void start() override;
+  [[nodiscard]] GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept override;
+
+ private:
+  /// An open device. The watching thread may hold it a little longer than the capture thread, and
+  /// so may a frame that was lent.
+  struct Connection {
+    explicit Connection(const std::shared_ptr<Source>& s) : source(s), decoder(s->format()) {}
+    std::shared_ptr<Source> source;
+    PayloadDecoder decoder;
+  };
+
+  void give_back(int index) noexcept override;
+
+  void connect();
+  [[nodiscard]] bool try_connect() noexcept;
+  void disconnect(CameraState state, const std::string& remedy);
+  void lose(const char* what) noexcept;
+  [[nodiscard]] bool wait_for_device(std::int64_t deadline_ns) noexcept;
+  /// Since the last buffer, or since the stream began.
+  [[nodiscard]] std::int64_t silence_ns(std::int64_t now_ns) const noexcept;
+  [[nodiscard]] std::int64_t tolerated_silence_ns() const noexcept;
+  void note_silence(std::int64_t now_ns) noexcept;
+  /// What collect() found in the driver's queue.
+  enum class Collected : std::uint8_t { frame, damaged, nothing, lost };
+  [[nodiscard]] Collected collect(Frame& out) noexcept;
+  /// Makes `out` of the payload. `kept`: the payload itself was lent and comes back with the frame.
+  [[nodiscard]] PayloadStatus deliver(const Filled& filled, std::uint64_t sequence, Frame& out,
+                                      bool& kept) noexcept;
+  [[nodiscard]] std::uint32_t take_flags() noexcept;
+  void note_delivery() noexcept;
+  void count_gap(std::uint32_t sequence) noexcept;
+  void count_damage(PayloadStatus status) noexcept;
+  void watch_controls() noexcept;
+
+  const Opener open_;
+  const std::int64_t period_ns_;
+
+  // The capture thread's own.
+  std::array<luma::LumaBuffer, 2> pool_;  // one with the caller, one to decode into
+  std::array<std::atomic<bool>, 2> lent_{};
+  std::array<std::shared_ptr<Source>, 8> lenders_;  // of payloads lent as they are, by index
+  std::int64_t next_try_ns_ = 0;
+  std::int64_t last_buffer_ns_ = 0;  // the last sign of life, damaged or not
+  std::int64_t opened_ns_ = 0;
+  std::uint64_t sequence_ = 0;                 // of the last buffer, never going back
+  std::optional<std::uint32_t> last_counted_;  // the driver's count of the last buffer
+  bool after_gap_ = false;
+
+  // Shared. The mutex is held for copies only, never during a system call.
+  mutable std::mutex mutex_;
+  std::condition_variable wake_watcher_;
+  std::shared_ptr<Connection> connection_;  // written by the capture thread only
+  CameraInfo info_;
+  std::string remedy_;
+  std::string moved_;
+  bool stopping_ = false;
+  std::atomic<CameraState> state_{CameraState::unplugged};
+  struct Counters {
+    std::atomic<std::uint64_t> delivered, lost, skipped, disconnects;
+    std::atomic<std::uint64_t> flagged, markers, too_short, undecodable;
+  };
+  Counters counters_{};
+  std::thread watcher_;  // last: it uses all of the above
+};
+
+}  // namespace dtact::hal::live

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "hal/live/source.hpp"
+#include "hal/luma/luma_buffer.hpp"
+#include "hal/mjpeg/grey_decoder.hpp"
+
+namespace dtact::hal::live {
+
+enum class PayloadStatus : std::uint8_t { ok, flagged, markers, too_short, undecodable };
+
+/// Turns payloads of one format into luma. Does not allocate after construction.
+class PayloadDecoder {
+ public:
+  explicit PayloadDecoder(const Format& format);
+
+  /// What can be told without decoding: the driver's mark, the length, a JPEG's first and last
+  /// marker.
+  [[nodiscard]] PayloadStatus inspect(const Filled& filled) const noexcept;
+  /// Unless ok, `out` is partly written and must not be used.
+  [[nodiscard]] PayloadStatus decode(const Filled& filled, luma::LumaBuffer& out) noexcept;
+
+ private:
+  Format format_;
+  std::unique_ptr<mjpeg::GreyDecoder> jpeg_;  // null for raw formats
+};
+
+}  // namespace dtact::hal::live

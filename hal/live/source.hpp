@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hal/camera.hpp"
+#include "hal/frame.hpp"
+
+namespace dtact::hal::live {
+
+/// How a payload is encoded.
+enum class Encoding : std::uint8_t { grey, nv12, yuyv, jpeg };
+
+struct Format {
+  Encoding encoding = Encoding::grey;
+  int width = 0;
+  int height = 0;
+  std::ptrdiff_t bytes_per_line = 0;  ///< 0 = lines without padding; of no meaning for JPEG.
+  bool full_range = true;             ///< Of raw luma.
+  /// Full-range grey payloads may be lent as they are: kLumaPadding bytes after them can be read,
+  /// and they stay readable until the source is destroyed.
+  bool lendable = false;
+};
+
+/// A buffer that the driver has filled.
+struct Filled {
+  int index = -1;
+  std::span<const std::uint8_t> payload;
+  std::uint32_t sequence = 0;     ///< The driver's count since the stream began.
+  std::int64_t timestamp_ns = 0;  ///< CLOCK_MONOTONIC.
+  TimestampMeaning meaning = TimestampMeaning::arrival;
+  bool flagged = false;  ///< The driver says that the payload is damaged.
+};
+
+enum class DequeueStatus : std::uint8_t { filled, none, failed };
+
+/// A device that streams. wait(), dequeue(), enqueue() and stop() belong to the capture thread.
+class Source {
+ public:
+  Source() = default;
+  Source(const Source&) = delete;
+  Source& operator=(const Source&) = delete;
+  virtual ~Source() = default;
+
+  [[nodiscard]] virtual Format format() const noexcept = 0;
+  /// Waits at most until `deadline_ns` (CLOCK_MONOTONIC) for a buffer or an error.
+  virtual void wait(std::int64_t deadline_ns) noexcept = 0;
+  /// The oldest filled buffer, if any. `failed`: the stream is of no more use.
+  [[nodiscard]] virtual DequeueStatus dequeue(Filled& out) noexcept = 0;
+  /// Hands a buffer back to the driver. False: the stream is of no more use.
+  [[nodiscard]] virtual bool enqueue(int index) noexcept = 0;
+  /// Lets go of the device, so that it can be opened anew while this object still exists.
+  virtual void stop() noexcept = 0;
+  /// Reads the locked ones of `controls` again and sets back what has moved. Returns the sentence
+  /// that says what moved; empty when nothing did. Called on another thread than the rest.
+  [[nodiscard]] virtual std::string check_controls(std::vector<CameraControl>& controls) = 0;
+};
+
+/// A device that has been opened and streams.
+struct Opened {
+  std::shared_ptr<Source> source;
+  std::string identity;      ///< As in CameraInfo.
+  std::string pixel_format;  ///< As in CameraInfo.
+  std::vector<CameraControl> controls;
+};
+
+/// Opens the configured device and starts it. Throws DeviceError.
+using Opener = std::function<Opened()>;
+
+}  // namespace dtact::hal::live

@@ -1,0 +1,188 @@
+#include "hal/v4l2/photometry.hpp"
+
+#include <fmt/format.h>
+#include <linux/videodev2.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <stdexcept>
+
+#include "hal/live/exposure.hpp"
+#include "hal/v4l2/ioctl.hpp"
+
+namespace dtact::hal::v4l2 {
+namespace {
+
+struct Control {
+  const char* name;
+  std::uint32_t id;
+  std::optional<std::int64_t> off;  ///< The value that keeps it from acting by itself.
+};
+
+constexpr const char* kAutoExposure = "auto_exposure";
+constexpr const char* kExposure = "exposure_time_absolute";
+/// V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 µs.
+constexpr double kExposureUnitUs = 100;
+
+/// In the order of setting: many cameras refuse a value while its automatic is on.
+constexpr std::array<Control, 17> kControls{{
+    {kAutoExposure, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL},
+    {"exposure_dynamic_framerate", V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0},
+    {"gain_automatic", V4L2_CID_AUTOGAIN, 0},
+    {"white_balance_automatic", V4L2_CID_AUTO_WHITE_BALANCE, 0},
+    {"focus_automatic_continuous", V4L2_CID_FOCUS_AUTO, 0},
+    {"power_line_frequency", V4L2_CID_POWER_LINE_FREQUENCY, V4L2_CID_POWER_LINE_FREQUENCY_DISABLED},
+    {"backlight_compensation", V4L2_CID_BACKLIGHT_COMPENSATION, 0},
+    {kExposure, V4L2_CID_EXPOSURE_ABSOLUTE, std::nullopt},
+    {"gain", V4L2_CID_GAIN, std::nullopt},
+    {"white_balance_temperature", V4L2_CID_WHITE_BALANCE_TEMPERATURE, std::nullopt},
+    {"focus_absolute", V4L2_CID_FOCUS_ABSOLUTE, std::nullopt},
+    {"gamma", V4L2_CID_GAMMA, std::nullopt},
+    {"contrast", V4L2_CID_CONTRAST, std::nullopt},
+    {"brightness", V4L2_CID_BRIGHTNESS, std::nullopt},
+    {"saturation", V4L2_CID_SATURATION, std::nullopt},
+    {"hue", V4L2_CID_HUE, std::nullopt},
+    {"sharpness", V4L2_CID_SHARPNESS, std::nullopt},
+}};
+
+const Control* find(const std::string& name) {
+  const auto* it = std::ranges::find_if(kControls, [&](const auto& c) { return name == c.name; });
+  return it == kControls.end() ? nullptr : it;
+}
+
+std::optional<v4l2_queryctrl> query(int fd, std::uint32_t id) {
+  v4l2_queryctrl q{};
+  q.id = id;
+  if (call(fd, VIDIOC_QUERYCTRL, q) != 0 || (q.flags & V4L2_CTRL_FLAG_DISABLED) != 0) {
+    return std::nullopt;
+  }
+  return q;
+}
+
+int get(int fd, std::uint32_t id, std::int64_t& value) {
+  v4l2_control control{id, 0};
+  const int error = call(fd, VIDIOC_G_CTRL, control);
+  if (error == 0) value = control.value;
+  return error;
+}
+
+int set(int fd, std::uint32_t id, std::int64_t value) {
+  v4l2_control control{id, static_cast<std::int32_t>(value)};
+  return call(fd, VIDIOC_S_CTRL, control);
+}
+
+/// Sets one control and reads it back.
+CameraControl lock(int fd, const Control& control, const v4l2_queryctrl& offered,
+                   std::int64_t value) {
+  CameraControl result;
+  result.name = control.name;
+  if (value < offered.minimum || value > offered.maximum) {
+    (void)get(fd, control.id, result.value);
+    result.note = fmt::format("{} = {} is outside this camera's {} to {}", control.name, value,
+                              offered.minimum, offered.maximum);
+    return result;
+  }
+  int error = set(fd, control.id, value);
+  if (error != 0 && control.id == V4L2_CID_EXPOSURE_AUTO) {
+    // Manual time with an automatic iris, which such a camera doesn't have.
+    value = V4L2_EXPOSURE_SHUTTER_PRIORITY;
+    error = set(fd, control.id, value);
+  }
+  const int read_error = get(fd, control.id, result.value);
+  if (error != 0) {
+    result.note =
+        fmt::format("the camera refuses {} = {} ({})", control.name, value, std::strerror(error));
+  } else if (read_error != 0) {
+    result.note =
+        fmt::format("{} cannot be read back ({})", control.name, std::strerror(read_error));
+  } else if (result.value != value) {
+    result.note = fmt::format("{} is {} after it was set to {}", control.name, result.value, value);
+  } else {
+    result.locked = true;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<OfferedControl> list_controls(int fd) {
+  std::vector<OfferedControl> offered;
+  for (const Control& control : kControls) {
+    const auto q = query(fd, control.id);
+    if (!q) continue;
+    OfferedControl entry{control.name, q->minimum, q->maximum, q->step, q->default_value, 0};
+    (void)get(fd, control.id, entry.value);
+    offered.push_back(std::move(entry));
+  }
+  return offered;
+}
+
+PhotometricLock::PhotometricLock(const V4l2Config& config)
+    : config_(config),
+      exposure_us_(live::exposure_us("camera.v4l2", config.exposure_us, config.exposure_pwm_periods,
+                                     config.pwm_hz)) {
+  for (const auto& [name, value] : config.controls) {
+    if (find(name) == nullptr) {
+      std::string names;
+      for (const Control& c : kControls)
+        names += fmt::format("{}{}", names.empty() ? "" : ", ", c.name);
+      throw std::runtime_error(fmt::format(
+          "camera.v4l2.controls.{}: not a control of the lock; allowed are {}", name, names));
+    }
+  }
+  if (exposure_us_ > 0 && config.controls.contains(kExposure)) {
+    throw std::runtime_error(
+        "camera.v4l2: give the exposure by exposure_us, by exposure_pwm_periods or by "
+        "controls.exposure_time_absolute, not by several");
+  }
+}
+
+std::vector<CameraControl> PhotometricLock::apply(int fd) const {
+  std::vector<CameraControl> controls;
+  for (const Control& control : kControls) {
+    const auto configured = config_.controls.find(control.name);
+    const bool exposure = control.name == std::string(kExposure) && exposure_us_ > 0;
+    const auto offered = query(fd, control.id);
+    if (!offered) {
+      if (exposure || configured != config_.controls.end()) {
+        CameraControl missing;
+        missing.name = control.name;
+        missing.note = fmt::format("this camera has no {}", control.name);
+        controls.push_back(std::move(missing));
+      }
+      continue;
+    }
+    std::int64_t value = control.off.value_or(offered->default_value);
+    if (configured != config_.controls.end()) value = configured->second;
+    if (exposure) value = std::max<std::int64_t>(1, std::llround(exposure_us_ / kExposureUnitUs));
+    controls.push_back(lock(fd, control, *offered, value));
+    if (exposure && controls.back().locked) {
+      controls.back().note =
+          live::rounding_note(exposure_us_, static_cast<double>(value) * kExposureUnitUs);
+    }
+  }
+  return controls;
+}
+
+std::string PhotometricLock::check(int fd, std::vector<CameraControl>& controls) const {
+  std::string moved;
+  for (CameraControl& control : controls) {
+    const Control* known = find(control.name);
+    if (!control.locked || known == nullptr) continue;
+    std::int64_t value = control.value;
+    if (get(fd, known->id, value) != 0 || value == control.value) continue;
+    moved += fmt::format("{}{} moved from {} to {} by itself", moved.empty() ? "" : "; ",
+                         control.name, control.value, value);
+    (void)set(fd, known->id, control.value);
+  }
+  if (!moved.empty()) {
+    moved += ": it was set back; another program or the camera's own automatic is at work";
+  }
+  return moved;
+}
+
+}  // namespace dtact::hal::v4l2

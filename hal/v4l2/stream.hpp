@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "hal/base/unique_fd.hpp"
+#include "hal/config.hpp"
+#include "hal/live/source.hpp"
+#include "hal/v4l2/photometry.hpp"
+
+namespace dtact::hal::v4l2 {
+
+/// A capture stream with memory-mapped buffers. The destructor stops it and unmaps.
+class Stream final : public live::Source {
+ public:
+  static constexpr unsigned kBuffers = 4;
+
+  /// Sets the mode `asked` in `fourcc` and maps the buffers. Throws ModeError when the driver
+  /// agrees to something else, DeviceError when it refuses.
+  Stream(base::UniqueFd fd, const std::string& node, std::uint32_t fourcc,
+         const CameraConfig& asked, const PhotometricLock& lock);
+  ~Stream() override;
+
+  /// Sets every control of the lock and reads it back.
+  [[nodiscard]] std::vector<CameraControl> lock_controls() { return lock_.apply(fd_.get()); }
+  /// Hands all buffers to the driver and starts it. Throws DeviceError.
+  void start();
+
+  [[nodiscard]] live::Format format() const noexcept override { return format_; }
+  void wait(std::int64_t deadline_ns) noexcept override;
+  [[nodiscard]] live::DequeueStatus dequeue(live::Filled& out) noexcept override;
+  [[nodiscard]] bool enqueue(int index) noexcept override;
+  void stop() noexcept override;
+  [[nodiscard]] std::string check_controls(std::vector<CameraControl>& controls) override;
+
+ private:
+  void set_format(std::uint32_t fourcc, const CameraConfig& asked);
+  void set_rate(double fps);
+  void map_buffers();
+
+  base::UniqueFd fd_;
+  std::string node_;
+  PhotometricLock lock_;
+  live::Format format_;
+  std::vector<std::span<std::uint8_t>> buffers_;
+};
+
+}  // namespace dtact::hal::v4l2

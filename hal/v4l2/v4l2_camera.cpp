@@ -1,0 +1,46 @@
+#include "hal/v4l2/v4l2_camera.hpp"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "hal/v4l2/finder.hpp"
+#include "hal/v4l2/modes.hpp"
+#include "hal/v4l2/photometry.hpp"
+#include "hal/v4l2/stream.hpp"
+
+namespace dtact::hal::v4l2 {
+namespace {
+
+live::Opened open(const CameraConfig& config, const DeviceName& name, const PhotometricLock& lock) {
+  DeviceName::Opened device = name.open();
+  const std::uint32_t fourcc = choose(list_modes(device.fd.get()), config, device.identity);
+  const auto stream =
+      std::make_shared<Stream>(std::move(device.fd), device.node, fourcc, config, lock);
+  // Before the stream begins, so that its first frame is right; and again in it, since some
+  // cameras forget when they start.
+  (void)stream->lock_controls();
+  stream->start();
+  return {stream, device.identity, find_format(fourcc)->name, stream->lock_controls()};
+}
+
+live::Opener opener(const CameraConfig& config) {
+  check_pixel_format(config.v4l2.pixel_format);
+  const std::string& range = config.v4l2.range;
+  if (range != "auto" && range != "full" && range != "limited") {
+    throw std::runtime_error(
+        fmt::format("camera.v4l2.range = \"{}\": allowed are auto, full, limited", range));
+  }
+  return [config, name = DeviceName(config.v4l2.device), lock = PhotometricLock(config.v4l2)] {
+    return open(config, name, lock);
+  };
+}
+
+}  // namespace
+
+V4l2Camera::V4l2Camera(const CameraConfig& config)
+    : LiveCamera(config, "v4l2", config.v4l2.device, opener(config)) {}
+
+}  // namespace dtact::hal::v4l2

@@ -1,0 +1,71 @@
+#include "clients/ctl/cameras.hpp"
+
+#include <gtest/gtest.h>
+#include <linux/videodev2.h>
+
+#include <sstream>
+
+namespace dtact::ctl {
+namespace {
+
+hal::v4l2::SurveyedCamera camera() {
+  hal::v4l2::SurveyedCamera c;
+  c.attached.node = "/dev/video2";
+  c.attached.by_path = "/dev/v4l/by-path/usb-0:1-video-index0";
+  c.attached.serial = "4711";
+  c.attached.bus = "usb-1";
+  c.attached.card = "Finger";
+  c.attached.driver = "uvcvideo";
+  hal::v4l2::Mode mode;
+  mode.fourcc = V4L2_PIX_FMT_MJPEG;
+  mode.width = mode.min_width = 800;
+  mode.height = mode.min_height = 600;
+  mode.fps = {60.00024, 30};
+  c.modes.push_back(mode);
+  mode.fourcc = V4L2_PIX_FMT_H264;
+  c.modes.push_back(mode);
+  c.controls.push_back({"gain", 0, 100, 1, 5, 10});
+  return c;
+}
+
+std::string printed(const std::vector<hal::v4l2::SurveyedCamera>& cameras, bool json) {
+  std::ostringstream out;
+  print_cameras(cameras, json, out);
+  return out.str();
+}
+
+TEST(Cameras, AreListedWithNamesModesAndControls) {
+  EXPECT_EQ(printed({camera()}, false),
+            "/dev/v4l/by-path/usb-0:1-video-index0\n"
+            "  Finger (uvcvideo), /dev/video2 at present\n"
+            "  or serial:4711, bus:usb-1\n"
+            "  modes\n"
+            "    MJPEG 800x600 at 60, 30\n"
+            "    H264 800x600 at 60, 30 (not usable)\n"
+            "  controls\n"
+            "    gain                        0 to 100, step 1, default 5, now 10\n");
+  EXPECT_EQ(
+      printed({camera()}, true),
+      R"([{"name":"/dev/v4l/by-path/usb-0:1-video-index0","node":"/dev/video2",)"
+      R"("by_path":"/dev/v4l/by-path/usb-0:1-video-index0","by_id":"","serial":"4711",)"
+      R"("bus":"usb-1","card":"Finger","driver":"uvcvideo","problem":"",)"
+      R"("modes":[{"format":"MJPEG","usable":true,"width":800,"height":600,"min_width":800,)"
+      R"("min_height":600,"fps_is_range":false,"fps":[60,30]},{"format":"H264","usable":false,)"
+      R"("width":800,"height":600,"min_width":800,"min_height":600,"fps_is_range":false,)"
+      R"("fps":[60,30]}],"controls":[{"name":"gain","minimum":0,"maximum":100,"step":1,)"
+      R"("default":5,"value":10}]}])"
+      "\n");
+}
+
+TEST(Cameras, NoneAndForbiddenOnes) {
+  EXPECT_EQ(printed({}, false), "no camera is attached\n");
+  EXPECT_EQ(printed({}, true), "[]\n");
+  hal::v4l2::SurveyedCamera forbidden;
+  forbidden.attached.node = "/dev/video0";
+  forbidden.attached.problem = "no permission to open /dev/video0: join the group";
+  EXPECT_EQ(printed({forbidden}, false),
+            "/dev/video0\n  no permission to open /dev/video0: join the group\n");
+}
+
+}  // namespace
+}  // namespace dtact::ctl

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <linux/videodev2.h>
+#include <umockdev.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace dtact::hal::v4l2 {
+
+/// What the emulated driver fills a buffer with.
+struct EmulatedBuffer {
+  std::vector<std::uint8_t> payload;
+  std::uint32_t sequence = 0;
+  std::uint32_t flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+  std::int64_t timestamp_us = -1;  ///< −1 = now.
+  std::uint32_t index_offset = 0;  ///< Added to the index: a driver that lies.
+};
+
+/// /dev/video0 emulated in this process by libumockdev: a camera of 32×16 GREY at 60 frames a
+/// second with three controls, whose every system call can be made to fail. Needs
+/// libumockdev-preload.
+class EmulatedCamera {
+ public:
+  static constexpr std::uint32_t kWidth = 32;
+  static constexpr std::uint32_t kHeight = 16;
+
+  EmulatedCamera();
+  EmulatedCamera(const EmulatedCamera&) = delete;
+  EmulatedCamera& operator=(const EmulatedCamera&) = delete;
+  ~EmulatedCamera();
+
+  /// Every call of `request` fails with this errno from now on; 0 = works again.
+  void fail(unsigned long request, int error, int times = -1);
+  /// The next free buffers are filled with these, one each.
+  void deliver(const EmulatedBuffer& buffer);
+  /// A picture of one grey value.
+  void deliver_grey(std::uint8_t value, std::uint32_t sequence);
+  void set_pixel_format(std::uint32_t fourcc);
+  /// What S_FMT answers, whatever was asked; 0 = as asked.
+  void insist_on_width(std::uint32_t width);
+  void insist_on_rate(std::uint32_t fps);
+  void grant_buffers(std::uint32_t count);
+  void set_control(std::uint32_t id, std::int32_t value);
+  [[nodiscard]] std::int32_t control(std::uint32_t id) const;
+  [[nodiscard]] bool streaming() const;
+
+ private:
+  struct Control {
+    const char* name;
+    std::int32_t minimum, maximum, initial, value;
+  };
+  static gboolean on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
+  void handle(UMockdevIoctlClient* client);
+  int answer(unsigned long request, std::vector<std::uint8_t>& argument);
+  int dequeue(v4l2_buffer& buffer);
+  [[nodiscard]] std::uint32_t buffer_bytes() const;
+
+  UMockdevTestbed* testbed_;
+  UMockdevIoctlBase* handler_;
+  std::string backing_;  // the file behind the node, which is what gets mapped
+  mutable std::mutex mutex_;
+  std::map<unsigned long, std::pair<int, int>> failures_;  // request → errno, times left
+  std::deque<EmulatedBuffer> pending_;
+  std::deque<std::uint32_t> queued_;
+  std::map<std::uint32_t, Control> controls_;
+  std::uint32_t fourcc_ = V4L2_PIX_FMT_GREY;
+  std::uint32_t forced_width_ = 0;
+  std::uint32_t forced_fps_ = 0;
+  std::uint32_t granted_ = 4;
+  bool streaming_ = false;
+};
+
+}  // namespace dtact::hal::v4l2
