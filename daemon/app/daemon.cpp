@@ -122,7 +122,7 @@ void run_daemon(const Config& config) {
   }
   pipeline::PipelineConfig settings = config.pipeline;
   settings.state_folder = state;
-  settings.light.leds = *net::scheme_leds(config.ring_scheme);
+  if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;
   pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), start.calibration,
                               settings);
   net::Server server(io, make_net_config(config), pipeline, store);
