@@ -6,6 +6,7 @@
 
 #include "daemon/app/config.hpp"
 #include "daemon/app/daemon.hpp"
+#include "daemon/app/doctor/doctor.hpp"
 #include "daemon/app/options.hpp"
 
 int main(int argc, char** argv) {
@@ -19,6 +20,7 @@ int main(int argc, char** argv) {
     const LoadedConfig loaded = load_config(options.config, options.settings);
     if (options.print_config) print_config(loaded, std::cout);
     if (options.print_config || options.check_config) return 0;
+    if (options.doctor) return doctor(loaded.config.hal, std::cout);
 
     spdlog::set_level(spdlog::level::from_str(loaded.config.log_level));
     run_daemon(loaded.config);

@@ -85,8 +85,39 @@ struct CameraConfig {
   LibcameraConfig libcamera;
 };
 
+/// One line of a GPIO chip.
+struct GpioLineConfig {
+  std::string chip;         ///< Path, name or label ("pinctrl-rp1"); empty = no line.
+  int line = -1;            ///< Offset on the chip.
+  bool active_low = false;  ///< "on" is the low level.
+};
+
+/// A real ring of WS2812B, on SPI or on a GPIO line.
+struct Ws2812Config {
+  /// light = colour × (brightness / 255)^gamma; 2.2: equal steps look equal, 1: proportional.
+  double gamma = 2.2;
+  double current_budget_ma = 500;  ///< What the ring may draw; a LED draws 1 … 60 mA.
+  int resend_ms = 1000;            ///< A glitch heals after at most this long; 0 = never re-sent.
+  bool leave_on = false;           ///< Keep the light when the program ends.
+  int first_led = 0;      ///< Where the chain's first LED sits: 0 = 3 o'clock, then clockwise.
+  bool clockwise = true;  ///< The way the chain runs on from there, as the camera sees it.
+
+  std::string spi_device = "/dev/spidev0.0";
+  int spi_hz = 3'200'000;
+  int spi_bits = 4;            ///< SPI bits for each WS2812B bit: 3, 4 or 8.
+  bool spi_check_rate = true;  ///< Measure the true rate at start and refuse a wrong one.
+
+  GpioLineConfig data;     ///< Data line of the "ws2812_gpio" backend.
+  int gpio_priority = 60;  ///< SCHED_FIFO priority of the thread that clocks it.
+  int gpio_retries = 5;    ///< Times a disturbed write is sent again.
+
+  GpioLineConfig power;      ///< Switches the ring's supply; either backend.
+  int power_settle_ms = 50;  ///< From power on to the first write.
+};
+
 struct RingConfig {
   std::string backend = "sim";
+  Ws2812Config ws2812;
 };
 
 struct Config {

@@ -17,7 +17,8 @@ struct Rgb {
 };
 
 /// What the ring is told to show: LED 0 is at the image's right (3 o'clock), the others follow
-/// clockwise as the camera sees them. Each LED shows its colour scaled by brightness / 255.
+/// clockwise as the camera sees them. Each LED shows its colour scaled by brightness / 255, or,
+/// where a ring dims along a gamma, by (brightness / 255)^gamma.
 struct Light {
   std::array<Rgb, kLedCount> leds = all({255, 255, 255});
   std::uint8_t brightness = 255;
@@ -38,7 +39,17 @@ struct RingInfo {
 /// What became of a write to the ring.
 struct ShowResult {
   bool ok = true;
-  std::string message;  ///< When not ok: what failed and the remedy.
+  std::string message;   ///< When not ok: what failed and the remedy. When dimmed: why.
+  double dimmed_to = 1;  ///< What a current limit left of the light asked for; 1 = all of it.
+};
+
+/// Run-time condition of a ring that writes by itself (a re-send can fail). Any thread may ask.
+struct RingReport {
+  bool ok = true;              ///< The last write worked.
+  std::string message;         ///< When not ok: what failed and the remedy.
+  std::string note;            ///< Found at start: worth knowing, not wrong. Empty = nothing.
+  std::uint64_t writes = 0;    ///< Tried, re-sends included.
+  std::uint64_t failures = 0;  ///< Of these.
 };
 
 /// The LEDs that light the layer. show() may block for a millisecond and more, so it is called on
@@ -52,6 +63,7 @@ class LightRing {
 
   [[nodiscard]] virtual RingInfo info() const = 0;
   [[nodiscard]] virtual ShowResult show(const Light& light) = 0;
+  [[nodiscard]] virtual RingReport report() const { return {}; }
 };
 
 }  // namespace dtact::hal

@@ -41,6 +41,20 @@ Key integer(std::string path, Integer& field, std::int64_t least, std::int64_t m
           [&field] { return fmt::format("{}", field); }};
 }
 
+Key one_of(std::string path, int& field, std::vector<std::int64_t> allowed) {
+  const std::string words = fmt::format("one of {}", fmt::join(allowed, ", "));
+  return {std::move(path), words,
+          [&field, allowed = std::move(allowed)](const toml::node& node, const fs::path&) {
+            const auto value = node.value_exact<std::int64_t>();
+            if (!value || std::find(allowed.begin(), allowed.end(), *value) == allowed.end()) {
+              return false;
+            }
+            field = static_cast<int>(*value);
+            return true;
+          },
+          [&field] { return fmt::format("{}", field); }};
+}
+
 Key real(std::string path, double& field, double least, double most, const std::string& unit) {
   return {std::move(path), fmt::format("a number, {} … {} {}", least, most, unit),
           [&field, least, most](const toml::node& node, const fs::path&) {
@@ -197,7 +211,9 @@ Key scheme(std::string path, std::string& field) {
 }  // namespace
 
 std::vector<Key> bind_keys(Config& c) {
+  constexpr const char* kChip = "a GPIO chip's path, name or label, or \"\"";
   hal::CameraConfig& camera = c.hal.camera;
+  hal::Ws2812Config& ws2812 = c.hal.ring.ws2812;
   pipeline::PipelineConfig& p = c.pipeline;
   std::vector<Key> keys{
       choice("log_level", c.log_level, {"trace", "debug", "info", "warn", "error"}),
@@ -222,6 +238,25 @@ std::vector<Key> bind_keys(Config& c) {
       choice("ring.backend", c.hal.ring.backend, hal::ring_backends()),
       integer("ring.brightness", p.light.brightness, 0, 255, ""),
       scheme("ring.scheme", c.ring_scheme),
+      real("ring.ws2812.gamma", ws2812.gamma, 0.2, 5, ""),
+      real("ring.ws2812.current_budget_ma", ws2812.current_budget_ma, 8, 10000, "(milliamperes)"),
+      integer("ring.ws2812.resend_ms", ws2812.resend_ms, 0, 3600000, "(milliseconds; 0 = never)"),
+      boolean("ring.ws2812.leave_on", ws2812.leave_on),
+      integer("ring.ws2812.first_led", ws2812.first_led, 0, hal::kLedCount - 1, ""),
+      boolean("ring.ws2812.clockwise", ws2812.clockwise),
+      text("ring.ws2812.spi_device", ws2812.spi_device, "a device such as \"/dev/spidev0.0\""),
+      integer("ring.ws2812.spi_hz", ws2812.spi_hz, 1000000, 20000000, "(hertz)"),
+      one_of("ring.ws2812.spi_bits", ws2812.spi_bits, {3, 4, 8}),
+      boolean("ring.ws2812.spi_check_rate", ws2812.spi_check_rate),
+      integer("ring.ws2812.gpio_priority", ws2812.gpio_priority, 0, 99, "(0 = normal scheduling)"),
+      integer("ring.ws2812.gpio_retries", ws2812.gpio_retries, 0, 100, ""),
+      integer("ring.ws2812.power_settle_ms", ws2812.power_settle_ms, 0, 10000, "(milliseconds)"),
+      text("ring.ws2812.power.chip", ws2812.power.chip, kChip),
+      integer("ring.ws2812.power.line", ws2812.power.line, -1, 4095, "(offset on the chip)"),
+      boolean("ring.ws2812.power.active_low", ws2812.power.active_low),
+      text("ring.ws2812.data.chip", ws2812.data.chip, kChip),
+      integer("ring.ws2812.data.line", ws2812.data.line, -1, 4095, "(offset on the chip)"),
+      boolean("ring.ws2812.data.active_low", ws2812.data.active_low),
 
       optional_integer("capture.cpu", p.cpu, 0, 1023, ""),
       integer("capture.fifo_priority", p.fifo_priority, 0, 99, "(0 = normal scheduling)"),

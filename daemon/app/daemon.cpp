@@ -117,9 +117,12 @@ void run_daemon(const Config& config) {
   net::FolderCalibrationStore store(state, start.folder);
 
   hal::Devices devices = hal::open_devices(config.hal);
+  if (const std::string note = devices.ring->report().note; !note.empty()) {
+    spdlog::warn("ring: {}", note);
+  }
   pipeline::PipelineConfig settings = config.pipeline;
   settings.state_folder = state;
-  settings.light.leds = *net::scheme_leds(config.ring_scheme);
+  if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;
   pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), start.calibration,
                               settings);
   net::Server server(io, make_net_config(config), pipeline, store);

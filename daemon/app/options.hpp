@@ -13,6 +13,7 @@ struct Options {
   std::vector<std::string> settings;            ///< --set KEY=VALUE, in order.
   bool check_config = false;
   bool print_config = false;
+  bool doctor = false;  ///< --doctor: check the machine instead of running.
 };
 
 /// Either options to run with, or the exit status after --help, --version or a mistake, whose text

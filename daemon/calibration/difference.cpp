@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "daemon/recon/reconstructor.hpp"
-#include "hal/frame.hpp"
 
 namespace dtact::calibration {
 
@@ -21,7 +20,7 @@ std::vector<float> mean_depth_um(const recon::Model& model,
   reconstructor.set_reference(reference_q8);
   std::vector<std::int16_t> depth(model.rectify.entries.size());
   std::vector<float> mean(depth.size());
-  std::vector<std::uint8_t> padded(model.reference_q8.size() + hal::kLumaPadding);
+  std::vector<std::uint8_t> padded(model.reference_q8.size() + recon::kLumaPadding);
   const auto share = 1.0F / static_cast<float>(frames.size());
   for (const image::Grey8& frame : frames) {
     if (frame.width != model.rectify.frame_width || frame.height != model.rectify.frame_height) {

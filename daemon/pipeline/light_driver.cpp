@@ -6,6 +6,8 @@ namespace dtact::pipeline {
 namespace {
 
 constexpr std::int64_t kRetryNs = 5'000'000;
+// A ring that writes by itself, to heal glitches, is asked so often how that goes.
+constexpr std::int64_t kLookNs = 250'000'000;
 
 }  // namespace
 
@@ -43,7 +45,7 @@ hal::Light LightDriver::light() const {
 
 void LightDriver::run() {
   while (!stop_) {
-    work_.wait();
+    if (!work_.wait_for(kLookNs)) look();
     Request request;
     while (!stop_ && requests_.pop(request)) serve(request);
   }
@@ -60,6 +62,14 @@ void LightDriver::serve(const Request& request) {
   if (request.light != before) tell(LightChanged{request.light});
 }
 
+void LightDriver::look() {
+  const hal::RingReport report = ring_->report();
+  if (report.writes == 0 || report.ok != trouble_) return;
+  trouble_ = !report.ok;
+  const std::scoped_lock lock(mutex_);
+  message_ = report.message;
+}
+
 hal::ShowResult LightDriver::write(const hal::Light& light) {
   note({true, clock_.monotonic_ns(), light});
   hal::ShowResult result = ring_->show(light);
@@ -69,7 +79,7 @@ hal::ShowResult LightDriver::write(const hal::Light& light) {
     const std::scoped_lock lock(mutex_);
     if (result.ok) light_ = light;
     shown = light_;
-    message_ = result.ok ? std::string() : result.message;
+    message_ = result.message;
   }
   note({false, clock_.monotonic_ns(), shown});
   return result;

@@ -43,7 +43,7 @@ class LightDriver {
   [[nodiscard]] bool submit(std::uint64_t ticket, const hal::Light& light);
   [[nodiscard]] bool next_event(Event& out) { return events_.pop(out); }
   [[nodiscard]] hal::RingInfo info() const { return ring_->info(); }
-  /// The last error, empty when the last write went well.
+  /// The last error, or why the ring shows less light than it was asked for; empty when well.
   [[nodiscard]] std::string message() const;
   [[nodiscard]] hal::Light light() const;
 
@@ -58,6 +58,7 @@ class LightDriver {
   };
   void run();
   void serve(const Request& request);
+  void look();
   hal::ShowResult write(const hal::Light& light);
   void note(const LightNote& note);
   void tell(const Event& event);

@@ -11,7 +11,7 @@ namespace dtact::pipeline {
 /// its own. Overflow policy: push() refuses and leaves the value with the caller, who keeps it and
 /// tries again; nothing is ever dropped here.
 template <typename T, std::size_t kCapacity>
-class SpscQueue {
+class SpscQueue {  // NOLINT(clang-analyzer-optin.performance.Padding): a cache line each
  public:
   static_assert(kCapacity > 0 && (kCapacity & (kCapacity - 1)) == 0, "a power of two");
 

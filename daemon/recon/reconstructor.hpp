@@ -16,6 +16,10 @@ struct StepTimes {
   std::int64_t list_ns = 0;  ///< Gain, list, untrusted mark.
 };
 
+/// Bytes that must be readable after the last pixel of a luma image, for vector loads. The HAL's
+/// frames have as many (hal::kLumaPadding).
+inline constexpr std::size_t kLumaPadding = 64;
+
 /// Turns luma into depth, in fixed point (formats and ranges in kernels.hpp: Q6 luma, Q12 gain,
 /// int16 micrometres). Holds its scratch rows, so run() never allocates. One thread at a time.
 class Reconstructor {
@@ -33,12 +37,11 @@ class Reconstructor {
   /// long as two frames: call it between frames.
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
 
-  /// `luma`: frame sized, rows `stride` bytes apart, 64 bytes readable after the last pixel.
-  /// `depth_um`: width × height of the model's table, row-major.
-  /// Borders are replicated when smoothing. Beyond the list's covered range on the deep side
-  /// Method::list writes kUntrusted; so do both methods where the mask says so and where either
-  /// reference is darker than eight grey levels or the light less than an eighth of the
-  /// calibration's.
+  /// `luma`: frame sized, rows `stride` bytes apart, kLumaPadding bytes readable after the last
+  /// pixel. `depth_um`: width × height of the model's table, row-major. Borders are replicated when
+  /// smoothing. Beyond the list's covered range on the deep side Method::list writes kUntrusted; so
+  /// do both methods where the mask says so and where either reference is darker than eight grey
+  /// levels or the light less than an eighth of the calibration's.
   void run(const std::uint8_t* luma, std::ptrdiff_t stride, std::span<std::int16_t> depth_um,
            StepTimes* times = nullptr) noexcept;
 

@@ -13,7 +13,7 @@ struct RtSettings {
   std::string name;                      ///< At most 15 characters (the kernel's limit).
   std::optional<int> cpu;                ///< Pin to this CPU; empty = not pinned.
   int fifo_priority = 0;                 ///< SCHED_FIFO 1…99; 0 = normal scheduling.
-  std::size_t stack_bytes = 256 * 1024;  ///< Small, since locked memory counts it whole.
+  std::size_t stack_bytes = std::size_t{256} * 1024;  ///< Small, since locked memory counts it whole.
 };
 
 /// A thread with a name, a CPU and a scheduling class. What the system refuses is collected and

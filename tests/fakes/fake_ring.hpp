@@ -19,7 +19,12 @@ class FakeRing final : public hal::LightRing {
     std::function<void(const hal::Light&)> on_show;
     mutable std::mutex mutex;
     std::vector<hal::Light> shown;
+    hal::RingReport report;  // guarded by mutex
 
+    void tell(hal::RingReport what) {
+      const std::scoped_lock lock(mutex);
+      report = std::move(what);
+    }
     [[nodiscard]] std::vector<hal::Light> all() const {
       const std::scoped_lock lock(mutex);
       return shown;
@@ -36,6 +41,10 @@ class FakeRing final : public hal::LightRing {
     }
     if (handle_.on_show) handle_.on_show(light);
     return {};
+  }
+  [[nodiscard]] hal::RingReport report() const override {
+    const std::scoped_lock lock(handle_.mutex);
+    return handle_.report;
   }
 
  private:

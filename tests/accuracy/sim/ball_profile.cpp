@@ -61,7 +61,7 @@ Centre centroid(const BallPress& press) {
   Centre centre;
   for (int y = 0; y < change.height; ++y) {
     for (int x = 0; x < change.width; ++x) {
-      const double value = change.pixels[static_cast<std::size_t>(y * change.width + x)];
+      const double value = change.pixels[change.index(x, y)];
       const double weight = std::max(value - 5, 0.0);
       sum += weight;
       centre.x += weight * x;
@@ -80,7 +80,7 @@ Profile radial_profile(const Image& change, const Centre& centre, double mm_per_
       const double r = std::hypot(x - centre.x, y - centre.y) * mm_per_px;
       const auto ring = static_cast<std::size_t>(r / Profile::kStep_mm);
       if (ring >= kRings) continue;
-      sums[ring] += change.pixels[static_cast<std::size_t>(y * change.width + x)];
+      sums[ring] += change.pixels[change.index(x, y)];
       counts[ring] += 1;
     }
   }
@@ -123,16 +123,15 @@ double high_pass_noise(const Image& image) {
     total += taps.back();
   }
   const auto at = [&](const std::vector<double>& plane, int x, int y) {
-    return plane[static_cast<std::size_t>(y * image.width + x)];
+    return plane[image.index(x, y)];
   };
   std::vector<double> rows(image.pixels.size());
   for (int y = 0; y < image.height; ++y) {
     for (int x = kRadius; x < image.width - kRadius; ++x) {
       double sum = 0;
-      for (int k = -kRadius; k <= kRadius; ++k) {
-        sum += taps[static_cast<std::size_t>(k + kRadius)] * at(image.pixels, x + k, y);
-      }
-      rows[static_cast<std::size_t>(y * image.width + x)] = sum / total;
+      int source = x - kRadius;
+      for (const double tap : taps) sum += tap * at(image.pixels, source++, y);
+      rows[image.index(x, y)] = sum / total;
     }
   }
   double sum = 0;
@@ -141,9 +140,8 @@ double high_pass_noise(const Image& image) {
   for (int y = kBorder; y < image.height - kBorder; ++y) {
     for (int x = kBorder; x < image.width - kBorder; ++x) {
       double blurred = 0;
-      for (int k = -kRadius; k <= kRadius; ++k) {
-        blurred += taps[static_cast<std::size_t>(k + kRadius)] * at(rows, x, y + k);
-      }
+      int source = y - kRadius;
+      for (const double tap : taps) blurred += tap * at(rows, x, source++);
       const double rest = at(image.pixels, x, y) - blurred / total;
       sum += rest;
       squares += rest * rest;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -14,6 +15,12 @@ struct Image {
   int width = 0;
   int height = 0;
   std::vector<double> pixels;
+
+  /// Where pixel (column x, row y) lies in `pixels`.
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  }
 };
 
 /// Untouched and pressed, both of the same size.

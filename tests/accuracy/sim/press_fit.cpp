@@ -46,7 +46,7 @@ void fit_light(const Image& reference, sim::Scene& scene) {
   double aa = 0, ab = 0, bb = 0, ay = 0, by = 0;
   for (int y = 0; y < reference.height; ++y) {
     for (int x = 0; x < reference.width; ++x) {
-      const auto i = static_cast<std::size_t>(y * reference.width + x);
+      const auto i = reference.index(x, y);
       const double dx = x - (reference.width - 1) / 2.0;
       const double dy = y - (reference.height - 1) / 2.0;
       const double corner = std::hypot(reference.width, reference.height) / 2;
@@ -97,13 +97,12 @@ class PressedProfile {
 
   Profile operator()(const sim::OpticsModel& model) {
     sim::Optics(model, truth_.grid()).run(indentation_, loss_);
-    const int width = scene_.camera.width;
-    Image change{width / kEvery, scene_.camera.height / kEvery, {}};
+    Image change{scene_.camera.width / kEvery, scene_.camera.height / kEvery, {}};
     for (int y = 0; y < change.height; ++y) {
       truth_.pixels().sample_row(y * kEvery, loss_, row_);
-      for (int x = 0; x < change.width; ++x) {
-        const double light = light_[static_cast<std::size_t>(y * kEvery * width + x * kEvery)];
-        change.pixels.push_back(light / 64 * row_[static_cast<std::size_t>(x * kEvery)] / 32768);
+      const std::size_t first = static_cast<std::size_t>(y) * kEvery * row_.size();
+      for (std::size_t x = 0; x < static_cast<std::size_t>(change.width); ++x) {
+        change.pixels.push_back(light_[first + x * kEvery] / 64.0 * row_[x * kEvery] / 32768);
       }
     }
     return radial_profile(change, {centre_.x / kEvery, centre_.y / kEvery},

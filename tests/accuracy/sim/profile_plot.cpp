@@ -25,7 +25,9 @@ struct Axes {
 
 void draw_axes(std::string& svg, const Axes& axes, double step, bool numbers_below) {
   auto out = std::back_inserter(svg);
-  for (double grey = axes.bottom; grey <= axes.top; grey += step) {
+  const int lines = static_cast<int>((axes.top - axes.bottom) / step);
+  for (int i = 0; i <= lines; ++i) {
+    const double grey = axes.bottom + i * step;
     fmt::format_to(out,
                    R"(<line x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}" stroke="{}"/>)"
                    R"(<text x="{:.1f}" y="{:.1f}" text-anchor="end">{:.0f}</text>)"

@@ -10,6 +10,8 @@
 
 #include "tests/fakes/fake_ring.hpp"
 
+// A missing value ends the test by the exception of its access.
+// NOLINTBEGIN(bugprone-unchecked-optional-access)
 namespace dtact::pipeline {
 namespace {
 
@@ -87,9 +89,24 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   EXPECT_EQ(driver.light().brightness, 200);  // what it still shows
   ring.broken = false;
   ASSERT_TRUE(driver.submit(7, dimmed(100)));
-  EXPECT_EQ(std::get<CommandDone>(*next()).outcome, Outcome::done);
+  EXPECT_EQ(std::get<CommandDone>(next().value()).outcome, Outcome::done);
   EXPECT_FALSE(driver.trouble());
   EXPECT_EQ(driver.message(), "");
+}
+
+TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
+  driver.start();
+  const auto eventually = [](auto condition) {
+    for (int i = 0; i < 1000 && !condition(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return condition();
+  };
+  ring.tell({.ok = false, .message = "the wire is cut", .note = {}, .writes = 2, .failures = 1});
+  EXPECT_TRUE(eventually([&] { return driver.trouble(); }));
+  EXPECT_TRUE(eventually([&] { return driver.message() == "the wire is cut"; }));
+  ring.tell({.ok = true, .message = {}, .note = {}, .writes = 3, .failures = 1});
+  EXPECT_TRUE(eventually([&] { return !driver.trouble() && driver.message().empty(); }));
 }
 
 TEST_F(LightDriverTest, RefusesWhenTooManyWait) {
@@ -105,3 +122,4 @@ TEST_F(LightDriverTest, StopsWhileItsQueuesAreFull) {
 
 }  // namespace
 }  // namespace dtact::pipeline
+// NOLINTEND(bugprone-unchecked-optional-access)

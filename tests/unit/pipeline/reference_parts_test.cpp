@@ -67,7 +67,7 @@ TEST(ReferenceAverage, HoldsItsMostFramesAndBeginsAnew) {
 }
 
 TEST(LumaGrid, CellsAreMeans) {
-  std::vector<std::uint8_t> pixels(80 * 60, 10);
+  std::vector<std::uint8_t> pixels(std::size_t{80} * 60, 10);
   pixels[0] = 50;  // one of the first cell's four pixels
   LumaGrid grid;
   measure({pixels.data(), 80, 60, 80}, grid);
@@ -81,7 +81,7 @@ TEST(LumaGrid, CellsAreMeans) {
 }
 
 TEST(LumaGrid, ReferencesAreMeasuredInGreyLevels) {
-  const std::vector<std::uint16_t> q8(80 * 60, 2624);
+  const std::vector<std::uint16_t> q8(std::size_t{80} * 60, 2624);
   LumaGrid grid;
   measure(q8, 80, 60, grid);
   EXPECT_FLOAT_EQ(grid.cells[kGridCells - 1], 10.25F);
@@ -117,15 +117,15 @@ TEST_F(TouchTest, APressIsATouchUnderAnyLight) {
 
 TEST_F(TouchTest, TheFitSeesTheLightThroughAPress) {
   (void)darkening({.light = 0.5, .press_mm = 1.5});
-  EXPECT_NEAR(field[15 * kGridWidth + 20], 0.5, 0.02);  // under the press
-  EXPECT_NEAR(field[5 * kGridWidth + 5], 0.5, 0.01);
+  EXPECT_NEAR(field[cell_at(20, 15)], 0.5, 0.02);  // under the press
+  EXPECT_NEAR(field[cell_at(5, 5)], 0.5, 0.01);
 }
 
 TEST_F(TouchTest, OneNumberSeesADimmedRingThroughALargePress) {
   const LumaGrid now = grid_of({.light = 0.5, .press_mm = 1.5});
   (void)check.compare(grid_of({}), now, region, TouchCheck::kSameShape, field);
-  EXPECT_NEAR(field[15 * kGridWidth + 20], 0.5, 0.003);
-  EXPECT_EQ(field[15 * kGridWidth + 20], field[0]);
+  EXPECT_NEAR(field[cell_at(20, 15)], 0.5, 0.003);
+  EXPECT_EQ(field[cell_at(20, 15)], field[0]);
 }
 
 TEST_F(TouchTest, RelightingBringsAReferenceToTheLightOfNow) {
@@ -135,7 +135,7 @@ TEST_F(TouchTest, RelightingBringsAReferenceToTheLightOfNow) {
   std::vector<std::uint16_t> relit(then.size());
   relight(then, fakes::kToyWidth, fakes::kToyHeight, field, relit);
   for (std::size_t x = 8; x < 152; ++x) {  // the calibrated part of one row
-    const std::size_t i = 20 * fakes::kToyWidth + x;
+    const std::size_t i = std::size_t{20} * fakes::kToyWidth + x;
     ASSERT_NEAR(relit[i], now[i], 64) << i;  // a quarter of a grey level
   }
 }

@@ -11,6 +11,8 @@
 #include "hal/base/atomic_file.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
+// A missing value ends the test by the exception of its access.
+// NOLINTBEGIN(bugprone-unchecked-optional-access)
 namespace dtact::pipeline {
 namespace {
 
@@ -124,3 +126,4 @@ TEST_F(StoreTest, ABusyWriterRefuses) {
 
 }  // namespace
 }  // namespace dtact::pipeline
+// NOLINTEND(bugprone-unchecked-optional-access)

@@ -80,7 +80,7 @@ TEST(LightTimeline, ExposureBeginsAPeriodBeforeTheFramesEnd) {
 }
 
 TEST(LightTimeline, FramesBelongToTheLightTheyWereExposedUnder) {
-  hal::Light bright;
+  const hal::Light bright;
   hal::Light dim;
   dim.brightness = 100;
   LightTimeline timeline(bright, 2, kPeriod);
@@ -95,7 +95,7 @@ TEST(LightTimeline, FramesBelongToTheLightTheyWereExposedUnder) {
 }
 
 TEST(LightTimeline, AFailedWriteLeavesTheOldLight) {
-  hal::Light bright;
+  const hal::Light bright;
   hal::Light dim;
   dim.brightness = 100;
   LightTimeline timeline(bright, 0, kPeriod);

@@ -33,7 +33,8 @@ Radii radii_of(const Pressed& pressed) {
   Radii radii;
   double lowest = 0;
   for (int j = kSize / 2; j < kSize; ++j) {
-    const double r = (j - kSize / 2) * kSpacing;
+    const int points = j - kSize / 2;
+    const double r = points * kSpacing;
     const double u = pressed.indentation_mm(kSize / 2, j);
     if (pressed.pressure(kSize / 2, j) > 0) radii.contact = r;
     if (radii.zero == 0 && u < 0) {

@@ -11,7 +11,7 @@ namespace dtact::hal::sim {
 namespace {
 
 std::vector<std::uint16_t> field(const Scene& scene, const Light& light) {
-  std::vector<std::uint16_t> out(160 * 120);
+  std::vector<std::uint16_t> out(kPixels);
   LightField(scene).compute(led_levels(light), out);
   return out;
 }
@@ -71,7 +71,7 @@ TEST(LightField, IsAsUnevenAsThePapers) {
     double squares = 0;
     for (int y = 0; y < 120; ++y) {
       for (int x = 20; x < 140; ++x) {
-        const double v = plane[static_cast<std::size_t>(y * 160 + x)];
+        const double v = plane[pixel(x, y)];
         sum += v;
         squares += v * v;
       }

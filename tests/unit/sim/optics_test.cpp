@@ -14,6 +14,12 @@ namespace dtact::hal::sim {
 namespace {
 
 constexpr int kN = 200;
+constexpr std::size_t kPoints = 40000;  // kN²
+
+constexpr std::size_t at(int x, int y) {
+  return static_cast<std::size_t>(y) * kN + static_cast<std::size_t>(x);
+}
+
 const Grid kGrid = {kN, kN, 0.125, -12.5, -12.5};
 
 OpticsModel model() {
@@ -36,18 +42,18 @@ TEST(Optics, ResponseHasTwoSides) {
 
 TEST(Optics, EvenIndentationIsNotChangedByScattering) {
   Optics optics(model(), kGrid);
-  const std::vector<std::int16_t> indentation(kN * kN, Truth::kPerMm);  // 1 mm
-  std::vector<std::int16_t> loss(kN * kN);
+  const std::vector<std::int16_t> indentation(kPoints, Truth::kPerMm);  // 1 mm
+  std::vector<std::int16_t> loss(kPoints);
   optics.run(indentation, loss);
   for (const std::int16_t value : loss) ASSERT_NEAR(value, 0.18 * 32768, 2);
 }
 
 TEST(Optics, ScatteringKeepsTheSumAndHasTheTwoWidths) {
   Optics optics(model(), kGrid);
-  std::vector<std::int16_t> indentation(kN * kN, 0);
-  std::vector<std::int16_t> loss(kN * kN);
+  std::vector<std::int16_t> indentation(kPoints, 0);
+  std::vector<std::int16_t> loss(kPoints);
   for (int y = 96; y < 104; ++y) {
-    for (int x = 96; x < 104; ++x) indentation[static_cast<std::size_t>(y * kN + x)] = 16000;
+    for (int x = 96; x < 104; ++x) indentation[at(x, y)] = 16000;
   }
   optics.run(indentation, loss);
   // 64 points of 2 mm: 0.4 − 0.08 = 0.32 of the light each.
@@ -57,7 +63,7 @@ TEST(Optics, ScatteringKeepsTheSumAndHasTheTwoWidths) {
   double variance = 0;
   for (int y = 0; y < kN; ++y) {
     for (int x = 0; x < kN; ++x) {
-      variance += loss[static_cast<std::size_t>(y * kN + x)] * std::pow((x - 99.5) * 0.125, 2);
+      variance += loss[at(x, y)] * std::pow((x - 99.5) * 0.125, 2);
     }
   }
   EXPECT_NEAR(variance / sum, 0.063 + 0.972 + 0.0833, 0.06);
@@ -68,8 +74,8 @@ TEST(Optics, WithoutScatteringItIsTheResponse) {
   sharp.narrow_mm = 0;
   sharp.narrow_weight = 1;
   Optics optics(sharp, kGrid);
-  std::vector<std::int16_t> indentation(kN * kN, 0);
-  std::vector<std::int16_t> loss(kN * kN);
+  std::vector<std::int16_t> indentation(kPoints, 0);
+  std::vector<std::int16_t> loss(kPoints);
   indentation[kN * 50 + 50] = 8000;
   indentation[kN * 60 + 50] = -1600;
   optics.run(indentation, loss);
@@ -81,7 +87,8 @@ TEST(Optics, WithoutScatteringItIsTheResponse) {
 TEST(Optics, BuiltInResponseRises) {
   const Scene scene = default_scene();
   double last = -1;
-  for (double d = -0.4; d <= 1.8; d += 0.01) {
+  for (int um = -400; um <= 1800; um += 10) {
+    const double d = um / 1000.0;
     const double now = response(scene.optics, d);
     ASSERT_GT(now, last) << d;
     last = now;

@@ -13,7 +13,7 @@ namespace dtact::hal::sim {
 namespace {
 
 image::Grey8 frame(Renderer& renderer, std::uint64_t sequence, const Light& light = {}) {
-  image::Grey8 image{160, 120, std::vector<std::uint8_t>(160 * 120)};
+  image::Grey8 image{160, 120, std::vector<std::uint8_t>(kPixels)};
   renderer.render(sequence, led_levels(light), image.pixels.data(), 160, 120);
   return image;
 }
@@ -80,7 +80,7 @@ TEST(Renderer, PressDarkensAndBulgeBrightens) {
     for (int y = 0; y < 120; ++y) {
       for (int x = 0; x < 160; ++x) {
         if (std::abs(std::hypot(x - 79.5, y - 59.5) * 0.2 - radius_mm) > 0.2) continue;
-        const auto i = static_cast<std::size_t>(y * 160 + x);
+        const auto i = pixel(x, y);
         sum += before.pixels[i] - after.pixels[i];
         ++count;
       }
@@ -117,14 +117,14 @@ TEST(Renderer, OverexposureIsWhite) {
 
 TEST(Renderer, RendersTheRowsAskedForAndNoMore) {
   Renderer renderer(small_scene(), 1);
-  std::vector<std::uint8_t> out(200 * 120, 7);
+  std::vector<std::uint8_t> out(24000, 7);  // 120 rows, 200 bytes apart
   renderer.render(0, led_levels({}), out.data(), 200, 60);
-  EXPECT_NE(out[59 * 200], 7);
-  EXPECT_EQ(out[59 * 200 + 160], 7);
-  EXPECT_EQ(out[60 * 200], 7);
+  EXPECT_NE(out[11800], 7);
+  EXPECT_EQ(out[11960], 7);
+  EXPECT_EQ(out[12000], 7);
   renderer.render(0, led_levels({}), out.data(), 200, 120);
   const auto whole = frame(renderer, 0);
-  EXPECT_EQ(out[100 * 200 + 50], whole.pixels[100 * 160 + 50]);
+  EXPECT_EQ(out[20050], whole.pixels[pixel(50, 100)]);
 }
 
 }  // namespace

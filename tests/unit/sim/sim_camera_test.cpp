@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -189,8 +191,9 @@ TEST_F(SimCameraTest, TornFrameHasTheLowerHalfOfTheOneBefore) {
   const auto first = pixels(frame);
   ASSERT_EQ(camera.grab(frame, 0s), GrabStatus::ok);
   const auto torn = pixels(frame);
-  EXPECT_TRUE(std::equal(torn.begin() + 60 * 160, torn.end(), first.begin() + 60 * 160));
-  EXPECT_FALSE(std::equal(torn.begin(), torn.begin() + 60 * 160, first.begin()));
+  constexpr std::ptrdiff_t kHalf = 9600;  // 60 rows of 160
+  EXPECT_TRUE(std::equal(torn.begin() + kHalf, torn.end(), first.begin() + kHalf));
+  EXPECT_FALSE(std::equal(torn.begin(), torn.begin() + kHalf, first.begin()));
 }
 
 TEST_F(SimCameraTest, TruncatedFramesAreDamagedInEveryFormat) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 
 #include "hal/sim/scene.hpp"
@@ -24,6 +25,13 @@ object = "ball"
 radius_mm = 4.0
 keys = [ { t = 1.0 }, { t = 2.0, depth = 1.0 } ]
 )";
+
+inline constexpr std::size_t kPixels = 19200;  // 160 · 120
+
+/// Where a pixel of that sensor lies in its row-major image.
+constexpr std::size_t pixel(int x, int y) {
+  return static_cast<std::size_t>(y) * 160 + static_cast<std::size_t>(x);
+}
 
 inline Scene small_scene(const std::string& rest = kBallPress) {
   return parse_scene(kSmallSensor + rest, "small.toml");

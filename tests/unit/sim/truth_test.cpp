@@ -49,7 +49,7 @@ TEST(Truth, IsABallWhereItTouchesAndBulgesOutside) {
   float lowest = 0;
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) {
-      const auto i = static_cast<std::size_t>(y * 160 + x);
+      const auto i = pixel(x, y);
       lowest = std::min(lowest, map[i]);
       const double r = std::hypot(x - 79.5, y - 59.5) * 0.2;
       if (contact[i] == 255 && r < 2) {
@@ -87,8 +87,8 @@ keys = [ { t = 0.0, x = 4.0, y = -3.0, depth = 0.5, rotation = 45.0 } ]
   std::vector<float> map;
   Truth(scene).indentation_mm(0, map);
   const auto at = [&](double x_mm, double y_mm) {
-    return map[static_cast<std::size_t>(std::lround(59.5 + y_mm / 0.2) * 160 +
-                                        std::lround(79.5 + x_mm / 0.2))];
+    return map[pixel(static_cast<int>(std::lround(79.5 + x_mm / 0.2)),
+                     static_cast<int>(std::lround(59.5 + y_mm / 0.2)))];
   };
   EXPECT_GT(at(4, -3), 0.4F);
   // Clockwise with y downwards: the axis turns from the right towards the lower right.
@@ -119,8 +119,9 @@ keys = [ { t = 0.0, x = 6.0, depth = 0.4 } ]
 )");
   std::vector<float> map;
   Truth(scene).indentation_mm(0, map);
-  EXPECT_NEAR(*std::max_element(map.begin() + 59 * 160, map.begin() + 59 * 160 + 80), 0.6, 0.01);
-  EXPECT_NEAR(*std::max_element(map.begin() + 59 * 160 + 80, map.begin() + 60 * 160), 0.4, 0.01);
+  const float* const row = &map[pixel(0, 59)];
+  EXPECT_NEAR(*std::max_element(row, row + 80), 0.6, 0.01);
+  EXPECT_NEAR(*std::max_element(row + 80, row + 160), 0.4, 0.01);
 }
 
 }  // namespace

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "daemon/app/doctor/machine.hpp"
+#include "hal/config.hpp"
+
+namespace dtact::app {
+
+enum class Verdict : std::uint8_t {
+  good,
+  note,  ///< Could be better; nothing fails for it.
+  wrong  ///< The daemon will not start, or not run as configured.
+};
+
+struct Finding {
+  Verdict verdict = Verdict::good;
+  std::string what;  ///< What was looked at and what it is.
+  std::string mend;  ///< The command, or the line and the file it belongs to. Empty when good.
+};
+using Findings = std::vector<Finding>;
+
+// Each looks at one subject. What the configuration does not use is at most a note.
+
+/// Nodes of cameras: there, permitted, at least one that captures.
+[[nodiscard]] Findings check_camera(const Machine& machine, const hal::CameraConfig& camera);
+/// spidev: there, permitted, a speed inside the WS2812B's window, bufsiz, the true rate.
+[[nodiscard]] Findings check_spi(const Machine& machine, const hal::RingConfig& ring);
+/// What makes the SPI rate of a Raspberry Pi move: config.txt's core clock.
+[[nodiscard]] Findings check_core_clock(const Machine& machine, const hal::RingConfig& ring);
+/// GPIO chips and the configured lines: there, permitted, free.
+[[nodiscard]] Findings check_gpio(const Machine& machine, const hal::RingConfig& ring);
+/// RLIMIT_RTPRIO and RLIMIT_MEMLOCK.
+[[nodiscard]] Findings check_realtime(const Machine& machine);
+/// A clock source that is read without a system call.
+[[nodiscard]] Findings check_clock_source(const Machine& machine);
+/// CPU frequency governors.
+[[nodiscard]] Findings check_governor(const Machine& machine);
+
+}  // namespace dtact::app

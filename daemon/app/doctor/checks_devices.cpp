@@ -1,0 +1,197 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+#include "daemon/app/doctor/checks.hpp"
+#include "hal/ws2812/encoder.hpp"
+#include "hal/ws2812/spi_wire.hpp"
+
+namespace dtact::app {
+namespace {
+
+std::string join_group(const Machine& machine, const std::string& path,
+                       const std::string& usual_group) {
+  const std::string owner = machine.group(path);
+  // Without a rule of udev's the node belongs to root: the rule first, then the group.
+  const std::string rule =
+      owner.empty() || owner == "root"
+          ? "sudo cp config/udev/60-dtactd.rules /etc/udev/rules.d/ && sudo udevadm control "
+            "--reload && sudo udevadm trigger && "
+          : "";
+  return fmt::format("{}sudo usermod -aG {} {}, then log in again", rule,
+                     owner.empty() || owner == "root" ? usual_group : owner, machine.user());
+}
+
+bool is_raspberry_pi(const Machine& machine) {
+  return machine.line("/proc/device-tree/model").value_or("").starts_with("Raspberry Pi");
+}
+
+/// The chip that the configuration names by path, name or label; null when there is none.
+const hal::gpiod::Chip* find_chip(const std::vector<hal::gpiod::Chip>& chips,
+                                  const std::string& name) {
+  const auto found = std::find_if(chips.begin(), chips.end(), [&](const hal::gpiod::Chip& chip) {
+    return chip.path == name || chip.path == "/dev/" + name || chip.label == name;
+  });
+  return found == chips.end() ? nullptr : &*found;
+}
+
+Finding check_line(const Machine& machine, const std::vector<hal::gpiod::Chip>& chips,
+                   const std::string& key, const hal::GpioLineConfig& line) {
+  const std::string what = fmt::format("{}: chip \"{}\" line {}", key, line.chip, line.line);
+  const hal::gpiod::Chip* chip = find_chip(chips, line.chip);
+  if (chip == nullptr) {
+    return {Verdict::wrong, what + ": no such chip that this user may open",
+            fmt::format("gpiodetect, then set {}.chip", key)};
+  }
+  if (line.line < 0 || line.line >= chip->lines) {
+    return {Verdict::wrong, fmt::format("{}: the chip has lines 0 … {}", what, chip->lines - 1),
+            fmt::format("gpioinfo {}, then set {}.line", chip->path, key)};
+  }
+  if (const std::string holder = machine.gpio_holder(chip->path, line.line); !holder.empty()) {
+    return {Verdict::wrong, fmt::format("{}: in use by \"{}\"", what, holder),
+            fmt::format("free it, or choose a free line: gpioinfo {}", chip->path)};
+  }
+  return {Verdict::good, what + " is free", ""};
+}
+
+}  // namespace
+
+Findings check_camera(const Machine& machine, const hal::CameraConfig& camera) {
+  const bool needed = camera.backend == "v4l2" || camera.backend == "libcamera";
+  const Verdict bad = needed ? Verdict::wrong : Verdict::note;
+  const std::vector<std::string> nodes = machine.list("/dev", "video");
+  if (nodes.empty()) {
+    if (!needed) {
+      return {{Verdict::good, fmt::format("camera.backend = \"{}\" needs no node", camera.backend),
+               ""}};
+    }
+    return {{bad, "no camera node (/dev/video*)",
+             "plug the camera in and see lsusb and dmesg; sudo modprobe uvcvideo"}};
+  }
+  Findings findings;
+  bool captures = false;
+  for (const std::string& node : nodes) {
+    if (const int error = machine.access(node); error != 0) {
+      findings.push_back({bad, fmt::format("{}: {}", node, std::strerror(error)),
+                          join_group(machine, node, "video")});
+      continue;
+    }
+    const Machine::Video video = machine.video(node);
+    if (video.error != 0) {
+      findings.push_back(
+          {Verdict::note, fmt::format("{}: {}", node, std::strerror(video.error)), "dmesg | tail"});
+    } else if (video.captures) {
+      captures = true;
+      findings.push_back({Verdict::good, fmt::format("{} \"{}\" captures", node, video.card), ""});
+    }  // Metadata nodes are nobody's concern.
+  }
+  if (!captures && findings.empty()) {
+    findings.push_back({bad, "no video node captures", "v4l2-ctl --list-devices"});
+  }
+  return findings;
+}
+
+Findings check_spi(const Machine& machine, const hal::RingConfig& ring) {
+  const hal::Ws2812Config& config = ring.ws2812;
+  if (ring.backend != "ws2812_spi") {
+    return {{Verdict::good, fmt::format("ring.backend = \"{}\" needs no SPI", ring.backend), ""}};
+  }
+  Findings findings;
+  const hal::ws2812::SpiFormat format{config.spi_bits, static_cast<double>(config.spi_hz)};
+  const std::string refused = hal::ws2812::why_refused(format);
+  if (refused.empty()) {
+    findings.push_back({Verdict::good,
+                        fmt::format("{:.3f} MHz with {} SPI bits for each WS2812B bit fits",
+                                    format.hz / 1e6, format.bits),
+                        ""});
+  } else {
+    findings.push_back({Verdict::wrong, refused, "set ring.ws2812.spi_hz and spi_bits"});
+  }
+
+  const int error = machine.access(config.spi_device);
+  if (error == ENOENT) {
+    findings.push_back(
+        {Verdict::wrong, fmt::format("{} is not there", config.spi_device),
+         is_raspberry_pi(machine)
+             ? "sudo raspi-config nonint do_spi 0 && sudo reboot"
+             : "enable the SPI controller and a spidev child in the board's device tree; ls "
+               "/dev/spidev*"});
+    return findings;
+  }
+  if (error != 0) {
+    findings.push_back({Verdict::wrong,
+                        fmt::format("{}: {}", config.spi_device, std::strerror(error)),
+                        join_group(machine, config.spi_device, "spi")});
+    return findings;
+  }
+  findings.push_back({Verdict::good, fmt::format("{} may be opened", config.spi_device), ""});
+
+  const std::array<hal::Rgb, hal::kLedCount> leds{};
+  const std::size_t need = refused.empty() ? hal::ws2812::encode(leds, format).size() : 0;
+  const std::string bufsiz = machine.line("/sys/module/spidev/parameters/bufsiz").value_or("4096");
+  if (std::strtoull(bufsiz.c_str(), nullptr, 10) < need) {
+    findings.push_back(
+        {Verdict::wrong, fmt::format("spidev.bufsiz = {}, the ring needs {}", bufsiz, need),
+         fmt::format("put spidev.bufsiz=4096 on the kernel's command line{}, reboot",
+                     is_raspberry_pi(machine) ? " (/boot/firmware/cmdline.txt)" : "")});
+  } else {
+    findings.push_back(
+        {Verdict::good, fmt::format("spidev.bufsiz = {}, the ring needs {}", bufsiz, need), ""});
+  }
+
+  const Machine::SpiRate rate =
+      machine.spi_rate(config.spi_device, static_cast<std::uint32_t>(config.spi_hz));
+  if (!rate.error.empty()) {
+    findings.push_back({Verdict::wrong, "the rate cannot be measured: " + rate.error, "dmesg"});
+  } else if (const std::string off = hal::ws2812::why_rate_refused(format, rate.hz); !off.empty()) {
+    findings.push_back(
+        {Verdict::wrong, off,
+         is_raspberry_pi(machine) ? "see core clock, below" : "choose another ring.ws2812.spi_hz"});
+  } else {
+    findings.push_back({Verdict::good, fmt::format("measured rate {:.3f} MHz", rate.hz / 1e6), ""});
+  }
+  return findings;
+}
+
+Findings check_core_clock(const Machine& machine, const hal::RingConfig& ring) {
+  const std::string model = machine.line("/proc/device-tree/model").value_or("");
+  // A Raspberry Pi 5's header SPI has a clock of its own.
+  const bool four = model.starts_with("Raspberry Pi 4") || model.find("Module 4") != model.npos;
+  const bool three = model.starts_with("Raspberry Pi 3") || model.find("Module 3") != model.npos;
+  if (ring.backend != "ws2812_spi" || (!four && !three)) return {};
+  const std::string path = "/boot/firmware/config.txt";
+  const std::string config = machine.text(path);
+  const std::string wanted = four ? "core_freq_min=500" : "core_freq=250";
+  const std::string lines = four ? "core_freq=500\\ncore_freq_min=500" : "core_freq=250";
+  if (config.find("\n" + wanted) != std::string::npos || config.starts_with(wanted)) {
+    return {{Verdict::good, fmt::format("{} has {}", path, wanted), ""}};
+  }
+  return {
+      {Verdict::note,
+       fmt::format("{}: the core clock, from which the SPI's is divided, moves with load", model),
+       fmt::format("printf '{}\\n' | sudo tee -a {} && sudo reboot", lines, path)}};
+}
+
+Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {
+  const bool data = ring.backend == "ws2812_gpio";
+  const bool power = (data || ring.backend == "ws2812_spi") && !ring.ws2812.power.chip.empty();
+  if (!data && !power) return {{Verdict::good, "no line is configured", ""}};
+  Findings findings;
+  for (const std::string& node : machine.list("/dev", "gpiochip")) {
+    if (const int error = machine.access(node); error != 0) {
+      findings.push_back({Verdict::wrong, fmt::format("{}: {}", node, std::strerror(error)),
+                          join_group(machine, node, "gpio")});
+    }
+  }
+  const auto chips = machine.gpio_chips();
+  if (power) {
+    findings.push_back(check_line(machine, chips, "ring.ws2812.power", ring.ws2812.power));
+  }
+  if (data) findings.push_back(check_line(machine, chips, "ring.ws2812.data", ring.ws2812.data));
+  return findings;
+}
+
+}  // namespace dtact::app

@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <sstream>
+#include <string_view>
+
+#include "daemon/app/doctor/checks.hpp"
+
+namespace dtact::app {
+
+Findings check_realtime(const Machine& machine) {
+  if (machine.privileged()) return {{Verdict::good, "root has no limits", ""}};
+  const std::string limits = "/etc/security/limits.d/dtactd.conf";
+  const auto mend = [&](const char* what) {
+    return fmt::format(
+        "echo '{} - {}' | sudo tee -a {}, then log in again (under systemd the unit's "
+        "LimitRTPRIO= and LimitMEMLOCK= do this)",
+        machine.user(), what, limits);
+  };
+  Findings findings;
+  const rlim_t priority = machine.limit(RLIMIT_RTPRIO);
+  if (priority == 0) {
+    findings.push_back(
+        {Verdict::wrong, "RLIMIT_RTPRIO = 0: no real-time scheduling", mend("rtprio 90")});
+  } else {
+    findings.push_back({Verdict::good,
+                        priority == RLIM_INFINITY ? "RLIMIT_RTPRIO is unlimited"
+                                                  : fmt::format("RLIMIT_RTPRIO = {}", priority),
+                        ""});
+  }
+  const rlim_t memory = machine.limit(RLIMIT_MEMLOCK);
+  // mlockall() counts the whole address space, touched or not: some hundreds of megabytes.
+  constexpr rlim_t kEnough = 1U << 30U;
+  if (memory < kEnough) {
+    findings.push_back(
+        {Verdict::wrong,
+         fmt::format("RLIMIT_MEMLOCK = {} kB: memory cannot be locked", memory / 1024),
+         mend("memlock unlimited")});
+  } else {
+    findings.push_back({Verdict::good, "RLIMIT_MEMLOCK suffices", ""});
+  }
+  return findings;
+}
+
+Findings check_clock_source(const Machine& machine) {
+  const std::string folder = "/sys/devices/system/clocksource/clocksource0/";
+  const auto current = machine.line(folder + "current_clocksource");
+  if (!current) return {{Verdict::note, "the clock source cannot be read", "ls " + folder}};
+  // Those that the kernel's vDSO reads without a system call; the others cost a microsecond each.
+  constexpr std::array<std::string_view, 5> kQuick{
+      "tsc", "kvm-clock", "hyperv_clocksource_tsc_page", "arch_sys_counter", "riscv_clocksource"};
+  if (std::find(kQuick.begin(), kQuick.end(), *current) != kQuick.end()) {
+    return {{Verdict::good, *current, ""}};
+  }
+  std::istringstream available(machine.line(folder + "available_clocksource").value_or(""));
+  for (std::string name; available >> name;) {
+    if (std::find(kQuick.begin(), kQuick.end(), name) != kQuick.end()) {
+      return {{Verdict::wrong, fmt::format("{}: each reading is a slow call", *current),
+               fmt::format("echo {} | sudo tee {}current_clocksource", name, folder)}};
+    }
+  }
+  return {{Verdict::note,
+           fmt::format("{}: each reading is a slow call, and there is no other", *current),
+           "see dmesg | grep -i clocksource for why the quick one was given up"}};
+}
+
+Findings check_governor(const Machine& machine) {
+  const std::string cpus = "/sys/devices/system/cpu";
+  std::string slow;
+  int governed = 0;
+  for (const std::string& cpu : machine.list(cpus, "cpu")) {
+    const auto governor = machine.line(cpu + "/cpufreq/scaling_governor");
+    if (!governor) continue;
+    ++governed;
+    if (*governor != "performance") slow = *governor;
+  }
+  if (governed == 0) return {{Verdict::good, "the processor's clock is not governed here", ""}};
+  if (slow.empty()) return {{Verdict::good, "performance", ""}};
+  return {{Verdict::note, fmt::format("{}: the clock climbs only after a frame is late", slow),
+           fmt::format("echo performance | sudo tee {}/cpu*/cpufreq/scaling_governor", cpus)}};
+}
+
+}  // namespace dtact::app

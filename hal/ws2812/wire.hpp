@@ -1,0 +1,29 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "hal/light_ring.hpp"
+
+namespace dtact::hal::ws2812 {
+
+/// What carries colours to the LEDs. After construction used by one thread, the ring's own. Errors
+/// are sentences with the remedy; an empty string is success.
+class Wire {
+ public:
+  Wire() = default;
+  Wire(const Wire&) = delete;
+  Wire& operator=(const Wire&) = delete;
+  virtual ~Wire() = default;
+
+  [[nodiscard]] virtual RingInfo info() const = 0;
+  /// The first call: measures, without a pulse that LEDs would take for data, whether the wire can
+  /// serve a chain of `leds`.
+  [[nodiscard]] virtual std::string prepare(int leds) = 0;
+  /// What prepare() found worth knowing; empty when nothing.
+  [[nodiscard]] virtual std::string note() const = 0;
+  /// Sends one colour to each LED, the chain's first LED first, and waits until it is through.
+  [[nodiscard]] virtual std::string send(std::span<const Rgb> leds) = 0;
+};
+
+}  // namespace dtact::hal::ws2812

@@ -1,0 +1,214 @@
+// The SPI ring on the real spidev driver. Runs in the guest, with spi-mock loaded: a controller
+// that records what it is sent and takes the time that a wire would.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "hal/ws2812/ring.hpp"
+#include "hal/ws2812/spi_wire.hpp"
+#include "tests/kernel/ring/guest.hpp"
+#include "tests/unit/ws2812/chain_model.hpp"
+
+namespace dtact::hal::ws2812 {
+namespace {
+
+using kernel_test::AsNobody;
+using kernel_test::eventually;
+using kernel_test::read_text;
+using kernel_test::write_text;
+using testing::ElementsAreArray;
+using testing::HasSubstr;
+
+constexpr const char* kMock = "/sys/kernel/debug/spi_mock/";
+
+/// One transfer as the controller saw it; the layout is spi-mock's.
+struct Transfer {
+  struct Head {
+    std::uint64_t start_ns;
+    std::uint32_t speed_hz;
+    std::uint32_t bytes;
+    std::uint8_t mode, word, cs_change, flags;
+    std::uint32_t delay_us;
+  };
+  Head head;
+  std::vector<std::uint8_t> data;
+};
+static_assert(sizeof(Transfer::Head) == 24);
+
+std::vector<Transfer> recorded() {
+  const std::string log = read_text(std::string(kMock) + "log");
+  std::vector<Transfer> transfers;
+  for (std::size_t at = 0; at + sizeof(Transfer::Head) <= log.size();) {
+    Transfer transfer{};
+    std::memcpy(&transfer.head, log.data() + at, sizeof transfer.head);
+    at += sizeof transfer.head;
+    transfer.data.assign(log.begin() + static_cast<std::ptrdiff_t>(at),
+                         log.begin() + static_cast<std::ptrdiff_t>(at + transfer.head.bytes));
+    at += transfer.head.bytes;
+    transfers.push_back(std::move(transfer));
+  }
+  return transfers;
+}
+
+void forget() { write_text(std::string(kMock) + "log", "0"); }
+void fail_with(int error) { write_text(std::string(kMock) + "fail", std::to_string(error)); }
+
+/// What LEDs on the wire would show after a transfer.
+std::vector<Rgb> shown_by(const Transfer& transfer) {
+  test::ChainModel chain;
+  chain.spi(transfer.data, transfer.head.speed_hz);
+  EXPECT_EQ(chain.odd_pulses(), 0);
+  return chain.shown();
+}
+
+Light rainbow() {
+  Light light;
+  light.leds = {Rgb{255, 0, 0}, Rgb{0, 255, 0},   Rgb{0, 0, 255}, Rgb{1, 2, 4},
+                Rgb{8, 16, 32}, Rgb{64, 128, 85}, Rgb{170, 7, 9}, Rgb{255, 255, 255}};
+  return light;
+}
+
+Ws2812Config quiet() {
+  Ws2812Config config;
+  config.resend_ms = 0;
+  return config;
+}
+
+class SpiRing : public testing::Test {
+ protected:
+  void SetUp() override {
+    fail_with(0);
+    write_text(std::string(kMock) + "realtime", "1");
+    forget();
+  }
+};
+
+TEST_F(SpiRing, TheControllerReceivesTheColours) {
+  for (const SpiFormat format :
+       {SpiFormat{4, 3'200'000}, SpiFormat{3, 2'700'000}, SpiFormat{8, 6'400'000}}) {
+    Ws2812Config config = quiet();
+    config.spi_bits = format.bits;
+    config.spi_hz = static_cast<int>(format.hz);
+    config.spi_check_rate = false;
+    const auto ring = open_spi_ring(config);
+    forget();
+    const ShowResult result = ring->show(rainbow());
+    ASSERT_TRUE(result.ok) << result.message;
+    const auto transfers = recorded();
+    ASSERT_EQ(transfers.size(), 1U);
+    EXPECT_EQ(transfers[0].head.speed_hz, static_cast<std::uint32_t>(config.spi_hz));
+    EXPECT_EQ(transfers[0].head.mode, 0);
+    EXPECT_EQ(transfers[0].head.word, 8);
+    EXPECT_THAT(shown_by(transfers[0]), ElementsAreArray(rainbow().leds));
+  }
+}
+
+TEST_F(SpiRing, TheTrueRateIsMeasuredWithZerosOnly) {
+  Spidev port("/dev/spidev0.0", 3'200'000);
+  const MeasuredRate rate = measure_rate(port, base::system_clock());
+  EXPECT_EQ(rate.error, 0);
+  std::printf("measured: asked 3.200 MHz, timed %.3f MHz (spi-mock in the guest)\n", rate.hz / 1e6);
+  // The mock sleeps for the wire's time, and a sleep on a busy machine is never exact.
+  EXPECT_NEAR(rate.hz, 3.2e6, 0.5e6);
+  for (const Transfer& transfer : recorded()) {
+    EXPECT_EQ(transfer.data, std::vector<std::uint8_t>(transfer.data.size(), 0));
+    EXPECT_LE(transfer.data.size(), 4096U);
+  }
+}
+
+TEST_F(SpiRing, ATransferBeyondBufsizIsRefusedByTheDriver) {
+  Spidev port("/dev/spidev0.0", 3'200'000);
+  EXPECT_EQ(port.max_bytes(), 4096U);
+  EXPECT_EQ(port.transfer(std::vector<std::uint8_t>(4096)), 0);
+  EXPECT_EQ(port.transfer(std::vector<std::uint8_t>(4097)), EMSGSIZE);
+}
+
+TEST_F(SpiRing, AnErrorOfTheBusIsTheCommandsErrorAndHeals) {
+  Ws2812Config config;
+  config.resend_ms = 20;
+  config.spi_check_rate = false;
+  const auto ring = open_spi_ring(config);
+  fail_with(EIO);
+  const ShowResult result = ring->show(rainbow());
+  EXPECT_FALSE(result.ok);
+  EXPECT_THAT(result.message, HasSubstr("/dev/spidev0.0: write failed: Input/output error"));
+  EXPECT_THAT(result.message, HasSubstr("dmesg"));
+  EXPECT_FALSE(ring->report().ok);
+  EXPECT_TRUE(recorded().empty());
+
+  fail_with(0);
+  ASSERT_TRUE(eventually([&] { return ring->report().ok; }));
+  EXPECT_THAT(shown_by(recorded().back()), ElementsAreArray(rainbow().leds));
+}
+
+TEST_F(SpiRing, AnErrorDuringTheMeasurementStopsTheStart) {
+  fail_with(ETIMEDOUT);
+  try {
+    (void)open_spi_ring(quiet());
+    FAIL() << "started";
+  } catch (const std::runtime_error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("/dev/spidev0.0: write failed: Connection timed out"));
+  }
+}
+
+TEST_F(SpiRing, TheLightIsSentAgain) {
+  Ws2812Config config;
+  config.resend_ms = 20;
+  config.spi_check_rate = false;
+  const auto ring = open_spi_ring(config);
+  ASSERT_TRUE(ring->show(rainbow()).ok);
+  ASSERT_TRUE(eventually([&] { return recorded().size() >= 4; }));
+  for (const Transfer& transfer : recorded()) {
+    EXPECT_THAT(shown_by(transfer), ElementsAreArray(rainbow().leds));
+  }
+}
+
+TEST_F(SpiRing, DarkAtTheEndOrLeftOn) {
+  for (const bool leave_on : {false, true}) {
+    forget();
+    Ws2812Config config = quiet();
+    config.leave_on = leave_on;
+    config.spi_check_rate = false;
+    (void)open_spi_ring(config)->show(rainbow());
+    const auto transfers = recorded();
+    ASSERT_EQ(transfers.size(), leave_on ? 1U : 2U);
+    const auto expected = leave_on ? rainbow().leds : Light::all({0, 0, 0});
+    EXPECT_THAT(shown_by(transfers.back()), ElementsAreArray(expected));
+  }
+}
+
+TEST_F(SpiRing, WithoutPermissionTheRemedyIsNamed) {
+  const AsNobody nobody;
+  try {
+    (void)open_spi_ring(quiet());
+    FAIL() << "opened";
+  } catch (const std::runtime_error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("/dev/spidev0.0: cannot be opened: Permission denied"));
+    EXPECT_THAT(e.what(), HasSubstr("usermod -aG spi"));
+  }
+}
+
+/// Run with spi-mock's max_hz=2000000: the driver clocks slower than asked and says nothing.
+class SlowSpi : public SpiRing {};
+
+TEST_F(SlowSpi, IsRefusedWithBothRatesAndTheCure) {
+  try {
+    (void)open_spi_ring(quiet());
+    FAIL() << "started";
+  } catch (const std::runtime_error& e) {
+    std::printf("refused: %s\n", e.what());
+    EXPECT_THAT(e.what(), HasSubstr("asked for 3.200 MHz, the controller really sends"));
+    EXPECT_THAT(e.what(), HasSubstr("core_freq=500"));
+  }
+}
+
+}  // namespace
+}  // namespace dtact::hal::ws2812

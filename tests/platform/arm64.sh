@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# arm64.sh PACKAGE...: cross-builds the whole tree for arm64 on Debian 12, in a chroot so that the
+# other architecture's packages stay out of this machine, and runs the unit tests under qemu-user.
+# Of the Debian packages named, libraries are taken for arm64 and tools for this machine.
+#
+# Exit code: 0 passed; 77 such a chroot cannot be had here (the reason is printed); else failed.
+set -euo pipefail
+suite=bookworm
+root=${CHROOT_CACHE:-$HOME/.cache/dtactd-chroots}/$suite-arm64
+# shellcheck source=tests/platform/chroot.sh
+. "$(dirname "$0")/chroot.sh"
+
+[ "$(uname -m)" = x86_64 ] || skip "this machine is $(uname -m)"
+# Header-only packages have no architecture.
+foreign=()
+for package in "$@"; do
+  case $package in
+    libcli11-dev | libboost-dev) foreign+=("$package") ;;
+    lib*) foreign+=("$package:arm64") ;;
+    *) foreign+=("$package") ;;
+  esac
+done
+prepare 'dpkg --add-architecture arm64' crossbuild-essential-arm64 qemu-user-static "${foreign[@]}"
+copy_source
+cp "$(dirname "$0")/arm64.cmake" "$root/arm64.cmake"
+echo "arm64.sh: building"
+inside 'cd /source
+  cmake --preset dev -B /build --toolchain /arm64.cmake > /build.log
+  cmake --build /build > /build.log 2>&1 || { grep -v "^\[" /build.log; exit 1; }
+  ctest --test-dir /build --output-on-failure -L unit'

@@ -1,0 +1,61 @@
+# shellcheck shell=bash disable=SC2154
+# Sourced by debian13.sh and arm64.sh: a Debian of its own in a folder, kept from run to run.
+#
+# Each script sets before sourcing:
+#   suite   Debian's release
+#   root    the chroot's folder in $CHROOT_CACHE (default ~/.cache/dtactd-chroots)
+
+skip() {
+  echo "$(basename "$0"): skipped: $*" >&2
+  exit 77
+}
+
+source_folder=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
+
+# inside COMMAND: runs a shell command in the chroot, with /proc and /sys, which are gone afterwards.
+inside() {
+  # shellcheck disable=SC2016  # the inner shell expands it
+  unshare --mount bash -c '
+    mount -t proc proc "$1/proc"
+    mount --rbind /sys "$1/sys"
+    mount --rbind /dev "$1/dev"
+    exec chroot "$1" /usr/bin/env -i HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
+      PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
+      CCACHE_DIR=/ccache bash -euc "$2"' inside "$root" "$1"
+}
+
+# prepare SETUP PACKAGE...: makes the chroot, runs SETUP once in it, installs the packages.
+prepare() {
+  local setup=$1 stamp
+  shift
+  [ "$(id -u)" = 0 ] || skip "a chroot needs root: sudo $0"
+  command -v debootstrap > /dev/null || skip "run: apt-get install debootstrap"
+  mkdir -p "$(dirname "$root")"
+  exec 9> "$root.lock"
+  flock 9
+  if [ ! -e "$root/ready" ]; then
+    echo "$(basename "$0"): making a Debian $suite in $root"
+    rm -rf "$root"
+    debootstrap --variant=minbase "$suite" "$root" > "$root.log" 2>&1 \
+      || skip "no Debian $suite can be had: see $root.log"
+    touch "$root/ready"
+  fi
+  cp /etc/resolv.conf "$root/etc/resolv.conf"
+  stamp=$(printf '%s\n' "$setup" "$@" | sha256sum | cut -c1-16)
+  if [ "$(cat "$root/installed" 2> /dev/null)" != "$stamp" ]; then
+    echo "$(basename "$0"): installing packages"
+    inside "$setup
+      apt-get update -qq
+      apt-get install -y -qq --no-install-recommends $*" >> "$root.log" 2>&1 \
+      || { tail -n 20 "$root.log" >&2; exit 1; }
+    echo "$stamp" > "$root/installed"
+  fi
+}
+
+# copy_source: the tree as git sees it, uncommitted changes included, to /source.
+copy_source() {
+  rm -rf "$root/source"
+  mkdir -p "$root/source"
+  (cd "$source_folder" && git ls-files -z --cached --others --exclude-standard \
+    | tar --null --files-from=- --ignore-failed-read -c) | tar -x -C "$root/source"
+}

@@ -1,0 +1,316 @@
+#include "daemon/app/doctor/doctor.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cerrno>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <string>
+
+#include "daemon/app/doctor/checks.hpp"
+
+namespace dtact::app {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+/// A machine made of a folder of files and of a few answers.
+class FakeMachine : public Machine {
+ public:
+  FakeMachine() : Machine(make_folder()) {}
+  ~FakeMachine() override { fs::remove_all(below_root("/")); }
+
+  void file(const std::string& path, const std::string& text = "") {
+    fs::create_directories(below_root(path).parent_path());
+    std::ofstream(below_root(path)) << text;
+  }
+
+  [[nodiscard]] int access(const std::string& path) const override {
+    if (const auto found = denied.find(path); found != denied.end()) return found->second;
+    return fs::exists(below_root(path)) ? 0 : ENOENT;
+  }
+  [[nodiscard]] std::string group(const std::string& /*path*/) const override { return owner; }
+  [[nodiscard]] std::string user() const override { return "anna"; }
+  [[nodiscard]] bool privileged() const override { return root; }
+  [[nodiscard]] rlim_t limit(int resource) const override {
+    return resource == RLIMIT_RTPRIO ? rtprio : memlock;
+  }
+  [[nodiscard]] Video video(const std::string& path) const override { return videos.at(path); }
+  [[nodiscard]] SpiRate spi_rate(const std::string& /*device*/,
+                                 std::uint32_t /*asked_hz*/) const override {
+    return rate;
+  }
+  [[nodiscard]] std::vector<hal::gpiod::Chip> gpio_chips() const override { return chips; }
+  [[nodiscard]] std::string gpio_holder(const std::string& /*chip*/, int line) const override {
+    return line == held_line ? "lcd-reset" : "";
+  }
+
+  std::map<std::string, int> denied;
+  std::string owner = "root";
+  bool root = false;
+  rlim_t rtprio = 90;
+  rlim_t memlock = RLIM_INFINITY;
+  std::map<std::string, Video> videos;
+  SpiRate rate{3'200'000, {}};
+  std::vector<hal::gpiod::Chip> chips{{"/dev/gpiochip0", "pinctrl-rp1", 54}};
+  int held_line = -1;
+
+ private:
+  static fs::path make_folder() {
+    std::string name = (fs::temp_directory_path() / "doctor_test.XXXXXX").string();
+    return ::mkdtemp(name.data());
+  }
+};
+
+/// The only finding of a verdict other than good.
+Finding only_trouble(const Findings& findings) {
+  Finding trouble;
+  int count = 0;
+  for (const Finding& finding : findings) {
+    if (finding.verdict == Verdict::good) continue;
+    trouble = finding;
+    ++count;
+  }
+  EXPECT_EQ(count, 1);
+  return trouble;
+}
+
+bool all_good(const Findings& findings) {
+  return !findings.empty() && std::all_of(findings.begin(), findings.end(), [](const Finding& f) {
+    return f.verdict == Verdict::good && f.mend.empty();
+  });
+}
+
+hal::CameraConfig v4l2() {
+  hal::CameraConfig camera;
+  camera.backend = "v4l2";
+  return camera;
+}
+
+hal::RingConfig spi_ring() {
+  hal::RingConfig ring;
+  ring.backend = "ws2812_spi";
+  return ring;
+}
+
+/// With everything that an SPI ring needs.
+class SpiMachine : public FakeMachine {
+ public:
+  SpiMachine() {
+    file("/dev/spidev0.0");
+    file("/sys/module/spidev/parameters/bufsiz", "4096\n");
+  }
+};
+
+TEST(DoctorCamera, ASimulatedCameraNeedsNoNode) {
+  const FakeMachine machine;
+  EXPECT_TRUE(all_good(check_camera(machine, hal::CameraConfig{})));
+}
+
+TEST(DoctorCamera, NoNodeIsWrongWhenOneIsNeeded) {
+  const FakeMachine machine;
+  const Finding finding = only_trouble(check_camera(machine, v4l2()));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_THAT(finding.mend, HasSubstr("modprobe uvcvideo"));
+}
+
+TEST(DoctorCamera, NamesTheNodeThatCapturesAndPassesOverMetadata) {
+  FakeMachine machine;
+  machine.file("/dev/video0");
+  machine.file("/dev/video1");
+  machine.videos = {{"/dev/video0", {true, "Endoscope", 0}},
+                    {"/dev/video1", {false, "Endoscope", 0}}};
+  const Findings findings = check_camera(machine, v4l2());
+  ASSERT_THAT(findings, SizeIs(1));
+  EXPECT_EQ(findings[0].what, "/dev/video0 \"Endoscope\" captures");
+  EXPECT_TRUE(all_good(findings));
+}
+
+TEST(DoctorCamera, OnlyMetadataIsNoCamera) {
+  FakeMachine machine;
+  machine.file("/dev/video1");
+  machine.videos = {{"/dev/video1", {false, "Endoscope", 0}}};
+  EXPECT_EQ(only_trouble(check_camera(machine, v4l2())).what, "no video node captures");
+}
+
+TEST(DoctorCamera, AForbiddenNodeNamesTheGroup) {
+  FakeMachine machine;
+  machine.file("/dev/video0");
+  machine.denied = {{"/dev/video0", EACCES}};
+  machine.owner = "video";
+  const Finding finding = only_trouble(check_camera(machine, v4l2()));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_EQ(finding.mend, "sudo usermod -aG video anna, then log in again");
+  // Nobody asked for a camera: worth knowing, not wrong.
+  EXPECT_EQ(only_trouble(check_camera(machine, hal::CameraConfig{})).verdict, Verdict::note);
+}
+
+TEST(DoctorSpi, NotNeededWithoutAnSpiRing) {
+  const FakeMachine machine;
+  EXPECT_TRUE(all_good(check_spi(machine, hal::RingConfig{})));
+}
+
+TEST(DoctorSpi, AllIsWell) {
+  const SpiMachine machine;
+  EXPECT_TRUE(all_good(check_spi(machine, spi_ring())));
+}
+
+TEST(DoctorSpi, AnAbsentDevice) {
+  FakeMachine machine;
+  EXPECT_THAT(only_trouble(check_spi(machine, spi_ring())).mend, HasSubstr("device tree"));
+  // Device-tree strings end in a zero byte.
+  machine.file("/proc/device-tree/model", std::string("Raspberry Pi 5 Model B Rev 1.0\0", 31));
+  EXPECT_EQ(only_trouble(check_spi(machine, spi_ring())).mend,
+            "sudo raspi-config nonint do_spi 0 && sudo reboot");
+}
+
+TEST(DoctorSpi, AForbiddenDeviceOfRootsNeedsTheRuleAndTheGroup) {
+  SpiMachine machine;
+  machine.denied = {{"/dev/spidev0.0", EACCES}};
+  const Finding finding = only_trouble(check_spi(machine, spi_ring()));
+  EXPECT_THAT(finding.what, HasSubstr("Permission denied"));
+  EXPECT_THAT(finding.mend, HasSubstr("60-dtactd.rules"));
+  EXPECT_THAT(finding.mend, HasSubstr("usermod -aG spi anna"));
+}
+
+TEST(DoctorSpi, ASpeedOutsideTheWindow) {
+  const SpiMachine machine;
+  hal::RingConfig ring = spi_ring();
+  ring.ws2812.spi_bits = 3;
+  ring.ws2812.spi_hz = 2'400'000;
+  const Findings findings = check_spi(machine, ring);
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings[0].verdict, Verdict::wrong);
+  EXPECT_THAT(findings[0].what, HasSubstr("use 2.50 … 3.33 MHz"));
+}
+
+TEST(DoctorSpi, ASmallBufsiz) {
+  SpiMachine machine;
+  machine.file("/sys/module/spidev/parameters/bufsiz", "256\n");
+  const Finding finding = only_trouble(check_spi(machine, spi_ring()));
+  EXPECT_EQ(finding.what, "spidev.bufsiz = 256, the ring needs 336");
+  EXPECT_THAT(finding.mend, HasSubstr("spidev.bufsiz=4096"));
+}
+
+TEST(DoctorSpi, AWrongTrueRate) {
+  SpiMachine machine;
+  machine.rate = {2'000'000, {}};
+  const Finding finding = only_trouble(check_spi(machine, spi_ring()));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_THAT(finding.what, HasSubstr("really sends 2.000 MHz"));
+}
+
+TEST(DoctorCoreClock, IsOfInterestOnARaspberryPi4) {
+  SpiMachine machine;
+  EXPECT_THAT(check_core_clock(machine, spi_ring()), IsEmpty());
+  machine.file("/proc/device-tree/model", "Raspberry Pi 4 Model B Rev 1.4");
+  machine.file("/boot/firmware/config.txt", "dtparam=spi=on\n#core_freq_min=500\n");
+  const Finding finding = only_trouble(check_core_clock(machine, spi_ring()));
+  EXPECT_EQ(finding.verdict, Verdict::note);
+  EXPECT_THAT(finding.mend, HasSubstr("core_freq=500\\ncore_freq_min=500"));
+  machine.file("/boot/firmware/config.txt", "core_freq=500\ncore_freq_min=500\n");
+  EXPECT_TRUE(all_good(check_core_clock(machine, spi_ring())));
+  machine.file("/proc/device-tree/model", "Raspberry Pi 5 Model B Rev 1.0");
+  EXPECT_THAT(check_core_clock(machine, spi_ring()), IsEmpty());
+}
+
+TEST(DoctorGpio, NothingConfiguredNothingWrong) {
+  const FakeMachine machine;
+  EXPECT_TRUE(all_good(check_gpio(machine, spi_ring())));
+}
+
+TEST(DoctorGpio, LinesAreFoundByPathNameAndLabel) {
+  const FakeMachine machine;
+  hal::RingConfig ring = spi_ring();
+  for (const std::string chip : {"/dev/gpiochip0", "gpiochip0", "pinctrl-rp1"}) {
+    ring.ws2812.power = {chip, 17, false};
+    EXPECT_TRUE(all_good(check_gpio(machine, ring))) << chip;
+  }
+}
+
+TEST(DoctorGpio, WhatCanBeWrongWithALine) {
+  FakeMachine machine;
+  hal::RingConfig ring;
+  ring.backend = "ws2812_gpio";
+  ring.ws2812.data = {"gpiochip4", 17, false};
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("no such chip"));
+  ring.ws2812.data = {"gpiochip0", 54, false};
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("lines 0 … 53"));
+  ring.ws2812.data = {"gpiochip0", 27, false};
+  machine.held_line = 27;
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("in use by \"lcd-reset\""));
+  machine.held_line = -1;
+  machine.file("/dev/gpiochip0");
+  machine.denied = {{"/dev/gpiochip0", EACCES}};
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).mend, HasSubstr("usermod -aG gpio anna"));
+}
+
+TEST(DoctorRealtime, LimitsOfAnUnprivilegedUser) {
+  FakeMachine machine;
+  EXPECT_TRUE(all_good(check_realtime(machine)));
+  machine.rtprio = 0;
+  EXPECT_THAT(only_trouble(check_realtime(machine)).mend, HasSubstr("echo 'anna - rtprio 90'"));
+  machine.rtprio = 90;
+  machine.memlock = 8U << 20U;
+  EXPECT_THAT(only_trouble(check_realtime(machine)).what, HasSubstr("8192 kB"));
+  machine.root = true;
+  EXPECT_TRUE(all_good(check_realtime(machine)));
+}
+
+TEST(DoctorClock, AQuickSourceIsGood) {
+  for (const std::string name : {"tsc", "arch_sys_counter", "kvm-clock"}) {
+    FakeMachine machine;
+    machine.file("/sys/devices/system/clocksource/clocksource0/current_clocksource", name + "\n");
+    EXPECT_TRUE(all_good(check_clock_source(machine))) << name;
+  }
+}
+
+TEST(DoctorClock, ASlowSourceIsWrongWhenAQuickOneIsThere) {
+  FakeMachine machine;
+  const std::string folder = "/sys/devices/system/clocksource/clocksource0/";
+  machine.file(folder + "current_clocksource", "hpet\n");
+  machine.file(folder + "available_clocksource", "hpet acpi_pm \n");
+  EXPECT_EQ(only_trouble(check_clock_source(machine)).verdict, Verdict::note);
+  machine.file(folder + "available_clocksource", "hpet tsc acpi_pm \n");
+  const Finding finding = only_trouble(check_clock_source(machine));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_THAT(finding.mend, HasSubstr("echo tsc | sudo tee"));
+}
+
+TEST(DoctorClock, NoSourceFileIsANote) {
+  const FakeMachine machine;
+  EXPECT_EQ(only_trouble(check_clock_source(machine)).verdict, Verdict::note);
+}
+
+TEST(DoctorGovernor, AnyCpuThatIsNotAtFullClockIsNoted) {
+  FakeMachine machine;
+  EXPECT_TRUE(all_good(check_governor(machine)));
+  machine.file("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n");
+  EXPECT_TRUE(all_good(check_governor(machine)));
+  machine.file("/sys/devices/system/cpu/cpu1/cpufreq/scaling_governor", "ondemand\n");
+  const Finding finding = only_trouble(check_governor(machine));
+  EXPECT_EQ(finding.verdict, Verdict::note);
+  EXPECT_THAT(finding.what, HasSubstr("ondemand"));
+}
+
+TEST(Doctor, PrintsAReportAndAnExitStatusThatAgree) {
+  std::ostringstream out;
+  hal::Config config;
+  config.ring = spi_ring();
+  config.ring.ws2812.spi_device = "/dev/spidev-that-is-not-there";
+  EXPECT_EQ(doctor(config, out), 1);
+  EXPECT_THAT(out.str(),
+              HasSubstr("spi          WRONG  /dev/spidev-that-is-not-there is not there"));
+  EXPECT_THAT(out.str(), HasSubstr("mend:"));
+  EXPECT_THAT(out.str(), HasSubstr("wrong\n"));
+}
+
+}  // namespace
+}  // namespace dtact::app

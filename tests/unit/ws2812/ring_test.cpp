@@ -1,0 +1,242 @@
+#include "hal/ws2812/ring.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+namespace dtact::hal::ws2812 {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// What a wire was asked for, kept beyond the ring's life.
+struct Record {
+  std::mutex mutex;
+  std::vector<std::vector<Rgb>> writes;
+  std::vector<std::thread::id> threads;
+  std::string error;
+  std::string refusal;
+  std::string note;
+
+  std::vector<std::vector<Rgb>> all() {
+    const std::lock_guard lock(mutex);
+    return writes;
+  }
+  void fail_with(std::string sentence) {
+    const std::lock_guard lock(mutex);
+    error = std::move(sentence);
+  }
+};
+
+class RecordingWire final : public Wire {
+ public:
+  explicit RecordingWire(std::shared_ptr<Record> record) : record_(std::move(record)) {}
+  [[nodiscard]] RingInfo info() const override { return {"recording", "here"}; }
+  [[nodiscard]] std::string prepare(int /*leds*/) override { return record_->refusal; }
+  [[nodiscard]] std::string note() const override { return record_->note; }
+  [[nodiscard]] std::string send(std::span<const Rgb> leds) override {
+    const std::lock_guard lock(record_->mutex);
+    record_->writes.emplace_back(leds.begin(), leds.end());
+    record_->threads.push_back(std::this_thread::get_id());
+    return record_->error;
+  }
+
+ private:
+  std::shared_ptr<Record> record_;
+};
+
+/// No re-sends unless a test asks for them.
+Ws2812Config quiet() {
+  Ws2812Config config;
+  config.resend_ms = 0;
+  return config;
+}
+
+std::unique_ptr<Ring> ring(const std::shared_ptr<Record>& record, const Ws2812Config& config) {
+  return std::make_unique<Ring>(std::make_unique<RecordingWire>(record), nullptr, config, 0);
+}
+
+/// Waits generously for what another thread brings about.
+template <typename Condition>
+bool eventually(Condition condition) {
+  for (int i = 0; i < 2000; ++i) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return false;
+}
+
+const Light kRed{Light::all({255, 0, 0}), 255};
+
+TEST(Ws2812Ring, WritesOnItsOwnThreadAndGoesDarkAtTheEnd) {
+  const auto record = std::make_shared<Record>();
+  {
+    const auto ours = ring(record, quiet());
+    EXPECT_TRUE(record->all().empty()) << "nothing is written before it is asked for";
+    EXPECT_TRUE(ours->show(kRed).ok);
+    EXPECT_EQ(record->all().size(), 1U);
+  }
+  ASSERT_EQ(record->writes.size(), 2U);
+  EXPECT_EQ(record->writes[0], std::vector<Rgb>(8, Rgb{255, 0, 0}));
+  EXPECT_EQ(record->writes[1], std::vector<Rgb>(8, Rgb{0, 0, 0}));
+  for (const auto id : record->threads) EXPECT_NE(id, std::this_thread::get_id());
+}
+
+TEST(Ws2812Ring, StaysOnWhenAskedTo) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.leave_on = true;
+  (void)ring(record, config)->show(kRed);
+  EXPECT_EQ(record->writes.size(), 1U);
+}
+
+TEST(Ws2812Ring, GoesDarkAtTheEndThoughNothingWasShown) {
+  const auto record = std::make_shared<Record>();
+  (void)ring(record, quiet());
+  ASSERT_EQ(record->writes.size(), 1U);
+  EXPECT_EQ(record->writes[0], std::vector<Rgb>(8, Rgb{0, 0, 0}));
+}
+
+TEST(Ws2812Ring, ReSendsTheLastLight) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.resend_ms = 2;
+  const auto ours = ring(record, config);
+  (void)ours->show(Light{Light::all({1, 1, 1}), 255});
+  (void)ours->show(kRed);
+  const std::size_t before = record->all().size();
+  ASSERT_TRUE(eventually([&] { return record->all().size() >= before + 5; }));
+  EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
+}
+
+TEST(Ws2812Ring, AFailedWriteIsTheCommandsErrorAndHealsByItself) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.resend_ms = 2;
+  record->error = "the wire is cut: mend it";
+  const auto ours = ring(record, config);
+  const ShowResult result = ours->show(kRed);
+  EXPECT_FALSE(result.ok);
+  EXPECT_EQ(result.message, "the wire is cut: mend it");
+  EXPECT_FALSE(ours->report().ok);
+  EXPECT_GE(ours->report().failures, 1U);
+
+  record->fail_with("");
+  ASSERT_TRUE(eventually([&] { return ours->report().ok; }));
+  EXPECT_EQ(ours->report().message, "");
+  EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
+}
+
+TEST(Ws2812Ring, AfterAFailedCommandTheLightBeforeItIsSentAgain) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.resend_ms = 2;
+  const auto ours = ring(record, config);
+  ASSERT_TRUE(ours->show(kRed).ok);
+  record->fail_with("the wire is cut: mend it");
+  EXPECT_FALSE(ours->show(Light{Light::all({0, 0, 9}), 255}).ok);
+  record->fail_with("");
+  ASSERT_TRUE(eventually([&] { return ours->report().ok; }));
+  EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
+}
+
+TEST(Ws2812Ring, AReSendThatFailsShowsInTheReport) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.resend_ms = 2;
+  const auto ours = ring(record, config);
+  ASSERT_TRUE(ours->show(kRed).ok);
+  record->fail_with("the wire is cut: mend it");
+  ASSERT_TRUE(eventually([&] { return !ours->report().ok; }));
+  EXPECT_EQ(ours->report().message, "the wire is cut: mend it");
+}
+
+TEST(Ws2812Ring, SaysWhenTheBudgetDimmed) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.current_budget_ma = 250;
+  const auto ours = ring(record, config);
+  const ShowResult white = ours->show(Light{});
+  EXPECT_TRUE(white.ok);
+  EXPECT_NEAR(white.dimmed_to, 0.513, 0.001);
+  EXPECT_THAT(white.message, HasSubstr("dimmed to 51 %"));
+  EXPECT_THAT(white.message, HasSubstr("current_budget_ma = 250"));
+  const ShowResult red = ours->show(kRed);  // 8 · 20.7 mA
+  EXPECT_EQ(red.dimmed_to, 1);
+  EXPECT_EQ(red.message, "");
+}
+
+TEST(Ws2812Ring, SetsTheColoursInTheOrderOfTheChain) {
+  const auto record = std::make_shared<Record>();
+  Light light;
+  for (std::uint8_t i = 0; i < 8; ++i) light.leds[i] = {i, 0, 0};
+  const auto order = [&](int first, bool clockwise) {
+    Ws2812Config config = quiet();
+    config.first_led = first;
+    config.clockwise = clockwise;
+    (void)ring(record, config)->show(light);
+    std::vector<int> reds;
+    for (const Rgb& led : record->writes[record->writes.size() - 2]) reds.push_back(led.r);
+    return reds;
+  };
+  EXPECT_THAT(order(0, true), ElementsAre(0, 1, 2, 3, 4, 5, 6, 7));
+  EXPECT_THAT(order(2, true), ElementsAre(2, 3, 4, 5, 6, 7, 0, 1));
+  EXPECT_THAT(order(0, false), ElementsAre(0, 7, 6, 5, 4, 3, 2, 1));
+  EXPECT_THAT(order(5, false), ElementsAre(5, 4, 3, 2, 1, 0, 7, 6));
+}
+
+TEST(Ws2812Ring, CallersAtOnceEachGetAnAnswer) {
+  const auto record = std::make_shared<Record>();
+  const auto ours = ring(record, quiet());
+  std::atomic<int> answered = 0;
+  std::vector<std::jthread> callers;
+  callers.reserve(4);
+  for (int i = 0; i < 4; ++i) {
+    callers.emplace_back([&] {
+      for (int k = 0; k < 100; ++k) answered += ours->show(kRed).ok ? 1 : 0;
+    });
+  }
+  callers.clear();
+  EXPECT_EQ(answered, 400);
+}
+
+TEST(Ws2812Ring, AWireThatRefusesStopsTheStart) {
+  const auto record = std::make_shared<Record>();
+  record->refusal = "too slow: use SPI";
+  try {
+    (void)ring(record, quiet());
+    FAIL() << "started";
+  } catch (const std::runtime_error& e) {
+    EXPECT_STREQ(e.what(), "too slow: use SPI");
+  }
+  EXPECT_TRUE(record->writes.empty());
+}
+
+TEST(Ws2812Ring, ANoteOfTheWireIsReported) {
+  const auto record = std::make_shared<Record>();
+  record->note = "a little slow";
+  EXPECT_EQ(ring(record, quiet())->report().note, "a little slow");
+}
+
+TEST(Ws2812Ring, SettingsThatMakeNoSenseStopTheStart) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.first_led = 8;
+  EXPECT_THROW((void)ring(record, config), std::invalid_argument);
+  config = quiet();
+  config.current_budget_ma = 0;
+  EXPECT_THROW((void)ring(record, config), std::invalid_argument);
+  EXPECT_TRUE(record->writes.empty());
+}
+
+}  // namespace
+}  // namespace dtact::hal::ws2812
