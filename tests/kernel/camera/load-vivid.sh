@@ -1,3 +1,4 @@
+# shellcheck shell=sh
 # Loads vivid as /dev/video8 with one HDMI input; what it needs comes first. Sourced in the guest.
 for module in font cfbcopyarea cfbfillrect cfbimgblt v4l2-tpg videobuf2-dma-contig; do
   insmod "$KERNEL_CACHE/modules/$module.ko"

@@ -1,3 +1,4 @@
+# shellcheck shell=sh
 # Starts udevd, so that the guest has /dev/v4l/by-path and libcamera sees cameras. Sourced in the
 # guest.
 /lib/systemd/systemd-udevd --daemon
