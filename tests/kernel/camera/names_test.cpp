@@ -1,5 +1,6 @@
 #include <array>
 #include <cstdio>
+#include <filesystem>
 #include <optional>
 
 #include "tests/kernel/camera/guest_camera.hpp"
@@ -62,6 +63,7 @@ TEST_F(Names, TheMetadataNodeSLinkIsRefused) {
   wait_for_links();
   hal::CameraConfig c = config();
   c.v4l2.device = "/dev/v4l/by-path/platform-vhci_hcd.0-usb-0:1:1.0-video-index1";
+  ASSERT_TRUE(eventually(kPatience, [&] { return std::filesystem::exists(c.v4l2.device); }));
   hal::v4l2::V4l2Camera camera(c);
   try {
     camera.start();
