@@ -77,7 +77,7 @@ const char* describe(Status status) noexcept {
 }
 
 struct GreyDecoder::Impl {
-  Impl(int w, int h) : width(w), height(h), arena(arena_bytes(w)) {
+  Impl(int w, int h) : width(w), height(h), crop{0, 0, w, h}, arena(arena_bytes(w)) {
     cinfo.err = jpeg_std_error(&errors);
     cinfo.client_data = this;
     errors.error_exit = [](j_common_ptr c) {
@@ -149,22 +149,39 @@ struct GreyDecoder::Impl {
     }
     cinfo.out_color_space = JCS_GRAYSCALE;
     jpeg_start_decompress(&cinfo);
-    while (cinfo.output_scanline < cinfo.output_height) {
+    JDIMENSION left = static_cast<JDIMENSION>(crop.x);
+    JDIMENSION columns = static_cast<JDIMENSION>(crop.width);
+    // Widens to whole blocks on the left and gives back what it took.
+    if (columns < cinfo.output_width) jpeg_crop_scanline(&cinfo, &left, &columns);
+    const auto top = static_cast<JDIMENSION>(crop.y);
+    const auto bottom = static_cast<JDIMENSION>(crop.y + crop.height);
+    if (top > 0) jpeg_skip_scanlines(&cinfo, top);
+    read_rows(bottom, luma + left, stride);
+    // A skip to the end would leave the rest of the payload unread; the last row is read for that.
+    if (bottom + 1 < cinfo.output_height) {
+      jpeg_skip_scanlines(&cinfo, cinfo.output_height - bottom - 1);
+    }
+    read_rows(cinfo.output_height, luma + left, stride);
+    jpeg_finish_decompress(&cinfo);
+    return Status::ok;
+  }
+
+  void read_rows(JDIMENSION end, std::uint8_t* luma, std::ptrdiff_t stride) noexcept {
+    while (cinfo.output_scanline < end) {
       // libjpeg hands out at most one row of blocks at a time (rec_outbuf_height ≤ 4 rows).
       std::array<JSAMPROW, 4> rows{};
-      const JDIMENSION left = cinfo.output_height - cinfo.output_scanline;
+      const JDIMENSION left = end - cinfo.output_scanline;
       const JDIMENSION count = std::min<JDIMENSION>(rows.size(), left);
       for (JDIMENSION i = 0; i < count; ++i) {
         rows[i] = luma + static_cast<std::ptrdiff_t>(cinfo.output_scanline + i) * stride;
       }
       jpeg_read_scanlines(&cinfo, rows.data(), count);
     }
-    jpeg_finish_decompress(&cinfo);
-    return Status::ok;
   }
 
   int width;
   int height;
+  Crop crop;
   JpegArena arena;
   jpeg_decompress_struct cinfo{};
   jpeg_error_mgr errors{};
@@ -182,6 +199,15 @@ GreyDecoder::GreyDecoder(int width, int height) {
 GreyDecoder::GreyDecoder(GreyDecoder&&) noexcept = default;
 GreyDecoder& GreyDecoder::operator=(GreyDecoder&&) noexcept = default;
 GreyDecoder::~GreyDecoder() = default;
+
+void GreyDecoder::set_crop(const Crop& crop) {
+  const Impl& d = *impl_;
+  if (crop.x < 0 || crop.y < 0 || crop.width < 1 || crop.height < 1 ||
+      crop.width > d.width - crop.x || crop.height > d.height - crop.y) {
+    throw std::invalid_argument("JPEG decoder: the crop must lie in the picture");
+  }
+  impl_->crop = crop;
+}
 
 Status GreyDecoder::decode(std::span<const std::uint8_t> payload, std::uint8_t* luma,
                            std::ptrdiff_t stride) noexcept {

@@ -26,6 +26,14 @@ struct Size {
   bool operator==(const Size&) const = default;
 };
 
+/// A rectangle of the picture, pixels.
+struct Crop {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
+};
+
 /// Decodes the luma of JPEG frames of one size, full range by JFIF's definition. Colour is parsed
 /// (the entropy code is interleaved) and never transformed. Frames stand alone: nothing of an
 /// earlier one is used, and missing Huffman tables are the standard's (as UVC's MJPEG leaves them
@@ -41,6 +49,12 @@ class GreyDecoder {
   GreyDecoder(const GreyDecoder&) = delete;
   GreyDecoder& operator=(const GreyDecoder&) = delete;
   ~GreyDecoder();
+
+  /// From now on decode() works out no more pixels than it must to give those of `crop` as it would
+  /// without one; what it writes elsewhere in the picture is unspecified. All of the payload is
+  /// still parsed, so that damage anywhere is told. Throws std::invalid_argument unless the crop
+  /// has pixels and lies in the picture.
+  void set_crop(const Crop& crop);
 
   /// Writes width × height bytes to `luma`, rows `stride` bytes apart. Unless ok the output is
   /// partly written and must not be used: libjpeg would fill a damaged frame with grey. Bytes after

@@ -135,6 +135,49 @@ TEST_F(GreyDecoderTest, FlippedBytesNeverCrashOrPoisonTheNextFrame) {
   EXPECT_LE(worst_error(), 3);
 }
 
+TEST_F(GreyDecoderTest, ACropHoldsTheSameBitsWhereverItLies) {
+  for (const bool colour : {false, true}) {
+    const Bytes jpeg = make_jpeg({.quality = 60, .colour = colour},
+                                 [](int x, int y) { return 128 + (x * 37 + y * 91) % 100 - 50; });
+    luma::LumaBuffer whole(64, 48);
+    ASSERT_EQ(decoder.decode(jpeg, whole.data(), whole.stride()), Status::ok);
+    std::minstd_rand random(3);
+    for (int i = 0; i < 300; ++i) {
+      Crop crop;
+      crop.x = static_cast<int>(random() % 64);
+      crop.y = static_cast<int>(random() % 48);
+      crop.width = 1 + static_cast<int>(random() % static_cast<unsigned>(64 - crop.x));
+      crop.height = 1 + static_cast<int>(random() % static_cast<unsigned>(48 - crop.y));
+      GreyDecoder cropped(64, 48);
+      cropped.set_crop(crop);
+      luma::LumaBuffer part(80, 48);
+      ASSERT_EQ(cropped.decode(jpeg, part.data(), part.stride()), Status::ok);
+      for (int y = crop.y; y < crop.y + crop.height; ++y) {
+        ASSERT_TRUE(std::equal(part.row(y) + crop.x, part.row(y) + crop.x + crop.width,
+                               whole.row(y) + crop.x))
+            << crop.x << "," << crop.y << " " << crop.width << "x" << crop.height << " row " << y;
+      }
+      for (int y = 0; y < 48; ++y) ASSERT_EQ(part.row(y)[64], 0) << "beside the picture";
+    }
+  }
+}
+
+TEST_F(GreyDecoderTest, DamageBelowTheCropIsTold) {
+  const Bytes jpeg = make_jpeg({}, slope);
+  decoder.set_crop({16, 8, 16, 8});
+  for (std::size_t keep = 1; keep < jpeg.size(); keep += 7) {
+    ASSERT_EQ(decode(std::span(jpeg).first(keep)), Status::truncated) << keep;
+  }
+  EXPECT_EQ(decode(jpeg), Status::ok);
+}
+
+TEST_F(GreyDecoderTest, ACropOutsideThePictureIsRefused) {
+  EXPECT_THROW(decoder.set_crop({0, 0, 65, 1}), std::invalid_argument);
+  EXPECT_THROW(decoder.set_crop({60, 0, 5, 1}), std::invalid_argument);
+  EXPECT_THROW(decoder.set_crop({0, -1, 5, 5}), std::invalid_argument);
+  EXPECT_THROW(decoder.set_crop({0, 0, 0, 5}), std::invalid_argument);
+}
+
 TEST_F(GreyDecoderTest, MovesWithItsMemory) {
   GreyDecoder moved(std::move(decoder));
   EXPECT_EQ(moved.decode(make_jpeg({}, slope), out.data(), out.stride()), Status::ok);
