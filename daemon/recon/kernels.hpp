@@ -40,6 +40,17 @@ void rectify_reference_row(const std::uint16_t* luma_q8, std::ptrdiff_t frame_wi
                            const RectifyTable::Entry* entries, int width,
                            std::int16_t* reference_q6) noexcept;
 
+/// Area means for a coarse map: `fine` is `decimation` rows (1, 2 or 4) of width · decimation
+/// values of −Q6 luma, as rectify_difference_row gives them against a reference of zero. difference
+/// = reference − mean, the mean rounded half up. Each fine pixel was rounded to Q6 before.
+void average_difference_row(const std::int16_t* const* fine, int decimation,
+                            const std::int16_t* reference_q6, int width,
+                            std::int16_t* difference_q6) noexcept;
+
+/// The same mean of rows of a reference.
+void average_reference_row(const std::int16_t* const* fine, int decimation, int width,
+                           std::int16_t* reference_q6) noexcept;
+
 /// out[x] = Σ taps[k] · (row[x − k] + row[x + k]) in 32 bits, rounded half up. `taps`: Q14 from the
 /// centre outwards. Reads `taps.size() − 1` values before `row` and after `padded_width`; writes
 /// `padded_width` values, a multiple of kBlock. Inputs within ±kSmoothable.

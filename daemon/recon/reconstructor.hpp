@@ -5,7 +5,9 @@
 #include <memory>
 #include <span>
 
+#include "daemon/recon/activity.hpp"
 #include "daemon/recon/model.hpp"
+#include "daemon/recon/tiles.hpp"
 
 namespace dtact::recon {
 
@@ -13,7 +15,15 @@ namespace dtact::recon {
 struct StepTimes {
   std::int64_t rectify_ns = 0;  ///< Rectify and difference.
   std::int64_t smooth_ns = 0;
-  std::int64_t list_ns = 0;  ///< Gain, list, untrusted mark.
+  std::int64_t list_ns = 0;      ///< Gain, list, untrusted mark.
+  std::int64_t activity_ns = 0;  ///< Which tiles changed; run_active() only.
+};
+
+/// What a depth buffer holds besides the untouched map: kept beside each buffer that run_active()
+/// writes, so that only formerly active tiles are cleared. Starts as "anything at all".
+struct DrawnTiles {
+  TileRows tiles;
+  std::uint64_t rest = 0;  ///< Which untouched map lies outside the tiles; 0: none.
 };
 
 /// Bytes that must be readable after the last pixel of a luma image, for vector loads. The HAL's
@@ -25,7 +35,7 @@ inline constexpr std::size_t kLumaPadding = 64;
 class Reconstructor {
  public:
   /// Throws std::invalid_argument when the model's parts disagree in size.
-  explicit Reconstructor(std::shared_ptr<const Model> model);
+  explicit Reconstructor(std::shared_ptr<const Model> model, const ActivitySettings& activity = {});
   ~Reconstructor();
   Reconstructor(Reconstructor&&) noexcept;
   Reconstructor& operator=(Reconstructor&&) noexcept;
@@ -45,7 +55,20 @@ class Reconstructor {
   void run(const std::uint8_t* luma, std::ptrdiff_t stride, std::span<std::int16_t> depth_um,
            StepTimes* times = nullptr) noexcept;
 
-  /// Pixels of the last run() that were darker than the list covers, masked ones not counted.
+  /// The same where the image changed against the untouched one, in whole tiles widened by the
+  /// smoothing's reach: those hold what run() gives, bit for bit. Everywhere else `depth_um` is 0,
+  /// or kUntrusted where the mask or the light say so. ActivitySettings says what that can hide.
+  /// `drawn` belongs to this buffer. Method::published is computed in full. Allocates when `drawn`
+  /// is of another map, i.e. the first time.
+  void run_active(const std::uint8_t* luma, std::ptrdiff_t stride, std::span<std::int16_t> depth_um,
+                  DrawnTiles& drawn, ActivityReport& report, StepTimes* times = nullptr) noexcept;
+
+  [[nodiscard]] const TileGrid& grid() const noexcept;
+  /// The part of the frame that is read; the rest need not be decoded.
+  [[nodiscard]] FrameRegion region() const noexcept;
+
+  /// Pixels of the last run() or run_active() that were darker than the list covers, masked ones
+  /// not counted.
   [[nodiscard]] int beyond_pixels() const noexcept;
 
  private:

@@ -19,7 +19,22 @@ struct RectifyTable {
     std::uint8_t fx = 0;  ///< Weight of the right column, 0 … 128.
     std::uint8_t fy = 0;  ///< Weight of the lower row, 0 … 128.
   };
-  std::vector<Entry> entries;  ///< Row-major, width × height.
+  /// Row-major, (width · decimation) × (height · decimation).
+  std::vector<Entry> entries;
+  /// 1, 2 or 4: a pixel of the map is the mean of decimation × decimation entries, so that a coarse
+  /// map is a fine one averaged over areas and nothing aliases, whatever the lens does.
+  int decimation = 1;
+
+  [[nodiscard]] int fine_width() const noexcept { return width * decimation; }
+  [[nodiscard]] int fine_height() const noexcept { return height * decimation; }
+};
+
+/// A rectangle of the camera frame, pixels.
+struct FrameRegion {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
 };
 
 /// The table that copies the rectangle whose upper left corner is (crop_col, crop_row). Throws

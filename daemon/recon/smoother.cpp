@@ -19,52 +19,65 @@ std::vector<std::int16_t> gaussian_taps(double sigma_px) {
     weight[static_cast<std::size_t>(k)] = std::exp(-0.5 * k * k / (sigma_px * sigma_px));
     sum += 2 * weight[static_cast<std::size_t>(k)];
   }
-  std::vector<std::int16_t> taps(weight.size());
+  std::vector<std::int16_t> taps{0};
   int rest = kernels::kTapOne;
-  for (std::size_t k = 1; k < taps.size(); ++k) {
-    taps[k] = static_cast<std::int16_t>(std::lround(kernels::kTapOne * weight[k] / sum));
-    rest -= 2 * taps[k];
+  for (std::size_t k = 1; k < weight.size(); ++k) {
+    taps.push_back(static_cast<std::int16_t>(std::lround(kernels::kTapOne * weight[k] / sum)));
+    rest -= 2 * taps.back();
   }
-  taps[0] = static_cast<std::int16_t>(rest);
+  taps.front() = static_cast<std::int16_t>(rest);
   return taps;
 }
 
 RowBuffer::RowBuffer(int rows, int width)
-    : stride_(static_cast<std::size_t>(kernels::padded(width)) +
-              std::size_t{2} * kernels::kMaxRadius),
+    : stride_(static_cast<std::size_t>(vec::padded(width)) + 2 * kernels::kMaxRadius),
       data_(stride_ * static_cast<std::size_t>(rows)) {}
 
 std::span<std::int16_t> RowBuffer::at(int y) noexcept {
   return std::span(data_).subspan(static_cast<std::size_t>(y) * stride_, stride_);
 }
 
-Smoother::Smoother(std::vector<std::int16_t> taps, int width, int height)
-    : taps_(std::move(taps)),
-      radius_(static_cast<int>(taps_.size()) - 1),
+Smoother::Smoother(std::span<const std::int16_t> taps, int width, int height)
+    : taps_(taps),
       width_(width),
       height_(height),
-      ring_rows_(2 * radius_ + 1 + kStrip),
-      ring_(ring_rows_, width),
-      span_(2 * taps_.size() - 1) {}
+      pairs_((height + 1) / 2),
+      ring_pairs_(kStrip + 2 * reach()),
+      pair_size_(2 * static_cast<std::size_t>(vec::padded(width))),
+      ring_(pair_size_ * static_cast<std::size_t>(ring_pairs_ + 2)),
+      span_(static_cast<std::size_t>(taps_.count())) {}
 
-void Smoother::push(std::int16_t* row) noexcept {
-  std::fill_n(row - radius_, radius_, row[0]);
-  std::fill_n(row + width_, radius_, row[width_ - 1]);
-  kernels::smooth_horizontal_row(row, taps_, kernels::padded(width_),
-                                 ring_.row(pushed_ % ring_rows_));
-  ++pushed_;
+std::int16_t* Smoother::ring(int slot) noexcept {
+  return ring_.data() + static_cast<std::size_t>(slot) * pair_size_;
 }
 
-int Smoother::ready() const noexcept {
-  return pushed_ == height_ ? height_ : std::max(0, pushed_ - radius_);
+void Smoother::replicate_sides(std::int16_t* row, int first, int last) const noexcept {
+  if (first == 0) std::fill_n(row - radius(), radius(), row[0]);
+  if (last * vec::kBlock + radius() > width_) std::fill_n(row + width_, radius(), row[width_ - 1]);
 }
 
-void Smoother::take(int y, std::int16_t* out) noexcept {
-  int row = y - radius_;
-  for (const std::int16_t*& source : span_) {
-    source = ring_.row(std::clamp(row++, 0, height_ - 1) % ring_rows_);
+void Smoother::push(int pair, std::int16_t* row_a, std::int16_t* row_b, int first,
+                    int last) noexcept {
+  if (2 * pair + 1 == height_) row_b = row_a;
+  replicate_sides(row_a, first, last);
+  replicate_sides(row_b, first, last);
+  vec::smooth_across(row_a, row_b, taps_, first, last, ring(pair % ring_pairs_));
+  if (pair == 0) vec::smooth_across(row_a, row_a, taps_, first, last, ring(ring_pairs_));
+  if (pair == pairs_ - 1) {
+    vec::smooth_across(row_b, row_b, taps_, first, last, ring(ring_pairs_ + 1));
   }
-  kernels::smooth_vertical_row(span_.data(), taps_, kernels::padded(width_), out);
+}
+
+void Smoother::take(int pair, std::int16_t* row_a, std::int16_t* row_b, int first,
+                    int last) noexcept {
+  for (int k = -reach(); k <= reach(); ++k) {
+    const int source = pair + k;
+    const int slot = source < 0         ? ring_pairs_
+                     : source >= pairs_ ? ring_pairs_ + 1
+                                        : source % ring_pairs_;
+    span_[static_cast<std::size_t>(k + reach())] = ring(slot);
+  }
+  vec::smooth_down(span_.data(), taps_, first, last, row_a, row_b);
 }
 
 }  // namespace dtact::recon

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/recon/kernels.hpp"
+#include "daemon/recon/vector_kernels.hpp"
 
 namespace dtact::recon {
 
@@ -19,6 +20,10 @@ class RowBuffer {
  public:
   RowBuffer(int rows, int width);
   [[nodiscard]] std::int16_t* row(int y) noexcept { return at(y).data() + kernels::kMaxRadius; }
+  /// Values from one row to the next.
+  [[nodiscard]] std::ptrdiff_t stride() const noexcept {
+    return static_cast<std::ptrdiff_t>(stride_);
+  }
 
  private:
   [[nodiscard]] std::span<std::int16_t> at(int y) noexcept;
@@ -27,34 +32,43 @@ class RowBuffer {
   std::vector<std::int16_t> data_;
 };
 
-/// Separable smoothing of an image that streams through row by row: what is kept is only the rows
-/// the kernel spans. The image's edge is replicated. Allocates in the constructor only.
+/// Separable smoothing of an image that streams through in pairs of rows: what is kept is only what
+/// the kernel spans, so that it stays in the cache. The image's edge is replicated. Works on any
+/// blocks of 32 columns; allocates in the constructor only.
 class Smoother {
  public:
-  /// Rows that may be pushed before the ready ones are taken.
+  /// Pairs that may be pushed before the ready ones are taken.
   static constexpr int kStrip = 8;
 
-  Smoother(std::vector<std::int16_t> taps, int width, int height);
+  Smoother(std::span<const std::int16_t> taps, int width, int height);
 
-  /// Begins an image.
-  void start() noexcept { pushed_ = 0; }
-  /// The next row from the top, in a RowBuffer: the pixels beside the image are overwritten.
-  void push(std::int16_t* row) noexcept;
-  /// Rows from the top that can be computed by now: the pushed ones less the radius; all at the
-  /// end.
-  [[nodiscard]] int ready() const noexcept;
-  /// Row `y` < ready(), within kStrip of what the last strip made ready, or after the last push any
-  /// row not yet taken. Writes padded(width) values.
-  void take(int y, std::int16_t* out) noexcept;
+  /// Pairs of rows in the image; an odd height's last pair is its last row twice.
+  [[nodiscard]] int pairs() const noexcept { return pairs_; }
+  /// Pairs above and below that a pair's result depends on.
+  [[nodiscard]] int reach() const noexcept { return taps_.radius() / 2; }
+  /// Columns to the left and right that a pixel's result depends on, at most.
+  [[nodiscard]] int radius() const noexcept { return taps_.radius(); }
+
+  /// Rows 2·pair and 2·pair + 1 for the blocks [first, last), in a RowBuffer: radius() columns on
+  /// either side are read, too, and those beside the image overwritten. Pairs come in rising order.
+  void push(int pair, std::int16_t* row_a, std::int16_t* row_b, int first, int last) noexcept;
+  /// The smoothed rows of a pair for blocks that were pushed for all pairs within reach(), of which
+  /// the last is at most kStrip + 2·reach() pushes ago.
+  void take(int pair, std::int16_t* row_a, std::int16_t* row_b, int first, int last) noexcept;
 
  private:
-  std::vector<std::int16_t> taps_;
-  int radius_;
+  void replicate_sides(std::int16_t* row, int first, int last) const noexcept;
+  [[nodiscard]] std::int16_t* ring(int slot) noexcept;
+
+  vec::TapPairs taps_;
   int width_;
   int height_;
-  int pushed_ = 0;
-  int ring_rows_;
-  RowBuffer ring_;  ///< Horizontally smoothed rows; image row y lies in row y mod ring_rows_.
+  int pairs_;
+  int ring_pairs_;
+  std::size_t pair_size_;
+  /// Horizontally smoothed pairs; pair p lies in slot p mod ring_pairs_. Two more slots hold the
+  /// first and the last row doubled, for what lies above and below the image.
+  std::vector<std::int16_t> ring_;
   std::vector<const std::int16_t*> span_;
 };
 

@@ -36,42 +36,53 @@ TEST(GaussianTaps, RefusesWhatHasNoKernel) {
                std::invalid_argument);
 }
 
-/// Pushes an image of one value a row and returns the first column of the result.
+/// Smooths an image of one value a row; every column of the result must be the same.
 std::vector<int> smooth_column(Smoother& smoother, int width, const std::vector<int>& values) {
-  RowBuffer in(1, width);
-  RowBuffer out(1, width);
+  RowBuffer in(2, width);
+  RowBuffer out(2, width);
+  const int blocks = (width + vec::kBlock - 1) / vec::kBlock;
+  const auto fill = [&](int row, std::size_t y) {
+    std::fill_n(in.row(row), width, static_cast<std::int16_t>(values[y]));
+  };
   std::vector<int> result;
-  smoother.start();
   int pushed = 0;
-  for (const int value : values) {
-    std::fill_n(in.row(0), width, static_cast<std::int16_t>(value));
-    smoother.push(in.row(0));
-    ++pushed;
-    if (pushed % Smoother::kStrip != 0 && pushed != static_cast<int>(values.size())) continue;
-    while (static_cast<int>(result.size()) < smoother.ready()) {
-      smoother.take(static_cast<int>(result.size()), out.row(0));
-      EXPECT_TRUE(std::all_of(out.row(0), out.row(0) + width,
-                              [&](std::int16_t v) { return v == out.row(0)[0]; }));
-      result.push_back(out.row(0)[0]);
+  for (int pair = 0; pair < smoother.pairs(); ++pair) {
+    for (; pushed < std::min(smoother.pairs(), pair + smoother.reach() + 1); ++pushed) {
+      const auto y = static_cast<std::size_t>(2 * pushed);
+      fill(0, y);
+      if (y + 1 < values.size()) fill(1, y + 1);
+      smoother.push(pushed, in.row(0), in.row(1), 0, blocks);
+    }
+    smoother.take(pair, out.row(0), out.row(1), 0, blocks);
+    for (int i = 0; i < 2 && result.size() < values.size(); ++i) {
+      EXPECT_TRUE(std::all_of(out.row(i), out.row(i) + width,
+                              [&](std::int16_t v) { return v == out.row(i)[0]; }));
+      result.push_back(out.row(i)[0]);
     }
   }
   return result;
 }
 
+const std::vector<std::int16_t> kQuarters{8192, 4096};  // 1/4 1/2 1/4
+
 TEST(Smoother, ReplicatesTheFirstAndLastRow) {
-  Smoother smoother({8192, 4096}, 5, 4);  // 1/4 1/2 1/4
+  Smoother smoother(kQuarters, 5, 4);
   EXPECT_EQ(smooth_column(smoother, 5, {400, 0, 0, 800}), (std::vector<int>{300, 100, 200, 600}));
 }
 
+TEST(Smoother, AnOddHeightEndsWithItsLastRow) {
+  Smoother smoother(kQuarters, 5, 3);
+  EXPECT_EQ(smoother.pairs(), 2);
+  EXPECT_EQ(smooth_column(smoother, 5, {400, 0, 800}), (std::vector<int>{300, 300, 600}));
+}
+
 TEST(Smoother, ReplicatesTheFirstAndLastColumn) {
-  Smoother smoother({8192, 4096}, 3, 1);
-  RowBuffer in(1, 3);
-  RowBuffer out(1, 3);
+  Smoother smoother(kQuarters, 3, 1);
+  RowBuffer in(2, 3);
+  RowBuffer out(2, 3);
   std::copy_n(std::vector<std::int16_t>{400, 0, 800}.begin(), 3, in.row(0));
-  smoother.start();
-  smoother.push(in.row(0));
-  ASSERT_EQ(smoother.ready(), 1);
-  smoother.take(0, out.row(0));
+  smoother.push(0, in.row(0), in.row(1), 0, 1);
+  smoother.take(0, out.row(0), out.row(1), 0, 1);
   EXPECT_EQ(std::vector<int>(out.row(0), out.row(0) + 3), (std::vector<int>{300, 300, 600}));
 }
 
@@ -83,10 +94,17 @@ TEST(Smoother, EveryRowComesOutAtEveryHeight) {
   }
 }
 
-TEST(Smoother, StartForgetsTheImageBefore) {
-  Smoother smoother({8192, 4096}, 3, 3);
+TEST(Smoother, TheNextImageForgetsTheOneBefore) {
+  Smoother smoother(kQuarters, 3, 3);
   (void)smooth_column(smoother, 3, {900, 900, 900});
   EXPECT_EQ(smooth_column(smoother, 3, {0, 0, 0}), (std::vector<int>{0, 0, 0}));
+}
+
+TEST(Smoother, ReachCoversTheKernel) {
+  EXPECT_EQ(Smoother(gaussian_taps(0), 3, 3).reach(), 0);
+  EXPECT_EQ(Smoother(kQuarters, 3, 3).reach(), 1);         // one row up needs the pair above
+  EXPECT_EQ(Smoother(gaussian_taps(2), 3, 3).reach(), 3);  // six rows
+  EXPECT_EQ(Smoother(gaussian_taps(10), 3, 3).radius(), 30);
 }
 
 }  // namespace

@@ -1,0 +1,114 @@
+#include "daemon/recon/decimate.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <memory>
+#include <stdexcept>
+#include <vector>
+
+#include "daemon/recon/kernels.hpp"
+#include "daemon/recon/reconstructor.hpp"
+
+namespace dtact::recon {
+namespace {
+
+/// 16×12 pixels of the frame from column 2, row 3; 32 µm a level; no smoothing.
+Model make_model() {
+  Model model;
+  model.rectify = make_crop_table(24, 20, 2, 3, 16, 12);
+  model.mm_per_px = 0.05;
+  model.list = {-100 * 64, {}, -100 * 64, 100 * 64};
+  for (int q6 = -100 * 64; q6 <= 100 * 64; ++q6) {
+    model.list.um.push_back(static_cast<std::int16_t>(q6 / 2));
+  }
+  model.reference_q8.assign(24 * 20, 150 * 256);
+  return model;
+}
+
+std::vector<std::int16_t> run(const Model& model, int (*grey)(int, int)) {
+  std::vector<std::uint8_t> luma;
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 24; ++x) luma.push_back(static_cast<std::uint8_t>(grey(x, y)));
+  }
+  luma.resize(luma.size() + 64);
+  Reconstructor reconstructor(std::make_shared<const Model>(model));
+  std::vector<std::int16_t> depth(
+      static_cast<std::size_t>(model.rectify.width * model.rectify.height));
+  reconstructor.run(luma.data(), 24, depth);
+  return depth;
+}
+
+TEST(Decimate, KeepsMillimetresAndDropsWhatFillsNoPixel) {
+  Model model = make_model();
+  model.rectify = make_crop_table(24, 20, 2, 3, 15, 11);
+  model.smoothing_px = 2;
+  const Model half = decimate(model, 2);
+  EXPECT_EQ(half.rectify.width, 7);
+  EXPECT_EQ(half.rectify.height, 5);
+  EXPECT_EQ(half.rectify.entries.size(), 14U * 10U);
+  EXPECT_DOUBLE_EQ(half.mm_per_px, 0.1);
+  EXPECT_DOUBLE_EQ(half.smoothing_px, 1);
+  EXPECT_EQ(decimate(model, 1).rectify.entries.size(), 15U * 11U);
+}
+
+TEST(Decimate, APixelIsTheMeanOfItsArea) {
+  // One dark pixel of 120 levels below the reference, alone in its area.
+  const auto dark = [](int x, int y) { return x == 2 + 5 && y == 3 + 6 ? 70 : 150; };
+  const std::vector<std::int16_t> half = run(decimate(make_model(), 2), dark);
+  EXPECT_EQ(half[3 * 8 + 2], 640);  // 80 levels / 4 · 32 µm
+  EXPECT_EQ(half[3 * 8 + 3], 0);
+  const std::vector<std::int16_t> quarter = run(decimate(make_model(), 4), dark);
+  EXPECT_EQ(quarter[1 * 4 + 1], 160);  // 80 levels / 16 · 32 µm
+}
+
+TEST(Decimate, NothingAliases) {
+  // The finest stripes there are, in either direction: a coarse map that picked pixels would show
+  // all of them or none.
+  for (const int factor : {2, 4}) {
+    for (const std::int16_t um :
+         run(decimate(make_model(), factor), [](int x, int) { return x % 2 == 0 ? 110 : 150; })) {
+      EXPECT_EQ(um, 640);  // 20 levels
+    }
+    for (const std::int16_t um :
+         run(decimate(make_model(), factor), [](int, int y) { return y % 2 == 0 ? 110 : 150; })) {
+      EXPECT_EQ(um, 640);
+    }
+  }
+}
+
+TEST(Decimate, AnUntrustedPixelMarksItsArea) {
+  Model model = make_model();
+  model.untrusted.assign(16 * 12, 0);
+  model.untrusted[5 * 16 + 7] = 1;
+  const std::vector<std::int16_t> half = run(decimate(model, 2), [](int, int) { return 150; });
+  for (std::size_t i = 0; i < half.size(); ++i) {
+    EXPECT_EQ(half[i], i == 2 * 8 + 3 ? kUntrusted : 0) << i;
+  }
+}
+
+TEST(Decimate, RefusesWhatItCannotDo) {
+  const Model model = make_model();
+  EXPECT_THROW((void)decimate(model, 3), std::invalid_argument);
+  EXPECT_THROW((void)decimate(decimate(model, 2), 2), std::invalid_argument);
+  Model thin = model;
+  thin.rectify = make_crop_table(24, 20, 0, 0, 16, 3);
+  EXPECT_THROW((void)decimate(thin, 4), std::invalid_argument);
+}
+
+TEST(AverageRows, RoundTheMeanHalfUp) {
+  const std::array<std::int16_t, 4> upper{-1, -1, -16320, -16320};
+  const std::array<std::int16_t, 4> lower{-1, 1, -16320, -16320};
+  const std::array<const std::int16_t*, 2> rows{upper.data(), lower.data()};
+  const std::array<std::int16_t, 2> reference{100, 0};
+  std::array<std::int16_t, 2> out{};
+  kernels::average_difference_row(rows.data(), 2, reference.data(), 2, out.data());
+  EXPECT_EQ(out[0], 99);  // luma (1 + 1 + 1 − 1)/4 = 0.5 → 1
+  EXPECT_EQ(out[1], -16320);
+  kernels::average_reference_row(rows.data(), 2, 2, out.data());
+  EXPECT_EQ(out[0], 0);  // −0.5 → 0
+  EXPECT_EQ(out[1], -16320);
+}
+
+}  // namespace
+}  // namespace dtact::recon

@@ -1,0 +1,30 @@
+#pragma once
+
+// As vector_kernels.cpp asks for; a target the test does not know would not be run.
+#define HWY_WANT_AVX3_DL
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+#include <hwy/targets.h>
+
+#include <cstdint>
+#include <string>
+
+namespace dtact::recon {
+
+/// A test that runs once on each instruction set that this machine has and the kernels were built
+/// for.
+class EveryTarget : public testing::TestWithParam<std::int64_t> {
+ protected:
+  void SetUp() override { hwy::SetSupportedTargetsForTest(GetParam()); }
+  void TearDown() override { hwy::SetSupportedTargetsForTest(0); }
+};
+
+inline std::string target_of(const testing::TestParamInfo<std::int64_t>& info) {
+  return hwy::TargetName(info.param);
+}
+
+}  // namespace dtact::recon
+
+#define DTACT_EVERY_TARGET(suite)                                                                 \
+  INSTANTIATE_TEST_SUITE_P(Target, suite, testing::ValuesIn(hwy::SupportedAndGeneratedTargets()), \
+                           dtact::recon::target_of)

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "daemon/recon/model.hpp"
+
+namespace dtact::recon {
+
+/// What a reconstruction is: the scalar kernels, each over the whole image before the next, with no
+/// strips, rings or tiles. Slow and plain; whatever runs in the daemon gives the same bits.
+class Specification {
+ public:
+  explicit Specification(const Model& model);
+  void set_reference(std::span<const std::uint16_t> reference_q8);
+  /// Depth in micrometres, width × height of the model's table, row-major.
+  [[nodiscard]] std::vector<std::int16_t> run(const std::uint8_t* luma, std::ptrdiff_t stride);
+  /// Pixels of the last run() that were darker than the list covers.
+  [[nodiscard]] int beyond() const { return beyond_; }
+
+ private:
+  using Plane = std::vector<std::int16_t>;
+  [[nodiscard]] std::ptrdiff_t at(int y) const { return std::ptrdiff_t{y} * model_.rectify.width; }
+  [[nodiscard]] Plane rectify(std::span<const std::uint16_t> reference_q8) const;
+  [[nodiscard]] Plane difference(const std::uint8_t* luma, std::ptrdiff_t stride) const;
+  [[nodiscard]] Plane smooth(const Plane& in, std::span<const std::int16_t> taps) const;
+  [[nodiscard]] Plane look_up(const Plane& in, const std::int16_t* gain,
+                              const std::uint8_t* untrusted);
+
+  const Model& model_;
+  int width_;
+  int height_;
+  Plane lookup_;
+  Plane reference_q6_;
+  Plane gain_q12_;
+  std::vector<std::uint8_t> untrusted_;
+  int beyond_ = 0;
+};
+
+}  // namespace dtact::recon
