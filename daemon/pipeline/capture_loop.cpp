@@ -174,16 +174,22 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
   out.mm_per_px = model.mm_per_px;
   // Within the capacity reserved at start, so this allocates nothing.
   out.depth_um.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
+  // What another calibration drew in this buffer says nothing about this one's map.
+  if (std::exchange(out.drawn_generation, active_->generation) != active_->generation) {
+    out.drawn.rest = 0;
+  }
   recon::StepTimes steps;
+  recon::ActivityReport activity;
   const hal::LumaView& luma = frame_.luma();
-  active_->reconstructor.run(luma.data, luma.stride, out.depth_um, &steps);
+  active_->reconstructor.run_active(luma.data, luma.stride, out.depth_um, out.drawn, activity,
+                                    &steps);
   out.times.rectify_ns = steps.rectify_ns;
   out.times.smooth_ns = steps.smooth_ns;
   out.times.list_ns = steps.list_ns;
   const std::int64_t began_ns = clock_.monotonic_ns();
   out.contact = contact_.inspect(out.depth_um, out.width, out.mm_per_px);
   beyond_ = active_->reconstructor.beyond_pixels() > config_.beyond_pixels;
-  out.times.inspect_ns = clock_.monotonic_ns() - began_ns;
+  out.times.inspect_ns = steps.activity_ns + clock_.monotonic_ns() - began_ns;
 }
 
 void CaptureLoop::publish(DepthFrame& out) noexcept {

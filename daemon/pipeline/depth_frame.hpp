@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "daemon/pipeline/health.hpp"
+#include "daemon/recon/reconstructor.hpp"
 #include "hal/frame.hpp"
 #include "hal/light_ring.hpp"
 
@@ -15,7 +16,7 @@ struct StageTimes {
   std::int64_t rectify_ns = 0;
   std::int64_t smooth_ns = 0;
   std::int64_t list_ns = 0;
-  std::int64_t inspect_ns = 0;  ///< Contact summary and health statistics.
+  std::int64_t inspect_ns = 0;  ///< The look for what changed, and the contact summary.
 };
 
 /// What touches, in the depth map's coordinates (origin at its centre, x right, y down).
@@ -47,6 +48,9 @@ struct DepthFrame {
   double mm_per_px = 0;
   std::vector<std::int16_t>
       depth_um;  ///< Row-major; recon::kUntrusted marks pixels not to believe.
+
+  recon::DrawnTiles drawn;             ///< What depth_um holds, for the reconstruction.
+  std::uint64_t drawn_generation = 0;  ///< Calibration that drew it (ActiveCalibration).
 
   bool has_luma = false;
   int luma_width = 0;  ///< Pixels of the camera frame.

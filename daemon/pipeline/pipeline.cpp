@@ -86,6 +86,9 @@ DepthFrame Pipeline::prototype(const calibration::Calibration* calibration) cons
   }
   // Sized, not only reserved: copies keep the size, and its pages are touched now.
   frame.depth_um.resize(map);
+  // Any map up to so many rows takes its marks in here.
+  constexpr int kMostRows = 4096;
+  frame.drawn.tiles.resize(kMostRows / recon::TileGrid::kRows);
   frame.luma.resize(pixels(info_.width, info_.height));
   return frame;
 }
