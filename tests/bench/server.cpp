@@ -1,0 +1,87 @@
+// Times one case at a time on request, so that a driver can alternate between cases and processes.
+//   list               NAME=SHARE of the map that is computed, one line
+//   verify NAME        "ok" or what is wrong
+//   run NAME COUNT     two unmeasured runs, then COUNT times, nanoseconds of CPU, one line
+//   once NAME COUNT    COUNT runs and no more, for counting instructions
+//   target             the instruction set the kernels run with
+//   export FOLDER      the inputs, for the Python pipeline
+#include <time.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <exception>
+#include <iostream>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+
+#include "daemon/recon/vector_kernels.hpp"
+#include "tests/bench/cases.hpp"
+
+namespace {
+
+using dtact::bench::Case;
+
+const Case& find(const std::vector<Case>& cases, const std::string& name) {
+  for (const Case& c : cases) {
+    if (c.name == name) return c;
+  }
+  throw std::runtime_error("no case named " + name);
+}
+
+/// CPU time of this thread, so that other programs on the core do not count.
+std::int64_t thread_ns() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
+}
+
+void time(const Case& c, int count) {
+  // Reading the clock takes about a fifth of a microsecond: short cases are timed many at once.
+  constexpr std::int64_t kShortest_ns = 50'000;
+  c.once();
+  const std::int64_t warm = thread_ns();
+  c.once();
+  const std::int64_t once_ns = std::max<std::int64_t>(1, thread_ns() - warm);
+  const std::int64_t batch = std::max<std::int64_t>(1, kShortest_ns / once_ns);
+  for (int i = 0; i < count; ++i) {
+    const std::int64_t begin = thread_ns();
+    for (std::int64_t k = 0; k < batch; ++k) c.once();
+    std::cout << static_cast<double>(thread_ns() - begin) / static_cast<double>(batch) << ' ';
+  }
+}
+
+}  // namespace
+
+int main() {
+  try {
+    const std::vector<Case> cases = dtact::bench::make_cases();
+    for (std::string line; std::getline(std::cin, line);) {
+      std::istringstream words(line);
+      std::string verb;
+      std::string name;
+      int count = 1;
+      words >> verb >> name >> count;
+      if (verb == "list") {
+        for (const Case& c : cases) std::cout << c.name << '=' << c.share << ' ';
+      } else if (verb == "verify") {
+        const std::string wrong = find(cases, name).verify();
+        std::cout << (wrong.empty() ? "ok" : wrong);
+      } else if (verb == "run") {
+        time(find(cases, name), count);
+      } else if (verb == "once") {
+        for (int i = 0; i < count; ++i) find(cases, name).once();
+      } else if (verb == "target") {
+        std::cout << dtact::recon::vec::target_name();
+      } else if (verb == "export") {
+        dtact::bench::export_inputs(name);
+        std::cout << "ok";
+      }
+      std::cout << std::endl;
+    }
+  } catch (const std::exception& e) {
+    std::cerr << "bench_server: " << e.what() << '\n';
+    return 1;
+  }
+  return 0;
+}
