@@ -126,14 +126,14 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
     assembly.take(table, "", fs::absolute(*file).parent_path(),
                   [&](unsigned line) { return fmt::format("{}:{}", name, line); });
   }
-  for (const std::string& setting : settings) {
-    assembly.take(parse_setting(setting), "", fs::current_path(),
-                  [&](unsigned) { return "--set"; });
-  }
   if (const char* level = std::getenv("DTACTD_LOG"); level != nullptr) {
     toml::table table;
     table.insert("log_level", level);
     assembly.take(table, "", {}, [](unsigned) { return "DTACTD_LOG"; });
+  }
+  for (const std::string& setting : settings) {
+    assembly.take(parse_setting(setting), "", fs::current_path(),
+                  [&](unsigned) { return "--set"; });
   }
   const pipeline::ContactRules& contact = loaded.config.pipeline.contact;
   if (contact.lost_mm >= contact.made_mm) {

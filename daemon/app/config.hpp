@@ -39,8 +39,8 @@ struct LoadedConfig {
   std::vector<KeyOrigin> origins;  ///< One for each key, in the order of the documentation.
 };
 
-/// Reads `file` (none: defaults only), then applies each "key=value" of `settings`, then the
-/// environment's DTACTD_LOG. Relative paths in a file are relative to its folder; in settings, to
+/// Reads `file` (none: defaults only), then the environment's DTACTD_LOG, then applies each
+/// "key=value" of `settings`; the later wins. Relative paths in a file are relative to its folder; in settings, to
 /// the working directory. Throws std::runtime_error with file, line, key and the allowed values.
 [[nodiscard]] LoadedConfig load_config(const std::optional<std::filesystem::path>& file,
                                        const std::vector<std::string>& settings);

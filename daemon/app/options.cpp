@@ -20,6 +20,13 @@ Parsed parse_options(int argc, const char* const* argv) {
                  "Set one key, as in --set camera.fps=30; wins over the file, may be repeated")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
+  cli.add_option_function<std::string>(
+         "--log-level",
+         [&options](const std::string& level) {
+           options.settings.push_back("log_level='" + level + "'");
+         },
+         "The same as --set log_level=LEVEL: trace, debug, info, warn or error")
+      ->type_name("LEVEL");
   cli.add_flag("--check-config", options.check_config,
                "Check the configuration, say what is wrong, and exit");
   cli.add_flag("--print-config", options.print_config,
@@ -28,7 +35,7 @@ Parsed parse_options(int argc, const char* const* argv) {
                "Check what the configuration needs of this machine, print what is wrong with the\n"
                "command that mends it, and exit; status 1 when something is wrong");
   cli.footer(
-      "Environment: DTACTD_LOG sets the log level (trace, debug, info, warn, error).\n"
+      "Environment: DTACTD_LOG sets the log level; it wins over the file, an option over it.\n"
       "Exit status: 0 after SIGTERM or SIGINT, 1 on an error, 2 on a wrong command line.");
   try {
     cli.parse(argc, argv);

@@ -14,6 +14,7 @@
 
 #include "hal/base/atomic_file.hpp"
 #include "hal/sim/renderer.hpp"
+#include "version.hpp"
 
 namespace {
 
@@ -89,6 +90,7 @@ void render(const Arguments& arguments) {
 int main(int argc, char** argv) {
   try {
     CLI::App app("Writes frames of a simulated scene as PNG files.", "dtact-sim-render");
+    app.set_version_flag("--version", "dtact-sim-render " DTACT_VERSION);
     Arguments arguments;
     app.add_option("--scene", arguments.scene, "scene file; left out: the built-in scene")
         ->check(CLI::ExistingFile);

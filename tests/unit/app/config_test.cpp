@@ -125,6 +125,7 @@ TEST_F(ConfigFile, WrongSettingIsNamed) {
 TEST_F(ConfigFile, EnvironmentSetsTheLogLevel) {
   ::setenv("DTACTD_LOG", "trace", 1);
   EXPECT_EQ(load("log_level = 'warn'\n").log_level, "trace");
+  EXPECT_EQ(load("", {"log_level=error"}).log_level, "error");
   ::setenv("DTACTD_LOG", "loud", 1);
   EXPECT_THAT(error(""), HasSubstr("DTACTD_LOG"));
   ::unsetenv("DTACTD_LOG");

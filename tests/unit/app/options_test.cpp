@@ -23,6 +23,11 @@ TEST(Options, SettingsKeepTheirOrder) {
   EXPECT_TRUE(parsed.options.print_config);
 }
 
+TEST(Options, LogLevelIsASetting) {
+  EXPECT_EQ(parse({"--log-level", "debug"}).options.settings,
+            std::vector<std::string>{"log_level='debug'"});
+}
+
 TEST(Options, HelpAndVersionEndWell) {
   EXPECT_EQ(parse({"--help"}).exit_status, 0);
   EXPECT_EQ(parse({"--version"}).exit_status, 0);
