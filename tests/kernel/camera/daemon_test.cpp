@@ -125,7 +125,7 @@ class Daemon : public GuestCamera {
       arguments.emplace_back("--set");
       arguments.push_back(setting);
     }
-    daemon_.emplace(arguments);
+    daemon_ = std::make_unique<e2e::DaemonProcess>(arguments);
   }
 
   [[nodiscard]] client::Status status() const {
@@ -134,7 +134,7 @@ class Daemon : public GuestCamera {
   }
 
   e2e::TempFolder state_;
-  std::optional<e2e::DaemonProcess> daemon_;
+  std::unique_ptr<e2e::DaemonProcess> daemon_;
 };
 
 TEST_F(Daemon, ComesUpWithoutACameraAndServesItOncePlugged) {
@@ -158,6 +158,7 @@ TEST_F(Daemon, FourClientsWatchThroughAnUnplug) {
   wait_for_camera();
   start({"calibration=" + e2e::calibration_folder().string()});
   std::vector<std::unique_ptr<Watcher>> watchers;
+  watchers.reserve(4);
   for (int i = 0; i < 4; ++i) watchers.push_back(std::make_unique<Watcher>(daemon_->port()));
   const auto all = [&](const auto& condition) {
     return eventually(kPatience, [&] { return std::ranges::all_of(watchers, condition); });
@@ -171,6 +172,7 @@ TEST_F(Daemon, FourClientsWatchThroughAnUnplug) {
     measured("unplug to camera_lost at four clients", now_s() - begin, "s");
     EXPECT_EQ(status().camera.condition, "unplugged");
     std::vector<int> before;
+    before.reserve(watchers.size());
     for (const auto& w : watchers) before.push_back(w->frames());
 
     begin = now_s();
@@ -252,7 +254,7 @@ TEST_F(Daemon, TellsAFreezeAndAMovedControl) {
   const UsbCamera usb({folder()});
   wait_for_camera();
   start();
-  Watcher watcher(daemon_->port());
+  const Watcher watcher(daemon_->port());
   ASSERT_TRUE(eventually(kPatience, [&] { return status().camera.condition == "streaming"; }));
   usb.toggle_freeze();
   ASSERT_TRUE(eventually(kPatience, [&] { return status().camera.condition == "stalled"; }));

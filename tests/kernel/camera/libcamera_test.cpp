@@ -10,7 +10,6 @@ namespace {
 
 using hal::CameraState;
 using hal::Frame;
-using hal::GrabStatus;
 
 /// libcamera's own pipeline for USB cameras, over the real uvcvideo. Needs a running udevd and a
 /// firmware node above the camera.

@@ -10,7 +10,6 @@ namespace {
 
 using hal::CameraState;
 using hal::Frame;
-using hal::GrabStatus;
 using std::chrono::milliseconds;
 
 class Streaming : public GuestCamera {

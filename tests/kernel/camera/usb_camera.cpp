@@ -17,6 +17,7 @@ UsbCamera::UsbCamera(const std::vector<std::string>& arguments) {
   std::vector<std::string> owned = {DTACT_UVCFAKE};
   owned.insert(owned.end(), arguments.begin(), arguments.end());
   std::vector<char*> argv;
+  argv.reserve(owned.size() + 1);
   for (std::string& a : owned) argv.push_back(a.data());
   argv.push_back(nullptr);
   if (::posix_spawn(&pid_, DTACT_UVCFAKE, nullptr, nullptr, argv.data(), environ) != 0) {

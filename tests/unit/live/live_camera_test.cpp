@@ -15,6 +15,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr int kSide = 16;
+constexpr std::size_t kPixels = 256;
 
 /// A source of grey frames that lends its payloads.
 class LendingSource final : public Source {
@@ -37,7 +38,7 @@ class LendingSource final : public Source {
     if (filled.empty()) return DequeueStatus::none;
     out.index = filled.front();
     filled.pop_front();
-    out.payload = std::span(memory[static_cast<std::size_t>(out.index)]).first(kSide * kSide);
+    out.payload = std::span(memory[static_cast<std::size_t>(out.index)]).first(kPixels);
     out.sequence = sequence++;
     out.timestamp_ns = base::system_clock().monotonic_ns();
     return DequeueStatus::filled;
@@ -57,7 +58,7 @@ class LendingSource final : public Source {
   bool full_range = true;
   bool stopped = false;
   std::shared_ptr<bool> destroyed = std::make_shared<bool>(false);
-  std::array<std::array<std::uint8_t, kSide * kSide + kLumaPadding>, 3> memory{};
+  std::array<std::array<std::uint8_t, kPixels + kLumaPadding>, 3> memory{};
   std::deque<int> filled;
   std::vector<int> home;  // what came back
   std::uint32_t sequence = 0;

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <ctime>
 #include <stdexcept>
+#include <string_view>
 
 #include "hal/base/unique_fd.hpp"
 
@@ -36,6 +36,11 @@ constexpr std::uint32_t kMaxBuffers = 8;
 template <typename T>
 T& as(std::vector<std::uint8_t>& argument) {
   return *reinterpret_cast<T*>(argument.data());
+}
+
+template <std::size_t Size>
+void put_text(__u8 (&field)[Size], std::string_view text) {
+  text.copy(reinterpret_cast<char*>(field), Size - 1);
 }
 
 }  // namespace
@@ -154,9 +159,9 @@ int EmulatedCamera::answer(unsigned long request, std::vector<std::uint8_t>& arg
   switch (request) {
     case VIDIOC_QUERYCAP: {
       auto& capability = as<v4l2_capability>(argument);
-      std::strcpy(reinterpret_cast<char*>(capability.driver), "emulated");
-      std::strcpy(reinterpret_cast<char*>(capability.card), "Emulated camera");
-      std::strcpy(reinterpret_cast<char*>(capability.bus_info), "usb-emulated-1");
+      put_text(capability.driver, "emulated");
+      put_text(capability.card, "Emulated camera");
+      put_text(capability.bus_info, "usb-emulated-1");
       capability.device_caps = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
       capability.capabilities = capability.device_caps | V4L2_CAP_DEVICE_CAPS;
       return 0;

@@ -49,7 +49,7 @@ TEST(V4l2Camera, ConvertsAndStampsAFrame) {
 }
 
 TEST(V4l2Camera, TimesOutWithoutAFrame) {
-  EmulatedCamera device;
+  const EmulatedCamera device;
   V4l2Camera camera(small());
   camera.start();
   Frame frame;
