@@ -258,7 +258,7 @@ TEST_F(Daemon, TellsAFreezeAndAMovedControl) {
   ASSERT_TRUE(eventually(kPatience, [&] { return status().camera.condition == "streaming"; }));
   usb.toggle_freeze();
   ASSERT_TRUE(eventually(kPatience, [&] { return status().camera.condition == "stalled"; }));
-  EXPECT_TRUE(e2e::has(status().health, "camera_trouble"));
+  EXPECT_TRUE(eventually(kPatience, [&] { return e2e::has(status().health, "camera_trouble"); }));
   usb.toggle_freeze();
   ASSERT_TRUE(eventually(kPatience, [&] { return status().camera.condition == "streaming"; }));
   usb.drift();

@@ -95,8 +95,9 @@ TEST_F(Vivid, MarkedBuffersAreDroppedAndCounted) {
   Frame frame;
   grab_frame(camera, frame);
   set("Inject V4L2_BUF_FLAG_ERROR", 1);
-  grab_until(camera, frame, [](GrabStatus status) { return status == GrabStatus::damaged; });
-  EXPECT_GE(camera.report().damage.flagged, 1U);
+  // On a busy machine a whole frame is there behind the marked one: it is handed out, and the
+  // marked one only counted.
+  grab_until(camera, frame, [&](GrabStatus) { return camera.report().damage.flagged >= 1; });
   grab_frame(camera, frame);
 }
 
