@@ -233,7 +233,7 @@ def plot(out, medians, samples, shares, label):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--server", help="the bench_server program; built when not named")
-    parser.add_argument("--out", default="build/bench", help="folder for CSV and plots")
+    parser.add_argument("--out", default="build/bench/results", help="folder for CSV and plots")
     parser.add_argument("--quick", action="store_true", help="within 50 seconds")
     parser.add_argument("--core", type=int, default=max(os.sched_getaffinity(0)))
     options = parser.parse_args()
