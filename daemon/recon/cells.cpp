@@ -92,10 +92,12 @@ void SumCells(const uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits 
   constexpr int kWide = static_cast<int>(hn::MaxLanes(wide) / kCell);
   int cell = 0;
   for (; cell + kWide <= cells; cell += kWide) {
-    SumVector(wide, luma + cell * kCell, stride, limits, sum + cell, rough + cell, counts);
+    SumVector(wide, luma + std::ptrdiff_t{cell} * kCell, stride, limits, sum + cell, rough + cell,
+              counts);
   }
   for (; cell < cells; ++cell) {
-    SumVector(narrow, luma + cell * kCell, stride, limits, sum + cell, rough + cell, counts);
+    SumVector(narrow, luma + std::ptrdiff_t{cell} * kCell, stride, limits, sum + cell, rough + cell,
+              counts);
   }
 }
 

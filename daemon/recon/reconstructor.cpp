@@ -268,7 +268,7 @@ void Reconstructor::Impl::rectify(const std::uint8_t* luma, int y, int x0, int x
     const int fine_y = y * decimation + k;
     vec::rectify_difference(plan, fine_y, first, last, luma, entries(fine_y), table.fine_width(),
                             zero.data(), fine.row(k));
-    rows[static_cast<std::size_t>(k)] = fine.row(k) + x0 * decimation;
+    rows[static_cast<std::size_t>(k)] = fine.row(k) + std::ptrdiff_t{x0} * decimation;
   }
   kernels::average_difference_row(rows.data(), decimation, reference_q6.data() + at(y) + x0,
                                   std::min(x1, grid.width) - x0, row + x0);

@@ -30,7 +30,7 @@ std::vector<std::int16_t> gaussian_taps(double sigma_px) {
 }
 
 RowBuffer::RowBuffer(int rows, int width)
-    : stride_(static_cast<std::size_t>(vec::padded(width)) + 2 * kernels::kMaxRadius),
+    : stride_(static_cast<std::size_t>(vec::padded(width)) + std::size_t{2} * kernels::kMaxRadius),
       data_(stride_ * static_cast<std::size_t>(rows)) {}
 
 std::span<std::int16_t> RowBuffer::at(int y) noexcept {
@@ -70,12 +70,12 @@ void Smoother::push(int pair, std::int16_t* row_a, std::int16_t* row_b, int firs
 
 void Smoother::take(int pair, std::int16_t* row_a, std::int16_t* row_b, int first,
                     int last) noexcept {
-  for (int k = -reach(); k <= reach(); ++k) {
-    const int source = pair + k;
+  for (std::size_t k = 0; k < span_.size(); ++k) {
+    const int source = pair - reach() + static_cast<int>(k);
     const int slot = source < 0         ? ring_pairs_
                      : source >= pairs_ ? ring_pairs_ + 1
                                         : source % ring_pairs_;
-    span_[static_cast<std::size_t>(k + reach())] = ring(slot);
+    span_[k] = ring(slot);
   }
   vec::smooth_down(span_.data(), taps_, first, last, row_a, row_b);
 }

@@ -168,10 +168,11 @@ HWY_INLINE void RectifyGroups(D16 d16, const RectifyPlan::Block& block, const ui
   const hn::RebindToUnsigned<D16> du16;
   const int levels = kLevels == 0 ? block.levels : kLevels;
   const int32_t* const at = block.at + group;
-  const uint8_t* const own = data + group * kGroup;
+  const uint8_t* const own = data + std::ptrdiff_t{group} * kGroup;
   const auto place = hn::PromoteTo(du16, hn::LoadU(d8_half, own));
   const V16 fx = hn::BitCast(d16, hn::PromoteTo(du16, hn::LoadU(d8_half, own + kBlock)));
-  const V16 fy = hn::BitCast(d16, hn::PromoteTo(du16, hn::LoadU(d8_half, own + 2 * kBlock)));
+  const V16 fy =
+      hn::BitCast(d16, hn::PromoteTo(du16, hn::LoadU(d8_half, own + std::ptrdiff_t{2} * kBlock)));
 
   // The byte at a pixel's column and the one after it.
   const auto column = levels == 1 ? place : hn::And(place, hn::Set(du16, 0xF));
@@ -232,12 +233,12 @@ void RectifyDifference(const RectifyPlan& plan, int y, int first, int last, cons
                        int16_t* difference_q6) {
   const std::ptrdiff_t stride = plan.stride();
   const RectifyPlan::Block* block = plan.row(y) + first / kGroups;
-  const uint8_t* data = plan.data(y) + first / kGroups * RectifyPlan::kBlockData;
+  const uint8_t* data = plan.data(y) + std::ptrdiff_t{first / kGroups} * RectifyPlan::kBlockData;
   for (int begin = first / kGroups * kGroups; begin < last; begin += kGroups) {
     const int from = HWY_MAX(first - begin, 0);
     const int to = HWY_MIN(last - begin, kGroups);
-    const int16_t* const reference = reference_q6 + begin * kGroup;
-    int16_t* const difference = difference_q6 + begin * kGroup;
+    const int16_t* const reference = reference_q6 + std::ptrdiff_t{begin} * kGroup;
+    int16_t* const difference = difference_q6 + std::ptrdiff_t{begin} * kGroup;
     switch (block->levels) {
       case 0:
         RectifyScalar(luma, stride, entries, (begin + from) * kGroup,
@@ -301,14 +302,14 @@ HWY_NOINLINE void SmoothAcrossTaps(const int16_t* row_a, const int16_t* row_b, c
     for (int j = 0; j < count; ++j) {
       const auto first_taps = hn::BitCast(d16, hn::Set(d32, words[j]));
       const auto second_taps = hn::BitCast(d16, hn::Set(d32, words[count + j]));
-      const auto a = hn::LoadU(d16, row_a + x - radius + 2 * j);
-      const auto b = hn::LoadU(d16, row_b + x - radius + 2 * j);
+      const auto a = hn::LoadU(d16, row_a + (x - radius + 2 * j));
+      const auto b = hn::LoadU(d16, row_b + (x - radius + 2 * j));
       even_a.Add(a, first_taps);
       odd_a.Add(a, second_taps);
       even_b.Add(b, first_taps);
       odd_b.Add(b, second_taps);
     }
-    int16_t* const out = pairs + 2 * (x & -kBlock) + (x & (kBlock - 1));
+    int16_t* const out = pairs + (2 * (x & -kBlock) + (x & (kBlock - 1)));
     hn::StoreU(Merge(d16, even_a.Total(), even_b.Total()), d16, out);
     hn::StoreU(Merge(d16, odd_a.Total(), odd_b.Total()), d16, out + kBlock);
   }

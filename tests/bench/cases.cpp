@@ -84,7 +84,8 @@ Case coarse(const Inputs& in, const std::string& name, int factor) {
     Depth depth;
   };
   const auto model = std::make_shared<const recon::Model>(recon::decimate(*in.model, factor));
-  const auto pixels = static_cast<std::size_t>(model->rectify.width * model->rectify.height);
+  const auto pixels = static_cast<std::size_t>(model->rectify.width) *
+                      static_cast<std::size_t>(model->rectify.height);
   auto state = std::make_shared<State>(State{model, recon::Reconstructor(model), Depth(pixels)});
   return {name,
           [&in, state] { state->reconstructor.run(in.press.data(), kFrameWidth, state->depth); },

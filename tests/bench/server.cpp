@@ -77,7 +77,7 @@ int main() {
         dtact::bench::export_inputs(name);
         std::cout << "ok";
       }
-      std::cout << std::endl;
+      std::cout << '\n' << std::flush;
     }
   } catch (const std::exception& e) {
     std::cerr << "bench_server: " << e.what() << '\n';

@@ -18,6 +18,11 @@ namespace {
 constexpr int kFrameWidth = 210;  // not a multiple of a cell: the last column of cells overlaps
 constexpr int kFrameHeight = 150;
 
+std::size_t pixel(int x, int y, int width) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+         static_cast<std::size_t>(x);
+}
+
 Model make_model(int frame_width = kFrameWidth, int frame_height = kFrameHeight) {
   Model model;
   model.rectify =
@@ -28,7 +33,7 @@ Model make_model(int frame_width = kFrameWidth, int frame_height = kFrameHeight)
   for (int q6 = -40 * 64; q6 <= 110 * 64; ++q6) {
     model.list.um.push_back(static_cast<std::int16_t>(q6 / 2));  // 32 µm a level
   }
-  model.reference_q8.assign(static_cast<std::size_t>(frame_width * frame_height), 150 * 256);
+  model.reference_q8.assign(pixel(0, frame_height, frame_width), 150 * 256);
   return model;
 }
 
@@ -77,8 +82,8 @@ TEST_F(ActivityTest, HealthIsGatheredInTheSameLook) {
   settle();
   auto luma = untouched();
   for (int x = 64; x < 80; ++x) {
-    luma[static_cast<std::size_t>(100 * kFrameWidth + x)] = 255;
-    luma[static_cast<std::size_t>(102 * kFrameWidth + x)] = 2;
+    luma[pixel(x, 100, kFrameWidth)] = 255;
+    luma[pixel(x, 102, kFrameWidth)] = 2;
   }
   (void)active_tiles(luma);
   EXPECT_NEAR(report_.mean_grey, 150, 0.1);
@@ -183,7 +188,7 @@ TEST_F(ActivityTest, ANewReferenceForgetsEverything) {
   (void)active_tiles(frame([](int, int) { return 50.0; }));
   EXPECT_EQ(report_.active_tiles, report_.tiles);
   activity_.set_reference(
-      std::vector<std::uint16_t>(static_cast<std::size_t>(kFrameWidth * kFrameHeight), 100 * 256));
+      std::vector<std::uint16_t>(pixel(0, kFrameHeight, kFrameWidth), 100 * 256));
   EXPECT_EQ(active_tiles(frame([](int, int) { return 50.0; })), 0);
 }
 
@@ -220,12 +225,11 @@ TEST_P(ActiveTiles, HoldTheFullResultAndTheRestIsCleared) {
     const int x0 = static_cast<int>(random() % kFrameWidth);
     const int y0 = static_cast<int>(random() % kFrameHeight);
     const int radius = static_cast<int>(random() % 50) - 10;
-    std::vector<std::uint8_t> luma(static_cast<std::size_t>(kFrameWidth * kFrameHeight) + 64, 150);
+    std::vector<std::uint8_t> luma(pixel(0, kFrameHeight, kFrameWidth) + 64, 150);
     for (int y = 0; y < kFrameHeight; ++y) {
       for (int x = 0; x < kFrameWidth; ++x) {
         if (std::hypot(x - x0, y - y0) < radius) {
-          luma[static_cast<std::size_t>(y * kFrameWidth + x)] =
-              static_cast<std::uint8_t>(20 + random() % 200);
+          luma[pixel(x, y, kFrameWidth)] = static_cast<std::uint8_t>(20 + random() % 200);
         }
       }
     }
@@ -243,7 +247,7 @@ TEST_P(ActiveTiles, HoldTheFullResultAndTheRestIsCleared) {
     const std::vector<std::int16_t> full = specification.run(luma.data(), kFrameWidth);
     for (int y = 0; y < grid.height; ++y) {
       for (int x = 0; x < grid.width; ++x) {
-        const auto at = static_cast<std::size_t>(y * grid.width + x);
+        const auto at = pixel(x, y, grid.width);
         const std::uint64_t row = drawn[b].tiles[static_cast<std::size_t>(y / TileGrid::kRows)];
         const bool active = (row >> (x / grid.tile_width()) & 1U) != 0;
         const bool marked = full[at] == kUntrusted && model->untrusted[at] != 0;
@@ -262,8 +266,7 @@ TEST_P(ActiveTiles, AFlatFrameIsAllRest) {
   std::vector<std::int16_t> depth(model->rectify.entries.size(), 777);
   DrawnTiles drawn;
   ActivityReport report;
-  const std::vector<std::uint8_t> luma(static_cast<std::size_t>(kFrameWidth * kFrameHeight) + 64,
-                                       150);
+  const std::vector<std::uint8_t> luma(pixel(0, kFrameHeight, kFrameWidth) + 64, 150);
   reconstructor.run_active(luma.data(), kFrameWidth, depth, drawn, report);
   EXPECT_EQ(report.active_tiles, 0);
   EXPECT_EQ(std::ranges::count(depth, 0), static_cast<std::ptrdiff_t>(depth.size()));

@@ -22,7 +22,7 @@ Model make_model() {
   for (int q6 = -100 * 64; q6 <= 100 * 64; ++q6) {
     model.list.um.push_back(static_cast<std::int16_t>(q6 / 2));
   }
-  model.reference_q8.assign(24 * 20, 150 * 256);
+  model.reference_q8.assign(std::size_t{24} * 20, 150 * 256);
   return model;
 }
 
@@ -79,7 +79,7 @@ TEST(Decimate, NothingAliases) {
 
 TEST(Decimate, AnUntrustedPixelMarksItsArea) {
   Model model = make_model();
-  model.untrusted.assign(16 * 12, 0);
+  model.untrusted.assign(std::size_t{16} * 12, 0);
   model.untrusted[5 * 16 + 7] = 1;
   const std::vector<std::int16_t> half = run(decimate(model, 2), [](int, int) { return 150; });
   for (std::size_t i = 0; i < half.size(); ++i) {

@@ -48,7 +48,7 @@ std::vector<int> smooth_column(Smoother& smoother, int width, const std::vector<
   int pushed = 0;
   for (int pair = 0; pair < smoother.pairs(); ++pair) {
     for (; pushed < std::min(smoother.pairs(), pair + smoother.reach() + 1); ++pushed) {
-      const auto y = static_cast<std::size_t>(2 * pushed);
+      const auto y = 2 * static_cast<std::size_t>(pushed);
       fill(0, y);
       if (y + 1 < values.size()) fill(1, y + 1);
       smoother.push(pushed, in.row(0), in.row(1), 0, blocks);

@@ -10,6 +10,16 @@ namespace {
 
 const std::vector<std::int16_t> kPublishedTaps{4608, 3584, 1792, 512};
 
+/// The rows of fine pixels that make one row of the map.
+std::vector<const std::int16_t*> rows_of(const std::vector<std::int16_t>& fine,
+                                         const RectifyTable& table) {
+  std::vector<const std::int16_t*> rows(static_cast<std::size_t>(table.decimation));
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    rows[k] = fine.data() + k * static_cast<std::size_t>(table.fine_width());
+  }
+  return rows;
+}
+
 }  // namespace
 
 Specification::Specification(const Model& model)
@@ -28,8 +38,7 @@ Specification::Plane Specification::rectify(std::span<const std::uint16_t> refer
   const RectifyTable& table = model_.rectify;
   Plane out(static_cast<std::size_t>(at(height_)));
   Plane fine(static_cast<std::size_t>(table.fine_width() * table.decimation));
-  std::vector<const std::int16_t*> rows;
-  for (int k = 0; k < table.decimation; ++k) rows.push_back(fine.data() + k * table.fine_width());
+  const std::vector<const std::int16_t*> rows = rows_of(fine, table);
   for (int y = 0; y < height_; ++y) {
     kernels::rectify_reference_row(
         reference_q8.data(), table.frame_width,
@@ -46,8 +55,7 @@ Specification::Plane Specification::difference(const std::uint8_t* luma,
   Plane out(static_cast<std::size_t>(at(height_)));
   Plane fine(static_cast<std::size_t>(table.fine_width() * table.decimation));
   const Plane zero(fine.size());
-  std::vector<const std::int16_t*> rows;
-  for (int k = 0; k < table.decimation; ++k) rows.push_back(fine.data() + k * table.fine_width());
+  const std::vector<const std::int16_t*> rows = rows_of(fine, table);
   for (int y = 0; y < height_; ++y) {
     const RectifyTable::Entry* entries =
         table.entries.data() + std::ptrdiff_t{y} * table.decimation * table.fine_width();
@@ -71,12 +79,12 @@ Specification::Plane Specification::smooth(const Plane& in,
   const auto row_of = [padded](Plane& plane, int y) {
     return plane.data() + std::ptrdiff_t{y} * padded;
   };
-  Plane row(static_cast<std::size_t>(padded) + 2 * kernels::kMaxRadius);
+  Plane row(static_cast<std::size_t>(padded) + std::size_t{2} * kernels::kMaxRadius);
   Plane across(static_cast<std::size_t>(padded) * static_cast<std::size_t>(height_));
   for (int y = 0; y < height_; ++y) {
+    std::int16_t* const middle = row.data() + kernels::kMaxRadius;
     for (int x = -radius; x < width_ + radius; ++x) {
-      row[static_cast<std::size_t>(x + kernels::kMaxRadius)] =
-          in[static_cast<std::size_t>(at(y) + std::clamp(x, 0, width_ - 1))];
+      middle[x] = in[static_cast<std::size_t>(at(y) + std::clamp(x, 0, width_ - 1))];
     }
     kernels::smooth_horizontal_row(row.data() + kernels::kMaxRadius, taps, padded,
                                    row_of(across, y));
@@ -85,9 +93,8 @@ Specification::Plane Specification::smooth(const Plane& in,
   Plane down(static_cast<std::size_t>(padded));
   std::vector<const std::int16_t*> rows(2 * taps.size() - 1);
   for (int y = 0; y < height_; ++y) {
-    for (int k = -radius; k <= radius; ++k) {
-      rows[static_cast<std::size_t>(k + radius)] =
-          row_of(across, std::clamp(y + k, 0, height_ - 1));
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      rows[k] = row_of(across, std::clamp(y - radius + static_cast<int>(k), 0, height_ - 1));
     }
     kernels::smooth_vertical_row(rows.data(), taps, padded, down.data());
     std::copy_n(down.begin(), width_, out.begin() + at(y));

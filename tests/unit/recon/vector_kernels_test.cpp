@@ -164,24 +164,26 @@ TEST_P(VectorSmooth, BothDirectionsForEveryRadius) {
       smooth_across(row_of(y - 1), row_of(y), pairs, 0, split, paired.back().data());
       smooth_across(row_of(y - 1), row_of(y), pairs, split, blocks, paired.back().data());
       for (int x = 0; x < width; ++x) {
-        const std::size_t at = static_cast<std::size_t>(x / 32 * 64 + x % 2 * 32 + x % 32 / 2 * 2);
-        ASSERT_EQ(paired.back()[at],
+        const int at = x / 32 * 64 + x % 2 * 32 + x % 32 / 2 * 2;
+        ASSERT_EQ(paired.back().data()[at],
                   across[static_cast<std::size_t>(y - 1)][static_cast<std::size_t>(x)])
             << x;
-        ASSERT_EQ(paired.back()[at + 1],
+        ASSERT_EQ(paired.back().data()[at + 1],
                   across[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)])
             << x;
       }
     }
     std::vector<const std::int16_t*> pair_rows;
+    pair_rows.reserve(paired.size());
     for (const auto& row : paired) pair_rows.push_back(row.data());
     std::vector<std::int16_t> a(static_cast<std::size_t>(width));
     std::vector<std::int16_t> b(a);
     smooth_down(pair_rows.data(), pairs, 0, blocks, a.data(), b.data());
     for (int i = 0; i < 2; ++i) {
       std::vector<const std::int16_t*> span;
+      span.reserve(2 * kernel.size());
       for (int k = -radius; k <= radius; ++k) {
-        span.push_back(across[static_cast<std::size_t>(pairs.radius() + i + k)].data());
+        span.push_back((across.begin() + pairs.radius() + i + k)->data());
       }
       std::vector<std::int16_t> should(a.size());
       kernels::smooth_vertical_row(span.data(), kernel, width, should.data());
@@ -201,11 +203,12 @@ class VectorList : public VectorKernels {
       const std::vector<std::int16_t> difference = values(3 * stride, -32768, 32767);
       const std::vector<std::int16_t> gains = values(3 * stride, 0, 32767);
       std::vector<std::uint8_t> marks;
+      marks.reserve(gains.size());
       for (const std::int16_t g : gains) marks.push_back(static_cast<std::uint8_t>(g == 0));
       std::vector<std::int16_t> should(3 * static_cast<std::size_t>(width) + 1, 77);
       std::vector<std::int16_t> is = should;
       int beyond = 0;
-      for (int y = 0; y < 3; ++y) {
+      for (std::ptrdiff_t y = 0; y < 3; ++y) {
         beyond += kernels::gain_list_mask_row(
             difference.data() + y * stride, gain ? gains.data() + y * stride : nullptr,
             gain ? marks.data() + y * stride : nullptr, list, width, should.data() + y * width);
