@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Goals of the benchmarks: one line each, and a file a part, so that the parts can be summed up.
 
-As a program: goals.py FOLDER PART...  prints every goal of the parts and "all goals met" if so.
+As a program: goals.py FOLDER PART...  sums the parts up: every goal when there are several, and "all
+goals met" only when all are.
 """
 import csv
 import os
@@ -36,11 +37,13 @@ def summary(folder, parts):
         except FileNotFoundError:
             print(f"not measured: {part}")
             return
-    print()
-    for part, goal, measured, met, shortfall in goals:
-        print(f"{part:7} {line(goal, measured, met, shortfall)}")
+    if len(parts) > 1:
+        print()
+        for part, goal, measured, met, shortfall in goals:
+            print(f"{part:7} {line(goal, measured, met, shortfall)}")
     short = sum(not met for _, _, _, met, _ in goals)
-    print("all goals met" if short == 0 else f"{short} of {len(goals)} goals are short")
+    print(("all goals met" if short == 0 else f"{short} of {len(goals)} goals are short") +
+          ("" if len(parts) > 1 else f" (of the {parts[0]} only)"))
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ class Programs:
         self.dtactctl = os.path.join(build, "clients", "ctl", "dtactctl")
         self.render = os.path.join(build, "hal", "sim", "dtact-sim-render")
         self.client = os.path.join(build, "tests", "bench", "loop", "loop_client")
+        self.jitter = os.path.join(build, "tests", "bench", "loop", "loop_jitter")
         self.frames = os.path.join(build, "tests", "bench", "loop", "loop_frames")
 
 

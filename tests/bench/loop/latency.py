@@ -7,6 +7,7 @@ import subprocess
 from daemon import FPS, Daemon
 
 FIFO_CAPTURE = 40
+FIFO_NETWORK = 20
 FIFO_CLIENT = 10
 STEP_US = 10  # of the histogram
 IDLE_MS = 3.0
@@ -28,6 +29,12 @@ def stress(seconds):
                             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
+def stolen_s():
+    """CPU seconds that the host of a virtual machine has kept from it."""
+    with open("/proc/stat", encoding="ascii") as file:
+        return int(file.readline().split()[8]) / os.sysconf("SC_CLK_TCK")
+
+
 def missed(before, after):
     """Frames that the capture loop did not take, and faults of its thread, between two statuses."""
     frames = sum(after["camera"][k] - before["camera"][k] for k in ("lost", "skipped", "damaged"))
@@ -39,6 +46,7 @@ def missed(before, after):
 def run_case(programs, folder, recordings, case, seconds):
     settings = {"camera.replay.folder": recordings["mjpeg"]}
     settings["capture.fifo_priority"] = FIFO_CAPTURE if case.fifo else 0
+    settings["net.fifo_priority"] = FIFO_NETWORK if case.fifo else 0
     samples = os.path.join(folder, "samples.csv")
     with Daemon(programs, folder, settings) as daemon:
         daemon.wait_serving()
@@ -52,9 +60,9 @@ def run_case(programs, folder, recordings, case, seconds):
                 client.wait(timeout=4)
                 raise SystemExit("bench: the client ended at once")
             except subprocess.TimeoutExpired:
-                before = daemon.status()
+                before, stolen = daemon.status(), stolen_s()
             refused = client.communicate(timeout=seconds + 60)[0]
-            after = daemon.status()
+            after, stolen = daemon.status(), stolen_s() - stolen
             threads = daemon.threads()
         finally:
             if load:
@@ -64,7 +72,8 @@ def run_case(programs, folder, recordings, case, seconds):
         rows = list(csv.DictReader(file))
     frames, usage = missed(before, after)
     return {"case": case, "rows": rows, "missed": frames, "usage": usage, "threads": threads,
-            "refused": refused.strip().splitlines(), "stages": after["stages"]}
+            "refused": refused.strip().splitlines(), "stages": after["stages"],
+            "stolen": stolen / seconds / os.cpu_count()}
 
 
 def figures(result):
@@ -86,24 +95,25 @@ def figures(result):
         "p99.9_ms": percentile(latency, 0.999), "max_ms": latency[-1],
         "exposure_p50_ms": percentile(exposure, 0.5), "exposure_p99_ms": percentile(exposure, 0.99),
         "missed_by_capture": result["missed"], "dropped_to_clients": dropped,
-        "touching_share": sum(r["touching"] == "1" for r in rows) / len(rows), **result["usage"]}
+        "touching_share": sum(r["touching"] == "1" for r in rows) / len(rows),
+        "stolen_share": result["stolen"], **result["usage"]}
 
 
 def print_table(results, tables):
     print(f"\nLatency, ms from ready at the HAL to the client's socket at {FPS} fps, JPEG decoding "
           "included\n")
     print(f"{'':36} {'p50':>6} {'p99':>6} {'p99.9':>6} {'max':>6} {'missed':>7} {'dropped':>8}  "
-          f"{'from exposure':>14}  {'switches a frame':>16}  faults")
+          f"{'from exposure':>14}  {'switches a frame':>16}  {'faults':>6}  {'stolen':>6}")
     for result, t in zip(results, tables):
         per_frame = max(1, t["frames"] / result["case"].clients)
         print(f"{result['case'].name:36} {t['p50_ms']:6.2f} {t['p99_ms']:6.2f} {t['p99.9_ms']:6.2f} "
               f"{t['max_ms']:6.2f} {t['missed_by_capture']:7} {t['dropped_to_clients']:8}  "
               f"{t['exposure_p50_ms']:6.2f} {t['exposure_p99_ms']:7.2f}  "
               f"{(t['waits'] + t['preemptions']) / per_frame:16.2f}  "
-              f"{t['minor_faults']}+{t['major_faults']}")
+              f"{t['minor_faults']:>4}+{t['major_faults']}  {100 * t['stolen_share']:5.2f}%")
     print("missed: frames the capture loop did not take; dropped: frames a client did not get; from "
-          "exposure:\np50 and p99 from the start of exposure, one period before ready; switches and "
-          "page faults\n(minor+major) are the capture thread's")
+          "exposure: p50\nand p99 from the start of exposure, one period before ready; switches and "
+          "page faults (minor+major) are the capture thread's; stolen: CPU time that the host took")
     print(f"something touched in {100 * tables[0]['touching_share']:.0f} % of the frames")
     for fifo in (True, False):
         result = next(r for r in results if r["case"].fifo == fifo)

@@ -12,6 +12,7 @@ goals are met or not.
 """
 import argparse
 import os
+import subprocess
 import sys
 import tempfile
 import time
@@ -34,17 +35,21 @@ def machine():
     return f"{os.cpu_count()} CPUs, {model}, Linux {os.uname().release}"
 
 
-def busy_share(seconds):
-    """Share of all CPUs' time that others use while we wait."""
+def surroundings(programs, seconds):
+    """What the machine does before we begin: load of other programs, and how late it wakes a FIFO
+    thread that only sleeps on the capture thread's CPU."""
     def read():
         with open("/proc/stat", encoding="ascii") as file:
             values = [int(v) for v in file.readline().split()[1:9]]
-        return sum(values), values[3] + values[4]
+        return sum(values), values[3] + values[4], values[7]
 
-    total, idle = read()
-    time.sleep(seconds)
-    total_then, idle_then = read()
-    return 1 - (idle_then - idle) / max(1, total_then - total)
+    before = read()
+    jitter = subprocess.run([programs.jitter, str(max(os.sched_getaffinity(0))), "50", str(seconds)],
+                            check=True, capture_output=True, text=True).stdout
+    total, idle, stolen = (then - now for now, then in zip(before, read()))
+    return (f"before: other programs kept the CPUs {100 * (total - idle) / total:.0f} % busy, the "
+            f"host took {100 * stolen / total:.1f} %;\na FIFO thread that only sleeps was woken late "
+            f"by {jitter.strip()}")
 
 
 def main():
@@ -58,7 +63,7 @@ def main():
     programs = Programs(options.build)
     label = f"replay of the simulated sensor, 800x600 to 580x580, {machine()}"
     print(f"\nThe loop: {label}")
-    print(f"other programs kept the CPUs {100 * busy_share(3):.0f} % busy before it began")
+    print(surroundings(programs, 10))
 
     with tempfile.TemporaryDirectory() as folder:
         work = os.path.join(folder, "loop")

@@ -64,11 +64,14 @@ def many_clients(programs, folder, recordings, count, seconds):
     def change(key):
         return after[key] - before[key]
 
-    with open(output, newline="", encoding="ascii") as file:
+    with open(output, encoding="ascii") as file:
         received = sum(1 for _ in file) - 1
+    dropped = sum(c["dropped"] for c in after["clients"]) - \
+        sum(c["dropped"] for c in before["clients"])
     return {"clients": count, "cpu_percent": 100 * cpu / passed,
             "delivered_fps": received / seconds / count, "published_fps": change("frames") / passed,
             "encoded": change("encoded"), "fetched": change("frames") - change("skipped"),
+            "dropped": dropped,
             "rss_mib": rss / 1024}
 
 
@@ -116,10 +119,11 @@ def measure(programs, folder, recordings, out, label, seconds):
         print(f"bench: {count} clients", flush=True)
         points.append(many_clients(programs, folder, recordings, count, min(8, seconds)))
     print(f"\n{'clients':>8} {'CPU %':>7} {'fps at each':>12} {'encoded':>8} {'of fetched':>11} "
-          f"{'resident MiB':>13}")
+          f"{'dropped':>8} {'resident MiB':>13}")
     for p in points:
         print(f"{p['clients']:8} {p['cpu_percent']:7.0f} {p['delivered_fps']:12.1f} "
-              f"{p['encoded']:8} {p['fetched']:11} {p['rss_mib']:13.1f}")
+              f"{p['encoded']:8} {p['fetched']:11} "
+              f"{p['dropped']:8} {p['rss_mib']:13.1f}")
     with open(os.path.join(out, "clients.csv"), "w", newline="", encoding="ascii") as file:
         writer = csv.DictWriter(file, points[0].keys())
         writer.writeheader()
