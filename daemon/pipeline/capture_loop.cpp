@@ -188,7 +188,8 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
   out.times.smooth_ns = steps.smooth_ns;
   out.times.list_ns = steps.list_ns;
   const std::int64_t began_ns = clock_.monotonic_ns();
-  out.contact = contact_.inspect(out.depth_um, out.width, out.mm_per_px);
+  out.contact =
+      contact_.inspect(out.depth_um, active_->reconstructor.grid(), out.drawn.tiles, out.mm_per_px);
   beyond_ = active_->reconstructor.beyond_pixels() > config_.beyond_pixels;
   out.times.inspect_ns = clock_.monotonic_ns() - began_ns;
 }

@@ -91,7 +91,8 @@ def figures(result):
         counts = [int(r["dropped"]) for r in rows if r["client"] == client]
         dropped += counts[-1] - counts[0]
     return {
-        "frames": len(rows), "p50_ms": percentile(latency, 0.5), "p99_ms": percentile(latency, 0.99),
+        "frames": len(rows), "p50_ms": percentile(latency, 0.5),
+        "p99_ms": percentile(latency, 0.99),
         "p99.9_ms": percentile(latency, 0.999), "max_ms": latency[-1],
         "exposure_p50_ms": percentile(exposure, 0.5), "exposure_p99_ms": percentile(exposure, 0.99),
         "missed_by_capture": result["missed"], "dropped_to_clients": dropped,
@@ -111,9 +112,9 @@ def print_table(results, tables):
               f"{t['exposure_p50_ms']:6.2f} {t['exposure_p99_ms']:7.2f}  "
               f"{(t['waits'] + t['preemptions']) / per_frame:16.2f}  "
               f"{t['minor_faults']:>4}+{t['major_faults']}  {100 * t['stolen_share']:5.2f}%")
-    print("missed: frames the capture loop did not take; dropped: frames a client did not get; from "
-          "exposure: p50\nand p99 from the start of exposure, one period before ready; switches and "
-          "page faults (minor+major) are the capture thread's; stolen: CPU time that the host took")
+    print("missed: frames the capture loop did not take; dropped: frames a client did not get;\n"
+          "from exposure: p50 and p99 from the start of exposure, one period before ready; switches\n"
+          "and page faults (minor+major): of the capture thread; stolen: CPU time the host took")
     print(f"something touched in {100 * tables[0]['touching_share']:.0f} % of the frames")
     for fifo in (True, False):
         result = next(r for r in results if r["case"].fifo == fifo)
