@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 #include <libcamera/camera_manager.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hal/libcamera/formats.hpp"
@@ -57,12 +60,44 @@ std::shared_ptr<lc::Camera> find(lc::CameraManager& manager, const std::string& 
                                       id, names));
 }
 
+/// Finds the camera in libcamera's view of the machine. libcamera follows plugging by udev's
+/// events, and a manager that starts while a camera's nodes are just appearing can miss the last of
+/// them for good: after a while without the camera the search begins anew with a manager of its own
+/// (unless another camera of this process keeps the present one).
+class Search {
+ public:
+  explicit Search(std::string id) : id_(std::move(id)) {}
+
+  /// Throws DeviceError as find().
+  std::shared_ptr<lc::Camera> operator()() {
+    if (!manager_) manager_ = shared_manager();
+    try {
+      std::shared_ptr<lc::Camera> camera = find(*manager_, id_);
+      missing_since_.reset();
+      return camera;
+    } catch (const DeviceError&) {
+      const auto now = std::chrono::steady_clock::now();
+      if (!missing_since_) missing_since_ = now;
+      if (now - *missing_since_ > kPatience) {
+        manager_.reset();
+        missing_since_.reset();
+      }
+      throw;
+    }
+  }
+
+ private:
+  static constexpr std::chrono::seconds kPatience{5};
+  std::string id_;
+  std::shared_ptr<lc::CameraManager> manager_;
+  std::optional<std::chrono::steady_clock::time_point> missing_since_;
+};
+
 live::Opener opener(const CameraConfig& config) {
   check_pixel_format(config.libcamera.pixel_format);
   return [config, lock = PhotometricLock(config.libcamera, config.fps),
-          manager = std::shared_ptr<lc::CameraManager>()]() mutable -> live::Opened {
-    if (!manager) manager = shared_manager();
-    const std::shared_ptr<lc::Camera> camera = find(*manager, config.libcamera.device);
+          search = Search(config.libcamera.device)]() mutable -> live::Opened {
+    const std::shared_ptr<lc::Camera> camera = search();
     const auto session = std::make_shared<Session>(camera, config, lock);
     return {session, camera->id(), session->pixel_format(), session->controls()};
   };

@@ -121,6 +121,8 @@ std::vector<Attached> list_attached() {
     camera.serial = serial_of(camera.node);
     cameras.push_back(std::move(camera));
   }
+  // Not by node: which of two cameras got the first number is a matter of chance.
+  std::ranges::sort(cameras, {}, [](const Attached& c) { return c.stable_name() + c.node; });
   return cameras;
 }
 

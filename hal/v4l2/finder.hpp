@@ -22,8 +22,8 @@ struct Attached {
   [[nodiscard]] std::string stable_name() const;
 };
 
-/// The cameras that are attached, by node. Metadata nodes and nodes that capture nothing are left
-/// out.
+/// The cameras that are attached, in the order of their stable names. Metadata nodes and nodes that
+/// capture nothing are left out.
 [[nodiscard]] std::vector<Attached> list_attached();
 
 /// Which camera is meant, parsed from `camera.v4l2.device`.
