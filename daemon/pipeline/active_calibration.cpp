@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "daemon/calibration/mismatch.hpp"
+#include "daemon/recon/decimate.hpp"
 
 namespace dtact::pipeline {
 namespace {
@@ -46,11 +47,17 @@ calibration::AttachedCamera attached(const hal::CameraInfo& camera) {
   return now;
 }
 
+std::shared_ptr<const recon::Model> at(const std::shared_ptr<const recon::Model>& model,
+                                       const ReconstructionRules& rules) {
+  if (rules.decimation == 1) return model;
+  return std::make_shared<const recon::Model>(recon::decimate(*model, rules.decimation));
+}
+
 }  // namespace
 
 std::unique_ptr<ActiveCalibration> activate(
     const std::shared_ptr<const calibration::Calibration>& calibration,
-    const hal::CameraInfo& camera) {
+    const hal::CameraInfo& camera, const ReconstructionRules& rules) {
   const recon::Model& model = *calibration->model;
   const recon::RectifyTable& table = model.rectify;
   if (table.frame_width != camera.width || table.frame_height != camera.height) {
@@ -68,7 +75,7 @@ std::unique_ptr<ActiveCalibration> activate(
   }
   auto active = std::make_unique<ActiveCalibration>(
       ActiveCalibration{.calibration = calibration,
-                        .reconstructor = recon::Reconstructor(calibration->model),
+                        .reconstructor = recon::Reconstructor(at(calibration->model, rules)),
                         .grid = {},
                         .region = region,
                         .camera_mismatch = camera_differs(*calibration, camera)});

@@ -5,6 +5,7 @@
 
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/pipeline/luma_grid.hpp"
+#include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "hal/camera.hpp"
 #include "hal/light_ring.hpp"
@@ -26,7 +27,7 @@ struct ActiveCalibration {
 /// of this camera at all (other differences are a health condition).
 [[nodiscard]] std::unique_ptr<ActiveCalibration> activate(
     const std::shared_ptr<const calibration::Calibration>& calibration,
-    const hal::CameraInfo& camera);
+    const hal::CameraInfo& camera, const ReconstructionRules& rules);
 
 /// The camera, its mode or its controls are not those of the calibration.
 [[nodiscard]] bool camera_differs(const calibration::Calibration& calibration,

@@ -190,7 +190,8 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
   const std::int64_t began_ns = clock_.monotonic_ns();
   out.contact =
       contact_.inspect(out.depth_um, active_->reconstructor.grid(), out.drawn.tiles, out.mm_per_px);
-  beyond_ = active_->reconstructor.beyond_pixels() > config_.beyond_pixels;
+  const int pixel = model.rectify.decimation * model.rectify.decimation;
+  beyond_ = active_->reconstructor.beyond_pixels() * pixel > config_.beyond_pixels;
   out.times.inspect_ns = clock_.monotonic_ns() - began_ns;
 }
 

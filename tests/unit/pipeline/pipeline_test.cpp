@@ -161,6 +161,21 @@ TEST_F(PipelineTest, MeasuresAPressAndTellsContact) {
   EXPECT_FALSE(all<ContactChanged>()[1].touching);
 }
 
+TEST_F(PipelineTest, ACoarserMapHoldsTheSameSurface) {
+  config.reconstruction.decimation = 4;
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_fresh());
+  EXPECT_EQ(frame->width, 36);  // 144×104 pixels of 0.2 mm at full resolution
+  EXPECT_EQ(frame->height, 26);
+  EXPECT_EQ(frame->depth_um.size(), 36U * 26U);
+  EXPECT_DOUBLE_EQ(frame->mm_per_px, 0.8);
+  camera.press(1);
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.05);
+  EXPECT_NEAR(frame->contact.x_mm, 0.1, 0.1);
+  EXPECT_NEAR(frame->contact.y_mm, 0.1, 0.1);
+}
+
 TEST_F(PipelineTest, KeepsTheReferenceForATouchedStart) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
