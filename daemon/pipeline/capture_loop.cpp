@@ -43,6 +43,8 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       watch_(period_ns_),
       timeline_(config.light, camera_.info().light_delay_frames, period_ns_),
       teller_(exchange_),
+      whole_{0, 0, camera_.info().width, camera_.info().height},
+      area_(whole_),
       shown_(config.light) {
   // What the status says until the first frame.
   exchange_.state = state();
@@ -65,6 +67,7 @@ void CaptureLoop::run() noexcept {
   while (!exchange_.stop.load(std::memory_order_relaxed)) {
     take_notes();
     take_orders();
+    choose_area();
     const std::int64_t asked_ns = clock_.monotonic_ns();
     const hal::GrabStatus status = camera_.grab(frame_, timeout);
     const std::int64_t now_ns = clock_.monotonic_ns();
@@ -77,6 +80,18 @@ void CaptureLoop::run() noexcept {
     teller_.flush();
   }
   frame_.reset();
+}
+
+// Decoding is most of the work on a frame: no more than somebody reads.
+void CaptureLoop::choose_area() noexcept {
+  hal::Area area = whole_;
+  if (active_ && !keeper_.looks() && !exchange_.want_luma.load(std::memory_order_relaxed)) {
+    const recon::FrameRegion region = active_->reconstructor.region();
+    area = {region.x, region.y, region.width, region.height};
+  }
+  if (area == area_) return;
+  area_ = area;
+  camera_.will_read(area_);
 }
 
 void CaptureLoop::take_notes() noexcept {
@@ -201,8 +216,8 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   const bool want_depth = exchange_.want_depth.load(std::memory_order_relaxed);
   const bool want_luma = exchange_.want_luma.load(std::memory_order_relaxed);
   out.has_depth = reconstructed && want_depth;
-  out.has_luma = want_luma;
-  if (want_luma) {
+  out.has_luma = want_luma && area_ == whole_;  // not the frame before the one asked for
+  if (out.has_luma) {
     const hal::LumaView& luma = frame_.luma();
     const auto width = static_cast<std::size_t>(luma.width);
     out.luma_width = luma.width;
@@ -216,14 +231,14 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   out.done_ns = clock_.monotonic_ns();
   out.times.publish_ns = out.done_ns - began_ns;
   exchange_.statistics.add(out.times, reconstructed, out.camera.ready_ns, out.done_ns);
-  if (!want_depth && !want_luma) return;
+  if (!want_depth && !out.has_luma) return;
   exchange_.slot.publish();
   exchange_.frames.fetch_add(1, std::memory_order_relaxed);
   exchange_.wake.signal();
 }
 
 void CaptureLoop::mind_reference(bool settled) noexcept {
-  if (!active_ || !settled) return;
+  if (!active_ || !settled || (keeper_.looks() && area_ != whole_)) return;
   const KeeperStep step = keeper_.step(frame_.luma());
   if (step.reference_changed) {
     active_->reconstructor.set_reference(keeper_.reference());

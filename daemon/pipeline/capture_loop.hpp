@@ -45,6 +45,7 @@ class CaptureLoop {
   void run() noexcept;
 
  private:
+  void choose_area() noexcept;
   void take_notes() noexcept;
   void take_orders() noexcept;
   void execute(const RezeroOrder& order) noexcept;
@@ -77,6 +78,8 @@ class CaptureLoop {
   LightTimeline timeline_;
   Teller teller_;
   hal::Frame frame_;
+  const hal::Area whole_;  // frame
+  hal::Area area_;         // of the frame that is asked for
 
   hal::Light shown_;  // by the ring, as last noted
   bool light_mismatch_ = false;

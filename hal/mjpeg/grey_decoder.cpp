@@ -181,7 +181,7 @@ struct GreyDecoder::Impl {
 
   int width;
   int height;
-  Crop crop;
+  Area crop;
   JpegArena arena;
   jpeg_decompress_struct cinfo{};
   jpeg_error_mgr errors{};
@@ -200,7 +200,7 @@ GreyDecoder::GreyDecoder(GreyDecoder&&) noexcept = default;
 GreyDecoder& GreyDecoder::operator=(GreyDecoder&&) noexcept = default;
 GreyDecoder::~GreyDecoder() = default;
 
-void GreyDecoder::set_crop(const Crop& crop) {
+void GreyDecoder::set_crop(const Area& crop) {
   const Impl& d = *impl_;
   if (crop.x < 0 || crop.y < 0 || crop.width < 1 || crop.height < 1 ||
       crop.width > d.width - crop.x || crop.height > d.height - crop.y) {

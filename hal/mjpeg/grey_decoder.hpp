@@ -5,6 +5,8 @@
 #include <memory>
 #include <span>
 
+#include "hal/frame.hpp"
+
 namespace dtact::hal::mjpeg {
 
 enum class Status : std::uint8_t {
@@ -24,14 +26,6 @@ struct Size {
   int width = 0;   ///< Pixels.
   int height = 0;  ///< Pixels.
   bool operator==(const Size&) const = default;
-};
-
-/// A rectangle of the picture, pixels.
-struct Crop {
-  int x = 0;
-  int y = 0;
-  int width = 0;
-  int height = 0;
 };
 
 /// Decodes the luma of JPEG frames of one size, full range by JFIF's definition. Colour is parsed
@@ -54,7 +48,7 @@ class GreyDecoder {
   /// without one; what it writes elsewhere in the picture is unspecified. All of the payload is
   /// still parsed, so that damage anywhere is told. Throws std::invalid_argument unless the crop
   /// has pixels and lies in the picture.
-  void set_crop(const Crop& crop);
+  void set_crop(const Area& crop);
 
   /// Writes width × height bytes to `luma`, rows `stride` bytes apart. Unless ok the output is
   /// partly written and must not be used: libjpeg would fill a damaged frame with grey. Bytes after

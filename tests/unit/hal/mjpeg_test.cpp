@@ -143,7 +143,7 @@ TEST_F(GreyDecoderTest, ACropHoldsTheSameBitsWhereverItLies) {
     ASSERT_EQ(decoder.decode(jpeg, whole.data(), whole.stride()), Status::ok);
     std::minstd_rand random(3);
     for (int i = 0; i < 300; ++i) {
-      Crop crop;
+      Area crop;
       crop.x = static_cast<int>(random() % 64);
       crop.y = static_cast<int>(random() % 48);
       crop.width = 1 + static_cast<int>(random() % static_cast<unsigned>(64 - crop.x));

@@ -176,6 +176,16 @@ TEST_F(PipelineTest, ACoarserMapHoldsTheSameSurface) {
   EXPECT_NEAR(frame->contact.y_mm, 0.1, 0.1);
 }
 
+TEST_F(PipelineTest, LumaIsWholeThoughDepthReadsAPart) {
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_fresh());
+  pipeline->want(true, true);
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_luma; }));
+  EXPECT_TRUE(frame->has_depth);
+  EXPECT_GT(frame->luma.front(), 90);  // the corner, outside the map; unread it is 0
+  EXPECT_GT(frame->luma.back(), 90);
+}
+
 TEST_F(PipelineTest, KeepsTheReferenceForATouchedStart) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
