@@ -164,6 +164,7 @@ void run(const Arguments& arguments) {
   const auto refused_memory = dtact::base::lock_memory();
   std::vector<std::vector<Sample>> samples(static_cast<std::size_t>(arguments.clients));
   std::vector<dtact::base::RtThread> threads;
+  threads.reserve(samples.size());
   std::vector<std::string> failures(samples.size());
   for (std::size_t i = 0; i < samples.size(); ++i) {
     threads.emplace_back(

@@ -93,8 +93,8 @@ def plot(out, points, label):
     lower.set_xscale("log", base=2)
     lower.set_xticks(CLIENTS, [str(n) for n in CLIENTS])
     lower.set_xlabel("clients, each asking for every frame, 673 kB a frame")
-    upper.set_ylabel("frames a second at each client")
-    lower.set_ylabel("CPU of the daemon, % of one core")
+    upper.set_ylabel("frames a second at each")
+    lower.set_ylabel("daemon, % of one core")
     for axis in (upper, lower):
         axis.set_ylim(bottom=0)
         axis.legend(fontsize=8)

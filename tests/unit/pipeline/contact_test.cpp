@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -12,13 +13,14 @@ namespace {
 
 // 11×11 pixels of 0.5 mm: a pixel is 0.25 mm², the centre is pixel (5, 5).
 constexpr int kSide = 11;
+constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
 constexpr double kMmPerPx = 0.5;
 
 class ContactTest : public ::testing::Test {
  protected:
   /// Sets `count` pixels from the map's start to a depth.
   void fill(std::int16_t um, int count) {
-    map.assign(kSide * kSide, 0);
+    map.assign(kPixels, 0);
     for (int i = 0; i < count; ++i) map[static_cast<std::size_t>(i)] = um;
   }
   ContactSummary summarise() { return detector.inspect(map, grid, drawn, kMmPerPx); }
@@ -29,7 +31,7 @@ class ContactTest : public ::testing::Test {
 
   ContactDetector detector{
       {.made_mm = 0.10, .lost_mm = 0.05, .area_mm2 = 0.5, .debounce_frames = 2}};
-  std::vector<std::int16_t> map = std::vector<std::int16_t>(kSide * kSide, 0);
+  std::vector<std::int16_t> map = std::vector<std::int16_t>(kPixels, 0);
 };
 
 TEST_F(ContactTest, NothingPressedIsNoContact) {
@@ -117,7 +119,7 @@ TEST_F(ContactTest, AnEmptyMapIsNoContact) {
 // high).
 TEST_F(ContactTest, LooksAtTheDrawnTilesOnly) {
   const recon::TileGrid tiles{70, 33};
-  std::vector<std::int16_t> wide(70 * 33, 0);
+  std::vector<std::int16_t> wide(std::size_t{70} * 33, 0);
   wide[20 * 70 + 40] = 500;  // middle tile
   wide[20 * 70 + 69] = 700;  // right of it
   wide[32 * 70 + 69] = 900;  // the last
