@@ -284,8 +284,9 @@ std::vector<Key> bind_keys(Config& c) {
       integer("capture.fifo_priority", p.fifo_priority, 0, 99, "(0 = normal scheduling)"),
       boolean("capture.lock_memory", p.lock_memory),
 
-      named("reconstruction.resolution", p.reconstruction.decimation,
-            {{"full", 1}, {"half", 2}, {"quarter", 4}}),
+      named("reconstruction.method", p.reconstruction.decimation,
+            {{"full", 1}, {"half", 2}, {"quarter", 4}, {"auto", 0}}),
+      real("reconstruction.max_error_um", p.reconstruction.max_error_um, 1, 10000, "(micrometres)"),
 
       integer("reference.frames", p.reference.frames, 1, 256, "(frames)"),
       integer("reference.settle_frames", p.reference.settle_frames, 2, 64, "(frames)"),

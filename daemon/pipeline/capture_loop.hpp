@@ -13,6 +13,7 @@
 #include "daemon/pipeline/reference_keeper.hpp"
 #include "daemon/pipeline/reference_writer.hpp"
 #include "daemon/pipeline/teller.hpp"
+#include "daemon/pipeline/uncertainty.hpp"
 #include "hal/base/clock.hpp"
 #include "hal/camera.hpp"
 
@@ -53,6 +54,7 @@ class CaptureLoop {
   void process(std::int64_t now_ns) noexcept;
   void without_frame(hal::GrabStatus status, std::int64_t asked_ns, std::int64_t now_ns) noexcept;
   void reconstruct(DepthFrame& out) noexcept;
+  void judge(DepthFrame& out) noexcept;
   void mind_reference(bool settled) noexcept;
   void publish(DepthFrame& out) noexcept;
   void tell(HealthSet health, std::int64_t now_ns) noexcept;
@@ -74,6 +76,7 @@ class CaptureLoop {
   bool unusable_;
   ReferenceKeeper keeper_;
   ContactDetector contact_;
+  ResolutionChooser chooser_;
   CameraWatch watch_;
   LightTimeline timeline_;
   Teller teller_;

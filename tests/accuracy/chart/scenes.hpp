@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "hal/image/png.hpp"
+#include "hal/sim/renderer.hpp"
 
 /// What the chart measures on: the built-in simulated sensor (hal/sim), its truth never shown to
 /// the methods. Depth is asked for on the paper's crop: 580×580 of 800×600 pixels, 24×24 mm.
@@ -25,6 +26,9 @@ struct Shot {
   /// Where the error counts: true contact, everywhere when nothing touches. Row-major, crop sized.
   std::vector<std::uint8_t> judged;
 };
+
+/// What is true of one frame, without frames.
+[[nodiscard]] Shot truth_of(const hal::sim::Renderer& renderer, std::uint64_t sequence);
 
 /// The untouched sensor: the mean of many frames, Q8.
 [[nodiscard]] image::Grey16 make_reference();

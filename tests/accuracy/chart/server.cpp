@@ -112,7 +112,7 @@ std::string answer(Lab& lab, const std::string& verb, const std::string& rest) {
   }
   if (!lab.worker) throw std::runtime_error("'use SHOT|NAME' comes first");
   if (verb == "error") {
-    const Worker::Error error = lab.worker->error();
+    const Error error = lab.worker->error();
     return fmt::format("{} {}", error.mean_absolute_mm, error.untrusted_share);
   }
   if (verb == "run") {

@@ -90,32 +90,39 @@ void Worker::once() {
   }
 }
 
-Worker::Error Worker::error() {
-  const recon::RectifyTable& table = setting_.model->rectify;
-  const double scale = 1.0 / setting_.decimation;
+Error Worker::error() {
+  // The look for what changed has seen a few frames, as it has in a running daemon.
+  for (std::size_t i = 0; i < frames_.size(); ++i) once();
+  Error mean;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    once();
+    const Error one = error_of(depth_um_, setting_.decimation, shot_);
+    mean.mean_absolute_mm += one.mean_absolute_mm / static_cast<double>(frames_.size());
+    mean.untrusted_share += one.untrusted_share / static_cast<double>(frames_.size());
+  }
+  return mean;
+}
+
+Error error_of(const std::vector<std::int16_t>& depth_um, int decimation, const Shot& shot) {
+  const int width = kSide / decimation;
+  const double scale = 1.0 / decimation;
   double sum_mm = 0;
   std::int64_t trusted = 0;
   std::int64_t judged = 0;
-  // The look for what changed has seen a few frames, as it has in a running daemon.
-  for (std::size_t i = 0; i < frames_.size(); ++i) once();
-  for (std::size_t i = 0; i < frames_.size(); ++i) {
-    once();
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x) {
-        const auto at = static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x);
-        if (shot_.judged[at] == 0) continue;
-        ++judged;
-        const auto um = bilinear(depth_um_, table.width, table.height, (x + 0.5) * scale - 0.5,
-                                 (y + 0.5) * scale - 0.5);
-        if (!um) continue;
-        ++trusted;
-        sum_mm += std::abs(*um / 1000.0 - double{shot_.truth_mm[at]});
-      }
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const auto at = static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x);
+      if (shot.judged[at] == 0) continue;
+      ++judged;
+      const auto um =
+          bilinear(depth_um, width, width, (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5);
+      if (!um) continue;
+      ++trusted;
+      sum_mm += std::abs(*um / 1000.0 - double{shot.truth_mm[at]});
     }
   }
-  return {
-      trusted == 0 ? NAN : sum_mm / static_cast<double>(trusted),
-      1 - static_cast<double>(trusted) / static_cast<double>(std::max<std::int64_t>(1, judged))};
+  return {trusted == 0 ? NAN : sum_mm / static_cast<double>(trusted),
+          judged == 0 ? 0 : 1 - static_cast<double>(trusted) / static_cast<double>(judged)};
 }
 
 }  // namespace dtact::chart

@@ -24,6 +24,16 @@ struct Setting {
 [[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference,
                                                  const Shot& calibration_press);
 
+struct Error {
+  double mean_absolute_mm = 0;  ///< Over judged, trusted pixels.
+  double untrusted_share = 0;   ///< Of the judged pixels.
+};
+
+/// Of one map at 1/decimation of the crop's resolution, against the truth at every pixel of the
+/// crop: a coarser map is read bilinearly.
+[[nodiscard]] Error error_of(const std::vector<std::int16_t>& depth_um, int decimation,
+                             const Shot& shot);
+
 /// A setting at work on one shot, frame after frame.
 class Worker {
  public:
@@ -31,11 +41,7 @@ class Worker {
   /// Reconstructs the next of the shot's frames.
   void once();
 
-  struct Error {
-    double mean_absolute_mm = 0;  ///< Over judged, trusted pixels and all frames of the shot.
-    double untrusted_share = 0;   ///< Of the judged pixels.
-  };
-  /// Against the truth at every pixel of the crop; a coarser map is read bilinearly.
+  /// The mean over all frames of the shot.
   [[nodiscard]] Error error();
 
  private:
