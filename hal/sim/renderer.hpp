@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "hal/image/png.hpp"
@@ -19,17 +20,20 @@ class Renderer {
  public:
   /// Solves the scene's contacts. Throws std::runtime_error as Truth does.
   Renderer(const Scene& scene, std::uint64_t seed);
+  /// The same presses under the camera, optics and light of `scene`, whose camera mode and layer
+  /// must be the truth's: contact is solved once for many lights.
+  Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::uint64_t seed);
 
   /// Frame `sequence` in full-range luma: the first `rows` rows, `stride` bytes apart.
   void render(std::uint64_t sequence, const LedLevels& light, std::uint8_t* luma,
               std::ptrdiff_t stride, int rows) noexcept;
 
-  [[nodiscard]] const Truth& truth() const noexcept { return truth_; }
+  [[nodiscard]] const Truth& truth() const noexcept { return *truth_; }
 
  private:
   void expose(int rows) noexcept;
 
-  Truth truth_;
+  std::shared_ptr<const Truth> truth_;
   Optics optics_;
   LightField field_;
   Noise noise_;
