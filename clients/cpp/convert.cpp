@@ -101,8 +101,8 @@ Frame to_frame(const v1::Frame& message) {
   frame.light = to_light(message.light());
   frame.contact = to_contact(message.contact());
   const auto& times = message.times();
-  frame.times = {times.decode_ns(), times.rectify_ns(), times.smooth_ns(),
-                 times.list_ns(),   times.inspect_ns(), times.encode_ns()};
+  frame.times = {times.decode_ns(), times.activity_ns(), times.rectify_ns(), times.smooth_ns(),
+                 times.list_ns(),   times.inspect_ns(),  times.publish_ns(), times.encode_ns()};
   if (message.has_depth()) frame.depth = to_depth(message.depth());
   if (message.has_luma()) frame.luma = to_luma(message.luma());
   frame.dropped = message.dropped();
@@ -179,6 +179,10 @@ Status to_status(const v1::Status& message) {
   }
   status.version = message.version();
   status.uptime_s = message.uptime_s();
+  status.encoded = message.encoded();
+  const auto& usage = message.capture_thread();
+  status.capture_thread = {usage.minor_faults(), usage.major_faults(), usage.waits(),
+                           usage.preemptions()};
   return status;
 }
 

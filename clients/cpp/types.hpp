@@ -58,13 +58,16 @@ struct LumaMap {
   std::vector<std::uint8_t> values;  ///< Row-major.
 };
 
-/// Nanoseconds in each stage.
+/// Nanoseconds in each stage, in their order. Where nothing touched, rectify, smooth and list are
+/// 0.
 struct StageTimes {
   std::uint32_t decode_ns = 0;
+  std::uint32_t activity_ns = 0;  ///< The look for what changed.
   std::uint32_t rectify_ns = 0;
   std::uint32_t smooth_ns = 0;
   std::uint32_t list_ns = 0;
-  std::uint32_t inspect_ns = 0;
+  std::uint32_t inspect_ns = 0;  ///< The contact summary.
+  std::uint32_t publish_ns = 0;
   std::uint32_t encode_ns = 0;
 };
 
@@ -190,6 +193,14 @@ struct Status {
   std::vector<Client> clients;
   std::string version;
   double uptime_s = 0;
+  std::uint64_t encoded = 0;  ///< Frame messages, however many clients each went to.
+  /// What the kernel counted of the capture thread since start.
+  struct Usage {
+    std::uint64_t minor_faults = 0;  ///< Pages mapped without reading from a disk.
+    std::uint64_t major_faults = 0;  ///< Pages read from a disk.
+    std::uint64_t waits = 0;         ///< Voluntary context switches.
+    std::uint64_t preemptions = 0;   ///< Involuntary context switches.
+  } capture_thread;
 };
 
 }  // namespace dtact::client

@@ -58,12 +58,17 @@ void print(const Status& status, std::ostream& out) {
   if (!status.ring.message.empty()) fmt::print(out, "             {}\n", status.ring.message);
   fmt::print(out, "light        {}\n", text_of(status.light));
   print_calibration(status, out);
-  fmt::print(out, "frames       {} published, {} skipped, {:.1f} fps\n", status.frames,
-             status.skipped, status.fps);
+  fmt::print(out, "frames       {} published, {} skipped, {} encoded, {:.1f} fps\n", status.frames,
+             status.skipped, status.encoded, status.fps);
   for (const auto& stage : status.stages) {
     fmt::print(out, "  {:<10} p50 {:.0f} us, p99 {:.0f} us, max {:.0f} us\n", stage.name,
                stage.p50_us, stage.p99_us, stage.max_us);
   }
+  const auto& usage = status.capture_thread;
+  fmt::print(out,
+             "capture      page faults {} minor, {} major; context switches {} waiting, {} "
+             "preempted\n",
+             usage.minor_faults, usage.major_faults, usage.waits, usage.preemptions);
   for (const auto& refused : status.realtime_refused) fmt::print(out, "realtime     {}\n", refused);
   for (const auto& c : status.clients) {
     fmt::print(out, "client       {} {}, sent {}, dropped {}\n", c.address, c.program, c.sent,
@@ -126,7 +131,11 @@ std::string as_json(const Status& status) {
     json.open('{').member("address", c.address).member("program", c.program);
     json.member("sent", c.sent).member("dropped", c.dropped).close('}');
   }
-  json.close(']').member("version", status.version).member("uptime_s", status.uptime_s).close('}');
+  json.close(']').member("version", status.version).member("uptime_s", status.uptime_s);
+  json.member("encoded", status.encoded).key("capture_thread").open('{');
+  const auto& usage = status.capture_thread;
+  json.member("minor_faults", usage.minor_faults).member("major_faults", usage.major_faults);
+  json.member("waits", usage.waits).member("preemptions", usage.preemptions).close('}').close('}');
   return json.text();
 }
 

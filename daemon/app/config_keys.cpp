@@ -276,6 +276,7 @@ std::vector<Key> bind_keys(Config& c) {
       text("net.address", c.net.address, "an IPv4 or IPv6 address in quotes"),
       integer("net.port", c.net.port, 0, 65535, "(0 = any free one)"),
       integer("net.max_clients", c.net.max_clients, 1, 1024, ""),
+      integer("net.fifo_priority", c.net.fifo_priority, 0, 99, "(0 = normal scheduling)"),
       text("net.frame_id", c.net.frame_id, "a name in quotes"),
       milliseconds("net.hello_timeout_ms", c.net.hello_timeout, 100, 600000),
       milliseconds("net.dead_after_ms", c.net.dead_after, 1000, 600000),

@@ -12,13 +12,16 @@
 #include <memory>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
+#include "daemon/app/give_way.hpp"
 #include "daemon/app/service.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/net/calibration_store.hpp"
 #include "daemon/net/light_schemes.hpp"
 #include "daemon/net/server.hpp"
 #include "daemon/pipeline/pipeline.hpp"
+#include "hal/base/rt_thread.hpp"
 #include "hal/registry.hpp"
 #include "version.hpp"
 
@@ -125,16 +128,23 @@ void run_daemon(const Config& config) {
   if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;
   pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), start.calibration,
                               settings);
-  net::Server server(io, make_net_config(config), pipeline, store);
+  net::NetConfig net = make_net_config(config);
+  if (net.fifo_priority > 0) {
+    net.realtime_refused = base::make_fifo("network", net.fifo_priority).value_or("");
+    if (!net.realtime_refused.empty()) spdlog::warn("{}", net.realtime_refused);
+  }
+  net::Server server(io, std::move(net), pipeline, store);
   pipeline.start();
   for (const std::string& refused : pipeline.status().realtime) spdlog::warn("{}", refused);
 
   Watchdog watchdog(io, pipeline);
+  GiveWay give_way(io);
   signals.async_wait([&](const boost::system::error_code& error, int signal) {
     if (error) return;
     spdlog::info("{}: stopping", signal == SIGTERM ? "SIGTERM" : "SIGINT");
     notify_stopping();
     watchdog.stop();
+    give_way.stop();
     server.stop();
   });
 

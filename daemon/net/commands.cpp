@@ -207,6 +207,9 @@ void Commands::get_status(const Who& who) {
   auto message = reply_to(who.second);
   auto& status = *message.mutable_reply()->mutable_status();
   fill(port_.status(), status);
+  if (!config_.realtime_refused.empty()) status.add_realtime_refused(config_.realtime_refused);
+  for (const auto& stage : hub_.stages()) fill(stage, *status.add_stages());
+  status.set_encoded(hub_.encoded());
   for (const auto& session : hub_.sessions()) {
     if (!session->greeted()) continue;
     auto& client = *status.add_clients();

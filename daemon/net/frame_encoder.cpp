@@ -129,7 +129,9 @@ std::shared_ptr<const EncodedFrame> FrameEncoder::encode(FrameKind kind) {
   if (message.ByteSizeLong() > kMaxBody) return nullptr;
   auto buffer = impl_->free_buffer();
   message.SerializeToString(&buffer->body);
-  append_encode_time(base::system_clock().monotonic_ns() - start_ns, buffer->body);
+  const std::int64_t took_ns = base::system_clock().monotonic_ns() - start_ns;
+  append_encode_time(took_ns, buffer->body);
+  times_.add(took_ns);
   done = std::move(buffer);
   return done;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/pipeline/depth_frame.hpp"
+#include "daemon/pipeline/histogram.hpp"
 
 namespace dtact::net {
 
@@ -52,9 +53,13 @@ class FrameEncoder {
   /// out. Null when it would exceed the wire's cap.
   [[nodiscard]] std::shared_ptr<const EncodedFrame> encode(FrameKind kind);
 
+  /// What each encoding took; its count is that of encodings, not of clients.
+  [[nodiscard]] const pipeline::Histogram& times() const noexcept { return times_; }
+
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
+  pipeline::Histogram times_;
 };
 
 }  // namespace dtact::net

@@ -9,6 +9,8 @@
 #include <system_error>
 
 #include "daemon/net/messages.hpp"
+#include "daemon/pipeline/statistics.hpp"
+#include "hal/base/clock.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -93,6 +95,7 @@ void Hub::on_event(const pipeline::Event& event) {
 }
 
 void Hub::on_frame(const pipeline::DepthFrame& frame) {
+  handover_.add(base::system_clock().monotonic_ns() - frame.done_ns);
   const std::uint64_t missed = seen_frame_ ? frame.skipped - skipped_ : 0;
   skipped_ = frame.skipped;
   seen_frame_ = true;
@@ -140,6 +143,12 @@ void Hub::update_want() {
     luma = luma || subscription.kind.luma != 0;
   }
   port_.want(depth, luma);
+}
+
+std::vector<pipeline::StageStatistics> Hub::stages() const {
+  if (encoded() == 0) return {};
+  return {pipeline::summarise("handover", handover_),
+          pipeline::summarise("encode", encoder_.times())};
 }
 
 void Hub::on_request(const std::shared_ptr<Session>& session, const v1::ClientMessage& message) {

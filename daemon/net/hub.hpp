@@ -42,6 +42,11 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
     return sessions_;
   }
 
+  /// Percentiles of what happens to a frame on this thread.
+  [[nodiscard]] std::vector<pipeline::StageStatistics> stages() const;
+  /// Frame messages encoded since start.
+  [[nodiscard]] std::uint64_t encoded() const noexcept { return encoder_.times().count(); }
+
   void on_request(const std::shared_ptr<Session>& session,
                   const v1::ClientMessage& message) override;
   void on_closed(const Session& session) override;
@@ -57,6 +62,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   pipeline::Port& port_;
   boost::asio::posix::stream_descriptor events_;
   FrameEncoder encoder_;
+  pipeline::Histogram handover_;  ///< From published until fetched here.
   Handlers handlers_;
   std::vector<std::shared_ptr<Session>> sessions_;
   std::vector<std::shared_ptr<Session>> refused_;  ///< Being told why.

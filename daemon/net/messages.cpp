@@ -170,7 +170,9 @@ void fill(const pipeline::DepthFrame& frame, v1::Frame& out) {
   times.set_rectify_ns(clamp_ns(frame.times.rectify_ns));
   times.set_smooth_ns(clamp_ns(frame.times.smooth_ns));
   times.set_list_ns(clamp_ns(frame.times.list_ns));
+  times.set_activity_ns(clamp_ns(frame.times.activity_ns));
   times.set_inspect_ns(clamp_ns(frame.times.inspect_ns));
+  times.set_publish_ns(clamp_ns(frame.times.publish_ns));
 }
 
 void fill(const pipeline::Status& status, v1::Status& out) {
@@ -189,13 +191,19 @@ void fill(const pipeline::Status& status, v1::Status& out) {
   out.set_skipped(status.skipped);
   out.set_fps(status.fps);
   for (const auto& refused : status.realtime) out.add_realtime_refused(refused);
-  for (const auto& stage : status.stages) {
-    auto& to = *out.add_stages();
-    to.set_stage(stage.stage);
-    to.set_p50_us(stage.p50_us);
-    to.set_p99_us(stage.p99_us);
-    to.set_max_us(stage.max_us);
-  }
+  for (const auto& stage : status.stages) fill(stage, *out.add_stages());
+  auto& usage = *out.mutable_capture_thread();
+  usage.set_minor_faults(status.capture_thread.minor_faults);
+  usage.set_major_faults(status.capture_thread.major_faults);
+  usage.set_waits(status.capture_thread.waits);
+  usage.set_preemptions(status.capture_thread.preemptions);
+}
+
+void fill(const pipeline::StageStatistics& stage, v1::StagePercentiles& out) {
+  out.set_stage(stage.stage);
+  out.set_p50_us(stage.p50_us);
+  out.set_p99_us(stage.p99_us);
+  out.set_max_us(stage.max_us);
 }
 
 bool fill(const pipeline::Event& event, v1::Event& out) {

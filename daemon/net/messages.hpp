@@ -7,6 +7,7 @@ class Contact;
 class Event;
 class Frame;
 class LightState;
+class StagePercentiles;
 class Status;
 }  // namespace dtact::v1
 
@@ -17,8 +18,9 @@ void fill(const hal::Light& light, v1::LightState& out);
 void fill(const pipeline::ContactSummary& contact, v1::Contact& out);
 /// Everything but the maps, `dropped` and `times.encode_ns`.
 void fill(const pipeline::DepthFrame& frame, v1::Frame& out);
-/// With the advice; without clients, version and uptime.
+/// With the advice; without what the network part itself knows: its stages, clients, version, …
 void fill(const pipeline::Status& status, v1::Status& out);
+void fill(const pipeline::StageStatistics& stage, v1::StagePercentiles& out);
 /// False for CommandDone, which is an answer to one client and not an event.
 [[nodiscard]] bool fill(const pipeline::Event& event, v1::Event& out);
 

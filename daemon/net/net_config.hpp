@@ -29,6 +29,10 @@ struct NetConfig {
   /// Longest time without progress of unacknowledged or unaccepted data (TCP_USER_TIMEOUT), after
   /// which a client counts as dead: a pulled cable, or a program that stopped reading.
   std::chrono::milliseconds dead_after{30000};
+  /// SCHED_FIFO priority of the thread that runs the network part, below the capture thread's; 0 =
+  /// normal scheduling. Whoever owns the thread sets it, …
+  int fifo_priority = 20;
+  std::string realtime_refused;  ///< … and says here why it was refused; in status.
   Log log = [](LogLevel, const std::string&) {};
 };
 

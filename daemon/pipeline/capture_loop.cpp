@@ -183,16 +183,19 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
   const hal::LumaView& luma = frame_.luma();
   active_->reconstructor.run_active(luma.data, luma.stride, out.depth_um, out.drawn, activity,
                                     &steps);
+  out.times.activity_ns = steps.activity_ns;
   out.times.rectify_ns = steps.rectify_ns;
   out.times.smooth_ns = steps.smooth_ns;
   out.times.list_ns = steps.list_ns;
   const std::int64_t began_ns = clock_.monotonic_ns();
-  out.contact = contact_.inspect(out.depth_um, out.width, out.mm_per_px);
+  out.contact =
+      contact_.inspect(out.depth_um, active_->reconstructor.grid(), out.drawn.tiles, out.mm_per_px);
   beyond_ = active_->reconstructor.beyond_pixels() > config_.beyond_pixels;
-  out.times.inspect_ns = steps.activity_ns + clock_.monotonic_ns() - began_ns;
+  out.times.inspect_ns = clock_.monotonic_ns() - began_ns;
 }
 
 void CaptureLoop::publish(DepthFrame& out) noexcept {
+  const std::int64_t began_ns = clock_.monotonic_ns();
   const bool reconstructed = out.has_depth;
   const bool want_depth = exchange_.want_depth.load(std::memory_order_relaxed);
   const bool want_luma = exchange_.want_luma.load(std::memory_order_relaxed);
@@ -210,6 +213,7 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   }
   out.skipped = exchange_.slot.replaced();
   out.done_ns = clock_.monotonic_ns();
+  out.times.publish_ns = out.done_ns - began_ns;
   exchange_.statistics.add(out.times, reconstructed, out.camera.ready_ns, out.done_ns);
   if (!want_depth && !want_luma) return;
   exchange_.slot.publish();

@@ -5,6 +5,7 @@
 
 #include "daemon/pipeline/depth_frame.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/recon/tiles.hpp"
 
 namespace dtact::pipeline {
 
@@ -15,10 +16,12 @@ class ContactDetector {
  public:
   explicit ContactDetector(const ContactRules& rules) : rules_(rules) {}
 
-  /// One depth map: micrometres, row-major, `width` pixels a row, `mm_per_px` millimetres a pixel.
+  /// One depth map: micrometres, row-major, cut into tiles by `grid`, `mm_per_px` millimetres a
+  /// pixel. Only the tiles of `drawn` are looked at: the others hold no depth (recon::DrawnTiles).
   /// The summary is in millimetres in the surface frame: origin at the map's centre, x right, y
   /// down. Area, centroid and volume are those of the pixels deeper than `made_mm`.
-  [[nodiscard]] ContactSummary inspect(std::span<const std::int16_t> depth_um, int width,
+  [[nodiscard]] ContactSummary inspect(std::span<const std::int16_t> depth_um,
+                                       const recon::TileGrid& grid, const recon::TileRows& drawn,
                                        double mm_per_px) noexcept;
 
   [[nodiscard]] bool touching() const noexcept { return touching_; }

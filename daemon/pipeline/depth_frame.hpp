@@ -13,10 +13,12 @@ namespace dtact::pipeline {
 /// Nanoseconds of each stage of one frame.
 struct StageTimes {
   std::int64_t decode_ns = 0;
+  std::int64_t activity_ns = 0;  ///< The look for what changed.
   std::int64_t rectify_ns = 0;
   std::int64_t smooth_ns = 0;
   std::int64_t list_ns = 0;
-  std::int64_t inspect_ns = 0;  ///< The look for what changed, and the contact summary.
+  std::int64_t inspect_ns = 0;  ///< The contact summary.
+  std::int64_t publish_ns = 0;  ///< Copies of what subscribers want, until done_ns.
 };
 
 /// What touches, in the depth map's coordinates (origin at its centre, x right, y down).

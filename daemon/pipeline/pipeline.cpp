@@ -210,6 +210,7 @@ Status Pipeline::status() const {
   status.fps = exchange_.statistics.fps(clock_.monotonic_ns());
   status.realtime = realtime_;
   status.stages = exchange_.statistics.stages();
+  status.capture_thread = exchange_.statistics.usage();
   status.storage_message = writer_.message();
   if (status.storage_message.empty()) status.storage_message = restore_failure_;
   return status;

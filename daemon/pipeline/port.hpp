@@ -72,6 +72,14 @@ struct StageStatistics {
   double max_us = 0;
 };
 
+/// What the kernel counted of a thread since its start.
+struct ThreadUsage {
+  std::uint64_t minor_faults = 0;  ///< Pages mapped without reading from a disk.
+  std::uint64_t major_faults = 0;  ///< Pages read from a disk.
+  std::uint64_t waits = 0;         ///< Voluntary context switches.
+  std::uint64_t preemptions = 0;   ///< Involuntary context switches.
+};
+
 /// What `dtactctl status` shows.
 struct Status {
   State state = State::settling;
@@ -87,6 +95,7 @@ struct Status {
   double fps = 0;                     ///< Over the last second.
   std::vector<std::string> realtime;  ///< One sentence for each real-time setting refused.
   std::vector<StageStatistics> stages;
+  ThreadUsage capture_thread;  ///< Renewed once a second.
   /// Why the calibration or the last good reference could not be used or kept, and what to do;
   /// empty when all is well.
   std::string storage_message;

@@ -1,5 +1,7 @@
 #include "daemon/pipeline/statistics.hpp"
 
+#include <sys/resource.h>
+
 namespace dtact::pipeline {
 namespace {
 
@@ -7,10 +9,18 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 
 }  // namespace
 
+StageStatistics summarise(const char* stage, const Histogram& times) {
+  return {stage, static_cast<double>(times.percentile_ns(0.5)) / 1e3,
+          static_cast<double>(times.percentile_ns(0.99)) / 1e3,
+          static_cast<double>(times.max_ns()) / 1e3};
+}
+
 void Statistics::add(const StageTimes& times, bool has_depth, std::int64_t ready_ns,
                      std::int64_t done_ns) noexcept {
   histograms_[kDecode].add(times.decode_ns);
+  histograms_[kPublish].add(times.publish_ns);
   if (has_depth) {
+    histograms_[kActivity].add(times.activity_ns);
     histograms_[kRectify].add(times.rectify_ns);
     histograms_[kSmooth].add(times.smooth_ns);
     histograms_[kList].add(times.list_ns);
@@ -25,22 +35,37 @@ void Statistics::add(const StageTimes& times, bool has_depth, std::int64_t ready
     fps_.store((frames_ - 1) * 1e9 / static_cast<double>(passed), std::memory_order_relaxed);
     second_began_ns_ = done_ns;
     frames_ = 1;
+    take_usage();
   }
   last_ns_.store(done_ns, std::memory_order_relaxed);
 }
 
 std::vector<StageStatistics> Statistics::stages() const {
-  static constexpr std::array<const char*, kStages> kNames = {"decode", "rectify", "smooth",
-                                                              "list",   "inspect", "total"};
+  static constexpr std::array<const char*, kStages> kNames = {
+      "decode", "activity", "rectify", "smooth", "list", "inspect", "publish", "total"};
   std::vector<StageStatistics> all;
   for (std::size_t i = 0; i < kStages; ++i) {
-    const Histogram& h = histograms_[i];
-    if (h.count() == 0) continue;
-    all.push_back({kNames[i], static_cast<double>(h.percentile_ns(0.5)) / 1e3,
-                   static_cast<double>(h.percentile_ns(0.99)) / 1e3,
-                   static_cast<double>(h.max_ns()) / 1e3});
+    if (histograms_[i].count() > 0) all.push_back(summarise(kNames[i], histograms_[i]));
   }
   return all;
+}
+
+void Statistics::take_usage() noexcept {
+  rusage usage{};
+  if (::getrusage(RUSAGE_THREAD, &usage) != 0) return;
+  const auto store = [](std::atomic<std::uint64_t>& to, long value) {
+    to.store(static_cast<std::uint64_t>(value), std::memory_order_relaxed);
+  };
+  store(minor_faults_, usage.ru_minflt);
+  store(major_faults_, usage.ru_majflt);
+  store(waits_, usage.ru_nvcsw);
+  store(preemptions_, usage.ru_nivcsw);
+}
+
+ThreadUsage Statistics::usage() const noexcept {
+  return {minor_faults_.load(std::memory_order_relaxed),
+          major_faults_.load(std::memory_order_relaxed), waits_.load(std::memory_order_relaxed),
+          preemptions_.load(std::memory_order_relaxed)};
 }
 
 double Statistics::fps(std::int64_t now_ns) const noexcept {

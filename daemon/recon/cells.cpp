@@ -1,7 +1,6 @@
 #include "daemon/recon/cells.hpp"
 
-// Cells are pairs of the eight-byte sums within 128 bits, which scalable vectors leave open.
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include "daemon/recon/vector_targets.hpp"
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "daemon/recon/cells.cpp"
 #include <hwy/foreach_target.h>  // IWYU pragma: keep

@@ -4,11 +4,7 @@
 #include <cstring>
 
 #include "daemon/recon/model.hpp"
-
-// Shuffles and interleaves below are per 128 bits, which scalable vectors leave open.
-// AVX-512 as of Ice Lake and Zen 4, which Highway leaves out unless asked for.
-#define HWY_WANT_AVX3_DL
-#define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
+#include "daemon/recon/vector_targets.hpp"
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "daemon/recon/vector_kernels.cpp"
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
@@ -155,6 +151,27 @@ HWY_INLINE V16 Across(D16 d16, V16 pairs, V16 fx) {
 }
 #endif
 
+/// Sums of products of pairs of neighbouring lanes. Some targets keep two partial sums and
+/// spread them over the lanes until Total(): what is to be added once is added after it.
+template <class D32>
+struct PairSum {
+  D32 d32;
+  hn::VFromD<D32> sum0 = hn::Zero(d32);
+  hn::VFromD<D32> sum1 = hn::Zero(d32);
+  template <class V16>
+  HWY_INLINE void Add(V16 values, V16 taps) {
+#if HWY_TARGET == HWY_AVX3_DL && HWY_COMPILER_GCC_ACTUAL
+    // One instruction where Highway 1.0 has two.
+    if constexpr (hn::MaxLanes(D32()) == 16) {
+      sum0.raw = _mm512_dpwssd_epi32(sum0.raw, values.raw, taps.raw);
+      return;
+    }
+#endif
+    sum0 = hn::ReorderWidenMulAccumulate(d32, values, taps, sum0, sum1);
+  }
+  HWY_INLINE hn::VFromD<D32> Total() { return hn::RearrangeToOddPlusEven(sum0, sum1); }
+};
+
 /// The pixels of as many groups as `d16` has room for; `at`: where each group's bytes begin in
 /// luma. kLevels 0: block.levels.
 template <int kLevels, class D16>
@@ -194,17 +211,14 @@ HWY_INLINE void RectifyGroups(D16 d16, const RectifyPlan::Block& block, const ui
   const V16 below_q7 = Across(d16, lower, weights);
   const V16 rest = hn::Sub(hn::Set(d16, 128), fy);
   const auto half = hn::Set(d32, (1 << 7) + 128 * kAcrossLow);
-  auto none = hn::Zero(d32);
   // Pairs (above, below) times pairs of weights. Interleaving and packing undo each other within
   // every 128 bits.
-  auto low = hn::ReorderWidenMulAccumulate(d32, hn::InterleaveLower(d16, above_q7, below_q7),
-                                           hn::InterleaveLower(d16, rest, fy), half, none);
-  low = hn::RearrangeToOddPlusEven(low, none);
-  none = hn::Zero(d32);
-  auto high = hn::ReorderWidenMulAccumulate(d32, hn::InterleaveUpper(d16, above_q7, below_q7),
-                                            hn::InterleaveUpper(d16, rest, fy), half, none);
-  high = hn::RearrangeToOddPlusEven(high, none);
-  const V16 luma_q6 = hn::ReorderDemote2To(d16, hn::ShiftRight<8>(low), hn::ShiftRight<8>(high));
+  PairSum<decltype(d32)> low{d32};
+  PairSum<decltype(d32)> high{d32};
+  low.Add(hn::InterleaveLower(d16, above_q7, below_q7), hn::InterleaveLower(d16, rest, fy));
+  high.Add(hn::InterleaveUpper(d16, above_q7, below_q7), hn::InterleaveUpper(d16, rest, fy));
+  const V16 luma_q6 = hn::ReorderDemote2To(d16, hn::ShiftRight<8>(hn::Add(low.Total(), half)),
+                                           hn::ShiftRight<8>(hn::Add(high.Total(), half)));
   const int x = group * kGroup;
   hn::StoreU(hn::Sub(hn::LoadU(d16, reference_q6 + x), luma_q6), d16, difference_q6 + x);
 }
@@ -266,26 +280,6 @@ HWY_INLINE hn::VFromD<D16> Merge(D16 d16, V32 even, V32 odd) {
   return hn::OddEven(hn::BitCast(d16, hn::ShiftLeft<2>(hn::Add(odd, half))),
                      hn::BitCast(d16, hn::ShiftRight<14>(hn::Add(even, half))));
 }
-
-/// Sums of products of pairs of neighbouring lanes. Some targets keep two partial sums.
-template <class D32>
-struct PairSum {
-  D32 d32;
-  hn::VFromD<D32> sum0 = hn::Zero(d32);
-  hn::VFromD<D32> sum1 = hn::Zero(d32);
-  template <class V16>
-  HWY_INLINE void Add(V16 values, V16 taps) {
-#if HWY_TARGET == HWY_AVX3_DL && HWY_COMPILER_GCC_ACTUAL
-    // One instruction where Highway 1.0 has two.
-    if constexpr (hn::MaxLanes(D32()) == 16) {
-      sum0.raw = _mm512_dpwssd_epi32(sum0.raw, values.raw, taps.raw);
-      return;
-    }
-#endif
-    sum0 = hn::ReorderWidenMulAccumulate(d32, values, taps, sum0, sum1);
-  }
-  HWY_INLINE hn::VFromD<D32> Total() { return hn::RearrangeToOddPlusEven(sum0, sum1); }
-};
 
 /// kCount 0: taps.count(); else the loop over the taps is laid out by the compiler.
 template <int kCount>

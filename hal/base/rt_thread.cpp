@@ -20,6 +20,13 @@ void* run_body(void* argument) {
   return nullptr;
 }
 
+std::string fifo_refused(const std::string& name, int priority, int error) {
+  return fmt::format(
+      "thread {} runs without SCHED_FIFO priority {} ({}): give the user an rtprio limit "
+      "(LimitRTPRIO={} in the unit, or /etc/security/limits.d)",
+      name, priority, std::strerror(error), priority);
+}
+
 }  // namespace
 
 RtThread::RtThread(const RtSettings& settings, std::function<void()> body) {
@@ -51,10 +58,7 @@ RtThread::RtThread(const RtSettings& settings, std::function<void()> body) {
   if (settings.fifo_priority > 0) {
     const sched_param parameters{.sched_priority = settings.fifo_priority};
     if (const int e = ::pthread_setschedparam(thread_, SCHED_FIFO, &parameters); e != 0) {
-      refused_.push_back(fmt::format(
-          "thread {} runs without SCHED_FIFO priority {} ({}): give the user an rtprio limit "
-          "(LimitRTPRIO={} in the unit, or /etc/security/limits.d)",
-          settings.name, settings.fifo_priority, std::strerror(e), settings.fifo_priority));
+      refused_.push_back(fifo_refused(settings.name, settings.fifo_priority, e));
     }
   }
 }
@@ -76,6 +80,15 @@ RtThread& RtThread::operator=(RtThread&& other) noexcept {
 
 void RtThread::join() noexcept {
   if (std::exchange(joinable_, false)) ::pthread_join(thread_, nullptr);
+}
+
+std::optional<std::string> make_fifo(const std::string& name, int priority) {
+  const sched_param parameters{.sched_priority = priority};
+  // RESET_ON_FORK: without it, threads that libraries start later would be real-time, too.
+  if (::sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &parameters) == 0) {
+    return std::nullopt;
+  }
+  return fifo_refused(name, priority, errno);
 }
 
 std::optional<std::string> lock_memory() {

@@ -10,10 +10,11 @@
 namespace dtact::base {
 
 struct RtSettings {
-  std::string name;                      ///< At most 15 characters (the kernel's limit).
-  std::optional<int> cpu;                ///< Pin to this CPU; empty = not pinned.
-  int fifo_priority = 0;                 ///< SCHED_FIFO 1…99; 0 = normal scheduling.
-  std::size_t stack_bytes = std::size_t{256} * 1024;  ///< Small, since locked memory counts it whole.
+  std::string name;        ///< At most 15 characters (the kernel's limit).
+  std::optional<int> cpu;  ///< Pin to this CPU; empty = not pinned.
+  int fifo_priority = 0;   ///< SCHED_FIFO 1…99; 0 = normal scheduling.
+  std::size_t stack_bytes =
+      std::size_t{256} * 1024;  ///< Small, since locked memory counts it whole.
 };
 
 /// A thread with a name, a CPU and a scheduling class. What the system refuses is collected and
@@ -38,6 +39,11 @@ class RtThread {
   bool joinable_ = false;
   std::vector<std::string> refused_;
 };
+
+/// Gives the calling thread SCHED_FIFO `priority`, 1 … 99; threads it starts from then on begin
+/// with normal scheduling. Returns the sentence that says why it was refused and what to do, or
+/// nothing. `name` is how that sentence calls the thread.
+[[nodiscard]] std::optional<std::string> make_fifo(const std::string& name, int priority);
 
 /// Locks the process's memory as it is touched (MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT). Returns
 /// the sentence that says why it was refused and what to do, or nothing.

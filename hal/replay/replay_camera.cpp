@@ -105,8 +105,9 @@ GrabStatus ReplayCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noex
   }
   FrameInfo info;
   info.sequence = next_++;
-  info.ready_ns = now_ns;
-  info.timestamp_ns = config_.replay.paced ? due_ns(info.sequence) : now_ns;
+  // When it is due, not when the caller woke up: being late is the caller's latency.
+  info.ready_ns = config_.replay.paced ? due_ns(info.sequence) : now_ns;
+  info.timestamp_ns = info.ready_ns;
   info.meaning = TimestampMeaning::arrival;
   info.flags = std::exchange(after_gap_, false) ? kFrameAfterGap : kFrameNormal;
   return lend(out, info);
@@ -119,6 +120,7 @@ GrabStatus ReplayCamera::lend(Frame& out, FrameInfo info) noexcept {
     out = Frame(*this, 0, recording_.images[frame].view(), info);
     return GrabStatus::ok;
   }
+  const std::int64_t began_ns = clock_.monotonic_ns();
   const std::string& payload = recording_.payloads[frame];
   luma::LumaBuffer& buffer = decoded_[static_cast<std::size_t>(next_buffer_)];
   const auto status =
@@ -128,7 +130,7 @@ GrabStatus ReplayCamera::lend(Frame& out, FrameInfo info) noexcept {
     ++damaged_;
     return GrabStatus::damaged;
   }
-  info.decode_ns = clock_.monotonic_ns() - info.ready_ns;
+  info.decode_ns = clock_.monotonic_ns() - began_ns;
   ++delivered_;
   out = Frame(*this, next_buffer_, buffer.view(), info);
   next_buffer_ = 1 - next_buffer_;

@@ -23,6 +23,9 @@ import tempfile
 import time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, HERE)
+from goals import report  # noqa: E402
+
 REPEAT = {"scalar": 1, "python": 2, "python+decode": 2, "python-float32": 2}
 LABEL = {
     "full": "full field",
@@ -314,10 +317,7 @@ def main():
     exact = not wrong
     lines.append(("every result right, ours equal to the scalar kernels bit for bit",
                   "exact" if exact else "; ".join(wrong), exact, "" if exact else "wrong"))
-    for goal, measured, met, shortfall in lines:
-        print(f"{'met  ' if met else 'SHORT'}  {goal}: {measured}{'' if met else ' - ' + shortfall}")
-    if all(met for _, _, met, _ in lines):
-        print("all goals met")
+    report(options.out, "kernels", lines)
     try:
         plot(options.out, medians, samples, shares, label)
         print(f"\nsamples.csv, summary.csv, pipelines.svg, cost_against_area.svg in {options.out}")

@@ -86,9 +86,14 @@ TEST(Status, IsPrinted) {
   status.state = pipeline::State::serving;
   status.health.set(pipeline::Health::not_realtime);
   status.camera.backend = "sim";
+  status.stages = {{"activity", 3, 9, 20}};
+  status.capture_thread = {5, 6, 7, 8};
   rig.port.set_status(status);
   const auto result = ctl(rig, {"status"});
   EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_THAT(result.out,
+              AllOf(HasSubstr("activity   p50 3 us, p99 9 us, max 20 us"), HasSubstr("0 encoded"),
+                    HasSubstr("page faults 5 minor, 6 major; context switches 7 waiting, 8 pre")));
   EXPECT_THAT(result.out, AllOf(StartsWith("state        serving\nhealth       not_realtime\n"),
                                 HasSubstr("LimitRTPRIO"), HasSubstr("camera       sim"),
                                 HasSubstr("calibration  none"), HasSubstr("brightness 255")));
@@ -101,6 +106,7 @@ TEST(Status, IsOneLineOfJson) {
   EXPECT_THAT(result.out, StartsWith(R"({"state":"settling","health":[],"advice":"","camera":{)"));
   EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 1);
   EXPECT_THAT(result.out, HasSubstr(R"("calibration":null)"));
+  EXPECT_THAT(result.out, HasSubstr(R"("encoded":0,"capture_thread":{"minor_faults":0,)"));
 }
 
 TEST(Led, ShowsAndChanges) {

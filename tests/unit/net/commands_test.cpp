@@ -311,6 +311,7 @@ TEST(GetStatus, TellsEverything) {
   status.fps = 59.9;
   status.realtime = {"no SCHED_FIFO"};
   status.stages = {{"smooth", 400, 900, 1200}};
+  status.capture_thread = {5, 6, 7, 8};
   auto calibration = std::make_shared<calibration::Calibration>();
   calibration->name = "ball";
   auto model = std::make_shared<recon::Model>();
@@ -338,6 +339,12 @@ TEST(GetStatus, TellsEverything) {
   EXPECT_EQ(reply.fps(), 59.9);
   EXPECT_EQ(reply.realtime_refused(0), "no SCHED_FIFO");
   EXPECT_EQ(reply.stages(0).p99_us(), 900.0);
+  EXPECT_EQ(reply.stages_size(), 1);  // nothing was sent
+  EXPECT_EQ(reply.encoded(), 0U);
+  EXPECT_EQ(reply.capture_thread().minor_faults(), 5U);
+  EXPECT_EQ(reply.capture_thread().major_faults(), 6U);
+  EXPECT_EQ(reply.capture_thread().waits(), 7U);
+  EXPECT_EQ(reply.capture_thread().preemptions(), 8U);
   EXPECT_EQ(reply.calibration().name(), "ball");
   EXPECT_EQ(reply.calibration().covered_from_mm(), -0.01);
   EXPECT_EQ(reply.calibration().covered_to_mm(), 0.02);

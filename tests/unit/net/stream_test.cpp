@@ -75,6 +75,28 @@ TEST(Stream, EncodesWhatEachClientAskedFor) {
   EXPECT_EQ(frame.contact().area_mm2(), 12.5);
 }
 
+TEST(Stream, EncodesOnceForSixtyFourClients) {
+  NetConfig config;
+  config.max_clients = 64;
+  Rig rig(config);
+  std::vector<std::unique_ptr<RawClient>> clients;
+  for (int i = 0; i < 64; ++i) {
+    clients.push_back(std::make_unique<RawClient>(rig.tcp_port()));
+    clients.back()->hello();
+    clients.back()->subscribe(v1::DEPTH_DELTA_ZSTD);
+  }
+  for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
+    rig.port.publish(make_frame(sequence));
+    for (const auto& client : clients) ASSERT_EQ(client->frame().sequence(), sequence);
+  }
+  const auto status = clients.front()->request(get_status()).status();
+  EXPECT_EQ(status.encoded(), 3U);
+  ASSERT_EQ(status.stages_size(), 2);
+  EXPECT_EQ(status.stages(0).stage(), "handover");
+  EXPECT_EQ(status.stages(1).stage(), "encode");
+  EXPECT_GT(status.stages(1).p50_us(), 0.0);
+}
+
 TEST(Stream, LeavesDepthOutWhenThereIsNone) {
   Rig rig;
   RawClient client(rig.tcp_port());

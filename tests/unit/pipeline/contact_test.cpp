@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -12,24 +13,29 @@ namespace {
 
 // 11×11 pixels of 0.5 mm: a pixel is 0.25 mm², the centre is pixel (5, 5).
 constexpr int kSide = 11;
+constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
 constexpr double kMmPerPx = 0.5;
 
 class ContactTest : public ::testing::Test {
  protected:
   /// Sets `count` pixels from the map's start to a depth.
   void fill(std::int16_t um, int count) {
-    map.assign(kSide * kSide, 0);
+    map.assign(kPixels, 0);
     for (int i = 0; i < count; ++i) map[static_cast<std::size_t>(i)] = um;
   }
-  bool inspect() { return detector.inspect(map, kSide, kMmPerPx).touching; }
+  ContactSummary summarise() { return detector.inspect(map, grid, drawn, kMmPerPx); }
+  bool inspect() { return summarise().touching; }
+
+  recon::TileGrid grid{kSide, kSide};
+  recon::TileRows drawn{grid.all()};  // one tile
 
   ContactDetector detector{
       {.made_mm = 0.10, .lost_mm = 0.05, .area_mm2 = 0.5, .debounce_frames = 2}};
-  std::vector<std::int16_t> map = std::vector<std::int16_t>(kSide * kSide, 0);
+  std::vector<std::int16_t> map = std::vector<std::int16_t>(kPixels, 0);
 };
 
 TEST_F(ContactTest, NothingPressedIsNoContact) {
-  const ContactSummary summary = detector.inspect(map, kSide, kMmPerPx);
+  const ContactSummary summary = summarise();
   EXPECT_FALSE(summary.touching);
   EXPECT_EQ(summary.area_mm2, 0);
   EXPECT_EQ(summary.volume_mm3, 0);
@@ -39,7 +45,7 @@ TEST_F(ContactTest, NothingPressedIsNoContact) {
 TEST_F(ContactTest, SummaryIsInMillimetresFromTheCentre) {
   map[7 * kSide + 8] = 300;  // 3 px right, 2 px down
   map[7 * kSide + 9] = 900;  // 4 px right, 2 px down
-  const ContactSummary summary = detector.inspect(map, kSide, kMmPerPx);
+  const ContactSummary summary = summarise();
   EXPECT_DOUBLE_EQ(summary.area_mm2, 0.5);
   EXPECT_DOUBLE_EQ(summary.x_mm, 1.875);  // (1.5·300 + 2.0·900) / 1200
   EXPECT_DOUBLE_EQ(summary.y_mm, 1.0);
@@ -89,11 +95,11 @@ TEST_F(ContactTest, BetweenTheThresholdsNothingChanges) {
 
 TEST_F(ContactTest, UntrustedPixelsCountForNothing) {
   map.assign(map.size(), recon::kUntrusted);
-  const ContactSummary none = detector.inspect(map, kSide, kMmPerPx);
+  const ContactSummary none = summarise();
   EXPECT_EQ(none.area_mm2, 0);
   EXPECT_EQ(none.deepest_mm, 0);
   map[5 * kSide + 5] = -20;
-  EXPECT_DOUBLE_EQ(detector.inspect(map, kSide, kMmPerPx).deepest_mm, -0.02);
+  EXPECT_DOUBLE_EQ(summarise().deepest_mm, -0.02);
 }
 
 TEST_F(ContactTest, ResetForgets) {
@@ -106,7 +112,25 @@ TEST_F(ContactTest, ResetForgets) {
 }
 
 TEST_F(ContactTest, AnEmptyMapIsNoContact) {
-  EXPECT_FALSE(detector.inspect({}, 0, kMmPerPx).touching);
+  EXPECT_FALSE(detector.inspect({}, {0, 0}, {}, kMmPerPx).touching);
+}
+
+// 70×33 pixels: three columns of tiles of 32 (the last six wide), three rows of 16 (the last one
+// high).
+TEST_F(ContactTest, LooksAtTheDrawnTilesOnly) {
+  const recon::TileGrid tiles{70, 33};
+  std::vector<std::int16_t> wide(std::size_t{70} * 33, 0);
+  wide[20 * 70 + 40] = 500;  // middle tile
+  wide[20 * 70 + 69] = 700;  // right of it
+  wide[32 * 70 + 69] = 900;  // the last
+  EXPECT_EQ(detector.inspect(wide, tiles, {0, 0, 0}, kMmPerPx).deepest_mm, 0);
+  EXPECT_DOUBLE_EQ(detector.inspect(wide, tiles, {0, 0b010, 0}, kMmPerPx).deepest_mm, 0.5);
+  const ContactSummary both = detector.inspect(wide, tiles, {0, 0b110, 0}, kMmPerPx);
+  EXPECT_DOUBLE_EQ(both.deepest_mm, 0.7);
+  EXPECT_DOUBLE_EQ(both.deepest_x_mm, 17.25);  // 69 − 34.5 pixels
+  EXPECT_DOUBLE_EQ(both.deepest_y_mm, 2);      // 20 − 16 pixels
+  EXPECT_DOUBLE_EQ(both.area_mm2, 0.5);
+  EXPECT_DOUBLE_EQ(detector.inspect(wide, tiles, {0, 0, 0b100}, kMmPerPx).deepest_mm, 0.9);
 }
 
 }  // namespace

@@ -413,11 +413,13 @@ TEST_F(PipelineTest, StatusHasStagesAndRate) {
   ASSERT_TRUE(until_fresh());
   ASSERT_TRUE(until([&] { return pipeline->status().fps > 0; }));
   const Status status = pipeline->status();
-  ASSERT_EQ(status.stages.size(), 6U);
-  EXPECT_EQ(status.stages[2].stage, "smooth");
+  ASSERT_EQ(status.stages.size(), 8U);
+  EXPECT_EQ(status.stages[3].stage, "smooth");
   // Nothing touches, so nothing is smoothed; the look at the frame takes its time all the same.
-  EXPECT_EQ(status.stages[5].stage, "total");
-  EXPECT_GT(status.stages[5].p50_us, 0);
+  EXPECT_EQ(status.stages[1].stage, "activity");
+  EXPECT_GT(status.stages[1].p50_us, 0);
+  EXPECT_EQ(status.stages[7].stage, "total");
+  EXPECT_GT(status.stages[7].p50_us, 0);
   EXPECT_EQ(status.camera.identity, "fake camera");
   EXPECT_EQ(status.ring.identity, "fake ring");
   EXPECT_TRUE(status.realtime.empty());

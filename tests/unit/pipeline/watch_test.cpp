@@ -1,4 +1,6 @@
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/camera_watch.hpp"
@@ -155,14 +157,38 @@ TEST(Statistics, CountsFramesOfTheLastSecond) {
   for (int i = 0; i <= 100; ++i) statistics.add({}, false, i * kPeriod, i * kPeriod + kMs);
   EXPECT_DOUBLE_EQ(statistics.fps(1001 * kMs), 100);
   EXPECT_EQ(statistics.fps(5000 * kMs), 0);
-  ASSERT_EQ(statistics.stages().size(), 1U);  // nothing was reconstructed
-  statistics.add({.rectify_ns = 50'000}, true, 0, 2 * kMs);
+  ASSERT_EQ(statistics.stages().size(), 2U);  // nothing was reconstructed
+  statistics.add({.activity_ns = 3'000, .rectify_ns = 50'000, .publish_ns = 7'000}, true, 0,
+                 2 * kMs);
   const auto stages = statistics.stages();
-  ASSERT_EQ(stages.size(), 6U);
-  EXPECT_EQ(stages[1].stage, "rectify");
-  EXPECT_DOUBLE_EQ(stages[1].max_us, 50);
-  EXPECT_EQ(stages[5].stage, "total");
-  EXPECT_DOUBLE_EQ(stages[5].max_us, 2000);
+  ASSERT_EQ(stages.size(), 8U);
+  EXPECT_EQ(stages[1].stage, "activity");
+  EXPECT_DOUBLE_EQ(stages[1].max_us, 3);
+  EXPECT_EQ(stages[2].stage, "rectify");
+  EXPECT_DOUBLE_EQ(stages[2].max_us, 50);
+  EXPECT_EQ(stages[6].stage, "publish");
+  EXPECT_DOUBLE_EQ(stages[6].max_us, 7);
+  EXPECT_EQ(stages[7].stage, "total");
+  EXPECT_DOUBLE_EQ(stages[7].max_us, 2000);
+}
+
+TEST(Statistics, KnowsThePagesItsThreadTouchedOnceASecondIsOver) {
+  constexpr std::size_t kPages = 100;
+  const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  void* const fresh =
+      ::mmap(nullptr, kPages * page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(fresh, MAP_FAILED);
+  ASSERT_EQ(::madvise(fresh, kPages * page, MADV_NOHUGEPAGE), 0);
+  Statistics statistics;
+  statistics.add({}, false, 0, 0);
+  statistics.add({}, false, 0, 1000 * kMs);
+  const ThreadUsage before = statistics.usage();
+  for (std::size_t i = 0; i < kPages; ++i) static_cast<volatile char*>(fresh)[i * page] = 1;
+  statistics.add({}, false, 0, 1500 * kMs);
+  EXPECT_EQ(statistics.usage().minor_faults, before.minor_faults);
+  statistics.add({}, false, 0, 2000 * kMs);
+  EXPECT_GE(statistics.usage().minor_faults, before.minor_faults + kPages);
+  ::munmap(fresh, kPages * page);
 }
 
 }  // namespace

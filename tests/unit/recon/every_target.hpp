@@ -1,8 +1,9 @@
 #pragma once
 
-// As vector_kernels.cpp asks for; a target the test does not know would not be run.
-#define HWY_WANT_AVX3_DL
 #include <gtest/gtest.h>
+
+#include "daemon/recon/vector_targets.hpp"
+// After vector_targets.hpp:
 #include <hwy/highway.h>
 #include <hwy/targets.h>
 

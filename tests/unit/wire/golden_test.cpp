@@ -122,7 +122,7 @@ TEST(Golden, Events) {
 
 // One frame with every field.
 const char* const kFrame =
-    "12 a4 01"                                // ServerMessage.frame, 164 bytes
+    "12 a8 01"                                // ServerMessage.frame, 168 bytes
     "08 01 10 04 18 06 20 02 28 08 30 0a"     // sequence … published_ns
     "3a 02 03 0c"                             // health, packed
     "42 0b 08 80 01 12 06 08 01 10 02 18 03"  // light
@@ -130,7 +130,7 @@ const char* const kFrame =
     "11 00 00 00 00 00 00 f0 3f 19 00 00 00 00 00 00 00 40 21 00 00 00 00 00 00 08 40"
     "29 00 00 00 00 00 00 10 40 31 00 00 00 00 00 00 14 40 39 00 00 00 00 00 00 18 40"
     "41 00 00 00 00 00 00 1c 40"
-    "52 0c 08 01 10 02 18 03 20 04 28 05 30 06"  // times
+    "52 10 08 01 10 02 18 03 20 04 28 05 30 06 38 07 40 08"  // times
     "5a 22 08 01 10 02 18 01 21 00 00 00 00 00 00 e0 3f 29 00 00 00 00 00 00 f0 3f"
     "30 ff ff 03 3a 04 01 00 ff ff"        // depth; −32768 as zigzag 65535
     "62 0a 08 01 10 02 18 01 22 02 0a 0b"  // luma
@@ -169,6 +169,8 @@ ServerMessage full_frame() {
   times.set_list_ns(4);
   times.set_inspect_ns(5);
   times.set_encode_ns(6);
+  times.set_activity_ns(7);
+  times.set_publish_ns(8);
   auto& depth = *f.mutable_depth();
   depth.set_encoding(DEPTH_INT16);
   depth.set_width(2);

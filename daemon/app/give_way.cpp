@@ -1,0 +1,35 @@
+#include "daemon/app/give_way.hpp"
+
+#include <sys/resource.h>
+
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <thread>
+
+namespace dtact::app {
+namespace {
+
+constexpr std::chrono::milliseconds kInterval{100};
+constexpr std::chrono::milliseconds kPause{1};
+
+long voluntary_switches() noexcept {
+  rusage usage{};
+  ::getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_nvcsw;
+}
+
+}  // namespace
+
+GiveWay::GiveWay(boost::asio::io_context& io) : timer_(io) { wait(); }
+
+void GiveWay::wait() {
+  timer_.expires_after(kInterval);
+  timer_.async_wait([this](const boost::system::error_code& error) {
+    if (error) return;
+    if (voluntary_switches() == waits_) std::this_thread::sleep_for(kPause);
+    waits_ = voluntary_switches();
+    wait();
+  });
+}
+
+}  // namespace dtact::app

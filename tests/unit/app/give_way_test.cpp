@@ -1,0 +1,39 @@
+#include "daemon/app/give_way.hpp"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <chrono>
+#include <functional>
+
+namespace dtact::app {
+namespace {
+
+long voluntary_switches() {
+  rusage usage{};
+  ::getrusage(RUSAGE_THREAD, &usage);
+  return usage.ru_nvcsw;
+}
+
+TEST(GiveWay, PutsAThreadToSleepThatNeverWaits) {
+  boost::asio::io_context io(1);
+  GiveWay give_way(io);
+  const long before = voluntary_switches();
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  // Work that is never done, as with more clients than can be served.
+  std::function<void()> work = [&] {
+    if (voluntary_switches() - before >= 2 || std::chrono::steady_clock::now() > end) {
+      give_way.stop();
+    } else {
+      boost::asio::post(io, work);
+    }
+  };
+  boost::asio::post(io, work);
+  io.run();
+  EXPECT_GE(voluntary_switches() - before, 2);
+}
+
+}  // namespace
+}  // namespace dtact::app
