@@ -35,8 +35,7 @@ Renderer::Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::
   }
 }
 
-void Renderer::render(std::uint64_t sequence, const LedLevels& light, std::uint8_t* luma,
-                      std::ptrdiff_t stride, int rows) noexcept {
+void Renderer::update(std::uint64_t sequence, const LedLevels& light, int rows) noexcept {
   if (!lit_ || light != levels_) {
     levels_ = light;
     lit_ = true;
@@ -50,6 +49,17 @@ void Renderer::render(std::uint64_t sequence, const LedLevels& light, std::uint8
     exposed_rows_ = 0;
   }
   expose(rows);
+}
+
+std::span<const std::uint16_t> Renderer::render_clean(std::uint64_t sequence,
+                                                      const LedLevels& light) noexcept {
+  update(sequence, light, truth_->scene().camera.height);
+  return grey_;
+}
+
+void Renderer::render(std::uint64_t sequence, const LedLevels& light, std::uint8_t* luma,
+                      std::ptrdiff_t stride, int rows) noexcept {
+  update(sequence, light, rows);
   const std::size_t width = loss_row_.size();
   for (int y = 0; y < rows; ++y) {
     const std::size_t begin = static_cast<std::size_t>(y) * width;

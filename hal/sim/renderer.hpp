@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "hal/image/png.hpp"
@@ -28,9 +29,14 @@ class Renderer {
   void render(std::uint64_t sequence, const LedLevels& light, std::uint8_t* luma,
               std::ptrdiff_t stride, int rows) noexcept;
 
+  /// The image of that frame before noise and rounding, Q6, row-major. Valid until the next call.
+  [[nodiscard]] std::span<const std::uint16_t> render_clean(std::uint64_t sequence,
+                                                            const LedLevels& light) noexcept;
+
   [[nodiscard]] const Truth& truth() const noexcept { return *truth_; }
 
  private:
+  void update(std::uint64_t sequence, const LedLevels& light, int rows) noexcept;
   void expose(int rows) noexcept;
 
   std::shared_ptr<const Truth> truth_;
