@@ -7,6 +7,7 @@
 #include "daemon/pipeline/camera_watch.hpp"
 #include "daemon/pipeline/contact.hpp"
 #include "daemon/pipeline/exchange.hpp"
+#include "daemon/pipeline/image_watch.hpp"
 #include "daemon/pipeline/light_driver.hpp"
 #include "daemon/pipeline/light_timeline.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
@@ -53,6 +54,8 @@ class CaptureLoop {
   void without_frame(hal::GrabStatus status, std::int64_t asked_ns, std::int64_t now_ns) noexcept;
   void reconstruct(DepthFrame& out) noexcept;
   void mind_reference(bool settled) noexcept;
+  /// From now on depth is measured against the keeper's reference.
+  void use_reference() noexcept;
   void publish(DepthFrame& out) noexcept;
   void tell(HealthSet health, std::int64_t now_ns) noexcept;
   /// Answers the re-zero under way, if there is one.
@@ -74,6 +77,7 @@ class CaptureLoop {
   ReferenceKeeper keeper_;
   ContactDetector contact_;
   CameraWatch watch_;
+  ImageWatch image_watch_;
   LightTimeline timeline_;
   Teller teller_;
   hal::Frame frame_;

@@ -32,7 +32,7 @@ struct Job {
 void work(Job& job) {
   try {
     const atlas::Outcome o = atlas::run(job.method->calibration, job.row->script(job.value));
-    job.line = fmt::format("{},{},{},{:.5f},{:.5f},{:.3f},{:.3f},\"{}\"\n", job.row->id,
+    job.line = fmt::format("{},\"{}\",{},{:.5f},{:.5f},{:.3f},{:.3f},\"{}\"\n", job.row->id,
                            job.method->name, job.value, o.inside_mm, o.outside_mm, o.withheld,
                            o.flagged, atlas::conditions_of(o));
   } catch (...) {

@@ -279,8 +279,8 @@ std::vector<Row> scene_rows() {
       {"texture",
        "grooves 0.4 mm deep under a plate",
        "pitch, mm",
-       {6, 4, 3, 2, 1.5, 1, 0.6},
-       object([](double pitch) { return Pose{hal::sim::grating(pitch, 0.4, 10), 0, 0, 0.6}; }),
+       {4, 3, 2, 1.5, 1, 0.6},
+       object([](double pitch) { return Pose{hal::sim::grating(pitch, 0.4, 6), 0, 0, 0.6}; }),
        false,
        "what the layer's scattering has blurred away is not in the image"},
       {"walls",
@@ -303,7 +303,7 @@ std::vector<Row> scene_rows() {
 std::vector<Row> reference_rows() {
   return {
       {"relaxation",
-       "re-zeroed over the dent of a long press, which recovers later",
+       "re-zero asked for over the dent of a long press, which recovers later",
        "dent, mm",
        {0, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3},
        [](double dent) {
@@ -312,6 +312,7 @@ std::vector<Row> reference_rows() {
              {{hal::sim::ball(5), 2, -1, 1.0}, {hal::sim::ball(5), 2, -1, std::max(dent, 1e-4)}});
          script.frames = kFrames + 40;
          script.rezero = kReady + 6;
+         script.force = false;
          script.shot = [](int n) {
            Shot shot;
            if (n >= kReady && n < kReady + 46) shot.moment = moment_of(1);
@@ -321,7 +322,7 @@ std::vector<Row> reference_rows() {
          return script;
        },
        false,
-       "a dent shallower than what the activity look sees is no contact"},
+       ""},
       {"touched",
        "reference taken at start while touched",
        "depth, mm",

@@ -139,7 +139,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
     while (exchange_->reports.pop(report)) {
     }
     if (script_.rezero == next_) {
-      (void)exchange_->orders.push(pipeline::RezeroOrder{1, false});
+      (void)exchange_->orders.push(pipeline::RezeroOrder{1, script_.force});
     }
   }
 

@@ -19,9 +19,10 @@ namespace dtact::atlas {
 /// One run of the daemon's capture loop before the simulated camera, in its own time.
 struct Script {
   std::shared_ptr<const hal::sim::Truth> truth;
-  int frames = 0;                 ///< Asked of the camera, damaged ones included.
-  int judged = 12;                ///< The last so many are judged.
-  std::optional<int> rezero;      ///< The frame before which the reference is asked for anew.
+  int frames = 0;             ///< Asked of the camera, damaged ones included.
+  int judged = 12;            ///< The last so many are judged.
+  std::optional<int> rezero;  ///< The frame before which a new reference is asked for.
+  bool force = true;  ///< It is taken although something touches, as the darkened field seems to.
   std::function<Shot(int)> shot;  ///< Of frame n.
   /// The moment whose indentation is true at frame n, where it is not the one shown.
   std::function<std::uint64_t(int)> moment;
