@@ -139,7 +139,7 @@ void CaptureLoop::execute(CalibrationOrder& order) noexcept {
   unusable_ = false;
   const recon::Model& model = *active_->calibration->model;
   keeper_.use_calibration(model.reference_q8, active_->grid, active_->region);
-  if (keeper_.ready()) active_->set_reference(keeper_.reference());
+  if (keeper_.ready()) use_reference();
   light_mismatch_ = light_differs(*active_->calibration, shown_);
   keep_due_ = keeper_.ready() && keeper_.worth_keeping();
   exchange_.camera_mismatch.store(active_->camera_mismatch, std::memory_order_relaxed);
@@ -170,6 +170,7 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
   if (out.has_depth) {
     reconstruct(out);
   } else {
+    image_watch_.forget();
     // Nothing is known of contact meanwhile; what was known stands.
     out.contact = {};
     out.contact.touching = contact_.touching();
@@ -201,6 +202,7 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
   recon::ActivityReport activity;
   const hal::LumaView& luma = frame_.luma();
   reconstructor.run_active(luma.data, luma.stride, out.depth_um, out.drawn, activity, &steps);
+  image_watch_.look(activity, luma);
   out.times.activity_ns = steps.activity_ns;
   out.times.rectify_ns = steps.rectify_ns;
   out.times.smooth_ns = steps.smooth_ns;
@@ -227,6 +229,13 @@ void CaptureLoop::judge(DepthFrame& out) noexcept {
   if (config_.reconstruction.decimation == 0) {
     active_->use_decimation(chooser_.next(list_um, bend));
   }
+}
+
+void CaptureLoop::use_reference() noexcept {
+  active_->set_reference(keeper_.reference());
+  const recon::RectifyTable& table = active_->reconstructor().model().rectify;
+  image_watch_.set_reference(keeper_.reference(), table.frame_width, table.frame_height,
+                             active_->region);
 }
 
 void CaptureLoop::publish(DepthFrame& out) noexcept {
@@ -260,7 +269,7 @@ void CaptureLoop::mind_reference(bool settled) noexcept {
   if (!active_ || !settled || (keeper_.looks() && area_ != whole_)) return;
   const KeeperStep step = keeper_.step(frame_.luma());
   if (step.reference_changed) {
-    active_->set_reference(keeper_.reference());
+    use_reference();
     if (keeper_.footing() != Footing::stale) {
       teller_.reference({frame_.info().sequence, keeper_.footing() == Footing::restored});
     }
@@ -337,6 +346,7 @@ HealthSet CaptureLoop::health(bool settled, std::int64_t now_ns) const noexcept 
   set.set(Health::frames_lost, watch_.lost_lately(now_ns));
   set.set(Health::camera_trouble, watch_.trouble());
   set.set(Health::ring_trouble, light_.trouble());
+  set.add(image_watch_.conditions());
   set.set(Health::not_realtime, exchange_.not_realtime.load(std::memory_order_relaxed));
   return set;
 }

@@ -7,6 +7,7 @@
 #include "daemon/pipeline/camera_watch.hpp"
 #include "daemon/pipeline/contact.hpp"
 #include "daemon/pipeline/exchange.hpp"
+#include "daemon/pipeline/image_watch.hpp"
 #include "daemon/pipeline/light_driver.hpp"
 #include "daemon/pipeline/light_timeline.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
@@ -56,6 +57,8 @@ class CaptureLoop {
   void reconstruct(DepthFrame& out) noexcept;
   void judge(DepthFrame& out) noexcept;
   void mind_reference(bool settled) noexcept;
+  /// From now on depth is measured against the keeper's reference.
+  void use_reference() noexcept;
   void publish(DepthFrame& out) noexcept;
   void tell(HealthSet health, std::int64_t now_ns) noexcept;
   /// Answers the re-zero under way, if there is one.
@@ -78,6 +81,7 @@ class CaptureLoop {
   ContactDetector contact_;
   ResolutionChooser chooser_;
   CameraWatch watch_;
+  ImageWatch image_watch_;
   LightTimeline timeline_;
   Teller teller_;
   hal::Frame frame_;
