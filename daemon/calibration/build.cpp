@@ -16,35 +16,6 @@ namespace {
 /// Part of the contact that may be black or white before the press is refused.
 constexpr double kClipped = 0.01;
 
-/// The depth map's part of the reference, to whole grey levels.
-image::Grey8 crop_reference(const image::Grey16& q8, const Crop& crop) {
-  image::Grey8 part{crop.width, crop.height, {}};
-  for (int y = crop.row; y < crop.row + crop.height; ++y) {
-    for (int x = crop.col; x < crop.col + crop.width; ++x) {
-      const int value = q8.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(q8.width) +
-                                  static_cast<std::size_t>(x)];
-      part.pixels.push_back(static_cast<std::uint8_t>(std::min(255, (value + 128) / 256)));
-    }
-  }
-  return part;
-}
-
-/// The depth map's part of the mean of the frames, to whole grey levels.
-image::Grey8 crop_mean(const std::vector<image::Grey8>& frames, const Crop& crop) {
-  image::Grey8 part{crop.width, crop.height, {}};
-  const auto count = static_cast<int>(frames.size());
-  for (int y = crop.row; y < crop.row + crop.height; ++y) {
-    for (int x = crop.col; x < crop.col + crop.width; ++x) {
-      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(frames[0].width) +
-                         static_cast<std::size_t>(x);
-      int sum = 0;
-      for (const image::Grey8& frame : frames) sum += frame.pixels[pixel];
-      part.pixels.push_back(static_cast<std::uint8_t>((sum + count / 2) / count));
-    }
-  }
-  return part;
-}
-
 void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_per_px,
                     std::uint8_t limit, const char* message) {
   std::size_t all = 0;
@@ -82,6 +53,49 @@ void check(const BallPress& press) {
 
 }  // namespace
 
+image::Grey8 crop_reference(const image::Grey16& q8, const Crop& crop) {
+  image::Grey8 part{crop.width, crop.height, {}};
+  for (int y = crop.row; y < crop.row + crop.height; ++y) {
+    for (int x = crop.col; x < crop.col + crop.width; ++x) {
+      const int value = q8.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(q8.width) +
+                                  static_cast<std::size_t>(x)];
+      part.pixels.push_back(static_cast<std::uint8_t>(std::min(255, (value + 128) / 256)));
+    }
+  }
+  return part;
+}
+
+image::Grey8 crop_mean(const std::vector<image::Grey8>& frames, const Crop& crop) {
+  image::Grey8 part{crop.width, crop.height, {}};
+  const auto count = static_cast<int>(frames.size());
+  for (int y = crop.row; y < crop.row + crop.height; ++y) {
+    for (int x = crop.col; x < crop.col + crop.width; ++x) {
+      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(frames[0].width) +
+                         static_cast<std::size_t>(x);
+      int sum = 0;
+      for (const image::Grey8& frame : frames) sum += frame.pixels[pixel];
+      part.pixels.push_back(static_cast<std::uint8_t>((sum + count / 2) / count));
+    }
+  }
+  return part;
+}
+
+Calibration empty_calibration(const image::Grey16& reference_q8, const std::optional<Crop>& crop,
+                              double mm_per_px) {
+  const Crop part = crop.value_or(Crop{0, 0, reference_q8.width, reference_q8.height});
+  auto model = std::make_shared<recon::Model>();
+  model->rectify = recon::make_crop_table(reference_q8.width, reference_q8.height, part.col,
+                                          part.row, part.width, part.height);
+  model->mm_per_px = mm_per_px;
+  model->smoothing_px = std::min(10.0, kSmoothingMm / mm_per_px);
+  model->reference_q8 = reference_q8.pixels;
+  Calibration calibration;
+  calibration.crop_col = part.col;
+  calibration.crop_row = part.row;
+  calibration.model = std::move(model);
+  return calibration;
+}
+
 SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> reference_q8,
                     std::span<const image::Grey8> frames, double ball_radius_mm) {
   SettledPress press;
@@ -102,16 +116,11 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
 
 Calibration build(const BallPress& press) {
   check(press);
-  const int frame_width = press.reference_q8.width;
-  const int frame_height = press.reference_q8.height;
-  const Crop crop = press.crop.value_or(Crop{0, 0, frame_width, frame_height});
-  auto model = std::make_shared<recon::Model>();
+  Calibration calibration = empty_calibration(press.reference_q8, press.crop, press.mm_per_px);
+  auto model = std::make_shared<recon::Model>(*calibration.model);
   model->method = press.method;
-  model->rectify = recon::make_crop_table(frame_width, frame_height, crop.col, crop.row, crop.width,
-                                          crop.height);
-  model->mm_per_px = press.mm_per_px;
-  model->smoothing_px = std::min(10.0, kSmoothingMm / press.mm_per_px);
-  model->reference_q8 = press.reference_q8.pixels;
+  const Crop crop{calibration.crop_col, calibration.crop_row, model->rectify.width,
+                  model->rectify.height};
 
   const SettledPress settled =
       settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
@@ -124,9 +133,6 @@ Calibration build(const BallPress& press) {
   model->list = press.method == recon::Method::list
                     ? fit_list(settled.map, settled.contact)
                     : fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
-  Calibration calibration;
-  calibration.crop_col = crop.col;
-  calibration.crop_row = crop.row;
   calibration.model = std::move(model);
   return calibration;
 }

@@ -76,7 +76,8 @@ std::vector<double> KeyReader::numbers(const std::string& key, double low, doubl
   std::vector<double> values;
   values.reserve(array->size());
   for (const toml::node& node : *array) {
-    const double value = node.is_number() ? node.value<double>().value_or(std::nan("")) : std::nan("");
+    const double value =
+        node.is_number() ? node.value<double>().value_or(std::nan("")) : std::nan("");
     if (!(value >= low && value <= high)) {
       throw std::runtime_error(fmt::format("{}:{}: {}{}: entry {} is not allowed; expected {}",
                                            where_, node.source().begin.line, prefix_, key,

@@ -117,8 +117,8 @@ void read_gain(KeyReader reader, recon::SpatialGain& gain) {
   } else if (shape == "uniform") {
     gain.shape = recon::GainShape::uniform;
   } else if (shape != "none") {
-    reader.fail("shape", "\"" + shape +
-                             "\" is not allowed; expected \"none\", \"uniform\" or \"radial\"");
+    reader.fail("shape",
+                "\"" + shape + "\" is not allowed; expected \"none\", \"uniform\" or \"radial\"");
   }
   reader.finish();
 }

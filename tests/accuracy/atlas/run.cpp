@@ -176,7 +176,7 @@ Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
                               exchange.wake);
   pipeline::ReferenceWriter writer(table.frame_width, table.frame_height, {});
   pipeline::CaptureLoop loop({camera, light, writer, exchange, clock}, config,
-                             pipeline::activate(calibration, camera.info()), false);
+                             pipeline::activate(calibration, camera.info(), {}), false);
   loop.run();
   return camera.outcome();
 }

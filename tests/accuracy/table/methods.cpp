@@ -1,8 +1,10 @@
 #include "tests/accuracy/table/methods.hpp"
 
 #include <array>
+#include <string>
 
 #include "daemon/calibration/build.hpp"
+#include "daemon/calibration/press_set.hpp"
 
 namespace dtact::table {
 namespace {
@@ -26,9 +28,32 @@ std::shared_ptr<const recon::Model> ours_single(const Material& material) {
   return from_one(material, recon::Method::list);
 }
 
-constexpr std::array<Method, 2> kMethods = {{
+calibration::BallPresses many_presses(const Material& material) {
+  calibration::BallPresses set;
+  set.reference_q8 = material.reference_q8;
+  for (std::size_t i = 0; i < material.many.size(); ++i) {
+    set.presses.push_back(
+        {.name = "press " + std::to_string(i + 1), .frames = material.many[i], .depth_mm = {}});
+  }
+  set.ball_radius_mm = material.trial->centre.radius_mm;
+  set.mm_per_px = kMmPerPx;
+  set.crop = calibration::Crop{kCropCol, kCropRow, kCrop, kCrop};
+  return set;
+}
+
+std::shared_ptr<const recon::Model> published_regression(const Material& material) {
+  return calibration::build_regression(many_presses(material)).model;
+}
+
+std::shared_ptr<const recon::Model> ours_many(const Material& material) {
+  return calibration::build(many_presses(material)).model;
+}
+
+constexpr std::array<Method, 4> kMethods = {{
     {"published single image", published_single},
+    {"published regression", published_regression},
     {"ours, one press", ours_single},
+    {"ours, many presses", ours_many},
 }};
 
 }  // namespace

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/calibration/build.hpp"
+
+namespace dtact::calibration {
+
+/// Several presses of one ball, at places and depths that nobody needs to know.
+struct BallPresses {
+  image::Grey16 reference_q8;  ///< Untouched, Q8 luma, the mean of many frames.
+  struct Press {
+    std::string name;                  ///< In messages.
+    std::vector<image::Grey8> frames;  ///< The ball pressed in and at rest.
+    std::optional<double> depth_mm;    ///< Of its lowest point, where it was measured.
+  };
+  std::vector<Press> presses;
+  double ball_radius_mm = 0;
+  double mm_per_px = 0;
+  std::optional<Crop> crop;  ///< None: the whole frame.
+};
+
+/// What build() found out on the way.
+struct PressReport {
+  std::vector<double> depth_mm;  ///< Of each press's lowest point, as fitted.
+  /// Mean absolute error of each press under the list of all others, inside the sure contact, with
+  /// each gain that was tried, millimetres.
+  double without_gain_mm = 0;
+  double uniform_gain_mm = 0;
+};
+
+/// Ours. The list follows from the known sphere alone (fit_chain): in the inner three fifths of
+/// each contact, whose radius follows from the fitted depth, not from a circle in the image.
+/// Whether darkening counts as it is or as a share of the light at its place is decided by which
+/// predicts a press better that the list was made without; so is what the list says of its own
+/// uncertainty. `origin` is left for the caller to fill.
+///
+/// Throws std::runtime_error when a press cannot be used (naming it), and when the presses leave a
+/// gap that no press of known depth closes, saying which press is missing. At least two presses.
+[[nodiscard]] Calibration build(const BallPresses& set, PressReport* report = nullptr);
+
+/// The paper's linear regression, to compare with: depth = (k·distance + b) · darkening, the
+/// distance taken from (centre_x_mm, centre_y_mm) in the map (0, 0 is its centre; the paper moves
+/// it to a corner where the light comes from there), fitted by least squares over all pixels of all
+/// published circles against the sphere that is at zero on the circle. The two 7×7 Gaussian filters
+/// that follow become one smoothing of the difference: everything in between is linear.
+[[nodiscard]] Calibration build_regression(const BallPresses& set, double centre_x_mm = 0,
+                                           double centre_y_mm = 0);
+
+}  // namespace dtact::calibration
