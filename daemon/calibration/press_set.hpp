@@ -34,8 +34,9 @@ struct PressReport {
 /// Ours. The list follows from the known sphere alone (fit_chain): in the inner three fifths of
 /// each contact, whose radius follows from the fitted depth, not from a circle in the image.
 /// Whether darkening counts as it is or as a share of the light at its place is decided by which
-/// predicts a press better that the list was made without; so is what the list says of its own
-/// uncertainty. `origin` is left for the caller to fill.
+/// predicts a press better that the list was made without. What the list says of its own
+/// uncertainty is that error, with 5 % of the depth for objects of another shape added in squares.
+/// `origin` is left for the caller to fill.
 ///
 /// Throws std::runtime_error when a press cannot be used (naming it), and when the presses leave a
 /// gap that no press of known depth closes, saying which press is missing. At least two presses.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <stdexcept>
 #include <utility>
@@ -85,10 +86,21 @@ std::unique_ptr<ActiveCalibration> activate(
                         .reconstructors = reconstructors(calibration->model, rules),
                         .grid = {},
                         .region = region,
-                        .camera_mismatch = camera_differs(*calibration, camera),
-                        .list_um = kUnstatedListUm});
+                        .camera_mismatch = camera_differs(*calibration, camera)});
   measure(model.reference_q8, table.frame_width, table.frame_height, active->grid);
   return active;
+}
+
+double ActiveCalibration::list_um(double depth_mm) const noexcept {
+  const auto& rows = calibration->model->uncertainty;
+  if (rows.empty()) return kUnstatedListUm;
+  const auto above =
+      std::ranges::lower_bound(rows, depth_mm, {}, &recon::Model::Uncertainty::depth_mm);
+  if (above == rows.begin()) return rows.front().error_um;
+  if (above == rows.end()) return rows.back().error_um;
+  const auto below = above - 1;
+  return std::lerp(below->error_um, above->error_um,
+                   (depth_mm - below->depth_mm) / (above->depth_mm - below->depth_mm));
 }
 
 void ActiveCalibration::set_reference(std::span<const std::uint16_t> reference_q8) noexcept {

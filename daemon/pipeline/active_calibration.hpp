@@ -24,13 +24,15 @@ struct ActiveCalibration {
   LumaGrid grid;           ///< Of the calibration's reference.
   CellRegion region;       ///< Cells that lie wholly in the calibrated part of the frame.
   bool camera_mismatch = false;
-  double list_um = 0;            ///< What the list is uncertain by, micrometres.
   std::uint64_t generation = 0;  ///< Counts the calibrations of this run.
 
   [[nodiscard]] recon::Reconstructor& reconstructor() noexcept { return reconstructors[in_use]; }
   [[nodiscard]] const recon::Reconstructor& reconstructor() const noexcept {
     return reconstructors[in_use];
   }
+  /// What the list is uncertain by at an indentation, micrometres: as the calibration says, else
+  /// kUnstatedListUm.
+  [[nodiscard]] double list_um(double depth_mm) const noexcept;
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
   /// From the next frame on the map has 1/`decimation` of the resolution, where there is one such.
   void use_decimation(int decimation) noexcept;

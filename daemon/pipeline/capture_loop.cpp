@@ -221,9 +221,9 @@ void CaptureLoop::judge(DepthFrame& out) noexcept {
   const auto from_um = static_cast<std::int16_t>(1000 * config_.contact.made_mm);
   const double bend = bend_um(out.depth_um, active_->reconstructor().grid(), out.drawn.tiles,
                               out.mm_per_px, from_um);
-  const double list_um = keeper_.footing() == Footing::stale
-                             ? std::hypot(active_->list_um, kStaleReferenceUm)
-                             : active_->list_um;
+  // Half of the deepest is about the mean over a contact.
+  double list_um = active_->list_um(0.5 * out.contact.deepest_mm);
+  if (keeper_.footing() == Footing::stale) list_um = std::hypot(list_um, kStaleReferenceUm);
   out.decimation = out.drawn_decimation;
   out.uncertainty_um = uncertainty_at_um(list_um, bend, out.decimation);
   if (config_.reconstruction.decimation == 0) {

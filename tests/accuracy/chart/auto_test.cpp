@@ -65,11 +65,12 @@ std::vector<Judged> scripted_run(double max_error_um) {
     reconstructor.run_active(luma.data(), kWidth, depth, marks, report);
     const double bend =
         pipeline::bend_um(depth, grid, marks.tiles, reconstructor.model().mm_per_px, 100);
-    Judged judged{.chosen = decimation,
-                  .error_um = 0,
-                  .full_error_um = 0,
-                  .uncertainty_um = pipeline::uncertainty_at_um(active->list_um, bend, decimation)};
-    active->use_decimation(chooser.next(active->list_um, bend));
+    Judged judged{
+        .chosen = decimation,
+        .error_um = 0,
+        .full_error_um = 0,
+        .uncertainty_um = pipeline::uncertainty_at_um(pipeline::kUnstatedListUm, bend, decimation)};
+    active->use_decimation(chooser.next(pipeline::kUnstatedListUm, bend));
 
     const Shot shot = truth_of(renderer, sequence);
     if (std::ranges::count_if(shot.judged, [](std::uint8_t c) { return c != 0; }) < 300) continue;
