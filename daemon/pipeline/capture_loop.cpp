@@ -13,6 +13,9 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::chrono::milliseconds kLongestGrab{100};
 /// Pause before a camera that is away is asked again.
 constexpr std::int64_t kAwayPauseNs = 20'000'000;
+/// The published method knows no gain: a light brighter or dimmer than at calibration by this share
+/// makes every depth wrong by as much.
+constexpr double kOtherLevel = 0.1;
 
 constexpr const char* kTouchedSentence = "something touches: lift it and ask again, or force it";
 constexpr const char* kUnsteadySentence =
@@ -198,9 +201,12 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
 
 void CaptureLoop::use_reference() noexcept {
   active_->reconstructor.set_reference(keeper_.reference());
-  const recon::RectifyTable& table = active_->reconstructor.model().rectify;
+  const recon::Model& model = active_->reconstructor.model();
+  const recon::RectifyTable& table = model.rectify;
   image_watch_.set_reference(keeper_.reference(), table.frame_width, table.frame_height,
                              active_->region);
+  const double light = image_watch_.reference_mean() / active_->grid.mean;
+  other_level_ = model.method == recon::Method::published && std::abs(light - 1) > kOtherLevel;
 }
 
 void CaptureLoop::publish(DepthFrame& out) noexcept {
@@ -304,7 +310,7 @@ HealthSet CaptureLoop::health(bool settled, std::int64_t now_ns) const noexcept 
     set.set(Health::uncalibrated);
     set.set(Health::light_unsettled, !settled);
   }
-  set.set(Health::light_mismatch, light_mismatch_);
+  set.set(Health::light_mismatch, light_mismatch_ || other_level_);
   const bool differs = active_ && exchange_.camera_mismatch.load(std::memory_order_relaxed);
   set.set(Health::camera_mismatch, unusable_ || controls_moved_ || differs);
   set.set(Health::beyond_calibration, beyond_);
