@@ -41,6 +41,7 @@ def main():
         presses.plot([float(p["value_mm"]) for p in measured],
                      [float(p["error_mm"]) for p in measured], "o", ms=3, color=colour)
     trade.plot(*zip(*points), color="grey", lw=0.7, zorder=0)
+    trade.margins(0.15)
     trade.set(xlabel="finest pitch resolved, mm", ylabel="greatest depth measured, mm",
               title="layer thickness, simulated sensor")
     grooves.axhline(0.5, color="grey", lw=0.7, ls=":")
