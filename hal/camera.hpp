@@ -78,6 +78,10 @@ class Camera {
   [[nodiscard]] virtual CameraReport report() const = 0;
   /// Begins streaming. Throws std::runtime_error with a sentence that names the remedy.
   virtual void start() = 0;
+  /// What of the images will be read from now on: a compressed frame need not be decoded beyond it,
+  /// and what lies there is unspecified (a camera may deliver it all the same). It lies in the
+  /// image; until the first call it is the whole. Called between two grabs, by their thread.
+  virtual void will_read(const Area& /*area*/) noexcept {}
   /// Waits at most `timeout` for the newest complete frame. Does not allocate in steady state. The
   /// caller holds at most one frame: assigning `out` gives the one before back.
   [[nodiscard]] virtual GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept = 0;

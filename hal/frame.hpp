@@ -21,6 +21,15 @@ struct LumaView {
   [[nodiscard]] const std::uint8_t* row(int y) const noexcept { return data + y * stride; }
 };
 
+/// A rectangle of an image, pixels.
+struct Area {
+  int x = 0;
+  int y = 0;
+  int width = 0;
+  int height = 0;
+  bool operator==(const Area&) const = default;
+};
+
 /// What the moment in FrameInfo::timestamp_ns is.
 enum class TimestampMeaning : std::uint8_t {
   start_of_exposure,  ///< The first row's exposure began (UVC's SOE).

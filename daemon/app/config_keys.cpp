@@ -11,6 +11,8 @@
 #include <optional>
 #include <sstream>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "daemon/net/light_schemes.hpp"
 #include "hal/registry.hpp"
@@ -99,6 +101,26 @@ Key choice(std::string path, std::string& field, std::vector<std::string> allowe
             return true;
           },
           [&field] { return toml_string(field); }};
+}
+
+/// A number that goes by a name.
+Key named(std::string path, int& field, std::vector<std::pair<std::string, int>> names) {
+  std::vector<std::string> words;
+  for (const auto& [name, value] : names) words.push_back(toml_string(name));
+  return {std::move(path), fmt::format("one of {}", fmt::join(words, ", ")),
+          [&field, names](const toml::node& node, const fs::path&) {
+            const auto text = node.value_exact<std::string>();
+            const auto it =
+                std::ranges::find_if(names, [&](const auto& entry) { return text == entry.first; });
+            if (it == names.end()) return false;
+            field = it->second;
+            return true;
+          },
+          [&field, names] {
+            return toml_string(std::ranges::find_if(names, [&](const auto& entry) {
+                                 return entry.second == field;
+                               })->first);
+          }};
 }
 
 Key path(std::string key, fs::path& field, const std::string& allowed) {
@@ -261,6 +283,10 @@ std::vector<Key> bind_keys(Config& c) {
       optional_integer("capture.cpu", p.cpu, 0, 1023, ""),
       integer("capture.fifo_priority", p.fifo_priority, 0, 99, "(0 = normal scheduling)"),
       boolean("capture.lock_memory", p.lock_memory),
+
+      named("reconstruction.method", p.reconstruction.decimation,
+            {{"full", 1}, {"half", 2}, {"quarter", 4}, {"auto", 0}}),
+      real("reconstruction.max_error_um", p.reconstruction.max_error_um, 1, 10000, "(micrometres)"),
 
       integer("reference.frames", p.reference.frames, 1, 256, "(frames)"),
       integer("reference.settle_frames", p.reference.settle_frames, 2, 64, "(frames)"),

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "daemon/calibration/mismatch.hpp"
+#include "daemon/pipeline/uncertainty.hpp"
+#include "daemon/recon/decimate.hpp"
 
 namespace dtact::pipeline {
 namespace {
@@ -46,11 +48,23 @@ calibration::AttachedCamera attached(const hal::CameraInfo& camera) {
   return now;
 }
 
+std::vector<recon::Reconstructor> reconstructors(const std::shared_ptr<const recon::Model>& model,
+                                                 const ReconstructionRules& rules) {
+  std::vector<recon::Reconstructor> made;
+  for (const int decimation : {1, 2, 4}) {
+    if (rules.decimation != 0 && rules.decimation != decimation) continue;
+    made.emplace_back(decimation == 1 ? model
+                                      : std::make_shared<const recon::Model>(
+                                            recon::decimate(*model, decimation)));
+  }
+  return made;
+}
+
 }  // namespace
 
 std::unique_ptr<ActiveCalibration> activate(
     const std::shared_ptr<const calibration::Calibration>& calibration,
-    const hal::CameraInfo& camera) {
+    const hal::CameraInfo& camera, const ReconstructionRules& rules) {
   const recon::Model& model = *calibration->model;
   const recon::RectifyTable& table = model.rectify;
   if (table.frame_width != camera.width || table.frame_height != camera.height) {
@@ -68,12 +82,28 @@ std::unique_ptr<ActiveCalibration> activate(
   }
   auto active = std::make_unique<ActiveCalibration>(
       ActiveCalibration{.calibration = calibration,
-                        .reconstructor = recon::Reconstructor(calibration->model),
+                        .reconstructors = reconstructors(calibration->model, rules),
                         .grid = {},
                         .region = region,
-                        .camera_mismatch = camera_differs(*calibration, camera)});
+                        .camera_mismatch = camera_differs(*calibration, camera),
+                        .list_um = kUnstatedListUm});
   measure(model.reference_q8, table.frame_width, table.frame_height, active->grid);
   return active;
+}
+
+void ActiveCalibration::set_reference(std::span<const std::uint16_t> reference_q8) noexcept {
+  for (recon::Reconstructor& reconstructor : reconstructors) {
+    reconstructor.set_reference(reference_q8);
+  }
+}
+
+void ActiveCalibration::use_decimation(int decimation) noexcept {
+  for (std::size_t i = 0; i < reconstructors.size(); ++i) {
+    if (i == in_use || reconstructors[i].model().rectify.decimation != decimation) continue;
+    reconstructors[i].follow(reconstructors[in_use]);
+    in_use = i;
+    return;
+  }
 }
 
 bool camera_differs(const calibration::Calibration& calibration, const hal::CameraInfo& camera) {

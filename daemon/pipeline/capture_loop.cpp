@@ -43,9 +43,12 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       unusable_(unusable),
       keeper_(camera_.info().width, camera_.info().height, config.reference),
       contact_(config.contact),
+      chooser_(config.reconstruction.max_error_um),
       watch_(period_ns_),
       timeline_(config.light, camera_.info().light_delay_frames, period_ns_),
       teller_(exchange_),
+      whole_{0, 0, camera_.info().width, camera_.info().height},
+      area_(whole_),
       shown_(config.light) {
   // What the status says until the first frame.
   exchange_.state = state();
@@ -68,6 +71,7 @@ void CaptureLoop::run() noexcept {
   while (!exchange_.stop.load(std::memory_order_relaxed)) {
     take_notes();
     take_orders();
+    choose_area();
     const std::int64_t asked_ns = clock_.monotonic_ns();
     const hal::GrabStatus status = camera_.grab(frame_, timeout);
     const std::int64_t now_ns = clock_.monotonic_ns();
@@ -80,6 +84,18 @@ void CaptureLoop::run() noexcept {
     teller_.flush();
   }
   frame_.reset();
+}
+
+// Decoding is most of the work on a frame: no more than somebody reads.
+void CaptureLoop::choose_area() noexcept {
+  hal::Area area = whole_;
+  if (active_ && !keeper_.looks() && !exchange_.want_luma.load(std::memory_order_relaxed)) {
+    const recon::FrameRegion region = active_->reconstructor().region();
+    area = {region.x, region.y, region.width, region.height};
+  }
+  if (area == area_) return;
+  area_ = area;
+  camera_.will_read(area_);
 }
 
 void CaptureLoop::take_notes() noexcept {
@@ -172,21 +188,23 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
 }
 
 void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
-  const recon::Model& model = active_->reconstructor.model();
+  recon::Reconstructor& reconstructor = active_->reconstructor();
+  const recon::Model& model = reconstructor.model();
   out.width = model.rectify.width;
   out.height = model.rectify.height;
   out.mm_per_px = model.mm_per_px;
   // Within the capacity reserved at start, so this allocates nothing.
   out.depth_um.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
-  // What another calibration drew in this buffer says nothing about this one's map.
-  if (std::exchange(out.drawn_generation, active_->generation) != active_->generation) {
-    out.drawn.rest = 0;
-  }
+  // What another calibration or resolution drew in this buffer says nothing about this one's map.
+  const bool another = out.drawn_generation != active_->generation ||
+                       out.drawn_decimation != model.rectify.decimation;
+  if (another) out.drawn.rest = 0;
+  out.drawn_generation = active_->generation;
+  out.drawn_decimation = model.rectify.decimation;
   recon::StepTimes steps;
   recon::ActivityReport activity;
   const hal::LumaView& luma = frame_.luma();
-  active_->reconstructor.run_active(luma.data, luma.stride, out.depth_um, out.drawn, activity,
-                                    &steps);
+  reconstructor.run_active(luma.data, luma.stride, out.depth_um, out.drawn, activity, &steps);
   image_watch_.look(activity, luma);
   out.times.activity_ns = steps.activity_ns;
   out.times.rectify_ns = steps.rectify_ns;
@@ -194,19 +212,36 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
   out.times.list_ns = steps.list_ns;
   const std::int64_t began_ns = clock_.monotonic_ns();
   out.contact =
-      contact_.inspect(out.depth_um, active_->reconstructor.grid(), out.drawn.tiles, out.mm_per_px);
-  beyond_ = active_->reconstructor.beyond_pixels() > config_.beyond_pixels;
+      contact_.inspect(out.depth_um, reconstructor.grid(), out.drawn.tiles, out.mm_per_px);
+  const int pixel = model.rectify.decimation * model.rectify.decimation;
+  beyond_ = reconstructor.beyond_pixels() * pixel > config_.beyond_pixels;
+  judge(out);
   out.times.inspect_ns = clock_.monotonic_ns() - began_ns;
 }
 
 void CaptureLoop::use_reference() noexcept {
-  active_->reconstructor.set_reference(keeper_.reference());
-  const recon::Model& model = active_->reconstructor.model();
+  active_->set_reference(keeper_.reference());
+  const recon::Model& model = *active_->calibration->model;
   const recon::RectifyTable& table = model.rectify;
   image_watch_.set_reference(keeper_.reference(), table.frame_width, table.frame_height,
                              active_->region);
   const double light = image_watch_.reference_mean() / active_->grid.mean;
   other_level_ = model.method == recon::Method::published && std::abs(light - 1) > kOtherLevel;
+}
+
+/// What the map is worth, and at which resolution the next is made.
+void CaptureLoop::judge(DepthFrame& out) noexcept {
+  const auto from_um = static_cast<std::int16_t>(1000 * config_.contact.made_mm);
+  const double bend = bend_um(out.depth_um, active_->reconstructor().grid(), out.drawn.tiles,
+                              out.mm_per_px, from_um);
+  const double list_um = keeper_.footing() == Footing::stale
+                             ? std::hypot(active_->list_um, kStaleReferenceUm)
+                             : active_->list_um;
+  out.decimation = out.drawn_decimation;
+  out.uncertainty_um = uncertainty_at_um(list_um, bend, out.decimation);
+  if (config_.reconstruction.decimation == 0) {
+    active_->use_decimation(chooser_.next(list_um, bend));
+  }
 }
 
 void CaptureLoop::publish(DepthFrame& out) noexcept {
@@ -215,8 +250,8 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   const bool want_depth = exchange_.want_depth.load(std::memory_order_relaxed);
   const bool want_luma = exchange_.want_luma.load(std::memory_order_relaxed);
   out.has_depth = reconstructed && want_depth;
-  out.has_luma = want_luma;
-  if (want_luma) {
+  out.has_luma = want_luma && area_ == whole_;  // not the frame before the one asked for
+  if (out.has_luma) {
     const hal::LumaView& luma = frame_.luma();
     const auto width = static_cast<std::size_t>(luma.width);
     out.luma_width = luma.width;
@@ -230,14 +265,14 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   out.done_ns = clock_.monotonic_ns();
   out.times.publish_ns = out.done_ns - began_ns;
   exchange_.statistics.add(out.times, reconstructed, out.camera.ready_ns, out.done_ns);
-  if (!want_depth && !want_luma) return;
+  if (!want_depth && !out.has_luma) return;
   exchange_.slot.publish();
   exchange_.frames.fetch_add(1, std::memory_order_relaxed);
   exchange_.wake.signal();
 }
 
 void CaptureLoop::mind_reference(bool settled) noexcept {
-  if (!active_ || !settled) return;
+  if (!active_ || !settled || (keeper_.looks() && area_ != whole_)) return;
   const KeeperStep step = keeper_.step(frame_.luma());
   if (step.reference_changed) {
     use_reference();

@@ -14,6 +14,7 @@
 #include "daemon/pipeline/reference_keeper.hpp"
 #include "daemon/pipeline/reference_writer.hpp"
 #include "daemon/pipeline/teller.hpp"
+#include "daemon/pipeline/uncertainty.hpp"
 #include "hal/base/clock.hpp"
 #include "hal/camera.hpp"
 
@@ -46,6 +47,7 @@ class CaptureLoop {
   void run() noexcept;
 
  private:
+  void choose_area() noexcept;
   void take_notes() noexcept;
   void take_orders() noexcept;
   void execute(const RezeroOrder& order) noexcept;
@@ -53,6 +55,7 @@ class CaptureLoop {
   void process(std::int64_t now_ns) noexcept;
   void without_frame(hal::GrabStatus status, std::int64_t asked_ns, std::int64_t now_ns) noexcept;
   void reconstruct(DepthFrame& out) noexcept;
+  void judge(DepthFrame& out) noexcept;
   void mind_reference(bool settled) noexcept;
   /// From now on depth is measured against the keeper's reference.
   void use_reference() noexcept;
@@ -76,11 +79,14 @@ class CaptureLoop {
   bool unusable_;
   ReferenceKeeper keeper_;
   ContactDetector contact_;
+  ResolutionChooser chooser_;
   CameraWatch watch_;
   ImageWatch image_watch_;
   LightTimeline timeline_;
   Teller teller_;
   hal::Frame frame_;
+  const hal::Area whole_;  // frame
+  hal::Area area_;         // of the frame that is asked for
 
   hal::Light shown_;  // by the ring, as last noted
   bool light_mismatch_ = false;

@@ -55,7 +55,7 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
   bool unusable = false;
   if (calibration) {
     try {
-      active = activate(calibration, info_);
+      active = activate(calibration, info_, config_.reconstruction);
       active->generation = ++generations_;
       exchange_.generation = generations_;
       calibrations_.push_back({generations_, calibration});
@@ -152,7 +152,7 @@ bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
   if (exchange_.orders.room() == 0) return false;
   try {
     if (!command.calibration) throw std::invalid_argument("no calibration was given");
-    auto active = activate(command.calibration, camera_->info());
+    auto active = activate(command.calibration, camera_->info(), config_.reconstruction);
     const recon::RectifyTable& table = command.calibration->model->rectify;
     if (pixels(table.width, table.height) > depth_capacity_) {
       throw std::invalid_argument(

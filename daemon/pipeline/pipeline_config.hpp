@@ -15,6 +15,14 @@ struct ContactRules {
   int debounce_frames = 2;  ///< For this many frames in a row.
 };
 
+/// At which share of the calibration's resolution depth is reconstructed.
+struct ReconstructionRules {
+  /// 1, 2 or 4: a pixel of the map is the mean over so many of the calibration's in each direction.
+  /// 0: chosen for every frame, the coarsest whose expected error stays within max_error_um.
+  int decimation = 1;
+  double max_error_um = 50;
+};
+
 /// How the untouched image is taken.
 struct ReferenceRules {
   int frames = 32;            ///< Averaged into one reference, 1 … 256.
@@ -31,7 +39,9 @@ struct PipelineConfig {
   hal::Light light;         ///< What the ring shows at start.
   ContactRules contact;
   ReferenceRules reference;
-  int beyond_pixels = 64;  ///< More pixels than this beyond the list: Health::beyond_calibration.
+  ReconstructionRules reconstruction;
+  /// More of the calibration's pixels than this beyond the list: Health::beyond_calibration.
+  int beyond_pixels = 64;
   std::filesystem::path state_folder;  ///< Keeps the last good reference; empty = not kept.
 };
 

@@ -95,6 +95,10 @@ std::optional<RezeroResult> ReferenceKeeper::rezero(bool force, bool touching) n
   return std::nullopt;
 }
 
+bool ReferenceKeeper::looks() const noexcept {
+  return phase_ != Phase::holding || averaging_ || request_ || footing_ != Footing::fresh;
+}
+
 State ReferenceKeeper::state() const noexcept {
   switch (phase_) {
     case Phase::settling:

@@ -60,6 +60,8 @@ class ReferenceKeeper {
   /// The next frame under settled light. Mostly cheap; a decision takes about two frames' time.
   [[nodiscard]] KeeperStep step(const hal::LumaView& luma) noexcept;
 
+  /// The next image counts for a reference, all of it. Else step() does not look.
+  [[nodiscard]] bool looks() const noexcept;
   [[nodiscard]] State state() const noexcept;
   [[nodiscard]] Footing footing() const noexcept { return footing_; }
   /// False from a start or a light change until a reference or a stand-in is there.

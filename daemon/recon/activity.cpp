@@ -66,6 +66,23 @@ int Activity::y_of(int row) const noexcept {
   return std::min(y_ + row * kCell, frame_height_ - kCell);
 }
 
+void Activity::follow(const Activity& other) noexcept {
+  const bool same = x_ == other.x_ && y_ == other.y_ && columns_ == other.columns_ &&
+                    rows_ == other.rows_ && reference_ == other.reference_;
+  if (!same) return;
+  drift_ = other.drift_;
+  expected_ = other.expected_;
+  sum_ = other.sum_;
+  sum_before_ = other.sum_before_;
+  cell_ = other.cell_;
+  window_ = other.window_;
+  active_ = other.active_;
+  noise_ = other.noise_;
+  mean_drift_ = other.mean_drift_;
+  active_cells_ = other.active_cells_;
+  frames_ = other.frames_;
+}
+
 FrameRegion Activity::region() const noexcept {
   if (columns_ == 0) return {0, 0, frame_width_, frame_height_};
   return {x_, y_, x_of(columns_ - 1) + kCell - x_, y_of(rows_ - 1) + kCell - y_};

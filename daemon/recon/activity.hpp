@@ -70,6 +70,9 @@ class Activity {
   /// The untouched image: frame sized, Q8, row-major without padding. Forgets drift and activity.
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
 
+  /// Goes on where `other` is, when both look at the same cells.
+  void follow(const Activity& other) noexcept;
+
   /// Looks at a frame. The tiles hold until the next call.
   const TileRows& look(const std::uint8_t* luma, std::ptrdiff_t stride,
                        ActivityReport& report) noexcept;

@@ -410,6 +410,10 @@ void Reconstructor::set_reference(std::span<const std::uint16_t> reference_q8) n
   impl_->set_reference(reference_q8);
 }
 
+void Reconstructor::follow(const Reconstructor& other) noexcept {
+  impl_->activity.follow(other.impl_->activity);
+}
+
 void Reconstructor::run(const std::uint8_t* luma, std::ptrdiff_t stride,
                         std::span<std::int16_t> depth_um, StepTimes* times) noexcept {
   StepTimes spent;

@@ -104,6 +104,7 @@ void LiveCamera::start() {
 void LiveCamera::connect() {
   Opened opened = open_();
   auto fresh = std::make_shared<Connection>(opened.source);
+  if (area_) fresh->decoder.will_read(*area_);
   opened_ns_ = now_ns();
   last_buffer_ns_ = 0;
   last_counted_.reset();
@@ -167,6 +168,11 @@ bool LiveCamera::wait_for_device(std::int64_t deadline_ns) noexcept {
     next_try_ns_ = now_ns() + kRetry;
     if (connected) return true;
   }
+}
+
+void LiveCamera::will_read(const Area& area) noexcept {
+  area_ = area;
+  if (connection_) connection_->decoder.will_read(area);
 }
 
 GrabStatus LiveCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexcept {

@@ -38,6 +38,7 @@ class LiveCamera : public Camera, private FrameOwner {
   /// Throws only when the attached camera lacks the mode asked for. A camera that is away, busy or
   /// forbidden is a state of the report, since it may come back.
   void start() override;
+  void will_read(const Area& area) noexcept override;
   [[nodiscard]] GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept override;
 
  private:
@@ -79,6 +80,7 @@ class LiveCamera : public Camera, private FrameOwner {
   std::array<luma::LumaBuffer, 2> pool_;  // one with the caller, one to decode into
   std::array<std::atomic<bool>, 2> lent_{};
   std::array<std::shared_ptr<Source>, 8> lenders_;  // of payloads lent as they are, by index
+  std::optional<Area> area_;                        // what will be read; none: the whole image
   std::int64_t next_try_ns_ = 0;
   std::int64_t last_buffer_ns_ = 0;  // the last sign of life, damaged or not
   std::int64_t opened_ns_ = 0;

@@ -33,6 +33,10 @@ PayloadDecoder::PayloadDecoder(const Format& format)
                 ? std::make_unique<mjpeg::GreyDecoder>(format.width, format.height)
                 : nullptr) {}
 
+void PayloadDecoder::will_read(const Area& area) noexcept {
+  if (jpeg_) jpeg_->set_crop(area);
+}
+
 PayloadStatus PayloadDecoder::inspect(const Filled& filled) const noexcept {
   if (filled.flagged) return PayloadStatus::flagged;
   if (filled.payload.empty()) return PayloadStatus::too_short;

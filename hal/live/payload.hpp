@@ -16,6 +16,8 @@ class PayloadDecoder {
  public:
   explicit PayloadDecoder(const Format& format);
 
+  /// Of the next payloads only this part need be decoded. It lies in the image.
+  void will_read(const Area& area) noexcept;
   /// What can be told without decoding: the driver's mark, the length, a JPEG's first and last
   /// marker.
   [[nodiscard]] PayloadStatus inspect(const Filled& filled) const noexcept;

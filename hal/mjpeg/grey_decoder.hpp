@@ -5,6 +5,8 @@
 #include <memory>
 #include <span>
 
+#include "hal/frame.hpp"
+
 namespace dtact::hal::mjpeg {
 
 enum class Status : std::uint8_t {
@@ -26,14 +28,6 @@ struct Size {
   bool operator==(const Size&) const = default;
 };
 
-/// A rectangle of the picture, pixels.
-struct Crop {
-  int x = 0;
-  int y = 0;
-  int width = 0;
-  int height = 0;
-};
-
 /// Decodes the luma of JPEG frames of one size, full range by JFIF's definition. Colour is parsed
 /// (the entropy code is interleaved) and never transformed. Frames stand alone: nothing of an
 /// earlier one is used, and missing Huffman tables are the standard's (as UVC's MJPEG leaves them
@@ -52,9 +46,9 @@ class GreyDecoder {
 
   /// From now on decode() works out no more pixels than it must to give those of `crop` as it would
   /// without one; what it writes elsewhere in the picture is unspecified. All of the payload is
-  /// still parsed, so that damage anywhere is told. Throws std::invalid_argument unless the crop
-  /// has pixels and lies in the picture.
-  void set_crop(const Crop& crop);
+  /// still parsed, so that damage anywhere is told. A crop without pixels, or one that leaves the
+  /// picture, means the whole picture.
+  void set_crop(const Area& crop) noexcept;
 
   /// Writes width × height bytes to `luma`, rows `stride` bytes apart. Unless ok the output is
   /// partly written and must not be used: libjpeg would fill a damaged frame with grey. Bytes after

@@ -28,6 +28,7 @@ class ReplayCamera final : public Camera, private FrameOwner {
   [[nodiscard]] CameraInfo info() const override;
   [[nodiscard]] CameraReport report() const override;
   void start() override;
+  void will_read(const Area& area) noexcept override { decoder_.set_crop(area); }
   [[nodiscard]] GrabStatus grab(Frame& out, std::chrono::nanoseconds timeout) noexcept override;
 
  private:

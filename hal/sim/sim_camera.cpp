@@ -192,6 +192,10 @@ void SimCamera::start() {
   if (impl_->paced) impl_->device.run_paced();
 }
 
+void SimCamera::will_read(const Area& area) noexcept {
+  if (impl_->decoder) impl_->decoder->set_crop(area);
+}
+
 GrabStatus SimCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexcept {
   return impl_->grab(out, timeout.count());
 }

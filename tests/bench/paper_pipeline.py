@@ -23,6 +23,30 @@ TOP, LEFT = (HEIGHT - SIDE) // 2, (WIDTH - SIDE) // 2
 
 
 class PaperPipeline:
+    """`map_x`, `map_y`: where in the frame each pixel of the crop lies, SIDE x SIDE float32;
+    `untouched`: the reference image, HEIGHT x WIDTH x 3 bytes."""
+
+    def __init__(self, map_x, map_y, untouched):
+        # The published way rectifies the whole frame before it is cropped; outside the crop the
+        # map's content does not matter.
+        self.maps = [np.ascontiguousarray(np.pad(m, ((TOP, TOP), (LEFT, LEFT)), mode="edge"))
+                     for m in (map_x, map_y)]
+        self.reference = self.rectified_grey(untouched)
+
+    def rectified_grey(self, frame):
+        rectified = cv2.remap(frame, self.maps[0], self.maps[1], cv2.INTER_LINEAR)
+        return cv2.cvtColor(rectified[TOP:TOP + SIDE, LEFT:LEFT + SIDE], cv2.COLOR_BGR2GRAY)
+
+    def depth(self, frame, mm):
+        difference = cv2.subtract(self.reference, self.rectified_grey(frame))
+        depth = mm[difference]
+        depth = cv2.GaussianBlur(depth, (7, 7), 0)
+        return cv2.GaussianBlur(depth, (7, 7), 0)
+
+
+class Cases(PaperPipeline):
+    """What ./dev bench times, on the inputs in `folder`."""
+
     def __init__(self, folder):
         def read(name, kind):
             return np.fromfile(os.path.join(folder, name), dtype=kind)
@@ -34,22 +58,8 @@ class PaperPipeline:
         self.list = self.list32.astype(np.float64)
         self.expected = read("depth.i16", np.int16).reshape(SIDE, SIDE)
         crop = [read(f"map_{axis}.f32", np.float32).reshape(SIDE, SIDE) for axis in "xy"]
-        # The published way rectifies the whole frame before it is cropped; outside the crop the
-        # map's content does not matter.
-        self.maps = [np.ascontiguousarray(np.pad(m, ((TOP, TOP), (LEFT, LEFT)), mode="edge"))
-                     for m in crop]
         untouched = read("reference.raw", np.uint8).reshape(HEIGHT, WIDTH)
-        self.reference = self.rectified_grey(cv2.cvtColor(untouched, cv2.COLOR_GRAY2BGR))
-
-    def rectified_grey(self, frame):
-        rectified = cv2.remap(frame, self.maps[0], self.maps[1], cv2.INTER_LINEAR)
-        return cv2.cvtColor(rectified[TOP:TOP + SIDE, LEFT:LEFT + SIDE], cv2.COLOR_BGR2GRAY)
-
-    def depth(self, frame, mm):
-        difference = cv2.subtract(self.reference, self.rectified_grey(frame))
-        depth = mm[difference]
-        depth = cv2.GaussianBlur(depth, (7, 7), 0)
-        return cv2.GaussianBlur(depth, (7, 7), 0)
+        super().__init__(*crop, cv2.cvtColor(untouched, cv2.COLOR_GRAY2BGR))
 
     def python(self):
         return self.depth(self.frame, self.list)
@@ -71,7 +81,7 @@ def wrong(depth_mm, expected_um):
 
 def main():
     cv2.setNumThreads(1)
-    pipeline = PaperPipeline(sys.argv[1])
+    pipeline = Cases(sys.argv[1])
     cases = {"python": pipeline.python, "python-float32": pipeline.python_float32,
              "python+decode": pipeline.python_decode}
     for line in sys.stdin:

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <mutex>
@@ -75,6 +76,7 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
   void start() override {
     if (handle_.refuse_start) throw std::runtime_error("fake camera: told not to start");
   }
+  void will_read(const hal::Area& area) noexcept override { area_ = area; }
   [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
                                      std::chrono::nanoseconds timeout) noexcept override {
     using std::chrono::nanoseconds;
@@ -103,6 +105,7 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
     frame.ready_ns = frame.timestamp_ns;
     frame.meaning = hal::TimestampMeaning::start_of_exposure;
     toy_paint(handle_.scene(), frame.sequence, pixels_.data());
+    blank_unread();
     ++handle_.lent;
     ++handle_.delivered;
     out = hal::Frame(*this, 0, {pixels_.data(), kToyWidth, kToyHeight, kToyWidth}, frame);
@@ -112,7 +115,20 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
  private:
   void give_back(int /*index*/) noexcept override { --handle_.lent; }
 
+  /// Who reads what nobody asked for is to notice.
+  void blank_unread() noexcept {
+    for (int y = 0; y < kToyHeight; ++y) {
+      for (int x = 0; x < kToyWidth; ++x) {
+        const bool read =
+            x >= area_.x && x < area_.x + area_.width && y >= area_.y && y < area_.y + area_.height;
+        if (!read)
+          pixels_[static_cast<std::size_t>(y) * kToyWidth + static_cast<std::size_t>(x)] = 0;
+      }
+    }
+  }
+
   Handle& handle_;
+  hal::Area area_{0, 0, kToyWidth, kToyHeight};
   std::vector<std::uint8_t> pixels_;
   std::uint64_t sequence_ = 0;
 };

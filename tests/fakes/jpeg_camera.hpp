@@ -36,6 +36,7 @@ class JpegCamera final : public hal::Camera, private hal::FrameOwner {
   }
   [[nodiscard]] hal::CameraReport report() const override { return {}; }
   void start() override {}
+  void will_read(const hal::Area& area) noexcept override { decoder_.set_crop(area); }
   [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
                                      std::chrono::nanoseconds /*timeout*/) noexcept override {
     on_grab_(sequence_);

@@ -29,7 +29,7 @@ class Run:
         errors = [e for e in (inside, outside) if not math.isnan(e)]
         self.error = max(errors) if errors else math.nan
         self.told = number(line["flagged"]) >= 0.5 or number(line["withheld"]) >= 0.5
-        self.withheld = number(line["withheld"])
+        self.stated = number(line["stated_mm"])
         self.conditions = line["conditions"].replace("_", " ")
 
 
@@ -50,8 +50,10 @@ def verdict(runs, nominal):
     if not wrong:
         return "stays within", "–", False
     first = wrong[0]
-    silent = [r for r in wrong if not r.told]
-    said = first.conditions or ("no depth given" if first.told else "nothing")
+    silent = [r for r in wrong if not r.told and r.error > 2 * r.stated]
+    said = first.conditions or ("no depth given" if first.told else "no condition")
+    if not first.told:
+        said += f", stated uncertainty {first.stated:.3f} mm"
     if silent:
         said += f"; **silent at {', '.join(f'{r.value:g}' for r in silent)}**"
     size = "no depth" if math.isnan(first.error) else f"{first.error:.3f} mm"

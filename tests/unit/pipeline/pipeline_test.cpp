@@ -161,6 +161,52 @@ TEST_F(PipelineTest, MeasuresAPressAndTellsContact) {
   EXPECT_FALSE(all<ContactChanged>()[1].touching);
 }
 
+TEST_F(PipelineTest, ACoarserMapHoldsTheSameSurface) {
+  config.reconstruction.decimation = 4;
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_fresh());
+  EXPECT_EQ(frame->width, 36);  // 144×104 pixels of 0.2 mm at full resolution
+  EXPECT_EQ(frame->height, 26);
+  EXPECT_EQ(frame->depth_um.size(), 36U * 26U);
+  EXPECT_DOUBLE_EQ(frame->mm_per_px, 0.8);
+  camera.press(1);
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.05);
+  EXPECT_NEAR(frame->contact.x_mm, 0.1, 0.1);
+  EXPECT_NEAR(frame->contact.y_mm, 0.1, 0.1);
+}
+
+TEST_F(PipelineTest, AutoTakesTheCoarsestMapWithinTheBound) {
+  config.reconstruction.decimation = 0;
+  config.reconstruction.max_error_um = 1000;
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth && f.decimation == 4; }));
+  EXPECT_EQ(frame->width, 36);
+  EXPECT_NEAR(frame->uncertainty_um, 20, 1);  // a list that says nothing of itself, nothing pressed
+  camera.press(1);
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  EXPECT_GT(frame->uncertainty_um, 20);
+  EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.05);
+}
+
+TEST_F(PipelineTest, AutoTakesFullResolutionWhereTheBoundIsOutOfReach) {
+  config.reconstruction.decimation = 0;
+  config.reconstruction.max_error_um = 10;
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth && f.decimation == 1; }));
+  EXPECT_EQ(frame->width, 144);
+}
+
+TEST_F(PipelineTest, LumaIsWholeThoughDepthReadsAPart) {
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_fresh());
+  pipeline->want(true, true);
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_luma; }));
+  EXPECT_TRUE(frame->has_depth);
+  EXPECT_GT(frame->luma.front(), 90);  // the corner, outside the map; unread it is 0
+  EXPECT_GT(frame->luma.back(), 90);
+}
+
 TEST_F(PipelineTest, KeepsTheReferenceForATouchedStart) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());

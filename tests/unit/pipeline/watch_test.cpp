@@ -127,7 +127,7 @@ TEST(Activate, NamesAFrameSizeThatDoesNotFit) {
   camera.width = 320;
   camera.height = 240;
   try {
-    (void)activate(fakes::toy_calibration(), camera);
+    (void)activate(fakes::toy_calibration(), camera, {});
     FAIL();
   } catch (const std::invalid_argument& e) {
     EXPECT_STREQ(
@@ -142,12 +142,12 @@ TEST(Activate, KnowsTheCellsOfTheCalibratedPart) {
   hal::CameraInfo camera;
   camera.width = 160;
   camera.height = 120;
-  const auto active = activate(fakes::toy_calibration(), camera);
+  const auto active = activate(fakes::toy_calibration(), camera, {});
   EXPECT_EQ(active->region, (CellRegion{.x0 = 2, .y0 = 2, .x1 = 38, .y1 = 28}));
   EXPECT_FALSE(active->camera_mismatch);
   auto other = fakes::toy_calibration();
   other->origin.camera = "another";
-  EXPECT_TRUE(activate(other, camera)->camera_mismatch);
+  EXPECT_TRUE(activate(other, camera, {})->camera_mismatch);
 }
 
 TEST(Statistics, CountsFramesOfTheLastSecond) {

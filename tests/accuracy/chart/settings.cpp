@@ -1,0 +1,128 @@
+#include "tests/accuracy/chart/settings.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "daemon/calibration/build.hpp"
+#include "daemon/recon/decimate.hpp"
+
+namespace dtact::chart {
+namespace {
+
+std::shared_ptr<const recon::Model> calibrate(const image::Grey16& reference, const Shot& press,
+                                              recon::Method method) {
+  return calibration::build({.reference_q8 = reference,
+                             .frames = press.frames,
+                             .ball_radius_mm = 4.0,
+                             .mm_per_px = kMmPerPx,
+                             .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide},
+                             .method = method})
+      .model;
+}
+
+/// A map's value at a place between its pixels; none where one of the four is untrusted.
+std::optional<double> bilinear(const std::vector<std::int16_t>& map, int width, int height,
+                               double x, double y) {
+  x = std::clamp(x, 0.0, width - 1.0);
+  y = std::clamp(y, 0.0, height - 1.0);
+  const int x0 = std::min(static_cast<int>(x), std::max(0, width - 2));
+  const int y0 = std::min(static_cast<int>(y), std::max(0, height - 2));
+  double sum = 0;
+  for (int k = 0; k < 4; ++k) {
+    const int px = std::min(x0 + k % 2, width - 1);
+    const int py = std::min(y0 + k / 2, height - 1);
+    const double wx = k % 2 == 0 ? 1 - (x - x0) : x - x0;
+    const double wy = k / 2 == 0 ? 1 - (y - y0) : y - y0;
+    const std::int16_t um = map[static_cast<std::size_t>(py) * static_cast<std::size_t>(width) +
+                                static_cast<std::size_t>(px)];
+    if (wx * wy == 0) continue;
+    if (um == recon::kUntrusted) return std::nullopt;
+    sum += wx * wy * um;
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::vector<Setting> make_settings(const image::Grey16& reference, const Shot& calibration_press) {
+  std::vector<Setting> settings;
+  settings.push_back({"published full", "published", 1, false, 0,
+                      calibrate(reference, calibration_press, recon::Method::published)});
+  const auto list = calibrate(reference, calibration_press, recon::Method::list);
+  constexpr const char* kShare[] = {"", "full", "half", "", "quarter"};
+  for (const double smoothing_mm : {0.05, 0.1, 0.2, 0.4}) {
+    recon::Model smoothed = *list;
+    smoothed.smoothing_px = smoothing_mm / kMmPerPx;
+    for (const int decimation : {1, 2, 4}) {
+      const auto model =
+          std::make_shared<const recon::Model>(recon::decimate(smoothed, decimation));
+      for (const bool tiles : {false, true}) {
+        settings.push_back({fmt::format("list {}{} {:.2f}", kShare[decimation],
+                                        tiles ? " tiles" : "", smoothing_mm),
+                            "list", decimation, tiles, smoothing_mm, model});
+      }
+    }
+  }
+  return settings;
+}
+
+Worker::Worker(const Setting& setting, const image::Grey16& reference, const Shot& shot)
+    : setting_(setting), shot_(shot), reconstructor_(setting.model) {
+  reconstructor_.set_reference(reference.pixels);
+  for (const image::Grey8& frame : shot.frames) {
+    frames_.push_back(frame.pixels);
+    frames_.back().resize(frame.pixels.size() + recon::kLumaPadding);
+  }
+  const recon::RectifyTable& table = setting.model->rectify;
+  depth_um_.resize(static_cast<std::size_t>(table.width) * static_cast<std::size_t>(table.height));
+}
+
+void Worker::once() {
+  const std::uint8_t* luma = frames_[next_].data();
+  next_ = (next_ + 1) % frames_.size();
+  if (setting_.tiles) {
+    reconstructor_.run_active(luma, kWidth, depth_um_, drawn_, report_);
+  } else {
+    reconstructor_.run(luma, kWidth, depth_um_);
+  }
+}
+
+Error Worker::error() {
+  // The look for what changed has seen a few frames, as it has in a running daemon.
+  for (std::size_t i = 0; i < frames_.size(); ++i) once();
+  Error mean;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    once();
+    const Error one = error_of(depth_um_, setting_.decimation, shot_);
+    mean.mean_absolute_mm += one.mean_absolute_mm / static_cast<double>(frames_.size());
+    mean.untrusted_share += one.untrusted_share / static_cast<double>(frames_.size());
+  }
+  return mean;
+}
+
+Error error_of(const std::vector<std::int16_t>& depth_um, int decimation, const Shot& shot) {
+  const int width = kSide / decimation;
+  const double scale = 1.0 / decimation;
+  double sum_mm = 0;
+  std::int64_t trusted = 0;
+  std::int64_t judged = 0;
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const auto at = static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x);
+      if (shot.judged[at] == 0) continue;
+      ++judged;
+      const auto um =
+          bilinear(depth_um, width, width, (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5);
+      if (!um) continue;
+      ++trusted;
+      sum_mm += std::abs(*um / 1000.0 - double{shot.truth_mm[at]});
+    }
+  }
+  return {trusted == 0 ? NAN : sum_mm / static_cast<double>(trusted),
+          judged == 0 ? 0 : 1 - static_cast<double>(trusted) / static_cast<double>(judged)};
+}
+
+}  // namespace dtact::chart
