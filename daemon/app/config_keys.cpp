@@ -104,8 +104,9 @@ Key choice(std::string path, std::string& field, std::vector<std::string> allowe
 }
 
 /// A number that goes by a name.
-Key named(std::string path, int& field, std::vector<std::pair<std::string, int>> names) {
+Key named(std::string path, int& field, const std::vector<std::pair<std::string, int>>& names) {
   std::vector<std::string> words;
+  words.reserve(names.size());
   for (const auto& [name, value] : names) words.push_back(toml_string(name));
   return {std::move(path), fmt::format("one of {}", fmt::join(words, ", ")),
           [&field, names](const toml::node& node, const fs::path&) {

@@ -164,6 +164,8 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, const Activity
 
   rectify_reference(model->reference_q8);
   smooth_reference(calibration_q6);
+  apply(model->gain, {grid.width, grid.height, vec::padded(grid.width), model->mm_per_px},
+        calibration_q6);
   set_reference(model->reference_q8);
 }
 

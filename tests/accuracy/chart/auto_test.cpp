@@ -114,6 +114,7 @@ TEST(Auto, KeepsTheBoundWhereverFullResolutionDoesAndSavesPixels) {
 TEST(Uncertainty, IsHonestOnEveryObject) {
   const std::vector<Judged> run = scripted_run(60);
   std::vector<double> ratios;
+  ratios.reserve(run.size());
   for (const Judged& j : run) ratios.push_back(j.error_um / j.uncertainty_um);
   std::ranges::sort(ratios);
   const auto at = [&](double part) {
