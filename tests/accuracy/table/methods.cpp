@@ -3,6 +3,7 @@
 #include <array>
 
 #include "daemon/calibration/build.hpp"
+#include "tests/accuracy/table/regression.hpp"
 
 namespace dtact::table {
 namespace {
@@ -22,20 +23,27 @@ std::shared_ptr<const recon::Model> published_single(const Material& material) {
   return from_one(material, recon::Method::published);
 }
 
+std::shared_ptr<const recon::Model> published_regression(const Material& material) {
+  const RegressionCentre& centre = material.regression_centre;
+  return fit_regression(material, centre.right_mm, centre.down_mm);
+}
+
 std::shared_ptr<const recon::Model> ours_single(const Material& material) {
   return from_one(material, recon::Method::list);
 }
 
-constexpr std::array<Method, 2> kMethods = {{
+constexpr std::array<Method, 3> kMethods = {{
     {"published single image", published_single},
+    {"published linear regression", published_regression},
     {"ours, one press", ours_single},
 }};
 
 }  // namespace
 
-Material gather(Sensor& sensor, const Trial& trial) {
+Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& centre) {
   Material material;
   material.trial = &trial;
+  material.regression_centre = centre;
   material.reference_q8 = sensor.reference(kReferenceFrames);
   material.centre = sensor.press(0, kPressFrames);
   for (std::size_t i = 0; i < trial.many.size(); ++i) {
