@@ -44,9 +44,11 @@ struct PressReport {
 
 /// The paper's linear regression, to compare with: depth = (k·distance + b) · darkening, the
 /// distance taken from (centre_x_mm, centre_y_mm) in the map (0, 0 is its centre; the paper moves
-/// it to a corner where the light comes from there), fitted by least squares over all pixels of all
-/// published circles against the sphere that is at zero on the circle. The two 7×7 Gaussian filters
-/// that follow become one smoothing of the difference: everything in between is linear.
+/// it to a corner where the light comes from there). As it is described: truth is the sphere in
+/// each press's published circle, zero on the circle; each pixel gets a slope, by least squares
+/// over the presses whose circle holds it; a line is fitted through the slopes against the
+/// distance. What is brighter than untouched is 0, and the two 7×7 Gaussian filters that follow
+/// become one smoothing of the difference: everything in between is linear.
 [[nodiscard]] Calibration build_regression(const BallPresses& set, double centre_x_mm = 0,
                                            double centre_y_mm = 0);
 

@@ -13,6 +13,9 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::chrono::milliseconds kLongestGrab{100};
 /// Pause before a camera that is away is asked again.
 constexpr std::int64_t kAwayPauseNs = 20'000'000;
+/// The published method knows no gain: a light brighter or dimmer than at calibration by this share
+/// makes every depth wrong by as much.
+constexpr double kOtherLevel = 0.1;
 
 constexpr const char* kTouchedSentence = "something touches: lift it and ask again, or force it";
 constexpr const char* kUnsteadySentence =
@@ -216,6 +219,16 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
   out.times.inspect_ns = clock_.monotonic_ns() - began_ns;
 }
 
+void CaptureLoop::use_reference() noexcept {
+  active_->set_reference(keeper_.reference());
+  const recon::Model& model = *active_->calibration->model;
+  const recon::RectifyTable& table = model.rectify;
+  image_watch_.set_reference(keeper_.reference(), table.frame_width, table.frame_height,
+                             active_->region);
+  const double light = image_watch_.reference_mean() / active_->grid.mean;
+  other_level_ = model.method == recon::Method::published && std::abs(light - 1) > kOtherLevel;
+}
+
 /// What the map is worth, and at which resolution the next is made.
 void CaptureLoop::judge(DepthFrame& out) noexcept {
   const auto from_um = static_cast<std::int16_t>(1000 * config_.contact.made_mm);
@@ -229,13 +242,6 @@ void CaptureLoop::judge(DepthFrame& out) noexcept {
   if (config_.reconstruction.decimation == 0) {
     active_->use_decimation(chooser_.next(list_um, bend));
   }
-}
-
-void CaptureLoop::use_reference() noexcept {
-  active_->set_reference(keeper_.reference());
-  const recon::RectifyTable& table = active_->reconstructor().model().rectify;
-  image_watch_.set_reference(keeper_.reference(), table.frame_width, table.frame_height,
-                             active_->region);
 }
 
 void CaptureLoop::publish(DepthFrame& out) noexcept {
@@ -339,7 +345,7 @@ HealthSet CaptureLoop::health(bool settled, std::int64_t now_ns) const noexcept 
     set.set(Health::uncalibrated);
     set.set(Health::light_unsettled, !settled);
   }
-  set.set(Health::light_mismatch, light_mismatch_);
+  set.set(Health::light_mismatch, light_mismatch_ || other_level_);
   const bool differs = active_ && exchange_.camera_mismatch.load(std::memory_order_relaxed);
   set.set(Health::camera_mismatch, unusable_ || controls_moved_ || differs);
   set.set(Health::beyond_calibration, beyond_);

@@ -90,6 +90,7 @@ class CaptureLoop {
 
   hal::Light shown_;  // by the ring, as last noted
   bool light_mismatch_ = false;
+  bool other_level_ = false;     // the reference's light is not the calibration's, and it matters
   bool beyond_ = false;          // in the newest frame
   bool controls_moved_ = false;  // as the newest frame says
   std::int64_t beyond_until_ns_ = INT64_MIN;

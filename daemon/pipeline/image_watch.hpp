@@ -25,6 +25,8 @@ class ImageWatch {
   /// No depth is measured at present, so nothing is said about it.
   void forget() noexcept;
 
+  /// Grey levels, of the whole frame.
+  [[nodiscard]] double reference_mean() const noexcept { return reference_.mean; }
   [[nodiscard]] const HealthSet& conditions() const noexcept { return conditions_; }
 
  private:

@@ -32,9 +32,11 @@ struct Job {
 void work(Job& job) {
   try {
     const atlas::Outcome o = atlas::run(job.method->calibration, job.row->script(job.value));
-    job.line = fmt::format("{},\"{}\",{},{:.5f},{:.5f},{:.3f},{:.3f},\"{}\"\n", job.row->id,
-                           job.method->name, job.value, o.inside_mm, o.outside_mm, o.withheld,
-                           o.flagged, atlas::conditions_of(o));
+    job.line = fmt::format(
+        "{},{},\"{}\",\"{}\",\"{}\",\"{}\",{},{:.5f},{:.5f},{:.5f},{:.3f},{:.3f},\"{}\"\n",
+        job.row->group, job.row->id, job.row->title, job.row->unit, job.row->undecidable,
+        job.method->name, job.value, o.inside_mm, o.outside_mm, o.stated_mm, o.withheld, o.flagged,
+        atlas::conditions_of(o));
   } catch (...) {
     job.failure = std::current_exception();
   }
@@ -50,7 +52,10 @@ std::string all(std::vector<Job>& jobs, int threads) {
       });
     }
   }
-  std::string csv = "row,method,value,inside_mm,outside_mm,withheld,flagged,conditions\n";
+  std::string csv =
+      "group,row,title,unit,undecidable,method,value,inside_mm,outside_mm,stated_mm,withheld,"
+      "flagged,"
+      "conditions\n";
   for (const Job& job : jobs) {
     if (job.failure) std::rethrow_exception(job.failure);
     csv += job.line;
@@ -58,17 +63,19 @@ std::string all(std::vector<Job>& jobs, int threads) {
   return csv;
 }
 
-void print_false_flags() {
+/// A line like the others: the value is the number of frames, the error the share flagged falsely.
+std::string false_flags() {
   int frames = 0;
   double flagged = 0;
+  std::string conditions;
   for (const atlas::Script& script : atlas::clean_scripts()) {
-    const atlas::Outcome o = atlas::run(atlas::methods()[0].calibration, script);
+    const atlas::Outcome o = atlas::run(atlas::methods().back().calibration, script);
     frames += o.frames;
     flagged += o.flagged * o.frames;
-    fmt::print(stderr, "clean: {:.4f} of {} frames flagged ({})\n", o.flagged, o.frames,
-               atlas::conditions_of(o));
+    conditions += atlas::conditions_of(o);
   }
-  fmt::print("clean,,{},,,,{:.5f},\n", frames, flagged / frames);
+  return fmt::format("clean,clean,,,,,{},{:.5f},,,,,\"{}\"\n", frames, flagged / frames,
+                     conditions);
 }
 
 }  // namespace
@@ -91,9 +98,9 @@ int main(int argc, char** argv) {
         for (const double value : row.values) jobs.push_back({&row, value, &method, {}, {}});
       }
     }
-    const std::string csv = all(jobs, threads);
+    std::string csv = all(jobs, threads);
+    if (only.empty()) csv += false_flags();
     fmt::print("{}", csv);
-    if (only.empty()) print_false_flags();
     if (!out.empty()) dtact::base::write_file_atomically(out / "atlas.csv", csv);
     return 0;
   } catch (const std::exception& e) {

@@ -11,7 +11,7 @@ const std::vector<Method>& methods() {
     const table::Trial trial = table::draw(1);
     table::Sensor sensor(table::solve(hal::sim::default_scene(), trial.all()),
                          table::configurations()[0], trial.seed);
-    const table::Material material = table::gather(sensor, trial);
+    const table::Material material = table::gather(sensor, trial, {});
     std::vector<Method> all;
     for (const table::Method& method : table::methods()) {
       calibration::Calibration calibration;

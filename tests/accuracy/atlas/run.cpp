@@ -39,6 +39,8 @@ class Judge {
       ++withheld_;
       return;
     }
+    ++depths_;
+    stated_um_ += frame->uncertainty_um;
     look_up(true_moment(script_, n));
     table::Error inside;
     table::Error outside;
@@ -65,6 +67,7 @@ class Judge {
     outcome_.outside_mm = outside_.mean_mm();
     outcome_.withheld = withheld_ / frames;
     outcome_.flagged = flagged_ / frames;
+    outcome_.stated_mm = 0.001 * stated_um_ / std::max(1, depths_);
     return outcome_;
   }
 
@@ -82,6 +85,8 @@ class Judge {
   std::optional<std::uint64_t> moment_;
   double withheld_ = 0;
   double flagged_ = 0;
+  double stated_um_ = 0;
+  int depths_ = 0;
 };
 
 /// Between two frames it hands the one before to the judge; its clock is the loop's.
@@ -172,11 +177,13 @@ Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
   camera.attach(exchange);
   pipeline::PipelineConfig config;
   config.reference.frames = 16;
+  config.reconstruction.decimation = 1;
   pipeline::LightDriver light(std::make_unique<hal::null::NullRing>(), config.light, clock,
                               exchange.wake);
   pipeline::ReferenceWriter writer(table.frame_width, table.frame_height, {});
   pipeline::CaptureLoop loop({camera, light, writer, exchange, clock}, config,
-                             pipeline::activate(calibration, camera.info(), {}), false);
+                             pipeline::activate(calibration, camera.info(), config.reconstruction),
+                             false);
   loop.run();
   return camera.outcome();
 }

@@ -35,8 +35,9 @@ inline constexpr int kReady = 30;
 struct Outcome {
   double inside_mm = 0;   ///< Mean absolute error where the object touches; NaN: no depth there.
   double outside_mm = 0;  ///< And elsewhere.
-  double withheld = 0;  ///< Share of the frames without depth, or of the contact marked untrusted.
-  double flagged = 0;   ///< Share of the frames that carried a condition.
+  double withheld = 0;   ///< Share of the frames without depth, or of the contact marked untrusted.
+  double flagged = 0;    ///< Share of the frames that carried a condition.
+  double stated_mm = 0;  ///< The uncertainty that the frames with depth carried, mean.
   std::array<int, pipeline::kHealthCount> conditions{};  ///< Frames that carried each.
   int frames = 0;
 

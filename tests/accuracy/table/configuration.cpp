@@ -13,12 +13,12 @@ namespace {
 using hal::sim::Arrangement;
 
 constexpr std::array<Configuration, 6> kConfigurations = {{
-    {"all LEDs", "all", Arrangement::ring, 1, Published{4.080, 0.0476, 0.0534}},
-    {"scheme 1", "scheme1", Arrangement::ring, 2, Published{5.237, 0.0509, 0.0542}},
-    {"scheme 2", "scheme2", Arrangement::ring, 2, Published{5.262, 0.0524, 0.0586}},
-    {"scheme 3", "scheme3", Arrangement::ring, 2, Published{5.451, 0.0650, 0.0678}},
-    {"scheme 4", "scheme4", Arrangement::ring, 2, Published{16.550, 0.0510, 0.0651}},
-    {"side-lit", "all", Arrangement::sides, 1, std::nullopt},
+    {"all LEDs", "all", Arrangement::ring, 1, {}, Published{4.080, 0.0476, 0.0534}},
+    {"scheme 1", "scheme1", Arrangement::ring, 2, {}, Published{5.237, 0.0509, 0.0542}},
+    {"scheme 2", "scheme2", Arrangement::ring, 2, {}, Published{5.262, 0.0524, 0.0586}},
+    {"scheme 3", "scheme3", Arrangement::ring, 2, {}, Published{5.451, 0.0650, 0.0678}},
+    {"scheme 4", "scheme4", Arrangement::ring, 2, {12, -12}, Published{16.550, 0.0510, 0.0651}},
+    {"side-lit", "all", Arrangement::sides, 1, {}, std::nullopt},
 }};
 
 }  // namespace

@@ -26,6 +26,12 @@ struct Published {
   double regression_mm = 0;
 };
 
+/// (u_c, v_c) of the paper's linear regression, from the crop's centre.
+struct RegressionCentre {
+  double right_mm = 0;
+  double down_mm = 0;
+};
+
 /// A column of the table: which LEDs are lit, and where they are.
 struct Configuration {
   std::string_view name;
@@ -34,6 +40,8 @@ struct Configuration {
   /// Relative to all LEDs of the ring: half of the LEDs are exposed twice as long, so that the
   /// reference image is as bright.
   double exposure = 1;
+  /// The paper moved it to the upper right corner for scheme 4.
+  RegressionCentre regression_centre;
   std::optional<Published> published;  ///< The paper shows the side-lit sensor without numbers.
 };
 

@@ -42,7 +42,9 @@ calibration::BallPresses many_presses(const Material& material) {
 }
 
 std::shared_ptr<const recon::Model> published_regression(const Material& material) {
-  return calibration::build_regression(many_presses(material)).model;
+  const RegressionCentre& centre = material.regression_centre;
+  return calibration::build_regression(many_presses(material), centre.right_mm, centre.down_mm)
+      .model;
 }
 
 std::shared_ptr<const recon::Model> ours_many(const Material& material) {
@@ -58,9 +60,10 @@ constexpr std::array<Method, 4> kMethods = {{
 
 }  // namespace
 
-Material gather(Sensor& sensor, const Trial& trial) {
+Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& centre) {
   Material material;
   material.trial = &trial;
+  material.regression_centre = centre;
   material.reference_q8 = sensor.reference(kReferenceFrames);
   material.centre = sensor.press(0, kPressFrames);
   for (std::size_t i = 0; i < trial.many.size(); ++i) {

@@ -15,6 +15,7 @@ namespace dtact::table {
 /// The images a calibration is made from.
 struct Material {
   const Trial* trial = nullptr;  ///< For the balls' radii.
+  RegressionCentre regression_centre;
   image::Grey16 reference_q8;
   std::vector<image::Grey8> centre;             ///< Of the press near the centre.
   std::vector<std::vector<image::Grey8>> many;  ///< Of the presses anywhere.
@@ -25,7 +26,7 @@ struct Material {
 inline constexpr std::size_t kPressFrames = 8;
 inline constexpr std::size_t kReferenceFrames = 32;
 
-[[nodiscard]] Material gather(Sensor& sensor, const Trial& trial);
+[[nodiscard]] Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& centre);
 
 /// A row of the table.
 struct Method {

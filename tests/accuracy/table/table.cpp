@@ -83,7 +83,7 @@ std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count)
   std::vector<std::int16_t> depth(std::size_t{kCrop} * kCrop);
   for (std::size_t c = 0; c < configuration_count; ++c) {
     Sensor sensor(truth, configurations()[c], trial.seed);
-    const Material material = gather(sensor, trial);
+    const Material material = gather(sensor, trial, configurations()[c].regression_centre);
     const auto tests = photograph(sensor, trial, crop8(material.reference_q8));
     for (std::size_t m = 0; m < methods().size(); ++m) {
       recon::Reconstructor reconstructor(methods()[m].calibrate(material));

