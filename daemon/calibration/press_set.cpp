@@ -1,12 +1,14 @@
 #include "daemon/calibration/press_set.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
+#include <utility>
 
 #include "daemon/calibration/chain_fit.hpp"
 
@@ -60,18 +62,35 @@ struct Fitted {
   ChainFit chain;
 };
 
-/// Alternates between the contacts' radii and the chain.
-Fitted fit(const recon::Model& model, const BallPresses& set) {
-  Fitted fitted;
-  std::vector<double> reach_mm;
-  for (const BallPresses::Press& press : set.presses) {
+/// The presses in which a contact is found; the others' reasons go to `left_out`.
+std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set,
+                                     std::vector<std::string>& left_out) {
+  std::vector<SettledPress> presses;
+  std::vector<BallPresses::Press> used;
+  for (BallPresses::Press& press : set.presses) {
     try {
-      fitted.presses.push_back(
-          settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm));
-    } catch (const std::exception& e) {
-      throw std::runtime_error(fmt::format("{}: {}", press.name, e.what()));
+      presses.push_back(settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm));
+      used.push_back(std::move(press));
+    } catch (const std::runtime_error& e) {
+      left_out.push_back(fmt::format("{}: {}", press.name, e.what()));
     }
-    reach_mm.push_back(kSure * fitted.presses.back().contact.radius_mm);
+  }
+  set.presses = std::move(used);
+  if (presses.size() < 2) {
+    throw std::runtime_error(
+        fmt::format("a chain of presses needs at least two in which a contact is found: press "
+                    "lighter and deeper{}{}",
+                    left_out.empty() ? "" : "; left out: ", fmt::join(left_out, "; ")));
+  }
+  return presses;
+}
+
+/// Alternates between the contacts' radii and the chain.
+Fitted fit(std::vector<SettledPress> presses, const BallPresses& set) {
+  Fitted fitted{.presses = std::move(presses), .profiles = {}, .chain = {}};
+  std::vector<double> reach_mm;
+  for (const SettledPress& press : fitted.presses) {
+    reach_mm.push_back(kSure * press.contact.radius_mm);
   }
   for (int round = 0; round < kRounds; ++round) {
     fitted.profiles.clear();
@@ -161,18 +180,19 @@ void refuse_gaps(const ChainFit& chain, const BallPresses& set) {
 
 }  // namespace
 
-Calibration build(const BallPresses& set, PressReport* report) {
-  if (set.presses.size() < 2) {
-    throw std::invalid_argument("a chain of presses needs at least two: press lighter and deeper");
-  }
+Calibration build(const BallPresses& presses, PressReport* report) {
+  BallPresses set = presses;
   Calibration calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px);
-  recon::Model plain = *calibration.model;
+  const recon::Model plain = *calibration.model;
   recon::Model uniform = plain;
   uniform.gain.shape = recon::GainShape::uniform;
 
-  Fitted fitted = fit(plain, set);
+  PressReport found;
+  // With one gain a faint press may be seen and with the other not: both get what both see.
+  (void)settle_all(plain, set, found.left_out);
+  Fitted lit = fit(settle_all(uniform, set, found.left_out), set);
+  Fitted fitted = fit(settle_all(plain, set, found.left_out), set);
   std::vector<Prediction> predictions = predict_each(fitted);
-  Fitted lit = fit(uniform, set);
   const std::vector<Prediction> lit_predictions = predict_each(lit);
   const double without = mean_error(predictions);
   const double with = mean_error(lit_predictions);
@@ -197,7 +217,14 @@ Calibration build(const BallPresses& set, PressReport* report) {
                           radial_profile(press.map, press.contact, kFarField * set.ball_radius_mm));
   model->uncertainty = uncertainty_of(predictions);
   calibration.model = std::move(model);
-  if (report != nullptr) *report = {fitted.chain.depth_mm, without, with};
+  if (report != nullptr) {
+    for (std::size_t p = 0; p < set.presses.size(); ++p) {
+      found.presses.push_back({set.presses[p].name, fitted.chain.depth_mm[p]});
+    }
+    found.without_gain_mm = without;
+    found.uniform_gain_mm = with;
+    *report = std::move(found);
+  }
   return calibration;
 }
 

@@ -24,7 +24,12 @@ struct BallPresses {
 
 /// What build() found out on the way.
 struct PressReport {
-  std::vector<double> depth_mm;  ///< Of each press's lowest point, as fitted.
+  struct Depth {
+    std::string name;     ///< Of the press.
+    double depth_mm = 0;  ///< Of its lowest point, as fitted.
+  };
+  std::vector<Depth> presses;         ///< Those that were used.
+  std::vector<std::string> left_out;  ///< The others: name and reason.
   /// Mean absolute error of each press under the list of all others, inside the sure contact, with
   /// each gain that was tried, millimetres.
   double without_gain_mm = 0;
@@ -38,8 +43,9 @@ struct PressReport {
 /// uncertainty is that error, with 5 % of the depth for objects of another shape added in squares.
 /// `origin` is left for the caller to fill.
 ///
-/// Throws std::runtime_error when a press cannot be used (naming it), and when the presses leave a
-/// gap that no press of known depth closes, saying which press is missing. At least two presses.
+/// A press without a contact that can be used (too light, beyond the map) is left out. Throws
+/// std::runtime_error when fewer than two remain, naming those left out, and when the presses leave
+/// a gap that no press of known depth closes, saying which press is missing. At least two presses.
 [[nodiscard]] Calibration build(const BallPresses& set, PressReport* report = nullptr);
 
 /// The paper's linear regression, to compare with: depth = (k·distance + b) · darkening, the

@@ -96,10 +96,11 @@ calibration::Calibration make_from_many(const Options& options, const ImageSet& 
           ? calibration::build_regression(set, options.gain_centre[0], options.gain_centre[1])
           : calibration::build(set, &report);
   made.origin = origin;
-  for (std::size_t i = 0; i < report.depth_mm.size(); ++i) {
-    fmt::print("{}: {:.3f} mm deep\n", set.presses[i].name, report.depth_mm[i]);
+  for (const std::string& press : report.left_out) fmt::print("left out: {}\n", press);
+  for (const auto& press : report.presses) {
+    fmt::print("{}: {:.3f} mm deep\n", press.name, press.depth_mm);
   }
-  if (!report.depth_mm.empty()) {
+  if (!report.presses.empty()) {
     fmt::print(
         "a press under the list of the others: {:.4f} mm off as it is, {:.4f} mm as a share "
         "of the light at its place: {}\n",
