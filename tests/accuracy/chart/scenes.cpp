@@ -79,6 +79,17 @@ Shot make_calibration_press() {
   return shoot("calibration", press("\"ball\"\nradius_mm = 4.0", "x = 0.8, y = -0.5", 1.3), 32);
 }
 
+std::vector<Shot> make_calibration_presses() {
+  std::vector<Shot> shots;
+  for (int i = 0; i < 11; ++i) {
+    const std::string place = "x = " + std::to_string(i * 7 % 11 - 5) +
+                              ".0, y = " + std::to_string(i * 4 % 11 - 5) + ".0";
+    shots.push_back(shoot("press " + std::to_string(i + 1),
+                          press("\"ball\"\nradius_mm = 4.0", place, 0.4 + 0.1 * i), kShotFrames));
+  }
+  return shots;
+}
+
 std::vector<Shot> make_shots() {
   std::vector<Shot> shots;
   shots.push_back(

@@ -36,6 +36,10 @@ struct Shot {
 /// A ball of 4 mm radius pressed 1.3 mm deep near the centre: what calibrates.
 [[nodiscard]] Shot make_calibration_press();
 
+/// The same ball at eleven places, 0.4 to 1.4 mm deep: what calibrates where several presses are
+/// taken.
+[[nodiscard]] std::vector<Shot> make_calibration_presses();
+
 /// A ball of 5 mm radius 1.2 mm deep, three set screws 0.8 mm deep, a flat disc that covers most of
 /// the field 0.25 mm deep, nothing.
 [[nodiscard]] std::vector<Shot> make_shots();

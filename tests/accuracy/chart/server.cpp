@@ -56,9 +56,8 @@ std::vector<float> published_list_mm(const std::vector<Setting>& settings) {
 
 struct Lab {
   image::Grey16 reference = make_reference();
-  Shot calibration_press = make_calibration_press();
   std::vector<Shot> shots = make_shots();
-  std::vector<Setting> settings = make_settings(reference, calibration_press);
+  std::vector<Setting> settings = make_settings(reference);
   std::unique_ptr<Worker> worker;
 
   void use(const std::string& what) {

@@ -13,16 +13,16 @@ namespace dtact::chart {
 /// One way to reconstruct.
 struct Setting {
   std::string name;           ///< "list full tiles 0.10", unique.
-  std::string method;         ///< "published", "list".
+  std::string method;         ///< "published", "regression", "list", "ours".
   int decimation = 1;         ///< 1, 2 or 4.
   bool tiles = false;         ///< Only what changed.
   double smoothing_mm = 0.1;  ///< Standard deviation; 0: the method's own.
   std::shared_ptr<const recon::Model> model;
 };
 
-/// All of them, each calibrated with make_calibration_press() and nothing else.
-[[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference,
-                                                 const Shot& calibration_press);
+/// All of them, calibrated with make_calibration_press() or, "regression" and "ours", with
+/// make_calibration_presses(), and nothing else.
+[[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference);
 
 struct Error {
   double mean_absolute_mm = 0;  ///< Over judged, trusted pixels.
