@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -46,6 +47,7 @@ std::string all(std::vector<Job>& jobs, int threads) {
   std::atomic<std::size_t> next{0};
   {
     std::vector<std::jthread> workers;
+    workers.reserve(static_cast<std::size_t>(threads));
     for (int i = 0; i < threads; ++i) {
       workers.emplace_back([&] {
         for (std::size_t j = next++; j < jobs.size(); j = next++) work(jobs[j]);

@@ -95,6 +95,10 @@ double greatest_difference(Spoiler& a, const Shot& shot_a, Spoiler& b, const Sho
   for (int y = 0; y < first.height; ++y) {
     kept.insert(kept.end(), first.row(y), first.row(y) + first.width);
   }
+  const auto width = static_cast<std::size_t>(first.width);
+  const auto at = [width](int x, int y) {
+    return static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+  };
   const hal::LumaView second = b.make(shot_b, 1);
   // Means over cells of 16 × 16 pixels, so that rounding to whole levels averages out.
   const int reach = static_cast<int>(reach_mm / a.truth().scene().camera.mm_per_px / 16);
@@ -104,7 +108,7 @@ double greatest_difference(Spoiler& a, const Shot& shot_a, Spoiler& b, const Sho
       int sum = 0;
       for (int y = cy * 16; y < cy * 16 + 16; ++y) {
         for (int x = cx * 16; x < cx * 16 + 16; ++x) {
-          sum += second.row(y)[x] - kept[static_cast<std::size_t>(y * first.width + x)];
+          sum += second.row(y)[x] - kept[at(x, y)];
         }
       }
       greatest = std::max(greatest, std::abs(sum / 256.0));

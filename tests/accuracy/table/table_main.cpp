@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -35,6 +36,7 @@ std::vector<Cell> run_all(int seeds, int threads, std::size_t columns) {
   };
   {
     std::vector<std::jthread> workers;
+    workers.reserve(static_cast<std::size_t>(threads));
     for (int i = 0; i < threads; ++i) workers.emplace_back(work);
   }
   std::vector<Cell> cells;

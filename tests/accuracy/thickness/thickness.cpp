@@ -101,7 +101,7 @@ class Bench {
   /// Amplitude of the first harmonic of `value` along x over the middle of the plate, doubled:
   /// ridge minus groove of a sine, the same measure for truth and map.
   template <typename Value>
-  double contrast(double pitch_mm, const Value& value) const {
+  [[nodiscard]] double contrast(double pitch_mm, const Value& value) const {
     const double periods = std::max(1.0, std::floor(0.6 * kPlateMm / pitch_mm));
     const int half_width = static_cast<int>(std::lround(periods * pitch_mm / 2 / table::kMmPerPx));
     const int half_height = static_cast<int>(1.0 / table::kMmPerPx);
@@ -110,8 +110,8 @@ class Bench {
     double n = 0;
     for (int y = -half_height; y < half_height; ++y) {
       for (int x = -half_width; x < half_width; ++x) {
-        const auto i =
-            static_cast<std::size_t>((table::kCrop / 2 + y) * table::kCrop + table::kCrop / 2 + x);
+        const std::size_t i = static_cast<std::size_t>(table::kCrop / 2 + y) * table::kCrop +
+                              static_cast<std::size_t>(table::kCrop / 2 + x);
         if (depth_[i] == recon::kUntrusted) continue;
         const double angle = 2 * std::numbers::pi * x * table::kMmPerPx / pitch_mm;
         c += value(i) * std::cos(angle);
@@ -155,8 +155,8 @@ Result measure(double thickness_mm) {
   }
   // The simulator's objects reach 0.9 of the layer at most.
   const double most = 0.9 * thickness_mm;
-  for (double depth = 0.4; depth < most; depth += 0.1) {
-    result.presses.push_back(bench.press(depth));
+  for (int tenths = 4; 0.1 * tenths < most; ++tenths) {
+    result.presses.push_back(bench.press(0.1 * tenths));
   }
   return result;
 }

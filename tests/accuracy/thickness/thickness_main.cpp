@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
     app.add_option("--out", out, "Folder of thickness.csv; without it, only printed");
     CLI11_PARSE(app, argc, argv);
     std::vector<dtact::thickness::Result> results;
+    results.reserve(dtact::thickness::kThicknesses.size());
     for (const double mm : dtact::thickness::kThicknesses) {
       results.push_back(dtact::thickness::measure(mm));
     }

@@ -10,13 +10,11 @@ namespace {
 TEST(Thickness, ThinLayersResolveFinerAndThickOnesMeasureDeeper) {
   const Result thin = measure(1.0);
   const Result thick = measure(2.5);
-  ASSERT_TRUE(thin.finest_mm() && thick.finest_mm());
-  EXPECT_LT(*thin.finest_mm(), *thick.finest_mm());
-  EXPECT_LE(*thin.finest_mm(), 1.5);
-  ASSERT_TRUE(thin.deepest_mm() && thick.deepest_mm());
-  EXPECT_LE(*thin.deepest_mm(), 0.9);
-  EXPECT_GE(*thin.deepest_mm(), 0.7);
-  EXPECT_GE(*thick.deepest_mm(), 1.8);
+  EXPECT_LT(thin.finest_mm().value(), thick.finest_mm().value());
+  EXPECT_LE(thin.finest_mm().value(), 1.5);
+  EXPECT_LE(thin.deepest_mm().value(), 0.9);
+  EXPECT_GE(thin.deepest_mm().value(), 0.7);
+  EXPECT_GE(thick.deepest_mm().value(), 1.8);
 }
 
 TEST(Thickness, PitchesBeyondTheFirstUnresolvedOneDoNotCount) {

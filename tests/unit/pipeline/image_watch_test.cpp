@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -26,7 +27,7 @@ class ImageWatchTest : public ::testing::Test {
   void look() { watch_.look(report_, {pixels_.data(), kWidth, kHeight, kWidth}); }
   [[nodiscard]] bool has(Health health) const { return watch_.conditions().has(health); }
 
-  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(kWidth * kHeight, 100);
+  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(std::size_t{kWidth} * kHeight, 100);
   recon::ActivityReport report_;
   ImageWatch watch_;
 };
