@@ -61,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"leak", 2, 10}, Case{"banding", 0, 0.05},
                       Case{"banding_fast", 0.01, 0.1}, Case{"dead_pixels", 500, 10000},
                       Case{"frozen", 0, 4}, Case{"torn", 0, 0.5}, Case{"truncated", 0, 1},
-                      Case{"bulge", 0.5, 1.6}, Case{"full_field", 4, 10}),
+                      Case{"bulge", 0.5, 1.6}, Case{"full_field", 3, 10}),
     [](const auto& one) { return std::string(one.param.id); });
 
 TEST(Atlas, CleanScenesAreNotFlagged) {

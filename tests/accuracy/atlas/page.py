@@ -48,7 +48,7 @@ def verdict(runs, nominal):
     """Where the error leaves twice the nominal one, and what was said there."""
     wrong = [r for r in runs if r.error > 2 * nominal or math.isnan(r.error)]
     if not wrong:
-        return "stays within", "–", False
+        return "stays within", "–", False, False
     first = wrong[0]
     silent = [r for r in wrong if not r.told and r.error > 2 * r.stated]
     said = first.conditions or ("no depth given" if first.told else "no condition")
@@ -57,7 +57,7 @@ def verdict(runs, nominal):
     if silent:
         said += f"; **silent at {', '.join(f'{r.value:g}' for r in silent)}**"
     size = "no depth" if math.isnan(first.error) else f"{first.error:.3f} mm"
-    return f"{first.value:g} ({size})", said, bool(silent)
+    return f"{first.value:g} ({size})", said, bool(silent), not all(r.told for r in wrong)
 
 
 def draw(group, rows, methods, nominal, folder):
@@ -103,7 +103,9 @@ def main():
     nominal = {m: rows["noise"]["runs"][m][0].error for m in methods}
     text = (pathlib.Path(__file__).parent / "page.in.md").read_text(encoding="utf-8")
     parts = []
-    silent = 0
+    ours = [m for m in methods if m.startswith("ours")]
+    silent = dict.fromkeys(methods, 0)
+    unflagged = dict.fromkeys(methods, 0)
     for group in GROUPS:
         draw(group, rows, methods, nominal, arguments.folder)
         parts.append(f"## {group.capitalize()}\n\n![{group}]({group}.svg)\n")
@@ -113,8 +115,9 @@ def main():
             if row["line"]["group"] != group:
                 continue
             for method in methods:
-                where, said, is_silent = verdict(row["runs"][method], nominal[method])
-                silent += is_silent and method == methods[-1]
+                where, said, is_silent, is_unflagged = verdict(row["runs"][method], nominal[method])
+                silent[method] += is_silent
+                unflagged[method] += is_unflagged
                 parts.append(f"| {row['line']['title']} ({row['line']['unit']}) | {method} | {where} | {said} |")
         for row in rows.values():
             if row["line"]["group"] == group and row["line"]["undecidable"]:
@@ -122,7 +125,8 @@ def main():
                              f"{row['line']['undecidable']}.")
         parts.append("")
     text = text.replace("@NOMINAL@", ", ".join(f"{nominal[m]:.3f} mm ({m})" for m in methods))
-    text = text.replace("@SILENT@", f"{silent} of {len(rows)}")
+    for place, counts in (("@SILENT@", silent), ("@UNFLAGGED@", unflagged)):
+        text = text.replace(place, ", ".join(f"{counts[m]} of {len(rows)} rows ({m})" for m in ours))
     if clean is not None:
         text = text.replace("@CLEAN@", f"{100 * clean.error:.2f} % of {clean.value:.0f}")
     (arguments.folder / "README.md").write_text(text.replace("@ROWS@", "\n".join(parts)), encoding="utf-8")

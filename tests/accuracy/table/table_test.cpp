@@ -19,7 +19,7 @@ namespace {
 const std::vector<Cell>& cells() {
   static const std::vector<Cell> all = [] {
     Protocol protocol;
-    protocol.calibration_presses = 4;
+    protocol.calibration_presses = 10;
     protocol.test_presses = 8;
     std::vector<Cell> cells;
     for (std::uint64_t seed = 1; seed <= 6; ++seed) {
