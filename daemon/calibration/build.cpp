@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "daemon/calibration/list_fit.hpp"
+#include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/published.hpp"
 
 namespace dtact::calibration {
@@ -16,33 +17,34 @@ namespace {
 /// Part of the contact that may be black or white before the press is refused.
 constexpr double kClipped = 0.01;
 
-/// The depth map's part of the reference, to whole grey levels.
-image::Grey8 crop_reference(const image::Grey16& q8, const Crop& crop) {
-  image::Grey8 part{crop.width, crop.height, {}};
-  for (int y = crop.row; y < crop.row + crop.height; ++y) {
-    for (int x = crop.col; x < crop.col + crop.width; ++x) {
-      const int value = q8.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(q8.width) +
-                                  static_cast<std::size_t>(x)];
-      part.pixels.push_back(static_cast<std::uint8_t>(std::min(255, (value + 128) / 256)));
-    }
+/// An image as the depth map shows it: for each of its pixels the nearest of the frame.
+template <typename Pixel>
+image::Grey8 rectified(const recon::RectifyTable& table, const Pixel& pixel) {
+  image::Grey8 part{table.width, table.height, {}};
+  for (const recon::RectifyTable::Entry& e : table.entries) {
+    const auto x = static_cast<std::size_t>(e.x + (e.fx + 64) / 128);
+    const auto y = static_cast<std::size_t>(e.y + (e.fy + 64) / 128);
+    part.pixels.push_back(pixel(y * static_cast<std::size_t>(table.frame_width) + x));
   }
   return part;
 }
 
-/// The depth map's part of the mean of the frames, to whole grey levels.
-image::Grey8 crop_mean(const std::vector<image::Grey8>& frames, const Crop& crop) {
-  image::Grey8 part{crop.width, crop.height, {}};
+/// The reference to whole grey levels.
+image::Grey8 rectified_reference(const recon::RectifyTable& table, const image::Grey16& q8) {
+  return rectified(table, [&](std::size_t at) {
+    return static_cast<std::uint8_t>(std::min(255, (q8.pixels[at] + 128) / 256));
+  });
+}
+
+/// The mean of the frames to whole grey levels.
+image::Grey8 rectified_mean(const recon::RectifyTable& table,
+                            const std::vector<image::Grey8>& frames) {
   const auto count = static_cast<int>(frames.size());
-  for (int y = crop.row; y < crop.row + crop.height; ++y) {
-    for (int x = crop.col; x < crop.col + crop.width; ++x) {
-      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(frames[0].width) +
-                         static_cast<std::size_t>(x);
-      int sum = 0;
-      for (const image::Grey8& frame : frames) sum += frame.pixels[pixel];
-      part.pixels.push_back(static_cast<std::uint8_t>((sum + count / 2) / count));
-    }
-  }
-  return part;
+  return rectified(table, [&](std::size_t at) {
+    int sum = 0;
+    for (const image::Grey8& frame : frames) sum += frame.pixels[at];
+    return static_cast<std::uint8_t>((sum + count / 2) / count);
+  });
 }
 
 void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_per_px,
@@ -107,16 +109,19 @@ Calibration build(const BallPress& press) {
   const Crop crop = press.crop.value_or(Crop{0, 0, frame_width, frame_height});
   auto model = std::make_shared<recon::Model>();
   model->method = press.method;
-  model->rectify = recon::make_crop_table(frame_width, frame_height, crop.col, crop.row, crop.width,
-                                          crop.height);
+  std::vector<std::uint8_t> outside;
+  model->rectify =
+      map_table(press.lens, frame_width, frame_height,
+                {crop.col, crop.row, crop.width, crop.height, press.mm_per_px}, outside);
+  add_untrusted(*model, outside);
   model->mm_per_px = press.mm_per_px;
   model->smoothing_px = std::min(10.0, kSmoothingMm / press.mm_per_px);
   model->reference_q8 = press.reference_q8.pixels;
 
   const SettledPress settled =
       settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
-  const image::Grey8 reference = crop_reference(press.reference_q8, crop);
-  const image::Grey8 ball = crop_mean(press.frames, crop);
+  const image::Grey8 reference = rectified_reference(model->rectify, press.reference_q8);
+  const image::Grey8 ball = rectified_mean(model->rectify, press.frames);
   refuse_clipped(reference, settled.contact, press.mm_per_px, 255,
                  "the reference is white at the contact; lower the exposure or the light");
   refuse_clipped(ball, settled.contact, press.mm_per_px, 0,
@@ -127,6 +132,7 @@ Calibration build(const BallPress& press) {
   Calibration calibration;
   calibration.crop_col = crop.col;
   calibration.crop_row = crop.row;
+  calibration.lens = press.lens;
   calibration.model = std::move(model);
   return calibration;
 }

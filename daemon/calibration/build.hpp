@@ -38,8 +38,10 @@ struct BallPress {
   image::Grey16 reference_q8;        ///< Untouched, Q8 luma, the mean of many frames.
   std::vector<image::Grey8> frames;  ///< The ball pressed in and at rest.
   double ball_radius_mm = 0;
-  double mm_per_px = 0;
-  std::optional<Crop> crop;  ///< None: the whole frame.
+  double mm_per_px = 0;             ///< Of the depth map.
+  std::optional<recon::Lens> lens;  ///< None: the frame as it is.
+  /// Of the frame or, with a lens, of the rectified image; none: the whole.
+  std::optional<Crop> crop;
   recon::Method method = recon::Method::list;
 };
 

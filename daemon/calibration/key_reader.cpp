@@ -69,6 +69,25 @@ std::vector<std::int64_t> KeyReader::integers(const std::string& key, std::int64
   return values;
 }
 
+std::vector<double> KeyReader::numbers(const std::string& key, double low, double high) {
+  const std::string allowed = fmt::format("numbers from {} to {}", low, high);
+  const auto* array = take(key, allowed.c_str()).as_array();
+  if (array == nullptr) fail(key, "wrong type; expected an array of " + allowed);
+  std::vector<double> values;
+  values.reserve(array->size());
+  for (const toml::node& node : *array) {
+    const double value =
+        node.is_number() ? node.value<double>().value_or(std::nan("")) : std::nan("");
+    if (!(value >= low && value <= high)) {
+      throw std::runtime_error(fmt::format("{}:{}: {}{}: entry {} is not allowed; expected {}",
+                                           where_, node.source().begin.line, prefix_, key,
+                                           values.size() + 1, allowed));
+    }
+    values.push_back(value);
+  }
+  return values;
+}
+
 KeyReader KeyReader::table(const std::string& key) {
   const auto* table = take(key, "a table").as_table();
   if (table == nullptr) fail(key, "wrong type; expected a table");
@@ -98,6 +117,15 @@ void KeyReader::finish() const {
     if (!taken_.contains(key)) {
       fail(key, fmt::format("unknown key; allowed here: {}", fmt::join(taken_, ", ")));
     }
+  }
+}
+
+toml::table parse_toml(const std::string& text, const std::string& where) {
+  try {
+    return toml::parse(text, where);
+  } catch (const toml::parse_error& e) {
+    throw std::runtime_error(
+        fmt::format("{}:{}: {}", where, e.source().begin.line, e.description()));
   }
 }
 

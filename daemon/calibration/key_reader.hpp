@@ -22,6 +22,7 @@ class KeyReader {
   [[nodiscard]] std::string text(const std::string& key);
   [[nodiscard]] std::vector<std::int64_t> integers(const std::string& key, std::int64_t low,
                                                    std::int64_t high);
+  [[nodiscard]] std::vector<double> numbers(const std::string& key, double low, double high);
   [[nodiscard]] KeyReader table(const std::string& key);
   /// An array of tables, or nothing when the key is absent.
   [[nodiscard]] std::vector<KeyReader> tables(const std::string& key);
@@ -41,5 +42,8 @@ class KeyReader {
   std::string prefix_;
   std::set<std::string> taken_;
 };
+
+/// Parses TOML text. Throws std::runtime_error "WHERE:LINE: what is wrong".
+[[nodiscard]] toml::table parse_toml(const std::string& text, const std::string& where);
 
 }  // namespace dtact::calibration

@@ -9,6 +9,7 @@
 #include "clients/ctl/offline/images.hpp"
 #include "clients/ctl/offline/offline.hpp"
 #include "daemon/calibration/build.hpp"
+#include "daemon/calibration/lens_file.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -17,7 +18,8 @@ struct Options {
   std::vector<std::string> reference;
   std::vector<std::string> ball;
   double radius_mm = 0;
-  double mm_per_px = 0;
+  double mm_per_px = 0;  ///< 0: the lens's.
+  std::string lens;
   std::vector<int> centre;  ///< Row, column.
   std::vector<int> crop;    ///< Height, width.
   std::string method = "list";
@@ -35,6 +37,17 @@ std::optional<calibration::Crop> crop_of(const Options& options, int width, int 
                            options.crop[1], options.crop[0]};
 }
 
+recon::Lens lens_for(const std::string& path, const ImageSet& images) {
+  const calibration::LensFile file = calibration::load_lens(path);
+  if (file.frame_width != images.width() || file.frame_height != images.height()) {
+    throw std::runtime_error(fmt::format(
+        "--lens: {} was measured on {}x{} but the images are {}x{}; both must come from one camera "
+        "mode",
+        path, file.frame_width, file.frame_height, images.width(), images.height()));
+  }
+  return file.lens;
+}
+
 void run(const Options& options) {
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet ball = load_images(options.ball, "--ball");
@@ -44,6 +57,12 @@ void run(const Options& options) {
   press.frames = ball.frames();
   press.ball_radius_mm = options.radius_mm;
   press.mm_per_px = options.mm_per_px;
+  if (!options.lens.empty()) {
+    press.lens = lens_for(options.lens, reference);
+    if (press.mm_per_px == 0) press.mm_per_px = recon::central_mm_per_px(*press.lens);
+  } else if (press.mm_per_px == 0) {
+    throw std::runtime_error("--mm-per-px or --lens is required: one of them says the scale");
+  }
   press.crop = crop_of(options, reference.width(), reference.height());
   press.method = options.method == "published" ? recon::Method::published : recon::Method::list;
 
@@ -82,8 +101,10 @@ void add_calibrate(CLI::App& app) {
                    "The ball pressed in: PNG files, or a folder of them (averaged)")
       ->required();
   depth->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")->required();
-  depth->add_option("--mm-per-px", options->mm_per_px, "Scale of the image, mm per pixel")
-      ->required();
+  depth->add_option("--mm-per-px", options->mm_per_px,
+                    "Scale of the depth map, mm per pixel (default: the lens's in the middle)");
+  depth->add_option("--lens", options->lens,
+                    "Lens file of calibrate lens, or a calibration folder: rectifies the map");
   depth
       ->add_option("--centre", options->centre,
                    "Middle of the crop in the frame (default: the frame's)")
@@ -101,6 +122,7 @@ void add_calibrate(CLI::App& app) {
                    "Folder to write; an old calibration is replaced")
       ->required();
   depth->callback([options] { run(*options); });
+  add_calibrate_lens(*calibrate);
 }
 
 }  // namespace dtact::ctl

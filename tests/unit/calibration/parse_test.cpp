@@ -83,8 +83,7 @@ TEST(ParseCalibration, RefusesMissingAndUnknownKeys) {
 
 TEST(ParseCalibration, ReservedTablesMayBeEmptyOrAbsentButNotFilled) {
   const std::string png = format(sample()).reference_png;
-  EXPECT_NO_THROW((void)parse(with("[lens]\n[surface]\n[gain]\n", ""), png, "upload"));
-  expect_refused(with("[lens]\n", "[lens]\nk1 = 0.1\n"), "lens", "reserved");
+  EXPECT_NO_THROW((void)parse(with("[surface]\n[gain]\n", ""), png, "upload"));
   expect_refused(with("[gain]\n", "[gain]\nmap = 1\n"), "gain", "reserved");
 }
 
