@@ -178,6 +178,7 @@ ChessboardLens calibrate_chessboards(const std::vector<cv::Mat1b>& images,
   result.marks = marks_of(corners.front(), points);
   result.lens = images.size() == 1 ? choose_lens(result.marks)
                                    : choose_camera(corners, points, images.front().size());
+  level(result.lens.lens, result.marks);
   return result;
 }
 

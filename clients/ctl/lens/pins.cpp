@@ -244,6 +244,7 @@ PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Boa
   if (!missing.empty()) refuse(missing, lattice);
   press.marks = std::move(marks);
   press.lens = choose_lens(press.marks);
+  level(press.lens.lens, press.marks);
   return press;
 }
 

@@ -20,8 +20,9 @@ struct PinPress {
   int rows =
       0;  ///< As the image shows them: a board seen on edge has its rows and columns swapped.
   int cols = 0;
-  std::vector<Mark> marks;  ///< Row-major from the upper left; millimetres from the board's middle.
-  ChosenLens lens;          ///< Through the marks, its axes those of the board.
+  /// Row-major from the upper left; millimetres from the board's middle, with level axes (level()).
+  std::vector<Mark> marks;
+  ChosenLens lens;  ///< Through the marks.
 };
 
 /// Finds the pins pressed into the surface. Works on the darkening relative to the light, so that

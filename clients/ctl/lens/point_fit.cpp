@@ -197,6 +197,7 @@ std::vector<Point> leave_one_out(std::span<const Mark> marks, LensModel model) {
 }
 
 bool clearly_lower(std::span<const double> squares, std::span<const double> others) {
+  constexpr double kErrors = 2;  // standard errors: about one chance in forty
   double sum = 0;
   double sum2 = 0;
   for (std::size_t i = 0; i < squares.size(); ++i) {
@@ -206,7 +207,7 @@ bool clearly_lower(std::span<const double> squares, std::span<const double> othe
   }
   const auto n = static_cast<double>(squares.size());
   const double mean = sum / n;
-  return mean > std::sqrt(std::max(0.0, sum2 / n - mean * mean) / (n - 1));
+  return mean > kErrors * std::sqrt(std::max(0.0, sum2 / n - mean * mean) / (n - 1));
 }
 
 ChosenLens choose_lens(std::span<const Mark> marks) {
@@ -232,7 +233,7 @@ ChosenLens choose_lens(std::span<const Mark> marks) {
   return best;
 }
 
-Lens level(const Lens& lens) {
+void level(Lens& lens, std::span<Mark> marks) {
   constexpr double kStep = 1e-4;  // mm
   const Point at = project(lens, {0, 0});
   const Point right = project(lens, {kStep, 0});
@@ -243,9 +244,11 @@ Lens level(const Lens& lens) {
   const cv::Matx33d turn(std::cos(angle), std::sin(angle), 0, -std::sin(angle), std::cos(angle), 0,
                          0, 0, 1);
   const cv::Matx33d h = cv::Matx33d(lens.homography.data()) * turn;
-  Lens turned = lens;
-  std::copy(std::begin(h.val), std::end(h.val), turned.homography.begin());
-  return turned;
+  std::copy(std::begin(h.val), std::end(h.val), lens.homography.begin());
+  for (Mark& mark : marks) {
+    const cv::Vec3d mm = turn.t() * cv::Vec3d(mark.mm.x, mark.mm.y, 1);
+    mark.mm = {mm[0], mm[1]};
+  }
 }
 
 }  // namespace dtact::ctl

@@ -50,15 +50,15 @@ struct ChosenLens {
 };
 
 /// The smallest model that no larger one beats: a larger one must lower the mean squared
-/// left-out residual by more than the standard error of that change over the marks.
+/// left-out residual clearly.
 [[nodiscard]] ChosenLens choose_lens(std::span<const Mark> marks);
 
-/// Whether the mean of `squares` lies below that of `others`, of the same samples, by more than the
-/// standard error of the difference.
+/// Whether the mean of `squares` lies below that of `others`, of the same samples, by more than
+/// two standard errors of the difference: a parameter must earn its place.
 [[nodiscard]] bool clearly_lower(std::span<const double> squares, std::span<const double> others);
 
-/// The same lens about a surface whose x axis appears level at the origin: turns the millimetres'
-/// axes so that the Jacobian at the origin has no rotation (its polar decomposition).
-[[nodiscard]] recon::Lens level(const recon::Lens& lens);
+/// Turns the millimetres' axes so that the lens's Jacobian at the origin has no rotation (its polar
+/// decomposition): the rectified image is then as upright as the camera's, however the board lay.
+void level(recon::Lens& lens, std::span<Mark> marks);
 
 }  // namespace dtact::ctl

@@ -42,7 +42,7 @@ std::pair<int, int> pair_of(const std::string& text, const char* option) {
 
 void write(const Options& options, const ImageSet& images, const ChosenLens& chosen,
            const std::string& what) {
-  calibration::LensFile file{images.width(), images.height(), level(chosen.lens), {}};
+  calibration::LensFile file{images.width(), images.height(), chosen.lens, {}};
   recon::check(file.lens, file.frame_width, file.frame_height);
   file.notes = {what,
                 fmt::format("RMS distance from the ideal places: {:.4f} mm, each left out of "
