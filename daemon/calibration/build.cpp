@@ -65,6 +65,29 @@ void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_
   }
 }
 
+/// What the frame shows of the image that the lens rectifies; without a lens the frame.
+Crop seen(const BallPress& press) {
+  const int width = press.reference_q8.width;
+  const int height = press.reference_q8.height;
+  if (!press.lens) return {0, 0, width, height};
+  std::vector<std::uint8_t> outside;
+  (void)map_table(press.lens, width, height, {0, 0, width, height, press.mm_per_px}, outside);
+  int left = width;
+  int right = 0;
+  int top = height;
+  int bottom = 0;
+  for (int y = 0, i = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x, ++i) {
+      if (outside[static_cast<std::size_t>(i)] != 0) continue;
+      left = std::min(left, x);
+      right = std::max(right, x);
+      top = std::min(top, y);
+      bottom = std::max(bottom, y);
+    }
+  }
+  return {left, top, right - left + 1, bottom - top + 1};
+}
+
 void check(const BallPress& press) {
   if (press.frames.empty()) throw std::invalid_argument("no image of the ball");
   for (const image::Grey8& frame : press.frames) {
@@ -106,7 +129,7 @@ Calibration build(const BallPress& press) {
   check(press);
   const int frame_width = press.reference_q8.width;
   const int frame_height = press.reference_q8.height;
-  const Crop crop = press.crop.value_or(Crop{0, 0, frame_width, frame_height});
+  const Crop crop = press.crop.value_or(seen(press));
   auto model = std::make_shared<recon::Model>();
   model->method = press.method;
   std::vector<std::uint8_t> outside;

@@ -40,7 +40,7 @@ struct BallPress {
   double ball_radius_mm = 0;
   double mm_per_px = 0;             ///< Of the depth map.
   std::optional<recon::Lens> lens;  ///< None: the frame as it is.
-  /// Of the frame or, with a lens, of the rectified image; none: the whole.
+  /// Of the frame or, with a lens, of the rectified image; none: all that the frame shows.
   std::optional<Crop> crop;
   recon::Method method = recon::Method::list;
 };

@@ -25,9 +25,9 @@ Calibration load(const fs::path& folder) {
 
 void save(const Calibration& calibration, const fs::path& folder) {
   const Files files = format(calibration);
-  base::write_folder_atomically(
-      folder, {{kReferenceName, files.reference_png}, {kTomlName, files.toml}},
-      {kTomlName, kReferenceName}, "a calibration");
+  base::write_folder_atomically(folder,
+                                {{kReferenceName, files.reference_png}, {kTomlName, files.toml}},
+                                {kTomlName, kReferenceName}, "a calibration");
 }
 
 }  // namespace dtact::calibration

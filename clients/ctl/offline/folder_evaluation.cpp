@@ -62,6 +62,31 @@ void judge(PinDepths& depths, const std::vector<Mark>& marks) {
   depths.spread = std::sqrt(rest.dot(rest) / n) / depths.mean_mm;
 }
 
+/// Depth at a place from a paraboloid through the disc of `reach` pixels about it: the greatest
+/// single pixel would be the one with the most noise. NaN when not all of the disc is trusted.
+double peak_um(const std::vector<float>& um, int width, int height, double col, double row,
+               double reach) {
+  constexpr int kTerms = 6;
+  std::vector<double> terms;
+  std::vector<double> depths;
+  for (int y = static_cast<int>(std::ceil(row - reach)); y <= row + reach; ++y) {
+    for (int x = static_cast<int>(std::ceil(col - reach)); x <= col + reach; ++x) {
+      const double dx = (x - col) / reach;
+      const double dy = (y - row) / reach;
+      if (std::hypot(dx, dy) > 1) continue;
+      if (x < 0 || y < 0 || x >= width || y >= height) return std::nan("");
+      terms.insert(terms.end(), {1, dx, dy, dx * dx, dx * dy, dy * dy});
+      depths.push_back(um[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                          static_cast<std::size_t>(x)]);
+    }
+  }
+  const auto n = static_cast<int>(depths.size());
+  if (n < 2 * kTerms) return std::nan("");
+  cv::Mat1d fit;
+  cv::solve(cv::Mat1d(n, kTerms, terms.data()), cv::Mat1d(n, 1, depths.data()), fit, cv::DECOMP_QR);
+  return fit(0);
+}
+
 PinDepths read_pins(const FolderEvaluation& e, const Board& board) {
   const recon::Model& model = *e.calibration->model;
   const int width = model.rectify.width;
@@ -76,22 +101,13 @@ PinDepths read_pins(const FolderEvaluation& e, const Board& board) {
   for (const Mark& mark : e.pins->marks) {
     const double col = (mark.mm.x - corner.x) / model.mm_per_px;
     const double row = (mark.mm.y - corner.y) / model.mm_per_px;
-    float deepest = std::nanf("");
-    for (int y = std::max(0, static_cast<int>(row - reach));
-         y < std::min<double>(model.rectify.height, row + reach); ++y) {
-      for (int x = std::max(0, static_cast<int>(col - reach));
-           x < std::min<double>(width, col + reach); ++x) {
-        const float here = um[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                              static_cast<std::size_t>(x)];
-        if (std::hypot(x - col, y - row) <= reach) deepest = std::fmax(deepest, here);
-      }
-    }
-    if (std::isnan(deepest)) {
+    const double peak = peak_um(um, width, model.rectify.height, col, row, reach);
+    if (std::isnan(peak)) {
       throw std::runtime_error(fmt::format(
           "the pin at {:+.1f}, {:+.1f} mm from the board's middle lies outside the trusted map",
           mark.mm.x, mark.mm.y));
     }
-    depths.mm.push_back(0.001 * deepest);
+    depths.mm.push_back(0.001 * peak);
   }
   judge(depths, e.pins->marks);
   if (!(depths.mean_mm > 0)) throw std::runtime_error("the pins read no depth");

@@ -14,7 +14,7 @@ namespace dtact::ctl {
 
 /// How evenly a calibration reads the pins of a board, which are all of one length.
 struct PinDepths {
-  std::vector<double> mm;  ///< Greatest depth within a fifth of the pitch, of each pin.
+  std::vector<double> mm;  ///< Of each pin, at its centre (a paraboloid about it).
   double mean_mm = 0;
   double tilt_x_um_per_mm = 0;  ///< Of the plane through them that is taken off below.
   double tilt_y_um_per_mm = 0;
