@@ -105,53 +105,49 @@ std::vector<Candidate> find_candidates(const cv::Mat1f& image, double sigma) {
       const float value = band(y, x);
       if (!(value > 0) || value < highest(y, x)) continue;
       candidates.push_back({{static_cast<double>(x), static_cast<double>(y)},
-                            value / (std::sqrt(power(y, x)) + 1e-12),
-                            value});
+                            value / (std::sqrt(power(y, x)) + 1e-12)});
     }
   }
   std::ranges::sort(candidates, std::greater<>{}, &Candidate::salience);
   return candidates;
 }
 
-Lattice find_lattice(const std::vector<Candidate>& candidates, int rows, int cols) {
-  const auto wanted = static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols);
-  const Net net = largest_net(candidates, wanted);
-  Lattice best;
-  if (4 * net.size() < wanted) return best;
-  std::vector<double> responses;
+std::vector<Lattice> find_lattices(const std::vector<Candidate>& candidates, int rows, int cols) {
+  const int wanted = rows * cols;
+  const Net net = largest_net(candidates, static_cast<std::size_t>(wanted));
   int left = 0;
   int right = 0;
   int top = 0;
   int bottom = 0;
   for (const auto& [node, index] : net) {
-    responses.push_back(candidates[index].response);
     left = std::min(left, node.first);
     right = std::max(right, node.first);
     top = std::min(top, node.second);
     bottom = std::max(bottom, node.second);
   }
-  const auto middle = responses.begin() + static_cast<std::ptrdiff_t>(responses.size() / 2);
-  std::ranges::nth_element(responses, middle);
-  const double median = *middle;
   // The net may have grown into noise around the board, or the board may show in part.
+  std::vector<Lattice> lattices;
+  int fullest = wanted / 4;
   for (int y = std::min(top, bottom - rows + 1); y <= std::max(top, bottom - rows + 1); ++y) {
     for (int x = std::min(left, right - cols + 1); x <= std::max(left, right - cols + 1); ++x) {
-      Lattice window{rows, cols, {}, 0, 0};
+      Lattice window{rows, cols, {}, 0};
       for (int row = 0; row < rows; ++row) {
         for (int col = 0; col < cols; ++col) {
           const auto node = net.find({x + col, y + row});
           window.places.emplace_back();
           if (node == net.end()) continue;
-          const Candidate& candidate = candidates[node->second];
-          window.places.back() = candidate.px;
+          window.places.back() = candidates[node->second].px;
           ++window.found;
-          window.score += std::min(candidate.response, median);
         }
       }
-      if (window.score > best.score) best = std::move(window);
+      fullest = std::max(fullest, window.found);
+      lattices.push_back(std::move(window));
     }
   }
-  return best;
+  std::erase_if(lattices, [&](const Lattice& lattice) {
+    return lattice.found < std::max(wanted / 4, fullest - std::max(rows, cols));
+  });
+  return lattices;
 }
 
 }  // namespace dtact::ctl

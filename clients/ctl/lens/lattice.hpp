@@ -10,7 +10,6 @@ namespace dtact::ctl {
 struct Candidate {
   cv::Point2d px;
   double salience = 0;  ///< Its response over the local RMS response: what to try first.
-  double response = 0;  ///< Of the band pass; comparable within an image.
 };
 
 /// The local maxima of `image` (CV_32F) at about the size `sigma` pixels: differences of Gaussians
@@ -23,12 +22,13 @@ struct Lattice {
   int cols = 0;
   std::vector<std::optional<cv::Point2d>> places;  ///< Row-major; none where nothing was found.
   int found = 0;
-  double score = 0;  ///< Responses, each at most the median one.
 };
 
-/// The best lattice of rows × cols among the candidates. Neighbours are found from the step between
-/// those already found, so the spacing may change across the image; what lies outside the rows and
-/// columns that respond most is left out. Empty when fewer than a quarter of the places are found.
-[[nodiscard]] Lattice find_lattice(const std::vector<Candidate>& candidates, int rows, int cols);
+/// The lattices of rows × cols among the candidates. Neighbours are found from the step between
+/// those already found, so the spacing may change across the image; what grew beyond the board
+/// gives several windows of rows and columns. Those are returned that miss at most a row or a
+/// column more than the fullest, which has at least a quarter of its places.
+[[nodiscard]] std::vector<Lattice> find_lattices(const std::vector<Candidate>& candidates, int rows,
+                                                 int cols);
 
 }  // namespace dtact::ctl

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <stdexcept>
@@ -152,97 +154,154 @@ class PinFit {
   cv::Mat1d solver_;
 };
 
-/// The lattice at the scale and orientation at which the image shows it best.
-Lattice best_lattice(const cv::Mat1f& image, const Board& board) {
-  // Of the image's shorter side: from pins a few pixels wide to a board twice as large as the
-  // frame.
-  constexpr double kScales[] = {1 / 160., 1 / 120., 1 / 80., 1 / 60., 1 / 48., 1 / 36., 1 / 24.};
-  Lattice best;
-  double best_score = 0;
-  for (const double scale : kScales) {
-    const double sigma = scale * std::min(image.rows, image.cols);
-    if (sigma < 1) continue;
-    const std::vector<Candidate> candidates = find_candidates(image, sigma);
-    double power = 0;
-    for (const Candidate& c : candidates) power += c.response * c.response;
-    const double typical =
-        std::sqrt(power / std::max<double>(1, static_cast<double>(candidates.size())));
-    for (const auto& [rows, cols] : {std::pair{board.rows, board.cols}, {board.cols, board.rows}}) {
-      Lattice lattice = find_lattice(candidates, rows, cols);
-      // First the number of places found, then how far they stand out from all other maxima.
-      const double score = lattice.found + lattice.score / (typical * rows * cols + 1e-12);
-      if (lattice.found > 0 && score > best_score) {
-        best_score = score;
-        best = std::move(lattice);
-      }
-      if (board.rows == board.cols) break;
-    }
-  }
-  return best;
-}
-
 Point place_mm(const Board& board, const Lattice& lattice, int row, int col) {
   return {(col - 0.5 * (lattice.cols - 1)) * board.pitch_mm,
           (row - 0.5 * (lattice.rows - 1)) * board.pitch_mm};
 }
 
-[[noreturn]] void refuse(const std::vector<std::string>& missing, const Lattice& lattice) {
+[[noreturn]] void refuse(const std::vector<std::string>& missing, int pins) {
   throw std::runtime_error(fmt::format(
       "board: {} of {} pins not found: {} (rows and columns counted from the image's upper left "
       "corner); press the board in more evenly, with all its pins in the picture",
-      missing.size(), lattice.rows * lattice.cols, fmt::join(missing, "; ")));
+      missing.size(), pins, fmt::join(missing, "; ")));
 }
 
-/// The middle of the models: enough to look for pins with, and not led astray by a few bad ones.
+/// What the pins are first looked for with: not led astray by a few bad places.
 LensModel searching_model(std::size_t marks) {
   return marks >= 24 ? LensModel::radial1 : LensModel::affine;
+}
+
+/// A lattice followed up in the image: the pins found and those that are not.
+struct Settled {
+  const Lattice* lattice = nullptr;
+  std::vector<Mark> marks;
+  std::vector<std::string> missing;
+  double rms_mm = 0;  ///< Of the marks about a lens of twelve parameters.
+};
+
+/// The median of the heights around a place of the lattice.
+double neighbours_height(const std::vector<double>& heights, const Lattice& lattice, int row,
+                         int col) {
+  std::vector<double> around;
+  for (int y = std::max(0, row - 1); y <= std::min(lattice.rows - 1, row + 1); ++y) {
+    for (int x = std::max(0, col - 1); x <= std::min(lattice.cols - 1, col + 1); ++x) {
+      if (x == col && y == row) continue;
+      around.push_back(heights[static_cast<std::size_t>(y * lattice.cols + x)]);
+    }
+  }
+  std::ranges::sort(around);
+  return around[around.size() / 2];
+}
+
+Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, const Board& board) {
+  constexpr double kSure = 5;          // standard deviations of the noise
+  constexpr double kWithin = 0.25;     // of the pitch
+  constexpr double kNeighbours = 0.2;  // of the neighbours' height
+  constexpr int kRounds = 3;
+  Settled settled{&lattice, {}, {}, 0};
+  int i = 0;
+  for (const auto& place : lattice.places) {
+    if (place) {
+      settled.marks.push_back(
+          {place_mm(board, lattice, i / lattice.cols, i % lattice.cols), {place->x, place->y}});
+    }
+    ++i;
+  }
+  Lens lens = fit_lens(settled.marks, searching_model(settled.marks.size()));
+  for (int round = 0; round < kRounds; ++round) {
+    const PinFit fit(image, board.pitch_mm, recon::central_mm_per_px(lens));
+    std::vector<Point> places;
+    std::vector<double> heights;
+    for (int pin = 0; pin < lattice.rows * lattice.cols; ++pin) {
+      const auto peak =
+          fit.find(lens, place_mm(board, lattice, pin / lattice.cols, pin % lattice.cols),
+                   kWithin * board.pitch_mm);
+      places.push_back(peak ? peak->mm : Point{});
+      heights.push_back(peak ? peak->height : 0);
+    }
+    settled.marks.clear();
+    settled.missing.clear();
+    for (int pin = 0; pin < lattice.rows * lattice.cols; ++pin) {
+      const int row = pin / lattice.cols;
+      const int col = pin % lattice.cols;
+      const double height = heights[static_cast<std::size_t>(pin)];
+      if (height > kSure * fit.height_noise(noise) &&
+          height > kNeighbours * neighbours_height(heights, lattice, row, col)) {
+        settled.marks.push_back({place_mm(board, lattice, row, col),
+                                 project(lens, places[static_cast<std::size_t>(pin)])});
+      } else {
+        settled.missing.push_back(fmt::format("row {}, column {}", row + 1, col + 1));
+      }
+    }
+    if (2 * settled.missing.size() > lattice.places.size()) return settled;
+    lens = fit_lens(settled.marks, LensModel::radial2);
+  }
+  settled.rms_mm = rms(residuals_mm(lens, settled.marks));
+  return settled;
+}
+
+/// Whether two lattices are of the same places, found at other scales.
+bool same_places(const Lattice& a, const Lattice& b, double apart) {
+  if (a.rows != b.rows) return false;
+  for (std::size_t i = 0; i < a.places.size(); ++i) {
+    if (a.places[i] && b.places[i] && cv::norm(*a.places[i] - *b.places[i]) > apart) return false;
+  }
+  return true;
+}
+
+/// All lattices at several scales, of the board as it is and on edge.
+std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
+  // Of the image's shorter side: from pins a few pixels wide to a board twice as large as the
+  // frame.
+  constexpr double kScales[] = {1 / 160., 1 / 120., 1 / 80., 1 / 60., 1 / 48., 1 / 36., 1 / 24.};
+  std::vector<Lattice> all;
+  for (const double scale : kScales) {
+    const double sigma = scale * std::min(image.rows, image.cols);
+    if (sigma < 1) continue;
+    const std::vector<Candidate> candidates = find_candidates(image, sigma);
+    for (const auto& [rows, cols] : {std::pair{board.rows, board.cols}, {board.cols, board.rows}}) {
+      std::ranges::move(find_lattices(candidates, rows, cols), std::back_inserter(all));
+      if (board.rows == board.cols) break;
+    }
+  }
+  // The fullest first; of those of the same places one is enough.
+  std::ranges::stable_sort(all, std::greater<>{}, &Lattice::found);
+  const double apart = 0.25 * std::min(image.rows, image.cols) / std::max(board.rows, board.cols);
+  std::vector<Lattice> distinct;
+  for (Lattice& lattice : all) {
+    if (std::ranges::none_of(
+            distinct, [&](const Lattice& other) { return same_places(lattice, other, apart); })) {
+      distinct.push_back(std::move(lattice));
+    }
+  }
+  return distinct;
 }
 
 }  // namespace
 
 PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Board& board) {
-  constexpr double kSure = 5;       // standard deviations of the noise
-  constexpr double kWithin = 0.25;  // of the pitch
-  constexpr int kRounds = 3;
+  constexpr std::size_t kTries = 30;
   const cv::Mat1f image = relative_darkening(reference, frame);
-  const Lattice lattice = best_lattice(image, board);
-  if (lattice.found == 0) {
+  std::vector<Lattice> lattices = lattices_of(image, board);
+  lattices.resize(std::min(lattices.size(), kTries));
+  const double noise = noise_of(image);
+  Settled best;
+  for (const Lattice& lattice : lattices) {
+    Settled settled = settle(image, noise, lattice, board);
+    // The most pins, and of those windows and scales that have them the most regular one.
+    const bool better =
+        best.lattice == nullptr || settled.missing.size() < best.missing.size() ||
+        (settled.missing.size() == best.missing.size() && settled.rms_mm < best.rms_mm);
+    if (better) best = std::move(settled);
+  }
+  if (best.lattice == nullptr || 2 * best.missing.size() > best.lattice->places.size()) {
     throw std::runtime_error(fmt::format(
         "board: no lattice of {}x{} pins found; check that the images are an untouched surface and "
         "the same with the board pressed in, and the numbers of rows and columns",
         board.rows, board.cols));
   }
-  PinPress press{lattice.rows, lattice.cols, {}, {}};
-  std::vector<Mark> marks;
-  for (int row = 0, i = 0; row < lattice.rows; ++row) {
-    for (int col = 0; col < lattice.cols; ++col, ++i) {
-      const auto& place = lattice.places[static_cast<std::size_t>(i)];
-      if (place) marks.push_back({place_mm(board, lattice, row, col), {place->x, place->y}});
-    }
-  }
-  Lens lens = fit_lens(marks, searching_model(marks.size()));
-  const double noise = noise_of(image);
-  std::vector<std::string> missing;
-  for (int round = 0; round < kRounds; ++round) {
-    const PinFit fit(image, board.pitch_mm, recon::central_mm_per_px(lens));
-    marks.clear();
-    missing.clear();
-    for (int row = 0; row < lattice.rows; ++row) {
-      for (int col = 0; col < lattice.cols; ++col) {
-        const Point expected = place_mm(board, lattice, row, col);
-        const auto peak = fit.find(lens, expected, kWithin * board.pitch_mm);
-        if (peak && peak->height > kSure * fit.height_noise(noise)) {
-          marks.push_back({expected, project(lens, peak->mm)});
-        } else {
-          missing.push_back(fmt::format("row {}, column {}", row + 1, col + 1));
-        }
-      }
-    }
-    if (4 * missing.size() > lattice.places.size()) refuse(missing, lattice);
-    lens = round + 1 < kRounds ? fit_lens(marks, LensModel::radial2) : lens;
-  }
-  if (!missing.empty()) refuse(missing, lattice);
-  press.marks = std::move(marks);
+  if (!best.missing.empty()) refuse(best.missing, board.rows * board.cols);
+  PinPress press{best.lattice->rows, best.lattice->cols, std::move(best.marks), {}};
   press.lens = choose_lens(press.marks);
   level(press.lens.lens, press.marks);
   return press;

@@ -29,14 +29,16 @@ struct PinPress {
 /// an uneven ring or a dark corner changes nothing, and at several scales, so that the size of the
 /// pins in the image need not be known:
 ///
-/// 1. Local maxima of a band pass, joined into the lattice that fits best (lattice.hpp).
-/// 2. A lens through those; then, in the plane of the surface that this lens gives, each pin's
-///    centre is where the gradient of a third-order surface vanishes that is fitted to the image
-///    with Gaussian weights of a fifth of the pitch. The cubic terms take up a slope of the
+/// 1. Local maxima of a band pass, joined into lattices (lattice.hpp).
+/// 2. A lens through each of those; then, in the plane of the surface that this lens gives, each
+///    pin's centre is where the gradient of a third-order surface vanishes that is fitted to the
+///    image with Gaussian weights of a fifth of the pitch. The cubic terms take up a slope of the
 ///    surroundings, and in the plane of the surface a pin is round, so that perspective does not
 ///    pull its centre outwards. Repeated with the better lens.
 /// 3. A pin counts as found when the darkening there is a peak, higher than five times what the
-///    image's noise makes of it, within a quarter of the pitch of where the others say.
+///    image's noise makes of it and than a fifth of its neighbours' median, within a quarter of the
+///    pitch of where the others say. The lattice with the most pins wins, then the most regular
+///    one.
 ///
 /// `reference`, `frame`: grey levels, of one size. Throws std::runtime_error that names the missing
 /// pins by row and column, or says that no lattice was found.
