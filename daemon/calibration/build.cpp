@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "daemon/calibration/list_fit.hpp"
+#include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/published.hpp"
 
 namespace dtact::calibration {
@@ -15,6 +16,18 @@ namespace {
 
 /// Part of the contact that may be black or white before the press is refused.
 constexpr double kClipped = 0.01;
+
+/// An image as the depth map shows it: for each of its pixels the nearest of the frame.
+template <typename Pixel>
+image::Grey8 rectified(const recon::RectifyTable& table, const Pixel& pixel) {
+  image::Grey8 part{table.width, table.height, {}};
+  for (const recon::RectifyTable::Entry& e : table.entries) {
+    const auto x = static_cast<std::size_t>(e.x + (e.fx + 64) / 128);
+    const auto y = static_cast<std::size_t>(e.y + (e.fy + 64) / 128);
+    part.pixels.push_back(pixel(y * static_cast<std::size_t>(table.frame_width) + x));
+  }
+  return part;
+}
 
 void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_per_px,
                     std::uint8_t limit, const char* message) {
@@ -32,6 +45,27 @@ void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_
   if (static_cast<double>(clipped) > kClipped * static_cast<double>(all)) {
     throw std::runtime_error(message);
   }
+}
+
+/// What the frame shows of the image that the lens rectifies; without a lens the frame.
+Crop seen(const std::optional<recon::Lens>& lens, int width, int height, double mm_per_px) {
+  if (!lens) return {0, 0, width, height};
+  std::vector<std::uint8_t> outside;
+  (void)map_table(lens, width, height, {0, 0, width, height, mm_per_px}, outside);
+  int left = width;
+  int right = 0;
+  int top = height;
+  int bottom = 0;
+  for (int y = 0, i = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x, ++i) {
+      if (outside[static_cast<std::size_t>(i)] != 0) continue;
+      left = std::min(left, x);
+      right = std::max(right, x);
+      top = std::min(top, y);
+      bottom = std::max(bottom, y);
+    }
+  }
+  return {left, top, right - left + 1, bottom - top + 1};
 }
 
 void check(const BallPress& press) {
@@ -53,45 +87,39 @@ void check(const BallPress& press) {
 
 }  // namespace
 
-image::Grey8 crop_reference(const image::Grey16& q8, const Crop& crop) {
-  image::Grey8 part{crop.width, crop.height, {}};
-  for (int y = crop.row; y < crop.row + crop.height; ++y) {
-    for (int x = crop.col; x < crop.col + crop.width; ++x) {
-      const int value = q8.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(q8.width) +
-                                  static_cast<std::size_t>(x)];
-      part.pixels.push_back(static_cast<std::uint8_t>(std::min(255, (value + 128) / 256)));
-    }
-  }
-  return part;
+image::Grey8 rectified_reference(const recon::RectifyTable& table, const image::Grey16& q8) {
+  return rectified(table, [&](std::size_t at) {
+    return static_cast<std::uint8_t>(std::min(255, (q8.pixels[at] + 128) / 256));
+  });
 }
 
-image::Grey8 crop_mean(const std::vector<image::Grey8>& frames, const Crop& crop) {
-  image::Grey8 part{crop.width, crop.height, {}};
+image::Grey8 rectified_mean(const recon::RectifyTable& table,
+                            const std::vector<image::Grey8>& frames) {
   const auto count = static_cast<int>(frames.size());
-  for (int y = crop.row; y < crop.row + crop.height; ++y) {
-    for (int x = crop.col; x < crop.col + crop.width; ++x) {
-      const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(frames[0].width) +
-                         static_cast<std::size_t>(x);
-      int sum = 0;
-      for (const image::Grey8& frame : frames) sum += frame.pixels[pixel];
-      part.pixels.push_back(static_cast<std::uint8_t>((sum + count / 2) / count));
-    }
-  }
-  return part;
+  return rectified(table, [&](std::size_t at) {
+    int sum = 0;
+    for (const image::Grey8& frame : frames) sum += frame.pixels[at];
+    return static_cast<std::uint8_t>((sum + count / 2) / count);
+  });
 }
 
 Calibration empty_calibration(const image::Grey16& reference_q8, const std::optional<Crop>& crop,
-                              double mm_per_px) {
-  const Crop part = crop.value_or(Crop{0, 0, reference_q8.width, reference_q8.height});
+                              double mm_per_px, const std::optional<recon::Lens>& lens) {
+  const int width = reference_q8.width;
+  const int height = reference_q8.height;
+  const Crop part = crop ? *crop : seen(lens, width, height, mm_per_px);
   auto model = std::make_shared<recon::Model>();
-  model->rectify = recon::make_crop_table(reference_q8.width, reference_q8.height, part.col,
-                                          part.row, part.width, part.height);
+  std::vector<std::uint8_t> outside;
+  model->rectify = map_table(lens, width, height,
+                             {part.col, part.row, part.width, part.height, mm_per_px}, outside);
+  add_untrusted(*model, outside);
   model->mm_per_px = mm_per_px;
   model->smoothing_px = std::min(10.0, kSmoothingMm / mm_per_px);
   model->reference_q8 = reference_q8.pixels;
   Calibration calibration;
   calibration.crop_col = part.col;
   calibration.crop_row = part.row;
+  calibration.lens = lens;
   calibration.model = std::move(model);
   return calibration;
 }
@@ -116,16 +144,15 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
 
 Calibration build(const BallPress& press) {
   check(press);
-  Calibration calibration = empty_calibration(press.reference_q8, press.crop, press.mm_per_px);
+  Calibration calibration =
+      empty_calibration(press.reference_q8, press.crop, press.mm_per_px, press.lens);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   model->method = press.method;
-  const Crop crop{calibration.crop_col, calibration.crop_row, model->rectify.width,
-                  model->rectify.height};
 
   const SettledPress settled =
       settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
-  const image::Grey8 reference = crop_reference(press.reference_q8, crop);
-  const image::Grey8 ball = crop_mean(press.frames, crop);
+  const image::Grey8 reference = rectified_reference(model->rectify, press.reference_q8);
+  const image::Grey8 ball = rectified_mean(model->rectify, press.frames);
   refuse_clipped(reference, settled.contact, press.mm_per_px, 255,
                  "the reference is white at the contact; lower the exposure or the light");
   refuse_clipped(ball, settled.contact, press.mm_per_px, 0,

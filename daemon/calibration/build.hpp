@@ -38,20 +38,25 @@ struct BallPress {
   image::Grey16 reference_q8;        ///< Untouched, Q8 luma, the mean of many frames.
   std::vector<image::Grey8> frames;  ///< The ball pressed in and at rest.
   double ball_radius_mm = 0;
-  double mm_per_px = 0;
-  std::optional<Crop> crop;  ///< None: the whole frame.
+  double mm_per_px = 0;             ///< Of the depth map.
+  std::optional<recon::Lens> lens;  ///< None: the frame as it is.
+  /// Of the frame or, with a lens, of the rectified image; none: all that the frame shows.
+  std::optional<Crop> crop;
   recon::Method method = recon::Method::list;
 };
 
-/// A calibration without a list: frame, crop, scale, smoothing, reference. Throws
+/// A calibration without a list: frame, lens, crop, scale, smoothing, reference. Throws
 /// std::invalid_argument when the crop leaves the frame.
 [[nodiscard]] Calibration empty_calibration(const image::Grey16& reference_q8,
-                                            const std::optional<Crop>& crop, double mm_per_px);
+                                            const std::optional<Crop>& crop, double mm_per_px,
+                                            const std::optional<recon::Lens>& lens);
 
-/// The depth map's part of the reference, to whole grey levels.
-[[nodiscard]] image::Grey8 crop_reference(const image::Grey16& q8, const Crop& crop);
-/// The depth map's part of the mean of the frames, to whole grey levels.
-[[nodiscard]] image::Grey8 crop_mean(const std::vector<image::Grey8>& frames, const Crop& crop);
+/// The reference as the depth map shows it, to whole grey levels.
+[[nodiscard]] image::Grey8 rectified_reference(const recon::RectifyTable& table,
+                                               const image::Grey16& q8);
+/// The mean of the frames as the depth map shows it, to whole grey levels.
+[[nodiscard]] image::Grey8 rectified_mean(const recon::RectifyTable& table,
+                                          const std::vector<image::Grey8>& frames);
 
 /// The smoothing's standard deviation, millimetres. Light scatters sideways by about 0.3 mm in the
 /// layer, so that smoothing by 0.1 mm widens an edge by 5 % and takes a frame's noise of one grey

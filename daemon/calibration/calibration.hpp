@@ -3,9 +3,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "daemon/recon/lens.hpp"
 #include "daemon/recon/model.hpp"
 
 namespace dtact::calibration {
@@ -35,8 +37,11 @@ struct Origin {
 struct Calibration {
   std::string name;  ///< The folder's name.
   std::shared_ptr<const recon::Model> model;
-  int crop_col = 0;  ///< Upper left corner of the depth map in the frame, pixels.
+  /// Upper left corner of the depth map, pixels of the frame or, with a lens, of the rectified
+  /// image (recon::MapPlace), which has the frame's size.
+  int crop_col = 0;
   int crop_row = 0;
+  std::optional<recon::Lens> lens;  ///< None: the depth map is a part of the frame as it is.
   Origin origin;
 };
 

@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "daemon/calibration/lens_file.hpp"
+#include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/sha256.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
@@ -88,9 +90,12 @@ std::vector<double> column(const std::vector<recon::Model::Uncertainty>& rows,
 Files format(const Calibration& calibration) {
   const recon::Model& model = *calibration.model;
   const recon::RectifyTable& map = model.rectify;
-  if (!same(map, recon::make_crop_table(map.frame_width, map.frame_height, calibration.crop_col,
-                                        calibration.crop_row, map.width, map.height))) {
-    throw std::invalid_argument("calibration: the rectification is not the crop");
+  std::vector<std::uint8_t> outside;
+  if (!same(map, map_table(calibration.lens, map.frame_width, map.frame_height,
+                           {calibration.crop_col, calibration.crop_row, map.width, map.height,
+                            model.mm_per_px},
+                           outside))) {
+    throw std::invalid_argument("calibration: the rectification is not what crop and lens say");
   }
   Files files;
   files.reference_png =
@@ -108,7 +113,8 @@ Files format(const Calibration& calibration) {
       toml_string(calibration.origin.created), model.mm_per_px, model.smoothing_px);
   t += fmt::format("[frame]\nwidth = {}\nheight = {}\n\n", map.frame_width, map.frame_height);
   t += fmt::format(
-      "[crop]  # the depth map in the frame\ncol = {}\nrow = {}\nwidth = {}\n"
+      "[crop]  # the depth map in the frame, or in the image that the lens rectifies\ncol = "
+      "{}\nrow = {}\nwidth = {}\n"
       "height = {}\n\n",
       calibration.crop_col, calibration.crop_row, map.width, map.height);
   t += fmt::format("[reference]  # {}: 16-bit grey, grey level times 256\nsha256 = {}\n\n",
@@ -135,8 +141,11 @@ Files format(const Calibration& calibration) {
         "runs = {}\n\n",
         array_text(runs_of(model.untrusted)));
   }
-  t += "# Reserved for the lens's distortion and a curved surface. Empty: none.\n"
-       "[lens]\n[surface]\n\n";
+  t += fmt::format(
+      "[lens]  # where the surface appears in the frame; empty: the frame as it is\n{}\n",
+      calibration.lens ? format_lens(*calibration.lens) : "");
+  t += "# Reserved for a curved surface. Empty: none.\n"
+       "[surface]\n\n";
   t += gain_text(model.gain);
   if (!model.uncertainty.empty()) {
     t += "[uncertainty]  # of the list: mean absolute error in micrometres at some indentations\n";

@@ -120,4 +120,13 @@ void KeyReader::finish() const {
   }
 }
 
+toml::table parse_toml(const std::string& text, const std::string& where) {
+  try {
+    return toml::parse(text, where);
+  } catch (const toml::parse_error& e) {
+    throw std::runtime_error(
+        fmt::format("{}:{}: {}", where, e.source().begin.line, e.description()));
+  }
+}
+
 }  // namespace dtact::calibration

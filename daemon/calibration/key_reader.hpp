@@ -43,4 +43,7 @@ class KeyReader {
   std::set<std::string> taken_;
 };
 
+/// Parses TOML text. Throws std::runtime_error "WHERE:LINE: what is wrong".
+[[nodiscard]] toml::table parse_toml(const std::string& text, const std::string& where);
+
 }  // namespace dtact::calibration

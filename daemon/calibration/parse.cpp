@@ -5,14 +5,14 @@
 #include <string_view>
 
 #include "daemon/calibration/key_reader.hpp"
+#include "daemon/calibration/lens_file.hpp"
+#include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/sha256.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
 
 namespace dtact::calibration {
 namespace {
-
-constexpr int kMaxPixels = 16384;  // of a side; keeps every index within int
 
 std::vector<std::uint8_t> mask_of(KeyReader& reader, std::size_t pixels) {
   const auto limit = static_cast<std::int64_t>(pixels);
@@ -134,21 +134,12 @@ void read_uncertainty(KeyReader reader, std::vector<recon::Model::Uncertainty>& 
 
 /// Tables that later versions fill. What this program cannot apply it must not pass over.
 void refuse_reserved(KeyReader& top) {
-  for (const char* name : {"lens", "surface"}) {
+  for (const char* name : {"surface"}) {
     if (top.has(name) && !top.table(name).keys().empty()) {
       top.fail(name,
                "is reserved and must be empty: this program applies none of it; use the "
                "version that wrote the file");
     }
-  }
-}
-
-toml::table parse_toml(const std::string& text, const std::string& where) {
-  try {
-    return toml::parse(text, where);
-  } catch (const toml::parse_error& e) {
-    throw std::runtime_error(
-        fmt::format("{}:{}: {}", where, e.source().begin.line, e.description()));
   }
 }
 
@@ -185,8 +176,13 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   const int width = small(crop, "width", 1, frame_width - calibration.crop_col);
   const int height = small(crop, "height", 1, frame_height - calibration.crop_row);
   crop.finish();
-  model->rectify = recon::make_crop_table(frame_width, frame_height, calibration.crop_col,
-                                          calibration.crop_row, width, height);
+  if (top.has("lens")) {
+    calibration.lens = read_lens(top.table("lens"), frame_width, frame_height);
+  }
+  std::vector<std::uint8_t> outside;
+  model->rectify = map_table(
+      calibration.lens, frame_width, frame_height,
+      {calibration.crop_col, calibration.crop_row, width, height, model->mm_per_px}, outside);
 
   read_list(top.table("list"), model->method == recon::Method::list, model->list);
   if (top.has("gain")) read_gain(top.table("gain"), model->gain);
@@ -202,6 +198,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
     model->untrusted = mask_of(untrusted, model->rectify.entries.size());
     untrusted.finish();
   }
+  add_untrusted(*model, outside);
   refuse_reserved(top);
   read_reference(top.table("reference"), reference_png, where, *model);
   top.finish();

@@ -182,7 +182,7 @@ void refuse_gaps(const ChainFit& chain, const BallPresses& set) {
 
 Calibration build(const BallPresses& presses, PressReport* report) {
   BallPresses set = presses;
-  Calibration calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px);
+  Calibration calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
   const recon::Model plain = *calibration.model;
   recon::Model uniform = plain;
   uniform.gain.shape = recon::GainShape::uniform;

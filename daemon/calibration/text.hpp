@@ -6,6 +6,8 @@
 
 namespace dtact::calibration {
 
+/// Of a side of any image; keeps every index within int.
+inline constexpr int kMaxPixels = 16384;
 /// Version of the files. Another one is refused, whatever its keys.
 inline constexpr int kFormatVersion = 1;
 inline constexpr const char* kTomlName = "calibration.toml";
@@ -18,7 +20,7 @@ struct Files {
 };
 
 /// What parse() reads back. Throws std::invalid_argument when the calibration's parts disagree or
-/// its rectification is more than a crop.
+/// its rectification is not what its crop and lens say.
 [[nodiscard]] Files format(const Calibration& calibration);
 
 }  // namespace dtact::calibration

@@ -6,26 +6,33 @@ cd "$(dirname "$0")/../.."
 bin=build/bin out=build/figures
 rm -rf "$out" && mkdir -p "$out"
 
-# evaluate SENSOR MM_PER_PX: calibrates on a real press of a 4 mm ball and judges it against the
-# sphere, in-sample and with the list of one half of the disc on the other.
+# evaluate SENSOR: measures the lens on the press of a board of pins, calibrates through it on a press
+# of a 4 mm ball and judges both, and writes a page of pictures.
 evaluate() {
   local images=../shared/data/$1
-  echo "== $1, real images (one press of a ball of 4 mm radius, $2 mm/px)"
+  echo "== $1, real images"
   if [[ ! -d $images ]]; then
     echo "skipped: $images is not there"
     return
   fi
-  "$bin/dtactctl" calibrate depth --reference "$images/ball_reference.png" \
-    --ball "$images/ball.png" --radius-mm 4.0 --mm-per-px "$2" -o "$out/$1"
-  "$bin/dtactctl" evaluate --calibration "$out/$1" --reference "$images/ball_reference.png" \
-    --ball "$images/ball.png" --radius-mm 4.0
-  "$bin/dtactctl" reconstruct --calibration "$out/$1" --reference "$images/ball_reference.png" \
-    --frame "$images/ball.png" -o "$out/$1_ball.png"
-  "$bin/dtactctl" reconstruct --calibration "$out/$1" --reference "$images/board_reference.png" \
-    --frame "$images/board.png" -o "$out/$1_board.png"
+  "$bin/dtactctl" evaluate --folder "$images" -o "$out/$1"
 }
-evaluate sensor_a 0.0510
-evaluate sensor_b 0.05317
+evaluate sensor_a
+evaluate sensor_b
+evaluate sensor_c
+
+# raw SENSOR MM_PER_PX: the same ball on the frame as it is, without a lens.
+raw() {
+  local images=../shared/data/$1
+  [[ -d $images ]] || return 0
+  echo "== $1, real images, without a lens ($2 mm/px)"
+  "$bin/dtactctl" calibrate depth --reference "$images/ball_reference.png" \
+    --ball "$images/ball.png" --radius-mm 4.0 --mm-per-px "$2" -o "$out/$1_raw"
+  "$bin/dtactctl" evaluate --calibration "$out/$1_raw" --reference "$images/ball_reference.png" \
+    --ball "$images/ball.png" --radius-mm 4.0
+}
+raw sensor_a 0.0510
+raw sensor_b 0.05317
 
 echo "== pictures, simulated sensor"
 scene=config/scenes/calibrate_ball.toml
@@ -37,4 +44,4 @@ scene=config/scenes/calibrate_ball.toml
 "$bin/dtact-sim-render" --frames 540 -o "$out/nut.png"
 "$bin/dtactctl" reconstruct --calibration "$out/simulated" --reference "$out/reference" \
   --frame "$out/nut.png" -o tests/accuracy/m4_nut.png
-echo "pictures: $out/*.png, tests/accuracy/m4_nut.png"
+echo "pictures: $out/sensor_*/index.html, tests/accuracy/m4_nut.png"

@@ -9,6 +9,7 @@
 #include "clients/ctl/offline/images.hpp"
 #include "clients/ctl/offline/offline.hpp"
 #include "daemon/calibration/build.hpp"
+#include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/press_set.hpp"
 
 namespace dtact::ctl {
@@ -19,7 +20,8 @@ struct Options {
   std::vector<std::string> ball;
   std::vector<std::string> presses;
   double radius_mm = 0;
-  double mm_per_px = 0;
+  double mm_per_px = 0;  ///< 0: the lens's.
+  std::string lens;
   std::vector<int> centre;  ///< Row, column.
   std::vector<int> crop;    ///< Height, width.
   std::string method = "list";
@@ -36,6 +38,33 @@ std::optional<calibration::Crop> crop_of(const Options& options, int width, int 
       options.centre.empty() ? std::vector<int>{height / 2, width / 2} : options.centre;
   return calibration::Crop{centre[1] - options.crop[1] / 2, centre[0] - options.crop[0] / 2,
                            options.crop[1], options.crop[0]};
+}
+
+recon::Lens lens_for(const std::string& path, const ImageSet& images) {
+  const calibration::LensFile file = calibration::load_lens(path);
+  if (file.frame_width != images.width() || file.frame_height != images.height()) {
+    throw std::runtime_error(fmt::format(
+        "--lens: {} was measured on {}x{} but the images are {}x{}; both must come from one camera "
+        "mode",
+        path, file.frame_width, file.frame_height, images.width(), images.height()));
+  }
+  return file.lens;
+}
+
+/// The lens and the map's scale, of which at least one is given.
+struct Optics {
+  std::optional<recon::Lens> lens;
+  double mm_per_px = 0;
+};
+Optics optics_of(const Options& options, const ImageSet& images) {
+  Optics optics{.lens = {}, .mm_per_px = options.mm_per_px};
+  if (!options.lens.empty()) {
+    optics.lens = lens_for(options.lens, images);
+    if (optics.mm_per_px == 0) optics.mm_per_px = recon::central_mm_per_px(*optics.lens);
+  } else if (optics.mm_per_px == 0) {
+    throw std::runtime_error("--mm-per-px or --lens is required: one of them says the scale");
+  }
+  return optics;
 }
 
 /// "FOLDER@0.8": the press's images and the depth that was measured.
@@ -66,11 +95,13 @@ calibration::BallPresses::Press load_press(const std::string& text, const ImageS
 calibration::Calibration make_from_one(const Options& options, const ImageSet& reference) {
   const ImageSet ball = load_images(options.ball, "--ball");
   require_same_size(reference, "--reference", ball, "--ball");
+  const Optics optics = optics_of(options, reference);
   calibration::Calibration made = calibration::build(
       {.reference_q8 = reference.mean_q8(),
        .frames = ball.frames(),
        .ball_radius_mm = options.radius_mm,
-       .mm_per_px = options.mm_per_px,
+       .mm_per_px = optics.mm_per_px,
+       .lens = optics.lens,
        .crop = crop_of(options, reference.width(), reference.height()),
        .method = options.method == "published" ? recon::Method::published : recon::Method::list});
   made.origin.sources = reference.sources;
@@ -80,12 +111,14 @@ calibration::Calibration make_from_one(const Options& options, const ImageSet& r
 
 /// From several.
 calibration::Calibration make_from_many(const Options& options, const ImageSet& reference) {
+  const Optics optics = optics_of(options, reference);
   calibration::Origin origin;
   origin.sources = reference.sources;
   calibration::BallPresses set{.reference_q8 = reference.mean_q8(),
                                .presses = {},
                                .ball_radius_mm = options.radius_mm,
-                               .mm_per_px = options.mm_per_px,
+                               .mm_per_px = optics.mm_per_px,
+                               .lens = optics.lens,
                                .crop = crop_of(options, reference.width(), reference.height())};
   for (const std::string& text : options.presses) {
     set.presses.push_back(load_press(text, reference, origin));
@@ -165,8 +198,10 @@ void add_calibrate(CLI::App& app) {
                    "or a folder; repeat. FOLDER@MM where the depth was measured")
       ->take_all();
   depth->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")->required();
-  depth->add_option("--mm-per-px", options->mm_per_px, "Scale of the image, mm per pixel")
-      ->required();
+  depth->add_option("--mm-per-px", options->mm_per_px,
+                    "Scale of the depth map, mm per pixel (default: the lens's in the middle)");
+  depth->add_option("--lens", options->lens,
+                    "Lens file of calibrate lens, or a calibration folder: rectifies the map");
   depth
       ->add_option("--centre", options->centre,
                    "Middle of the crop in the frame (default: the frame's)")
@@ -192,6 +227,7 @@ void add_calibrate(CLI::App& app) {
                    "Folder to write; an old calibration is replaced")
       ->required();
   depth->callback([options] { run(*options); });
+  add_calibrate_lens(*calibrate);
 }
 
 }  // namespace dtact::ctl

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <memory>
+#include <stdexcept>
 
+#include "clients/ctl/offline/folder_evaluation.hpp"
 #include "clients/ctl/offline/images.hpp"
 #include "clients/ctl/offline/offline.hpp"
 
@@ -16,6 +19,9 @@ struct Options {
   std::vector<std::string> ball;
   double radius_mm = 0;
   bool json = false;
+  std::string folder;
+  Board board;
+  std::string page;
 };
 
 void print_json(const calibration::Evaluation& e) {
@@ -53,7 +59,24 @@ void print_text(const calibration::Evaluation& e) {
              100.0 * static_cast<double>(e.untrusted) / static_cast<double>(e.pixels));
 }
 
+void run_folder(const Options& options) {
+  constexpr double kUsualRadius = 4.0;  // mm, of the ball that this kind of sensor comes with
+  std::filesystem::path folder = std::filesystem::weakly_canonical(options.folder);
+  const FolderEvaluation e = evaluate_folder(
+      folder, options.board, options.radius_mm > 0 ? options.radius_mm : kUsualRadius);
+  for (const std::string& line : lines_of(e)) fmt::print("{}\n", line);
+  if (options.page.empty()) return;
+  write_page(e, folder.filename().string(), options.page);
+  fmt::print("page: {}\n", (std::filesystem::path(options.page) / "index.html").string());
+}
+
 void run(const Options& options) {
+  if (!options.folder.empty()) return run_folder(options);
+  if (options.calibration.empty() || options.reference.empty() || options.ball.empty() ||
+      options.radius_mm == 0) {
+    throw std::runtime_error(
+        "give --folder, or --calibration, --reference, --ball and --radius-mm");
+  }
   const calibration::Calibration calibration = calibration::load(options.calibration);
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet ball = load_images(options.ball, "--ball");
@@ -69,18 +92,36 @@ void add_evaluate(CLI::App& app) {
   CLI::App* evaluate =
       app.add_subcommand("evaluate", "Compare a calibration with the press of a ball");
   const auto options = std::make_shared<Options>();
-  evaluate->add_option("--calibration", options->calibration, "Calibration folder")->required();
+  evaluate->add_option("--calibration", options->calibration, "Calibration folder");
+  evaluate->add_option("--reference", options->reference,
+                       "Untouched surface: PNG files, or a folder of them (averaged)");
+  evaluate->add_option("--ball", options->ball,
+                       "The ball pressed in: PNG files, or a folder of them (averaged)");
   evaluate
-      ->add_option("--reference", options->reference,
-                   "Untouched surface: PNG files, or a folder of them (averaged)")
-      ->required();
-  evaluate
-      ->add_option("--ball", options->ball,
-                   "The ball pressed in: PNG files, or a folder of them (averaged)")
-      ->required();
-  evaluate->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")
-      ->required()
+      ->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm (with --folder: 4)")
       ->check(CLI::Range(0.1, 100.0));
+  CLI::Option* folder =
+      evaluate
+          ->add_option("--folder", options->folder,
+                       "Folder with board_reference.png, board.png, ball_reference.png, ball.png: "
+                       "measures the lens and makes and judges a calibration through it")
+          ->excludes("--calibration")
+          ->excludes("--reference")
+          ->excludes("--ball");
+  evaluate->add_option("--pin-rows", options->board.rows, "Rows of the board's pins")
+      ->capture_default_str()
+      ->check(CLI::Range(2, 100))
+      ->needs(folder);
+  evaluate->add_option("--pin-cols", options->board.cols, "Columns of the board's pins")
+      ->capture_default_str()
+      ->check(CLI::Range(2, 100))
+      ->needs(folder);
+  evaluate->add_option("--pitch-mm", options->board.pitch_mm, "Distance of neighbouring pins, mm")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 100.0))
+      ->needs(folder);
+  evaluate->add_option("-o,--output", options->page, "Folder for a page of pictures")
+      ->needs(folder);
   evaluate->add_flag("--json", options->json, "One JSON object instead of sentences");
   evaluate->callback([options] { run(*options); });
 }

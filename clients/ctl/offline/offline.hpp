@@ -8,7 +8,10 @@ namespace dtact::ctl {
 // output; it throws std::runtime_error or std::invalid_argument with a sentence on failure.
 
 /// calibrate depth --reference R.png --ball B.png --radius-mm 4.0 --mm-per-px S -o cal/
+/// and calibrate lens (below).
 void add_calibrate(CLI::App& app);
+/// lens --board-reference R.png --board B.png -o lens.toml, a command of `calibrate`.
+void add_calibrate_lens(CLI::App& calibrate);
 /// reconstruct --calibration cal/ --reference R.png --frame F.png -o depth.{npy,png,ply}
 void add_reconstruct(CLI::App& app);
 /// evaluate --calibration cal/ --reference R.png --ball B.png --radius-mm 4.0 [--json]

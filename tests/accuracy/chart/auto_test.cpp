@@ -32,6 +32,7 @@ std::vector<Judged> scripted_run(double max_error_um) {
                           .frames = make_calibration_press().frames,
                           .ball_radius_mm = 4.0,
                           .mm_per_px = kMmPerPx,
+                          .lens = {},
                           .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide}}));
   hal::CameraInfo camera;
   camera.width = kWidth;

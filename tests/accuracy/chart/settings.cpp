@@ -20,6 +20,7 @@ std::shared_ptr<const recon::Model> calibrate(const image::Grey16& reference, co
                              .frames = press.frames,
                              .ball_radius_mm = 4.0,
                              .mm_per_px = kMmPerPx,
+                             .lens = {},
                              .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide},
                              .method = method})
       .model;

@@ -81,10 +81,33 @@ TEST(ParseCalibration, RefusesMissingAndUnknownKeys) {
   expect_refused(with("[crop]", "[corp]"), "crop", "missing");
 }
 
+TEST(ParseCalibration, ReadsBackTheLens) {
+  Calibration with_lens = sample();
+  recon::Lens lens;
+  lens.homography = {20, 0.1, 5, -0.1, 20, 4, 0.001, 0, 1};
+  lens.centre_col = 5.5;
+  lens.centre_row = 4.25;
+  lens.radius_px = 10;
+  lens.radial = {0.1, -1.0 / 3};
+  auto model = std::make_shared<recon::Model>(*with_lens.model);
+  std::vector<std::uint8_t> outside;
+  model->rectify = make_lens_table(lens, 12, 9, {3, 2, 6, 5, model->mm_per_px}, outside);
+  with_lens.lens = lens;
+  with_lens.model = model;
+  const Files files = format(with_lens);
+  const Calibration back = parse(files.toml, files.reference_png, "upload");
+  ASSERT_TRUE(back.lens);
+  EXPECT_EQ(back.lens->homography, lens.homography);
+  EXPECT_EQ(back.lens->radial, lens.radial);
+  EXPECT_EQ(back.lens->centre_row, 4.25);
+  EXPECT_EQ(format(back).toml, files.toml);
+  expect_refused(with("[lens]", "[lens]\nk1 = 0.1"), "lens.homography", "missing");
+}
+
 TEST(ParseCalibration, ReservedTablesMayBeEmptyOrAbsentButNotFilled) {
   const std::string png = format(sample()).reference_png;
-  EXPECT_NO_THROW((void)parse(with("[lens]\n[surface]\n", ""), png, "upload"));
-  expect_refused(with("[lens]\n", "[lens]\nk1 = 0.1\n"), "lens", "reserved");
+  EXPECT_NO_THROW((void)parse(with("[surface]\n", ""), png, "upload"));
+  expect_refused(with("[surface]\n", "[surface]\nk1 = 0.1\n"), "surface", "reserved");
 }
 
 TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {

@@ -32,7 +32,8 @@ ROOMS = {
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
-    "clients/ctl/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration"],
+    "clients/ctl/lens": ["daemon/recon"],
+    "clients/ctl/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/ctl/lens"],
     "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/cpp", "clients/ctl/offline"],
 }
 # Only standard headers and Highway may stand in angle brackets here.

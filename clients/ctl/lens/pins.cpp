@@ -1,0 +1,310 @@
+#include "clients/ctl/lens/pins.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "clients/ctl/lens/lattice.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using recon::Lens;
+using recon::Point;
+
+/// Standard deviation of the pixel noise: from the median absolute response of the 3×3 filter that
+/// is blind to planes and edges (Immerkær 1996), which the pins hardly move.
+double noise_of(const cv::Mat1f& image) {
+  const cv::Matx33f filter(1, -2, 1, -2, 4, -2, 1, -2, 1);  // norm 6
+  cv::Mat1f response;
+  cv::filter2D(image, response, CV_32F, filter);
+  std::vector<float> sizes;
+  for (const float value : response) sizes.push_back(std::abs(value));
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::ranges::nth_element(sizes, middle);
+  return 1.4826 * *middle / 6;
+}
+
+/// Darkening in grey levels of the mean light, as if the light were even.
+cv::Mat1f relative_darkening(const cv::Mat1f& reference, const cv::Mat1f& frame) {
+  constexpr double kSmooth = 3;      // pixels: the light is smooth, the camera's noise is not
+  constexpr double kDarkest = 0.05;  // of the mean; below it there is nothing to see
+  cv::Mat1f light;
+  cv::GaussianBlur(reference, light, {}, kSmooth, kSmooth, cv::BORDER_REPLICATE);
+  const double mean = cv::mean(light)[0];
+  return cv::Mat1f((reference - frame).mul(mean / cv::max(light, kDarkest * mean)));
+}
+
+/// A pin's neighbourhood in the plane of the surface, and the fit to it.
+class PinFit {
+ public:
+  PinFit(const cv::Mat1f& image, double pitch_mm, double mm_per_px)
+      : image_(image), sigma_(pitch_mm / 5), points_(sample(sigma_, mm_per_px)) {
+    constexpr int kTerms = 10;
+    cv::Mat1d design(static_cast<int>(points_.size()), kTerms);
+    weights_ = cv::Mat1d(static_cast<int>(points_.size()), 1);
+    int i = 0;
+    for (const Point& p : points_) {
+      const double x = p.x / sigma_;
+      const double y = p.y / sigma_;
+      const double weight = std::exp(-(x * x + y * y) / 4);  // the square root of the Gaussian
+      const double terms[kTerms] = {1,     x,         y,         x * x,     x * y,
+                                    y * y, x * x * x, x * x * y, x * y * y, y * y * y};
+      for (int t = 0; t < kTerms; ++t) design(i, t) = weight * terms[t];
+      weights_(i++) = weight;
+    }
+    cv::invert(design, solver_, cv::DECOMP_SVD);
+  }
+
+  /// What the noise of one pixel makes of the height below.
+  [[nodiscard]] double height_noise(double pixel_noise) const {
+    double sum = 0;
+    for (int i = 0; i < solver_.cols; ++i) {
+      const double part = (solver_(3, i) + solver_(5, i)) * weights_(i);
+      sum += part * part;
+    }
+    return pixel_noise * std::sqrt(sum);
+  }
+
+  struct Peak {
+    Point mm;
+    /// Fall of the fitted paraboloid one weight's sigma around the peak, twice its mean, levels.
+    double height = 0;
+  };
+
+  /// The peak within `reach_mm` of `start`, or none.
+  [[nodiscard]] std::optional<Peak> find(const Lens& lens, Point start, double reach_mm) const {
+    constexpr int kSteps = 40;
+    Point at = start;
+    for (int step = 0; step < kSteps; ++step) {
+      const std::optional<cv::Mat1d> fit = fit_at(lens, at);
+      if (!fit) return std::nullopt;
+      const cv::Mat1d& c = *fit;
+      const cv::Matx22d bend(2 * c(3), c(4), c(4), 2 * c(5));
+      const bool peak = c(3) + c(5) < 0 && cv::determinant(bend) > 0;
+      // Uphill by half of Newton's step where the surface is a peak (the cubic terms change with
+      // the place, so that the slope falls about twice as fast as the bend says and the whole step
+      // swings about the peak), else along the slope; at most half a sigma, as far as the fit is to
+      // be trusted.
+      const cv::Vec2d slope(c(1), c(2));
+      cv::Vec2d move = peak ? -0.5 * (bend.inv() * slope) : 1e9 * slope;
+      const double size = cv::norm(move);
+      if (size > 0.5) move *= 0.5 / size;
+      at = {at.x + move[0] * sigma_, at.y + move[1] * sigma_};
+      if (std::hypot(at.x - start.x, at.y - start.y) > reach_mm) return std::nullopt;
+      if (peak && size < 1e-3) return Peak{at, -(c(3) + c(5))};
+    }
+    return std::nullopt;
+  }
+
+ private:
+  /// Places about a pin to three sigma, about a pixel apart.
+  static std::vector<Point> sample(double sigma, double mm_per_px) {
+    const double reach = 2.5 * sigma;
+    const int half = std::clamp(static_cast<int>(std::ceil(reach / mm_per_px)), 8, 40);
+    std::vector<Point> points;
+    for (int y = -half; y <= half; ++y) {
+      for (int x = -half; x <= half; ++x) {
+        const Point p{reach * x / half, reach * y / half};
+        if (std::hypot(p.x, p.y) <= reach) points.push_back(p);
+      }
+    }
+    return points;
+  }
+
+  [[nodiscard]] std::optional<cv::Mat1d> fit_at(const Lens& lens, Point at) const {
+    cv::Mat1d values(static_cast<int>(points_.size()), 1);
+    int i = 0;
+    for (const Point& p : points_) {
+      const Point px = project(lens, {at.x + p.x, at.y + p.y});
+      if (!(px.x > -image_.cols && px.x < 2 * image_.cols && px.y > -image_.rows &&
+            px.y < 2 * image_.rows)) {
+        return std::nullopt;
+      }
+      values(i) = weights_(i) * bilinear(px);
+      ++i;
+    }
+    return cv::Mat1d(solver_ * values);
+  }
+
+  /// Beyond the frame its edge goes on, so that a pin at the edge is not cut off.
+  [[nodiscard]] double bilinear(Point px) const {
+    const double x = std::clamp<double>(px.x, 0, image_.cols - 1);
+    const double y = std::clamp<double>(px.y, 0, image_.rows - 1);
+    const int left = std::min(static_cast<int>(x), image_.cols - 2);
+    const int top = std::min(static_cast<int>(y), image_.rows - 2);
+    const double fx = x - left;
+    const double fy = y - top;
+    return (1 - fy) * ((1 - fx) * image_(top, left) + fx * image_(top, left + 1)) +
+           fy * ((1 - fx) * image_(top + 1, left) + fx * image_(top + 1, left + 1));
+  }
+
+  const cv::Mat1f& image_;
+  double sigma_;
+  std::vector<Point> points_;
+  cv::Mat1d weights_;
+  cv::Mat1d solver_;
+};
+
+Point place_mm(const Board& board, const Lattice& lattice, int row, int col) {
+  return {(col - 0.5 * (lattice.cols - 1)) * board.pitch_mm,
+          (row - 0.5 * (lattice.rows - 1)) * board.pitch_mm};
+}
+
+[[noreturn]] void refuse(const std::vector<std::string>& missing, int pins) {
+  throw std::runtime_error(fmt::format(
+      "board: {} of {} pins not found: {} (rows and columns counted from the image's upper left "
+      "corner); press the board in more evenly, with all its pins in the picture",
+      missing.size(), pins, fmt::join(missing, "; ")));
+}
+
+/// What the pins are first looked for with: not led astray by a few bad places.
+LensModel searching_model(std::size_t marks) {
+  return marks >= 24 ? LensModel::radial1 : LensModel::affine;
+}
+
+/// A lattice followed up in the image: the pins found and those that are not.
+struct Settled {
+  const Lattice* lattice = nullptr;
+  std::vector<Mark> marks;
+  std::vector<std::string> missing;
+  double rms_mm = 0;  ///< Of the marks about a lens of twelve parameters.
+};
+
+/// The median of the heights around a place of the lattice.
+double neighbours_height(const std::vector<double>& heights, const Lattice& lattice, int row,
+                         int col) {
+  std::vector<double> around;
+  for (int y = std::max(0, row - 1); y <= std::min(lattice.rows - 1, row + 1); ++y) {
+    for (int x = std::max(0, col - 1); x <= std::min(lattice.cols - 1, col + 1); ++x) {
+      if (x == col && y == row) continue;
+      around.push_back(heights[static_cast<std::size_t>(y * lattice.cols + x)]);
+    }
+  }
+  std::ranges::sort(around);
+  return around[around.size() / 2];
+}
+
+Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, const Board& board) {
+  constexpr double kSure = 5;          // standard deviations of the noise
+  constexpr double kWithin = 0.25;     // of the pitch
+  constexpr double kNeighbours = 0.2;  // of the neighbours' height
+  constexpr int kRounds = 3;
+  Settled settled{&lattice, {}, {}, 0};
+  int i = 0;
+  for (const auto& place : lattice.places) {
+    if (place) {
+      settled.marks.push_back(
+          {place_mm(board, lattice, i / lattice.cols, i % lattice.cols), {place->x, place->y}});
+    }
+    ++i;
+  }
+  Lens lens = fit_lens(settled.marks, searching_model(settled.marks.size()));
+  for (int round = 0; round < kRounds; ++round) {
+    const PinFit fit(image, board.pitch_mm, recon::central_mm_per_px(lens));
+    std::vector<Point> places;
+    std::vector<double> heights;
+    for (int pin = 0; pin < lattice.rows * lattice.cols; ++pin) {
+      const auto peak =
+          fit.find(lens, place_mm(board, lattice, pin / lattice.cols, pin % lattice.cols),
+                   kWithin * board.pitch_mm);
+      places.push_back(peak ? peak->mm : Point{});
+      heights.push_back(peak ? peak->height : 0);
+    }
+    settled.marks.clear();
+    settled.missing.clear();
+    for (int pin = 0; pin < lattice.rows * lattice.cols; ++pin) {
+      const int row = pin / lattice.cols;
+      const int col = pin % lattice.cols;
+      const double height = heights[static_cast<std::size_t>(pin)];
+      if (height > kSure * fit.height_noise(noise) &&
+          height > kNeighbours * neighbours_height(heights, lattice, row, col)) {
+        settled.marks.push_back({place_mm(board, lattice, row, col),
+                                 project(lens, places[static_cast<std::size_t>(pin)])});
+      } else {
+        settled.missing.push_back(fmt::format("row {}, column {}", row + 1, col + 1));
+      }
+    }
+    if (2 * settled.missing.size() > lattice.places.size()) return settled;
+    lens = fit_lens(settled.marks, LensModel::radial2);
+  }
+  settled.rms_mm = rms(residuals_mm(lens, settled.marks));
+  return settled;
+}
+
+/// Whether two lattices are of the same places, found at other scales.
+bool same_places(const Lattice& a, const Lattice& b, double apart) {
+  if (a.rows != b.rows) return false;
+  for (std::size_t i = 0; i < a.places.size(); ++i) {
+    if (a.places[i] && b.places[i] && cv::norm(*a.places[i] - *b.places[i]) > apart) return false;
+  }
+  return true;
+}
+
+/// All lattices at several scales, of the board as it is and on edge.
+std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
+  // Of the image's shorter side: from pins a few pixels wide to a board twice as large as the
+  // frame.
+  constexpr double kScales[] = {1 / 160., 1 / 120., 1 / 80., 1 / 60., 1 / 48., 1 / 36., 1 / 24.};
+  std::vector<Lattice> all;
+  for (const double scale : kScales) {
+    const double sigma = scale * std::min(image.rows, image.cols);
+    if (sigma < 1) continue;
+    const std::vector<Candidate> candidates = find_candidates(image, sigma);
+    for (const auto& [rows, cols] : {std::pair{board.rows, board.cols}, {board.cols, board.rows}}) {
+      std::ranges::move(find_lattices(candidates, rows, cols), std::back_inserter(all));
+      if (board.rows == board.cols) break;
+    }
+  }
+  // The fullest first; of those of the same places one is enough.
+  std::ranges::stable_sort(all, std::greater<>{}, &Lattice::found);
+  const double apart = 0.25 * std::min(image.rows, image.cols) / std::max(board.rows, board.cols);
+  std::vector<Lattice> distinct;
+  for (Lattice& lattice : all) {
+    if (std::ranges::none_of(
+            distinct, [&](const Lattice& other) { return same_places(lattice, other, apart); })) {
+      distinct.push_back(std::move(lattice));
+    }
+  }
+  return distinct;
+}
+
+}  // namespace
+
+PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Board& board) {
+  constexpr std::size_t kTries = 30;
+  const cv::Mat1f image = relative_darkening(reference, frame);
+  std::vector<Lattice> lattices = lattices_of(image, board);
+  lattices.resize(std::min(lattices.size(), kTries));
+  const double noise = noise_of(image);
+  Settled best;
+  for (const Lattice& lattice : lattices) {
+    Settled settled = settle(image, noise, lattice, board);
+    // The most pins, and of those windows and scales that have them the most regular one.
+    const bool better =
+        best.lattice == nullptr || settled.missing.size() < best.missing.size() ||
+        (settled.missing.size() == best.missing.size() && settled.rms_mm < best.rms_mm);
+    if (better) best = std::move(settled);
+  }
+  if (best.lattice == nullptr || 2 * best.missing.size() > best.lattice->places.size()) {
+    throw std::runtime_error(fmt::format(
+        "board: no lattice of {}x{} pins found; check that the images are an untouched surface and "
+        "the same with the board pressed in, and the numbers of rows and columns",
+        board.rows, board.cols));
+  }
+  if (!best.missing.empty()) refuse(best.missing, board.rows * board.cols);
+  PinPress press{best.lattice->rows, best.lattice->cols, std::move(best.marks), {}};
+  press.lens = choose_lens(press.marks);
+  level(press.lens.lens, press.marks);
+  return press;
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "daemon/recon/lens.hpp"
+
+namespace dtact::ctl {
+
+/// A point of the surface and where the camera shows it.
+struct Mark {
+  recon::Point mm;
+  recon::Point px;
+};
+
+/// How many of the lens's parameters are free.
+enum class LensModel {
+  affine,      ///< 6
+  projective,  ///< 8
+  radial1,     ///< 11: centre of distortion and k₁
+  radial2,     ///< 12
+  radial3,     ///< 13
+  radial4,     ///< 14
+};
+[[nodiscard]] int parameters(LensModel model);
+
+/// The lens that minimises the squared distances in pixels (Levenberg–Marquardt from the best
+/// affine map through the smaller models). Throws std::runtime_error when there are fewer marks
+/// than parameters or they lie on a line.
+[[nodiscard]] recon::Lens fit_lens(std::span<const Mark> marks, LensModel model);
+
+/// Distances in millimetres on the surface from where each mark should lie to where the lens puts
+/// its pixel; from the lens's local inverse, so good for small ones.
+[[nodiscard]] std::vector<recon::Point> residuals_mm(const recon::Lens& lens,
+                                                     std::span<const Mark> marks);
+
+/// Root mean square of the distances.
+[[nodiscard]] double rms(std::span<const recon::Point> residuals);
+
+/// Each mark's residual with a lens fitted to all others.
+[[nodiscard]] std::vector<recon::Point> leave_one_out(std::span<const Mark> marks, LensModel model);
+
+/// A lens, the model that cross-validation chose, and how well it does.
+struct ChosenLens {
+  recon::Lens lens;
+  LensModel model = LensModel::affine;
+  std::vector<recon::Point> in_sample;       ///< mm, of each mark
+  std::vector<recon::Point> left_out;        ///< mm, of each mark with the lens of the others
+  std::vector<double> left_out_rms_of_each;  ///< mm, by LensModel; those that were tried
+};
+
+/// The smallest model that no larger one beats: a larger one must lower the mean squared
+/// left-out residual clearly.
+[[nodiscard]] ChosenLens choose_lens(std::span<const Mark> marks);
+
+/// Whether the mean of `squares` lies below that of `others`, of the same samples, by more than
+/// two standard errors of the difference: a parameter must earn its place.
+[[nodiscard]] bool clearly_lower(std::span<const double> squares, std::span<const double> others);
+
+/// Turns the millimetres' axes so that the lens's Jacobian at the origin has no rotation (its polar
+/// decomposition): the rectified image is then as upright as the camera's, however the board lay.
+void level(recon::Lens& lens, std::span<Mark> marks);
+
+}  // namespace dtact::ctl

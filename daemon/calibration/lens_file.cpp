@@ -1,0 +1,89 @@
+#include "daemon/calibration/lens_file.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "daemon/calibration/calibration.hpp"
+#include "daemon/calibration/text.hpp"
+#include "hal/base/atomic_file.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+constexpr double kReach = 1e6;  // of any number in the table, pixels or pixels per millimetre
+
+}  // namespace
+
+std::string format_lens(const recon::Lens& lens) {
+  return fmt::format(
+      "homography = [{}]  # mm on the surface to undistorted pixels\n"
+      "centre_col = {}\ncentre_row = {}  # of the distortion, pixels\n"
+      "radius_px = {}\nradial = [{}]  # k1, k2, ... of (distance / radius_px)^2, ^4, ...\n",
+      fmt::join(lens.homography, ", "), lens.centre_col, lens.centre_row, lens.radius_px,
+      fmt::join(lens.radial, ", "));
+}
+
+std::optional<recon::Lens> read_lens(KeyReader reader, int frame_width, int frame_height) {
+  if (reader.keys().empty()) return std::nullopt;
+  recon::Lens lens;
+  const std::vector<double> homography = reader.numbers("homography", -kReach, kReach);
+  if (homography.size() != lens.homography.size()) {
+    reader.fail("homography", "expected nine numbers");
+  }
+  std::ranges::copy(homography, lens.homography.begin());
+  lens.centre_col = reader.number("centre_col", -kReach, kReach);
+  lens.centre_row = reader.number("centre_row", -kReach, kReach);
+  lens.radius_px = reader.number("radius_px", 1, kReach);
+  lens.radial = reader.numbers("radial", -kReach, kReach);
+  if (lens.radial.size() > recon::Lens::kMaxRadial) {
+    reader.fail("radial", fmt::format("expected at most {} numbers", recon::Lens::kMaxRadial));
+  }
+  reader.finish();
+  try {
+    recon::check(lens, frame_width, frame_height);
+  } catch (const std::invalid_argument& e) {
+    reader.fail("", e.what());
+  }
+  return lens;
+}
+
+std::string format(const LensFile& file) {
+  std::string t = "# A lens of dtactd. Written by dtactctl calibrate lens.\n";
+  for (const std::string& note : file.notes) t += fmt::format("# {}\n", note);
+  t += fmt::format("version = {}\n\n[frame]\nwidth = {}\nheight = {}\n\n[lens]\n", kFormatVersion,
+                   file.frame_width, file.frame_height);
+  return t + format_lens(file.lens);
+}
+
+LensFile load_lens(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) {
+    const Calibration calibration = load(path);
+    if (!calibration.lens) {
+      throw std::runtime_error(
+          path.string() + ": this calibration has no lens; make one with dtactctl calibrate lens");
+    }
+    return {calibration.model->rectify.frame_width,
+            calibration.model->rectify.frame_height,
+            *calibration.lens,
+            {}};
+  }
+  const toml::table document = parse_toml(base::read_file(path), path.string());
+  KeyReader top(document, path.string());
+  (void)top.integer("version", kFormatVersion, kFormatVersion);
+  LensFile file;
+  KeyReader frame = top.table("frame");
+  file.frame_width = static_cast<int>(frame.integer("width", 2, kMaxPixels));
+  file.frame_height = static_cast<int>(frame.integer("height", 2, kMaxPixels));
+  frame.finish();
+  const std::optional<recon::Lens> lens =
+      read_lens(top.table("lens"), file.frame_width, file.frame_height);
+  top.finish();
+  if (!lens) top.fail("lens", "is empty; make a lens with dtactctl calibrate lens");
+  file.lens = *lens;
+  return file;
+}
+
+}  // namespace dtact::calibration

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/calibration/key_reader.hpp"
+#include "daemon/recon/lens.hpp"
+
+namespace dtact::calibration {
+
+/// A lens and the camera frame it was measured in: what `dtactctl calibrate lens` writes.
+struct LensFile {
+  int frame_width = 0;
+  int frame_height = 0;
+  recon::Lens lens;
+  std::vector<std::string> notes;  ///< Comment lines: how it was measured and how well it fits.
+};
+
+/// The keys of a `[lens]` table, one a line, without the header. Numbers are read back exactly.
+[[nodiscard]] std::string format_lens(const recon::Lens& lens);
+
+/// Takes a `[lens]` table's keys; an empty table is no lens. Throws as KeyReader.
+[[nodiscard]] std::optional<recon::Lens> read_lens(KeyReader reader, int frame_width,
+                                                   int frame_height);
+
+/// The text of a lens file.
+[[nodiscard]] std::string format(const LensFile& file);
+
+/// Reads a lens file, or the lens of a calibration folder. Throws std::runtime_error with file,
+/// line, key and remedy.
+[[nodiscard]] LensFile load_lens(const std::filesystem::path& path);
+
+}  // namespace dtact::calibration

@@ -1,0 +1,78 @@
+// The pins of real boards in images changed as other sensors of the family would change them.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "clients/ctl/lens/pins.hpp"
+#include "tests/accuracy/real/board_transforms.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+class RobustPins : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    const auto folder = sensor_folder(GetParam());
+    if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
+    board_ = load_board(*folder);
+  }
+  /// All pins are found and lie where the grid says, each judged by the lens of the others.
+  static void expect_found(const BoardImages& board, const char* what, double bound_mm = 0.06) {
+    const PinPress press = find_pins(board.reference, board.frame, {});
+    const double error = rms(press.lens.left_out);
+    fmt::print("{} {}: left-out RMS {:.4f} mm, {} parameters\n", GetParam(), what, error,
+               parameters(press.lens.model));
+    EXPECT_LE(error, bound_mm) << what;
+    EXPECT_EQ(press.marks.size(), 63U) << what;
+  }
+  BoardImages board_;
+};
+
+TEST_P(RobustPins, AsTheyAre) { expect_found(board_, "as it is"); }
+TEST_P(RobustPins, Portrait) {
+  expect_found(turned(board_), "portrait");
+  const PinPress press = find_pins(turned(board_).reference, turned(board_).frame, {});
+  EXPECT_EQ(press.rows, 9);
+  EXPECT_EQ(press.cols, 7);
+}
+TEST_P(RobustPins, DarkCorners) { expect_found(dark_corners(board_), "dark corners"); }
+TEST_P(RobustPins, Tilted) { expect_found(tilted(board_), "tilted"); }
+TEST_P(RobustPins, Leaking) { expect_found(leaking(board_), "leaking"); }
+TEST_P(RobustPins, Everything) {
+  expect_found(leaking(tilted(dark_corners(turned(board_)))), "all of them", 0.07);
+}
+
+TEST_P(RobustPins, NamesThePinsThatAreMissing) {
+  const PinPress whole = find_pins(board_.reference, board_.frame, {});
+  // The second row's third and the last row's last; half the pitch is about 25 pixels here.
+  BoardImages gone = board_;
+  for (const std::size_t pin : {11U, 62U}) {
+    const recon::Point px = whole.marks[pin].px;
+    gone = without_pin(gone, {static_cast<int>(px.x), static_cast<int>(px.y)}, 27);
+  }
+  EXPECT_THAT([&] { (void)find_pins(gone.reference, gone.frame, {}); },
+              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("2 of 63 pins not found"),
+                                                      HasSubstr("row 2, column 3"),
+                                                      HasSubstr("row 7, column 9"))));
+}
+
+TEST_P(RobustPins, AnUntouchedSurfaceIsNoBoard) {
+  // Both images of one surface; the second with the noise of another exposure.
+  cv::Mat1f frame = board_.reference.clone();
+  cv::RNG random(1);
+  for (float& level : frame) level += static_cast<float>(random.gaussian(1));
+  EXPECT_THAT([&] { (void)find_pins(board_.reference, frame, {}); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no lattice of 7x9 pins found")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, RobustPins, testing::Values("sensor_a", "sensor_b", "sensor_c"),
+                         [](const auto& sensor) { return std::string(sensor.param); });
+
+}  // namespace
+}  // namespace dtact::ctl
