@@ -61,6 +61,8 @@ DepthMap to_depth(const v1::DepthMap& message) {
   map.height = static_cast<int>(message.height());
   map.mm_per_px = message.mm_per_px();
   map.um_per_unit = message.um_per_unit();
+  map.decimation = static_cast<int>(message.decimation());
+  map.uncertainty_um = message.uncertainty_um();
   map.untrusted = static_cast<std::int16_t>(message.untrusted_value());
   return map;
 }

@@ -42,8 +42,11 @@ struct DepthMap {
   int width = 0;   ///< Pixels.
   int height = 0;  ///< Pixels.
   double mm_per_px = 0;
-  double um_per_unit = 1;            ///< Micrometres a unit of `values`.
-  std::int16_t untrusted = 0;        ///< The value of a pixel not to believe. 0 is a valid depth.
+  double um_per_unit = 1;      ///< Micrometres a unit of `values`.
+  std::int16_t untrusted = 0;  ///< The value of a pixel not to believe. 0 is a valid depth.
+  int decimation = 1;          ///< 1, 2 or 4: 1/decimation of the calibration's resolution.
+  /// Mean absolute error to expect inside the contact (dtact.proto), micrometres.
+  double uncertainty_um = 0;
   std::vector<std::int16_t> values;  ///< Row-major.
 
   /// One pixel in millimetres, NaN where untrusted.

@@ -33,9 +33,11 @@ std::string watch_line(const WatchMeter& meter, const client::Frame& last) {
       latency.count() == 0 ? "-"
                            : fmt::format("p50 {:.1f} p99 {:.1f} ms", latency.percentile_ms(0.5),
                                          latency.percentile_ms(0.99));
+  const std::string worth =
+      last.depth ? fmt::format(" +- {:.3f}", last.depth->uncertainty_um / 1000) : "";
   return fmt::format(
-      "{:5.1f} fps  contact {:6.1f} mm2  deepest {:6.3f} mm  latency {}  drops {}  {}", meter.fps(),
-      last.contact.area_mm2, last.contact.deepest_mm, delay, last.dropped,
+      "{:5.1f} fps  contact {:6.1f} mm2  deepest {:6.3f} mm{}  latency {}  drops {}  {}",
+      meter.fps(), last.contact.area_mm2, last.contact.deepest_mm, worth, delay, last.dropped,
       last.health.empty() ? "ok" : fmt::format("{}", fmt::join(last.health, ",")));
 }
 
@@ -44,6 +46,10 @@ std::string watch_json(const WatchMeter& meter, const client::Frame& last) {
   json.open('{').member("sequence", last.sequence).member("fps", meter.fps());
   json.member("touching", last.contact.touching).member("area_mm2", last.contact.area_mm2);
   json.member("deepest_mm", last.contact.deepest_mm);
+  if (last.depth) {
+    json.member("uncertainty_um", last.depth->uncertainty_um);
+    json.member("decimation", last.depth->decimation);
+  }
   const auto& latency = meter.latency();
   if (latency.count() == 0) {
     json.key("latency_p50_ms").null().key("latency_p99_ms").null();

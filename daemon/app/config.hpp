@@ -40,8 +40,9 @@ struct LoadedConfig {
 };
 
 /// Reads `file` (none: defaults only), then the environment's DTACTD_LOG, then applies each
-/// "key=value" of `settings`; the later wins. Relative paths in a file are relative to its folder; in settings, to
-/// the working directory. Throws std::runtime_error with file, line, key and the allowed values.
+/// "key=value" of `settings`; the later wins. Relative paths in a file are relative to its folder;
+/// in settings, to the working directory. Throws std::runtime_error with file, line, key and the
+/// allowed values.
 [[nodiscard]] LoadedConfig load_config(const std::optional<std::filesystem::path>& file,
                                        const std::vector<std::string>& settings);
 

@@ -104,8 +104,9 @@ Key choice(std::string path, std::string& field, std::vector<std::string> allowe
 }
 
 /// A number that goes by a name.
-Key named(std::string path, int& field, std::vector<std::pair<std::string, int>> names) {
+Key named(std::string path, int& field, const std::vector<std::pair<std::string, int>>& names) {
   std::vector<std::string> words;
+  words.reserve(names.size());
   for (const auto& [name, value] : names) words.push_back(toml_string(name));
   return {std::move(path), fmt::format("one of {}", fmt::join(words, ", ")),
           [&field, names](const toml::node& node, const fs::path&) {
@@ -284,8 +285,9 @@ std::vector<Key> bind_keys(Config& c) {
       integer("capture.fifo_priority", p.fifo_priority, 0, 99, "(0 = normal scheduling)"),
       boolean("capture.lock_memory", p.lock_memory),
 
-      named("reconstruction.resolution", p.reconstruction.decimation,
-            {{"full", 1}, {"half", 2}, {"quarter", 4}}),
+      named("reconstruction.method", p.reconstruction.decimation,
+            {{"full", 1}, {"half", 2}, {"quarter", 4}, {"auto", 0}}),
+      real("reconstruction.max_error_um", p.reconstruction.max_error_um, 1, 10000, "(micrometres)"),
 
       integer("reference.frames", p.reference.frames, 1, 256, "(frames)"),
       integer("reference.settle_frames", p.reference.settle_frames, 2, 64, "(frames)"),

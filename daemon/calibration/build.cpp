@@ -29,24 +29,6 @@ image::Grey8 rectified(const recon::RectifyTable& table, const Pixel& pixel) {
   return part;
 }
 
-/// The reference to whole grey levels.
-image::Grey8 rectified_reference(const recon::RectifyTable& table, const image::Grey16& q8) {
-  return rectified(table, [&](std::size_t at) {
-    return static_cast<std::uint8_t>(std::min(255, (q8.pixels[at] + 128) / 256));
-  });
-}
-
-/// The mean of the frames to whole grey levels.
-image::Grey8 rectified_mean(const recon::RectifyTable& table,
-                            const std::vector<image::Grey8>& frames) {
-  const auto count = static_cast<int>(frames.size());
-  return rectified(table, [&](std::size_t at) {
-    int sum = 0;
-    for (const image::Grey8& frame : frames) sum += frame.pixels[at];
-    return static_cast<std::uint8_t>((sum + count / 2) / count);
-  });
-}
-
 void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_per_px,
                     std::uint8_t limit, const char* message) {
   std::size_t all = 0;
@@ -66,12 +48,10 @@ void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_
 }
 
 /// What the frame shows of the image that the lens rectifies; without a lens the frame.
-Crop seen(const BallPress& press) {
-  const int width = press.reference_q8.width;
-  const int height = press.reference_q8.height;
-  if (!press.lens) return {0, 0, width, height};
+Crop seen(const std::optional<recon::Lens>& lens, int width, int height, double mm_per_px) {
+  if (!lens) return {0, 0, width, height};
   std::vector<std::uint8_t> outside;
-  (void)map_table(press.lens, width, height, {0, 0, width, height, press.mm_per_px}, outside);
+  (void)map_table(lens, width, height, {0, 0, width, height, mm_per_px}, outside);
   int left = width;
   int right = 0;
   int top = height;
@@ -107,6 +87,43 @@ void check(const BallPress& press) {
 
 }  // namespace
 
+image::Grey8 rectified_reference(const recon::RectifyTable& table, const image::Grey16& q8) {
+  return rectified(table, [&](std::size_t at) {
+    return static_cast<std::uint8_t>(std::min(255, (q8.pixels[at] + 128) / 256));
+  });
+}
+
+image::Grey8 rectified_mean(const recon::RectifyTable& table,
+                            const std::vector<image::Grey8>& frames) {
+  const auto count = static_cast<int>(frames.size());
+  return rectified(table, [&](std::size_t at) {
+    int sum = 0;
+    for (const image::Grey8& frame : frames) sum += frame.pixels[at];
+    return static_cast<std::uint8_t>((sum + count / 2) / count);
+  });
+}
+
+Calibration empty_calibration(const image::Grey16& reference_q8, const std::optional<Crop>& crop,
+                              double mm_per_px, const std::optional<recon::Lens>& lens) {
+  const int width = reference_q8.width;
+  const int height = reference_q8.height;
+  const Crop part = crop.value_or(seen(lens, width, height, mm_per_px));
+  auto model = std::make_shared<recon::Model>();
+  std::vector<std::uint8_t> outside;
+  model->rectify = map_table(lens, width, height,
+                             {part.col, part.row, part.width, part.height, mm_per_px}, outside);
+  add_untrusted(*model, outside);
+  model->mm_per_px = mm_per_px;
+  model->smoothing_px = std::min(10.0, kSmoothingMm / mm_per_px);
+  model->reference_q8 = reference_q8.pixels;
+  Calibration calibration;
+  calibration.crop_col = part.col;
+  calibration.crop_row = part.row;
+  calibration.lens = lens;
+  calibration.model = std::move(model);
+  return calibration;
+}
+
 SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> reference_q8,
                     std::span<const image::Grey8> frames, double ball_radius_mm) {
   SettledPress press;
@@ -127,19 +144,10 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
 
 Calibration build(const BallPress& press) {
   check(press);
-  const int frame_width = press.reference_q8.width;
-  const int frame_height = press.reference_q8.height;
-  const Crop crop = press.crop.value_or(seen(press));
-  auto model = std::make_shared<recon::Model>();
+  Calibration calibration =
+      empty_calibration(press.reference_q8, press.crop, press.mm_per_px, press.lens);
+  auto model = std::make_shared<recon::Model>(*calibration.model);
   model->method = press.method;
-  std::vector<std::uint8_t> outside;
-  model->rectify =
-      map_table(press.lens, frame_width, frame_height,
-                {crop.col, crop.row, crop.width, crop.height, press.mm_per_px}, outside);
-  add_untrusted(*model, outside);
-  model->mm_per_px = press.mm_per_px;
-  model->smoothing_px = std::min(10.0, kSmoothingMm / press.mm_per_px);
-  model->reference_q8 = press.reference_q8.pixels;
 
   const SettledPress settled =
       settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
@@ -152,10 +160,6 @@ Calibration build(const BallPress& press) {
   model->list = press.method == recon::Method::list
                     ? fit_list(settled.map, settled.contact)
                     : fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
-  Calibration calibration;
-  calibration.crop_col = crop.col;
-  calibration.crop_row = crop.row;
-  calibration.lens = press.lens;
   calibration.model = std::move(model);
   return calibration;
 }

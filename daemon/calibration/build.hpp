@@ -45,11 +45,23 @@ struct BallPress {
   recon::Method method = recon::Method::list;
 };
 
+/// A calibration without a list: frame, crop (none: all that the frame shows), scale, lens,
+/// smoothing, reference. Throws std::invalid_argument when the crop leaves the frame.
+[[nodiscard]] Calibration empty_calibration(const image::Grey16& reference_q8,
+                                            const std::optional<Crop>& crop, double mm_per_px,
+                                            const std::optional<recon::Lens>& lens);
+
+/// The depth map's part of the reference, the nearest pixels, to whole grey levels.
+[[nodiscard]] image::Grey8 rectified_reference(const recon::RectifyTable& table,
+                                               const image::Grey16& q8);
+/// The same of the mean of the frames.
+[[nodiscard]] image::Grey8 rectified_mean(const recon::RectifyTable& table,
+                                          const std::vector<image::Grey8>& frames);
+
 /// The smoothing's standard deviation, millimetres. Light scatters sideways by about 0.3 mm in the
 /// layer, so that smoothing by 0.1 mm widens an edge by 5 % and takes a frame's noise of one grey
 /// level (32 µm) to 0.14 (5 µm) at 0.05 mm a pixel. On the real ball presses the error of the half
-/// that was not fitted falls by less than 1 µm a pixel from there on, while the pins go on losing
-/// height.
+/// that was not fitted falls by less than 1 µm a pixel from there on.
 inline constexpr double kSmoothingMm = 0.1;
 
 /// Builds a calibration from images alone. `origin` is left for the caller to fill. Throws

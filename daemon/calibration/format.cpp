@@ -62,6 +62,29 @@ std::vector<std::int64_t> runs_of(const std::vector<std::uint8_t>& mask) {
   return runs;
 }
 
+std::string gain_text(const recon::SpatialGain& gain) {
+  switch (gain.shape) {
+    case recon::GainShape::none:
+      break;
+    case recon::GainShape::uniform:
+      return "[gain]  # darkening counts as a share of the light at its place\n"
+             "shape = \"uniform\"\n\n";
+    case recon::GainShape::radial:
+      return fmt::format(
+          "[gain]  # darkening is multiplied by 1 + per_mm * distance from the centre\n"
+          "shape = \"radial\"\ncentre_x_mm = {}\ncentre_y_mm = {}\nper_mm = {}\n\n",
+          gain.centre_x_mm, gain.centre_y_mm, gain.per_mm);
+  }
+  return "[gain]  # the same at every place\nshape = \"none\"\n\n";
+}
+
+std::vector<double> column(const std::vector<recon::Model::Uncertainty>& rows,
+                           double recon::Model::Uncertainty::* field) {
+  std::vector<double> values;
+  for (const auto& row : rows) values.push_back(row.*field);
+  return values;
+}
+
 }  // namespace
 
 Files format(const Calibration& calibration) {
@@ -121,8 +144,14 @@ Files format(const Calibration& calibration) {
   t += fmt::format(
       "[lens]  # where the surface appears in the frame; empty: the frame as it is\n{}\n",
       calibration.lens ? format_lens(*calibration.lens) : "");
-  t += "# Reserved for a curved surface, the spatial gain. Empty: none.\n"
-       "[surface]\n[gain]\n\n";
+  t += "# Reserved for a curved surface. Empty: none.\n[surface]\n\n";
+  t += gain_text(model.gain);
+  if (!model.uncertainty.empty()) {
+    t += "[uncertainty]  # of the list: mean absolute error in micrometres at some indentations\n";
+    t += fmt::format("depth_mm = {}\nerror_um = {}\n\n",
+                     array_text(column(model.uncertainty, &recon::Model::Uncertainty::depth_mm)),
+                     array_text(column(model.uncertainty, &recon::Model::Uncertainty::error_um)));
+  }
   t += fmt::format(
       "# Indentation in micrometres, positive = pressed, of the darkening first_q6/64 "
       "grey levels and\n# on, 64 entries a level. Covered: what the calibration "

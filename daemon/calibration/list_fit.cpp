@@ -5,25 +5,19 @@
 #include <stdexcept>
 #include <vector>
 
+#include "daemon/calibration/list_shape.hpp"
+
 namespace dtact::calibration {
 namespace {
 
 constexpr double kSure = 0.9;        // of the contact radius
 constexpr double kBinsPerLevel = 2;  // of the monotone fit
-constexpr double kVouched = 2;       // grey levels beyond the greatest one seen
 constexpr int kFewest = 4;           // pixels that make a grey level's vote
 constexpr std::size_t kRange = 256;  // grey levels
 
 double sag(double ball_radius, double r) {
   return ball_radius - std::sqrt(std::max(0.0, ball_radius * ball_radius - r * r));
 }
-
-/// A point of the list: darkening, indentation, and how many pixels say so.
-struct Knot {
-  double level = 0;
-  double depth_mm = 0;
-  double weight = 0;
-};
 
 /// sag = depth − slope · level.
 struct Line {
@@ -101,15 +95,6 @@ void make_monotone(std::vector<Knot>& knots) {
   }
 }
 
-/// Between the origin, the knots, and level beyond the last.
-double interpolate(const std::vector<Knot>& knots, double level) {
-  const auto above = std::ranges::lower_bound(knots, level, {}, &Knot::level);
-  if (above == knots.end()) return knots.back().depth_mm;
-  const Knot below = above == knots.begin() ? Knot{} : *(above - 1);
-  return std::lerp(below.depth_mm, above->depth_mm,
-                   (level - below.level) / (above->level - below.level));
-}
-
 /// Step 3. Returns the slope at zero, millimetres a grey level: that of the line to the origin, but
 /// within a factor of four of the contact's own, should a lopsided press put the edge at nothing.
 double hand_over(std::vector<Knot>& knots, double sure_level, double line_slope) {
@@ -124,33 +109,6 @@ double hand_over(std::vector<Knot>& knots, double sure_level, double line_slope)
   return slope;
 }
 
-double bulge_mm(double level, double slope, double c) {
-  return -c * (1 - std::exp(slope * level / c));
-}
-
-/// Step 5: the c at which dent and bulge have the same volume, from a radial profile, so that a
-/// ring that is cut off by the image counts whole.
-double bulge_limit(const RadialProfile& profile, const std::vector<Knot>& knots, double slope) {
-  const auto volume = [&](double c) {
-    double sum = 0;
-    for (std::size_t i = 0; i < profile.levels.size(); ++i) {
-      const double level = profile.levels[i];
-      if (std::isnan(level)) continue;
-      const double depth = level > 0 ? interpolate(knots, level) : bulge_mm(level, slope, c);
-      sum += depth * (2 * static_cast<double>(i) + 1);
-    }
-    return sum;
-  };
-  // From a bulge that hardly rises to a list that is straight; the greater c, the more bulge.
-  double low = 0.02;
-  double high = 10;
-  for (int i = 0; i < 50; ++i) {
-    const double middle = std::sqrt(low * high);
-    (volume(middle) > 0 ? low : high) = middle;
-  }
-  return low;
-}
-
 }  // namespace
 
 recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
@@ -163,34 +121,7 @@ recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
 
   const RadialProfile profile = radial_profile(map, contact, kFarField * contact.ball_radius_mm);
   const double slope = hand_over(knots, std::max(1.0, profile.at(sure_mm)), line.slope);
-  const double c = bulge_limit(profile, knots, slope);
-  const Knot deepest = knots.back();
-  const double faintest = std::ranges::min(
-      profile.levels, {}, [](double level) { return std::isnan(level) ? 0 : level; });
-
-  recon::DepthList list;
-  constexpr int kStep = recon::kEntriesPerLevel;
-  list.first_q6 = kListFirstLevel * kStep;
-  for (int q6 = kListFirstLevel * kStep; q6 <= kListLastLevel * kStep; ++q6) {
-    const double level = static_cast<double>(q6) / kStep;
-    double mm = 0;
-    if (level <= 0) {
-      mm = bulge_mm(level, slope, c);
-    } else if (level <= deepest.level) {
-      mm = interpolate(knots, level);
-    } else {
-      mm = deepest.depth_mm + line.slope * (level - deepest.level);
-    }
-    list.um.push_back(
-        static_cast<std::int16_t>(std::clamp(std::lround(1000 * mm), -16383L, 16383L)));
-  }
-  const auto covered = [](double level) {
-    return static_cast<int>(
-        std::lround(kStep * std::clamp<double>(level, kListFirstLevel, kListLastLevel)));
-  };
-  list.covered_from_q6 = covered(std::min(faintest, 0.0));
-  list.covered_to_q6 = covered(deepest.level + kVouched);
-  return list;
+  return make_list(knots, slope, line.slope, profile);
 }
 
 }  // namespace dtact::calibration

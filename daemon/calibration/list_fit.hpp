@@ -26,19 +26,10 @@ using PixelFilter = std::function<bool(int x, int y)>;
 /// 3. Towards the contact's edge the bright ring's scattered light lowers the darkening, the more
 ///    the deeper the press, so what one press shows there is not true of another. From the sure
 ///    part's edge down to zero the fit hands over to the straight line to the origin.
-/// 4. Above the greatest darkening the list goes on along the line of 1; two grey levels of that
-/// are
-///    vouched for, so that a frame's noise is not beyond the calibration.
-/// 5. The bulge: −c·(1 − exp(s·ΔI / c)) for ΔI < 0, with the slope s that the list has at zero. A
-///    thickening layer brightens ever faster, so the list flattens; c is where the volume of the
-///    bulge equals that of the dent, since the layer is incompressible.
+/// 4. make_list() adds what lies beyond and the bulge, along the line of 1.
 ///
 /// Throws std::runtime_error when the image doesn't darken from the contact's edge to its centre.
 [[nodiscard]] recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
                                         const PixelFilter& use = {});
-
-/// What fit_list's lists span: the design's −40 to +110 grey levels.
-inline constexpr int kListFirstLevel = -40;
-inline constexpr int kListLastLevel = 110;
 
 }  // namespace dtact::calibration

@@ -105,9 +105,36 @@ void read_light(KeyReader light, Origin& origin) {
   light.finish();
 }
 
+void read_gain(KeyReader reader, recon::SpatialGain& gain) {
+  // A calibration from before there were gains has the table, empty.
+  if (reader.keys().empty()) return;
+  const std::string shape = reader.text("shape");
+  if (shape == "radial") {
+    gain = {.shape = recon::GainShape::radial,
+            .centre_x_mm = reader.number("centre_x_mm", -1000, 1000),
+            .centre_y_mm = reader.number("centre_y_mm", -1000, 1000),
+            .per_mm = reader.number("per_mm", -1, 1)};
+  } else if (shape == "uniform") {
+    gain.shape = recon::GainShape::uniform;
+  } else if (shape != "none") {
+    reader.fail("shape",
+                "\"" + shape + "\" is not allowed; expected \"none\", \"uniform\" or \"radial\"");
+  }
+  reader.finish();
+}
+
+void read_uncertainty(KeyReader reader, std::vector<recon::Model::Uncertainty>& out) {
+  const std::vector<double> depths = reader.numbers("depth_mm", 0, 16.383);
+  const std::vector<double> errors = reader.numbers("error_um", 0, 16383);
+  if (depths.size() != errors.size()) reader.fail("error_um", "expected one for each depth_mm");
+  if (!std::ranges::is_sorted(depths)) reader.fail("depth_mm", "expected ascending values");
+  for (std::size_t i = 0; i < depths.size(); ++i) out.push_back({depths[i], errors[i]});
+  reader.finish();
+}
+
 /// Tables that later versions fill. What this program cannot apply it must not pass over.
 void refuse_reserved(KeyReader& top) {
-  for (const char* name : {"surface", "gain"}) {
+  for (const char* name : {"surface"}) {
     if (top.has(name) && !top.table(name).keys().empty()) {
       top.fail(name,
                "is reserved and must be empty: this program applies none of it; use the "
@@ -158,6 +185,8 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
       {calibration.crop_col, calibration.crop_row, width, height, model->mm_per_px}, outside);
 
   read_list(top.table("list"), model->method == recon::Method::list, model->list);
+  if (top.has("gain")) read_gain(top.table("gain"), model->gain);
+  if (top.has("uncertainty")) read_uncertainty(top.table("uncertainty"), model->uncertainty);
   read_camera(top.table("camera"), calibration.origin);
   read_light(top.table("light"), calibration.origin);
   for (KeyReader& source : top.tables("source")) {

@@ -121,13 +121,16 @@ Circle enclosing_circle(std::vector<Pixel> points) {
   return circle;
 }
 
+Circle published_circle(const image::Grey8& reference, const image::Grey8& ball) {
+  const std::vector<int> levels = darkening(reference, ball);
+  const Circle found = enclosing_circle(largest_patch(levels, ball.width, ball.height));
+  return {std::trunc(found.col), std::trunc(found.row), std::trunc(found.radius)};
+}
+
 recon::DepthList fit_published(const image::Grey8& reference, const image::Grey8& ball,
                                double ball_radius_mm, double mm_per_px) {
   const std::vector<int> levels = darkening(reference, ball);
-  const Circle found = enclosing_circle(largest_patch(levels, ball.width, ball.height));
-  const double col = std::trunc(found.col);
-  const double row = std::trunc(found.row);
-  const double radius = std::trunc(found.radius);
+  const auto [col, row, radius] = published_circle(reference, ball);
   if (radius < 1) {
     throw std::runtime_error(
         "no contact found: nothing is darker than the reference by more than "

@@ -40,6 +40,21 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::beyond_calibration,
      "Pressed deeper than was calibrated: such pixels are marked untrusted; press less or "
      "calibrate with a deeper press."},
+    {Health::image_repeated,
+     "The camera repeats all or part of a picture: depth is old there; look at the USB cable, hub "
+     "and processor load."},
+    {Health::image_dark, "The picture is too dark to measure in: raise the light or the exposure."},
+    {Health::image_saturated,
+     "Much of the picture is white: lower the light or the exposure and run dtactctl rezero."},
+    {Health::light_drifted,
+     "The light is not the reference's, or most of the surface is pressed, which looks alike: free "
+     "the surface and run dtactctl rezero."},
+    {Health::light_banded,
+     "Bands wander over the picture: make the exposure a whole number of the LEDs' PWM periods, or "
+     "the brightness full."},
+    {Health::image_noisy,
+     "Pixels are too noisy: raise the light and lower the camera's gain; many dead pixels look "
+     "alike."},
     {Health::frames_lost,
      "The camera loses frames: look at the USB cable, hub and processor load."},
     {Health::not_realtime,

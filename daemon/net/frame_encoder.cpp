@@ -85,6 +85,8 @@ void FrameEncoder::Impl::add_depth(v1::DepthEncoding encoding) {
   depth.set_height(static_cast<std::uint32_t>(frame->height));
   depth.set_mm_per_px(frame->mm_per_px);
   depth.set_um_per_unit(1);
+  depth.set_decimation(static_cast<std::uint32_t>(frame->decimation));
+  depth.set_uncertainty_um(frame->uncertainty_um);
   depth.set_untrusted_value(recon::kUntrusted);
   if (encoding == v1::DEPTH_DELTA_ZSTD) {
     delta_zstd.encode(frame->depth_um, static_cast<std::size_t>(frame->width),

@@ -11,9 +11,9 @@ struct Scheme {
 };
 
 constexpr std::array<Scheme, 5> kSchemes = {{{"all", 0b1111'1111},
-                                             {"scheme1", 0b0101'0101},
-                                             {"scheme2", 0b1010'1010},
-                                             {"scheme3", 0b0011'0011},
+                                             {"scheme1", 0b0011'0011},
+                                             {"scheme2", 0b1100'1100},
+                                             {"scheme3", 0b0110'0110},
                                              {"scheme4", 0b1100'0011}}};
 
 }  // namespace

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <stdexcept>
 #include <utility>
 
 #include "daemon/calibration/mismatch.hpp"
+#include "daemon/pipeline/uncertainty.hpp"
 #include "daemon/recon/decimate.hpp"
 
 namespace dtact::pipeline {
@@ -47,10 +49,16 @@ calibration::AttachedCamera attached(const hal::CameraInfo& camera) {
   return now;
 }
 
-std::shared_ptr<const recon::Model> at(const std::shared_ptr<const recon::Model>& model,
-                                       const ReconstructionRules& rules) {
-  if (rules.decimation == 1) return model;
-  return std::make_shared<const recon::Model>(recon::decimate(*model, rules.decimation));
+std::vector<recon::Reconstructor> reconstructors(const std::shared_ptr<const recon::Model>& model,
+                                                 const ReconstructionRules& rules) {
+  std::vector<recon::Reconstructor> made;
+  for (const int decimation : {1, 2, 4}) {
+    if (rules.decimation != 0 && rules.decimation != decimation) continue;
+    made.emplace_back(decimation == 1 ? model
+                                      : std::make_shared<const recon::Model>(
+                                            recon::decimate(*model, decimation)));
+  }
+  return made;
 }
 
 }  // namespace
@@ -75,12 +83,39 @@ std::unique_ptr<ActiveCalibration> activate(
   }
   auto active = std::make_unique<ActiveCalibration>(
       ActiveCalibration{.calibration = calibration,
-                        .reconstructor = recon::Reconstructor(at(calibration->model, rules)),
+                        .reconstructors = reconstructors(calibration->model, rules),
                         .grid = {},
                         .region = region,
                         .camera_mismatch = camera_differs(*calibration, camera)});
   measure(model.reference_q8, table.frame_width, table.frame_height, active->grid);
   return active;
+}
+
+double ActiveCalibration::list_um(double depth_mm) const noexcept {
+  const auto& rows = calibration->model->uncertainty;
+  if (rows.empty()) return kUnstatedListUm;
+  const auto above =
+      std::ranges::lower_bound(rows, depth_mm, {}, &recon::Model::Uncertainty::depth_mm);
+  if (above == rows.begin()) return rows.front().error_um;
+  if (above == rows.end()) return rows.back().error_um;
+  const auto below = above - 1;
+  return std::lerp(below->error_um, above->error_um,
+                   (depth_mm - below->depth_mm) / (above->depth_mm - below->depth_mm));
+}
+
+void ActiveCalibration::set_reference(std::span<const std::uint16_t> reference_q8) noexcept {
+  for (recon::Reconstructor& reconstructor : reconstructors) {
+    reconstructor.set_reference(reference_q8);
+  }
+}
+
+void ActiveCalibration::use_decimation(int decimation) noexcept {
+  for (std::size_t i = 0; i < reconstructors.size(); ++i) {
+    if (i == in_use || reconstructors[i].model().rectify.decimation != decimation) continue;
+    reconstructors[i].follow(reconstructors[in_use]);
+    in_use = i;
+    return;
+  }
 }
 
 bool camera_differs(const calibration::Calibration& calibration, const hal::CameraInfo& camera) {

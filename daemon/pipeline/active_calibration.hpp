@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/pipeline/luma_grid.hpp"
@@ -16,11 +18,24 @@ namespace dtact::pipeline {
 /// freed on the network's side, used on the capture thread.
 struct ActiveCalibration {
   std::shared_ptr<const calibration::Calibration> calibration;
-  recon::Reconstructor reconstructor;
-  LumaGrid grid;      ///< Of the calibration's reference.
-  CellRegion region;  ///< Cells that lie wholly in the calibrated part of the frame.
+  /// One for each resolution that may be asked for, the coarser after the finer.
+  std::vector<recon::Reconstructor> reconstructors;
+  std::size_t in_use = 0;  ///< Index of the one that works on the next frame.
+  LumaGrid grid;           ///< Of the calibration's reference.
+  CellRegion region;       ///< Cells that lie wholly in the calibrated part of the frame.
   bool camera_mismatch = false;
   std::uint64_t generation = 0;  ///< Counts the calibrations of this run.
+
+  [[nodiscard]] recon::Reconstructor& reconstructor() noexcept { return reconstructors[in_use]; }
+  [[nodiscard]] const recon::Reconstructor& reconstructor() const noexcept {
+    return reconstructors[in_use];
+  }
+  /// What the list is uncertain by at an indentation, micrometres: as the calibration says, else
+  /// kUnstatedListUm.
+  [[nodiscard]] double list_um(double depth_mm) const noexcept;
+  void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+  /// From the next frame on the map has 1/`decimation` of the resolution, where there is one such.
+  void use_decimation(int decimation) noexcept;
 };
 
 /// Throws std::invalid_argument, saying what to do, when the calibration cannot be used with frames

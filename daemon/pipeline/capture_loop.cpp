@@ -13,6 +13,9 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::chrono::milliseconds kLongestGrab{100};
 /// Pause before a camera that is away is asked again.
 constexpr std::int64_t kAwayPauseNs = 20'000'000;
+/// The published method knows no gain: a light brighter or dimmer than at calibration by this share
+/// makes every depth wrong by as much.
+constexpr double kOtherLevel = 0.1;
 
 constexpr const char* kTouchedSentence = "something touches: lift it and ask again, or force it";
 constexpr const char* kUnsteadySentence =
@@ -40,6 +43,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       unusable_(unusable),
       keeper_(camera_.info().width, camera_.info().height, config.reference),
       contact_(config.contact),
+      chooser_(config.reconstruction.max_error_um),
       watch_(period_ns_),
       timeline_(config.light, camera_.info().light_delay_frames, period_ns_),
       teller_(exchange_),
@@ -86,7 +90,7 @@ void CaptureLoop::run() noexcept {
 void CaptureLoop::choose_area() noexcept {
   hal::Area area = whole_;
   if (active_ && !keeper_.looks() && !exchange_.want_luma.load(std::memory_order_relaxed)) {
-    const recon::FrameRegion region = active_->reconstructor.region();
+    const recon::FrameRegion region = active_->reconstructor().region();
     area = {region.x, region.y, region.width, region.height};
   }
   if (area == area_) return;
@@ -138,7 +142,7 @@ void CaptureLoop::execute(CalibrationOrder& order) noexcept {
   unusable_ = false;
   const recon::Model& model = *active_->calibration->model;
   keeper_.use_calibration(model.reference_q8, active_->grid, active_->region);
-  if (keeper_.ready()) active_->reconstructor.set_reference(keeper_.reference());
+  if (keeper_.ready()) use_reference();
   light_mismatch_ = light_differs(*active_->calibration, shown_);
   keep_due_ = keeper_.ready() && keeper_.worth_keeping();
   exchange_.camera_mismatch.store(active_->camera_mismatch, std::memory_order_relaxed);
@@ -169,6 +173,7 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
   if (out.has_depth) {
     reconstruct(out);
   } else {
+    image_watch_.forget();
     // Nothing is known of contact meanwhile; what was known stands.
     out.contact = {};
     out.contact.touching = contact_.touching();
@@ -183,31 +188,60 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
 }
 
 void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
-  const recon::Model& model = active_->reconstructor.model();
+  recon::Reconstructor& reconstructor = active_->reconstructor();
+  const recon::Model& model = reconstructor.model();
   out.width = model.rectify.width;
   out.height = model.rectify.height;
   out.mm_per_px = model.mm_per_px;
   // Within the capacity reserved at start, so this allocates nothing.
   out.depth_um.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
-  // What another calibration drew in this buffer says nothing about this one's map.
-  if (std::exchange(out.drawn_generation, active_->generation) != active_->generation) {
-    out.drawn.rest = 0;
-  }
+  // What another calibration or resolution drew in this buffer says nothing about this one's map.
+  const bool another = out.drawn_generation != active_->generation ||
+                       out.drawn_decimation != model.rectify.decimation;
+  if (another) out.drawn.rest = 0;
+  out.drawn_generation = active_->generation;
+  out.drawn_decimation = model.rectify.decimation;
   recon::StepTimes steps;
   recon::ActivityReport activity;
   const hal::LumaView& luma = frame_.luma();
-  active_->reconstructor.run_active(luma.data, luma.stride, out.depth_um, out.drawn, activity,
-                                    &steps);
+  reconstructor.run_active(luma.data, luma.stride, out.depth_um, out.drawn, activity, &steps);
+  image_watch_.look(activity, luma);
   out.times.activity_ns = steps.activity_ns;
   out.times.rectify_ns = steps.rectify_ns;
   out.times.smooth_ns = steps.smooth_ns;
   out.times.list_ns = steps.list_ns;
   const std::int64_t began_ns = clock_.monotonic_ns();
   out.contact =
-      contact_.inspect(out.depth_um, active_->reconstructor.grid(), out.drawn.tiles, out.mm_per_px);
+      contact_.inspect(out.depth_um, reconstructor.grid(), out.drawn.tiles, out.mm_per_px);
   const int pixel = model.rectify.decimation * model.rectify.decimation;
-  beyond_ = active_->reconstructor.beyond_pixels() * pixel > config_.beyond_pixels;
+  beyond_ = reconstructor.beyond_pixels() * pixel > config_.beyond_pixels;
+  judge(out);
   out.times.inspect_ns = clock_.monotonic_ns() - began_ns;
+}
+
+void CaptureLoop::use_reference() noexcept {
+  active_->set_reference(keeper_.reference());
+  const recon::Model& model = *active_->calibration->model;
+  const recon::RectifyTable& table = model.rectify;
+  image_watch_.set_reference(keeper_.reference(), table.frame_width, table.frame_height,
+                             active_->region);
+  const double light = image_watch_.reference_mean() / active_->grid.mean;
+  other_level_ = model.method == recon::Method::published && std::abs(light - 1) > kOtherLevel;
+}
+
+/// What the map is worth, and at which resolution the next is made.
+void CaptureLoop::judge(DepthFrame& out) noexcept {
+  const auto from_um = static_cast<std::int16_t>(1000 * config_.contact.made_mm);
+  const double bend = bend_um(out.depth_um, active_->reconstructor().grid(), out.drawn.tiles,
+                              out.mm_per_px, from_um);
+  // Half of the deepest is about the mean over a contact.
+  double list_um = active_->list_um(0.5 * out.contact.deepest_mm);
+  if (keeper_.footing() == Footing::stale) list_um = std::hypot(list_um, kStaleReferenceUm);
+  out.decimation = out.drawn_decimation;
+  out.uncertainty_um = uncertainty_at_um(list_um, bend, out.decimation);
+  if (config_.reconstruction.decimation == 0) {
+    active_->use_decimation(chooser_.next(list_um, bend));
+  }
 }
 
 void CaptureLoop::publish(DepthFrame& out) noexcept {
@@ -241,7 +275,7 @@ void CaptureLoop::mind_reference(bool settled) noexcept {
   if (!active_ || !settled || (keeper_.looks() && area_ != whole_)) return;
   const KeeperStep step = keeper_.step(frame_.luma());
   if (step.reference_changed) {
-    active_->reconstructor.set_reference(keeper_.reference());
+    use_reference();
     if (keeper_.footing() != Footing::stale) {
       teller_.reference({frame_.info().sequence, keeper_.footing() == Footing::restored});
     }
@@ -311,13 +345,14 @@ HealthSet CaptureLoop::health(bool settled, std::int64_t now_ns) const noexcept 
     set.set(Health::uncalibrated);
     set.set(Health::light_unsettled, !settled);
   }
-  set.set(Health::light_mismatch, light_mismatch_);
+  set.set(Health::light_mismatch, light_mismatch_ || other_level_);
   const bool differs = active_ && exchange_.camera_mismatch.load(std::memory_order_relaxed);
   set.set(Health::camera_mismatch, unusable_ || controls_moved_ || differs);
   set.set(Health::beyond_calibration, beyond_);
   set.set(Health::frames_lost, watch_.lost_lately(now_ns));
   set.set(Health::camera_trouble, watch_.trouble());
   set.set(Health::ring_trouble, light_.trouble());
+  set.add(image_watch_.conditions());
   set.set(Health::not_realtime, exchange_.not_realtime.load(std::memory_order_relaxed));
   return set;
 }

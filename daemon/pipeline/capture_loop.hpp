@@ -7,12 +7,14 @@
 #include "daemon/pipeline/camera_watch.hpp"
 #include "daemon/pipeline/contact.hpp"
 #include "daemon/pipeline/exchange.hpp"
+#include "daemon/pipeline/image_watch.hpp"
 #include "daemon/pipeline/light_driver.hpp"
 #include "daemon/pipeline/light_timeline.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/pipeline/reference_keeper.hpp"
 #include "daemon/pipeline/reference_writer.hpp"
 #include "daemon/pipeline/teller.hpp"
+#include "daemon/pipeline/uncertainty.hpp"
 #include "hal/base/clock.hpp"
 #include "hal/camera.hpp"
 
@@ -53,7 +55,10 @@ class CaptureLoop {
   void process(std::int64_t now_ns) noexcept;
   void without_frame(hal::GrabStatus status, std::int64_t asked_ns, std::int64_t now_ns) noexcept;
   void reconstruct(DepthFrame& out) noexcept;
+  void judge(DepthFrame& out) noexcept;
   void mind_reference(bool settled) noexcept;
+  /// From now on depth is measured against the keeper's reference.
+  void use_reference() noexcept;
   void publish(DepthFrame& out) noexcept;
   void tell(HealthSet health, std::int64_t now_ns) noexcept;
   /// Answers the re-zero under way, if there is one.
@@ -74,7 +79,9 @@ class CaptureLoop {
   bool unusable_;
   ReferenceKeeper keeper_;
   ContactDetector contact_;
+  ResolutionChooser chooser_;
   CameraWatch watch_;
+  ImageWatch image_watch_;
   LightTimeline timeline_;
   Teller teller_;
   hal::Frame frame_;
@@ -83,6 +90,7 @@ class CaptureLoop {
 
   hal::Light shown_;  // by the ring, as last noted
   bool light_mismatch_ = false;
+  bool other_level_ = false;     // the reference's light is not the calibration's, and it matters
   bool beyond_ = false;          // in the newest frame
   bool controls_moved_ = false;  // as the newest frame says
   std::int64_t beyond_until_ns_ = INT64_MIN;

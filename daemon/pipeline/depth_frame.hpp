@@ -48,11 +48,15 @@ struct DepthFrame {
   int width = 0;  ///< Pixels of the depth map.
   int height = 0;
   double mm_per_px = 0;
+  int decimation = 1;         ///< The map has 1/decimation of the calibration's resolution.
+  double uncertainty_um = 0;  ///< Mean absolute error to expect inside the contact.
   std::vector<std::int16_t>
       depth_um;  ///< Row-major; recon::kUntrusted marks pixels not to believe.
 
-  recon::DrawnTiles drawn;             ///< What depth_um holds, for the reconstruction.
-  std::uint64_t drawn_generation = 0;  ///< Calibration that drew it (ActiveCalibration).
+  recon::DrawnTiles drawn;  ///< What depth_um holds, for the reconstruction.
+  /// Calibration (ActiveCalibration) and decimation that drew it.
+  std::uint64_t drawn_generation = 0;
+  int drawn_decimation = 0;
 
   bool has_luma = false;
   int luma_width = 0;  ///< Pixels of the camera frame.

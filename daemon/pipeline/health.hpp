@@ -20,13 +20,21 @@ enum class Health : std::uint8_t {
   frames_lost = 8,         ///< The camera lost frames within the last second.
   camera_trouble = 9,      ///< Unplugged, stalled, busy, denied; status has the sentence.
   ring_trouble = 10,       ///< The last write to the ring failed; status has the sentence.
-  not_realtime = 11        ///< The capture thread runs without real-time scheduling.
+  not_realtime = 11,       ///< The capture thread runs without real-time scheduling.
+  // What the picture itself shows (image_watch.hpp).
+  light_drifted = 12,    ///< The light is not the reference's, or most of the field is pressed.
+  light_banded = 13,     ///< Bands wander over the picture: PWM against the rolling shutter.
+  image_saturated = 14,  ///< Too much of the picture is white.
+  image_dark = 15,       ///< The picture is too dark to measure in.
+  image_noisy = 16,      ///< Pixels are noisier than smoothing makes up for, or many are dead.
+  image_repeated = 17    ///< All or part of the picture is the one before: frozen or torn.
 };
-inline constexpr int kHealthCount = 12;
+inline constexpr int kHealthCount = 18;
 
 class HealthSet {
  public:
   void set(Health h, bool on = true) noexcept { bits_ = on ? bits_ | bit(h) : bits_ & ~bit(h); }
+  void add(const HealthSet& other) noexcept { bits_ |= other.bits_; }
   [[nodiscard]] bool has(Health h) const noexcept { return (bits_ & bit(h)) != 0; }
   [[nodiscard]] bool empty() const noexcept { return bits_ == 0; }
   [[nodiscard]] std::uint32_t bits() const noexcept { return bits_; }

@@ -18,7 +18,9 @@ struct ContactRules {
 /// At which share of the calibration's resolution depth is reconstructed.
 struct ReconstructionRules {
   /// 1, 2 or 4: a pixel of the map is the mean over so many of the calibration's in each direction.
+  /// 0: chosen for every frame, the coarsest whose expected error stays within max_error_um.
   int decimation = 1;
+  double max_error_um = 50;
 };
 
 /// How the untouched image is taken.

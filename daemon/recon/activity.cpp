@@ -1,6 +1,7 @@
 #include "daemon/recon/activity.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <numeric>
@@ -63,6 +64,23 @@ int Activity::x_of(int column) const noexcept {
 
 int Activity::y_of(int row) const noexcept {
   return std::min(y_ + row * kCell, frame_height_ - kCell);
+}
+
+void Activity::follow(const Activity& other) noexcept {
+  const bool same = x_ == other.x_ && y_ == other.y_ && columns_ == other.columns_ &&
+                    rows_ == other.rows_ && reference_ == other.reference_;
+  if (!same) return;
+  drift_ = other.drift_;
+  expected_ = other.expected_;
+  sum_ = other.sum_;
+  sum_before_ = other.sum_before_;
+  cell_ = other.cell_;
+  window_ = other.window_;
+  active_ = other.active_;
+  noise_ = other.noise_;
+  mean_drift_ = other.mean_drift_;
+  active_cells_ = other.active_cells_;
+  frames_ = other.frames_;
 }
 
 FrameRegion Activity::region() const noexcept {
@@ -219,6 +237,41 @@ void Activity::follow_drift() noexcept {
   mean_drift_ = static_cast<double>(total) / cells / kQ16;
 }
 
+void Activity::compare_with_before(ActivityReport& report) const noexcept {
+  // A row's mean change, of this row and the two above.
+  std::array<double, 3> change{};
+  double squares = 0;
+  std::int64_t rough = 0;
+  const std::int32_t darkest = settings_.limits.dark * vec::kCellPixels;
+  const std::int32_t brightest = settings_.limits.saturated * vec::kCellPixels;
+  for (int row = 0; row < rows_; ++row) {
+    const std::int32_t* const now = &sum_[at(0, row)];
+    const std::int32_t* const before = &sum_before_[at(0, row)];
+    const std::int32_t* const roughness = &rough_[at(0, row)];
+    // Sums over one row fit 32 bits, which the compiler turns into vector code.
+    std::int32_t step = 0;
+    std::int32_t rough_row = 0;
+    std::int32_t changed = 0;
+    std::int32_t open = 0;  // cells that are not clipped
+    for (int i = 0; i < columns_; ++i) {
+      step += now[i] - before[i];
+      rough_row += roughness[i];
+      changed |= now[i] ^ before[i];
+      open += static_cast<std::int32_t>(now[i] > darkest) &
+              static_cast<std::int32_t>(now[i] < brightest);
+    }
+    rough += rough_row;
+    report.unchanged_rows += changed == 0 && 2 * open > columns_ ? 1 : 0;
+    change = {static_cast<double>(step), change[0], change[1]};
+    const double bend = change[0] - 2 * change[1] + change[2];
+    if (row >= 2) squares += bend * bend;
+  }
+  report.ripple = std::sqrt(squares / std::max(1, rows_ - 2)) /
+                  (static_cast<double>(columns_) * vec::kCellPixels);
+  report.rough_noise =
+      kFromDifference * static_cast<double>(rough) / (columns_ * rows_) / vec::kRoughPixels;
+}
+
 const TileRows& Activity::look(const std::uint8_t* luma, std::ptrdiff_t stride,
                                ActivityReport& report) noexcept {
   report = {};
@@ -247,6 +300,7 @@ const TileRows& Activity::look(const std::uint8_t* luma, std::ptrdiff_t stride,
   }
   if (++frames_ % kDriftEvery == 0) follow_drift();
 
+  if (frames_ > 1) compare_with_before(report);
   report.mean_grey = static_cast<double>(totals.grey) / cells / vec::kCellPixels;
   report.pixel_noise = kFromDifference * mean(totals.quiet_rough) / vec::kRoughPixels;
   report.cell_noise = noise_;

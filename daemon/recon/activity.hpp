@@ -45,6 +45,14 @@ struct ActivityReport {
   std::int64_t pixels = 0;
   std::int64_t saturated = 0;  ///< Pixels at least as bright as CellLimits::saturated.
   std::int64_t dark = 0;       ///< Pixels at most as bright as CellLimits::dark.
+  /// Standard deviation of a pixel's noise, from all cells: steep depth adds a little.
+  double rough_noise = 0;
+  /// Rows of cells, at the frame's edge or inside, none of which changed by a bit since the frame
+  /// before. Noise changes every row: such a row was not exposed anew. Clipped cells do not count.
+  int unchanged_rows = 0;
+  /// How unevenly the rows of cells changed since the frame before: root mean square of the second
+  /// difference, along the columns, of each row's mean change. Bands that wander, not a press.
+  double ripple = 0;
   int cells = 0;
   int active_cells = 0;
   int tiles = 0;  ///< Of the depth map.
@@ -61,6 +69,9 @@ class Activity {
 
   /// The untouched image: frame sized, Q8, row-major without padding. Forgets drift and activity.
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+
+  /// Goes on where `other` is, when both look at the same cells.
+  void follow(const Activity& other) noexcept;
 
   /// Looks at a frame. The tiles hold until the next call.
   const TileRows& look(const std::uint8_t* luma, std::ptrdiff_t stride,
@@ -90,6 +101,8 @@ class Activity {
   [[nodiscard]] bool touched(int column, int row) const noexcept;
   void mark() noexcept;
   void follow_drift() noexcept;
+  /// Fills in what the comparison with the frame before tells.
+  void compare_with_before(ActivityReport& report) const noexcept;
 
   ActivitySettings settings_;
   TileGrid grid_;

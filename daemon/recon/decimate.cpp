@@ -25,8 +25,10 @@ Model decimate(const Model& model, int factor) {
                                                   : static_cast<std::size_t>(table.width) *
                                                         static_cast<std::size_t>(table.height),
                           0);
+  const int left = (from.width - table.fine_width()) / 2;
+  const int top = (from.height - table.fine_height()) / 2;
   for (int y = 0; y < table.fine_height(); ++y) {
-    const auto row = static_cast<std::ptrdiff_t>(y) * from.width;
+    const auto row = static_cast<std::ptrdiff_t>(y + top) * from.width + left;
     table.entries.insert(table.entries.end(), from.entries.begin() + row,
                          from.entries.begin() + row + table.fine_width());
     if (model.untrusted.empty()) continue;

@@ -6,6 +6,7 @@
 
 #include "daemon/recon/list.hpp"
 #include "daemon/recon/rectify.hpp"
+#include "daemon/recon/spatial_gain.hpp"
 
 namespace dtact::recon {
 
@@ -30,6 +31,14 @@ struct Model {
   /// 10. Method::published has filters of its own and ignores it.
   double smoothing_px = 0;
   DepthList list;
+  /// What the list is uncertain by: mean absolute error in micrometres at some indentations,
+  /// ascending. Empty: not known.
+  struct Uncertainty {
+    double depth_mm = 0;
+    double error_um = 0;
+  };
+  std::vector<Uncertainty> uncertainty;
+  SpatialGain gain;  ///< Of Method::list.
   /// The untouched image at calibration time, frame sized, Q8 luma (0…65280), row-major without
   /// padding: brings a differently lit image back to the calibration's light.
   std::vector<std::uint16_t> reference_q8;

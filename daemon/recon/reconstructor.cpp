@@ -164,6 +164,8 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, const Activity
 
   rectify_reference(model->reference_q8);
   smooth_reference(calibration_q6);
+  apply(model->gain, {grid.width, grid.height, vec::padded(grid.width), model->mm_per_px},
+        calibration_q6);
   set_reference(model->reference_q8);
 }
 
@@ -408,6 +410,10 @@ int Reconstructor::beyond_pixels() const noexcept { return impl_->beyond; }
 
 void Reconstructor::set_reference(std::span<const std::uint16_t> reference_q8) noexcept {
   impl_->set_reference(reference_q8);
+}
+
+void Reconstructor::follow(const Reconstructor& other) noexcept {
+  impl_->activity.follow(other.impl_->activity);
 }
 
 void Reconstructor::run(const std::uint8_t* luma, std::ptrdiff_t stride,

@@ -47,6 +47,11 @@ class Reconstructor {
   /// long as two frames: call it between frames.
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
 
+  /// Takes over how far the untouched image was followed, and what is active, from one that worked
+  /// on the frames until now: same reference, another resolution. Does nothing where the two look
+  /// at different parts of the frame. Does not allocate.
+  void follow(const Reconstructor& other) noexcept;
+
   /// `luma`: frame sized, rows `stride` bytes apart, kLumaPadding bytes readable after the last
   /// pixel. `depth_um`: width × height of the model's table, row-major. Borders are replicated when
   /// smoothing. Beyond the list's covered range on the deep side Method::list writes kUntrusted; so

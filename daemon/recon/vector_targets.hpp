@@ -1,7 +1,8 @@
 #pragma once
 
-// Which of Highway's targets the kernels are built for. Included before Highway itself, by the tests
-// too: a target that they do not know would not be run, one that is not built would be awaited.
+// Which of Highway's targets the kernels are built for. Included before Highway itself, by the
+// tests too: a target that they do not know would not be run, one that is not built would be
+// awaited.
 
 /// AVX-512 as of Ice Lake and Zen 4, which Highway leaves out unless asked for.
 #define HWY_WANT_AVX3_DL

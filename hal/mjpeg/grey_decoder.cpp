@@ -200,13 +200,11 @@ GreyDecoder::GreyDecoder(GreyDecoder&&) noexcept = default;
 GreyDecoder& GreyDecoder::operator=(GreyDecoder&&) noexcept = default;
 GreyDecoder::~GreyDecoder() = default;
 
-void GreyDecoder::set_crop(const Area& crop) {
-  const Impl& d = *impl_;
-  if (crop.x < 0 || crop.y < 0 || crop.width < 1 || crop.height < 1 ||
-      crop.width > d.width - crop.x || crop.height > d.height - crop.y) {
-    throw std::invalid_argument("JPEG decoder: the crop must lie in the picture");
-  }
-  impl_->crop = crop;
+void GreyDecoder::set_crop(const Area& crop) noexcept {
+  Impl& d = *impl_;
+  const bool fits = crop.x >= 0 && crop.y >= 0 && crop.width > 0 && crop.height > 0 &&
+                    crop.width <= d.width - crop.x && crop.height <= d.height - crop.y;
+  d.crop = fits ? crop : Area{0, 0, d.width, d.height};
 }
 
 Status GreyDecoder::decode(std::span<const std::uint8_t> payload, std::uint8_t* luma,

@@ -46,9 +46,9 @@ class GreyDecoder {
 
   /// From now on decode() works out no more pixels than it must to give those of `crop` as it would
   /// without one; what it writes elsewhere in the picture is unspecified. All of the payload is
-  /// still parsed, so that damage anywhere is told. Throws std::invalid_argument unless the crop
-  /// has pixels and lies in the picture.
-  void set_crop(const Area& crop);
+  /// still parsed, so that damage anywhere is told. A crop without pixels, or one that leaves the
+  /// picture, means the whole picture.
+  void set_crop(const Area& crop) noexcept;
 
   /// Writes width × height bytes to `luma`, rows `stride` bytes apart. Unless ok the output is
   /// partly written and must not be used: libjpeg would fill a damaged frame with grey. Bytes after

@@ -14,7 +14,6 @@
 namespace dtact::hal::sim {
 namespace {
 
-constexpr int kQuality = 90;
 constexpr std::size_t kSpare = std::size_t{256} * 1024;
 
 // 800 × 600 asks libjpeg for 60 kB; four times that and a line's worth of everything.
@@ -29,7 +28,7 @@ constexpr int kRows = 8;
 
 class PayloadEncoder::Jpeg {
  public:
-  Jpeg(int width, int height)
+  Jpeg(int width, int height, int quality)
       : width_((width + 15) / 16 * 16), height_(height), arena_(arena_bytes(width)) {
     cinfo_.err = ::jpeg_std_error(&errors_);
     jpeg_create_compress(&cinfo_);
@@ -38,13 +37,13 @@ class PayloadEncoder::Jpeg {
     cinfo_.input_components = 3;
     cinfo_.in_color_space = JCS_YCbCr;
     ::jpeg_set_defaults(&cinfo_);
-    ::jpeg_set_quality(&cinfo_, kQuality, TRUE);
+    ::jpeg_set_quality(&cinfo_, quality, TRUE);
     cinfo_.raw_data_in = TRUE;
     cinfo_.dct_method = JDCT_IFAST;
     cinfo_.comp_info[0].h_samp_factor = 2;
     cinfo_.comp_info[0].v_samp_factor = 1;
     destination_.init_destination = [](j_compress_ptr) {};
-    // capacity() is more than quality 90 can fill.
+    // capacity() is more than quality 95 can fill.
     destination_.empty_output_buffer = [](j_compress_ptr) -> boolean { std::abort(); };
     destination_.term_destination = [](j_compress_ptr) {};
     cinfo_.dest = &destination_;
@@ -116,21 +115,21 @@ Output output_from_name(std::string_view name) {
       fmt::format("camera.sim.output = \"{}\": allowed are luma, yuyv, mjpeg", name));
 }
 
-PayloadEncoder::PayloadEncoder(Output output, int width, int height)
+PayloadEncoder::PayloadEncoder(Output output, int width, int height, int jpeg_quality)
     : output_(output), width_(width), height_(height) {
   if (output != Output::luma && width % 2 != 0) {
     throw std::runtime_error(fmt::format(
         "camera.width = {}: yuyv and mjpeg share chroma between two pixels; choose an even width",
         width));
   }
-  if (output == Output::mjpeg) jpeg_ = std::make_unique<Jpeg>(width, height);
+  if (output == Output::mjpeg) jpeg_ = std::make_unique<Jpeg>(width, height, jpeg_quality);
 }
 
 PayloadEncoder::~PayloadEncoder() = default;
 
 std::size_t PayloadEncoder::capacity() const noexcept {
   const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
-  // At quality 90 a coefficient's code is at most 26 bits long: 3.25 bytes a pixel of luma, and
+  // At quality 95 a coefficient's code is at most 26 bits long: 3.25 bytes a pixel of luma, and
   // next to nothing for constant chroma. Blocks at the border are whole.
   return output_ == Output::mjpeg ? pixels * 4 + kSpare : pixels * 2;
 }

@@ -14,18 +14,22 @@ namespace dtact::hal::sim {
 enum class Output : std::uint8_t {
   luma,  ///< V4L2 GREY, full range.
   yuyv,  ///< V4L2 YUYV, limited range as UVC cameras send it, neutral chroma.
-  mjpeg  ///< Baseline JPEG, 4:2:2, quality 90, neutral chroma.
+  mjpeg  ///< Baseline JPEG, 4:2:2, quality 90 by default, neutral chroma.
 };
 
 /// Throws std::runtime_error naming the allowed values.
 [[nodiscard]] Output output_from_name(std::string_view name);
+
+/// What the simulated camera compresses with.
+inline constexpr int kJpegQuality = 90;
 
 /// Packs luma as the device would send it. All memory is taken at construction. One thread at a
 /// time; not copyable.
 class PayloadEncoder {
  public:
   /// Throws std::runtime_error when `width` is odd and the output has chroma.
-  PayloadEncoder(Output output, int width, int height);
+  /// `jpeg_quality`: 1 … 95.
+  PayloadEncoder(Output output, int width, int height, int jpeg_quality = kJpegQuality);
   PayloadEncoder(const PayloadEncoder&) = delete;
   PayloadEncoder& operator=(const PayloadEncoder&) = delete;
   ~PayloadEncoder();

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace dtact::hal::sim {
 namespace {
@@ -15,12 +16,15 @@ std::size_t pixel_count(const CameraModel& camera) {
 }  // namespace
 
 Renderer::Renderer(const Scene& scene, std::uint64_t seed)
-    : truth_(scene),
-      optics_(scene.optics, truth_.grid()),
+    : Renderer(std::make_shared<const Truth>(scene), scene, seed) {}
+
+Renderer::Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::uint64_t seed)
+    : truth_(std::move(truth)),
+      optics_(scene.optics, truth_->grid()),
       field_(scene),
       noise_(seed, scene.camera.read_noise, scene.camera.shot_noise),
-      indentation_(truth_.grid().size()),
-      loss_(truth_.grid().size()),
+      indentation_(truth_->grid().size()),
+      loss_(truth_->grid().size()),
       loss_row_(static_cast<std::size_t>(scene.camera.width)),
       light_(pixel_count(scene.camera)),
       grey_(light_.size()),
@@ -31,21 +35,31 @@ Renderer::Renderer(const Scene& scene, std::uint64_t seed)
   }
 }
 
-void Renderer::render(std::uint64_t sequence, const LedLevels& light, std::uint8_t* luma,
-                      std::ptrdiff_t stride, int rows) noexcept {
+void Renderer::update(std::uint64_t sequence, const LedLevels& light, int rows) noexcept {
   if (!lit_ || light != levels_) {
     levels_ = light;
     lit_ = true;
     field_.compute(light, light_);
     exposed_rows_ = 0;
   }
-  if (const Truth::Moment now = truth_.moment(sequence); now != moment_) {
+  if (const Truth::Moment now = truth_->moment(sequence); now != moment_) {
     moment_ = now;
-    truth_.blend(now, indentation_);
+    truth_->blend(now, indentation_);
     optics_.run(indentation_, loss_);
     exposed_rows_ = 0;
   }
   expose(rows);
+}
+
+std::span<const std::uint16_t> Renderer::render_clean(std::uint64_t sequence,
+                                                      const LedLevels& light) noexcept {
+  update(sequence, light, truth_->scene().camera.height);
+  return grey_;
+}
+
+void Renderer::render(std::uint64_t sequence, const LedLevels& light, std::uint8_t* luma,
+                      std::ptrdiff_t stride, int rows) noexcept {
+  update(sequence, light, rows);
   const std::size_t width = loss_row_.size();
   for (int y = 0; y < rows; ++y) {
     const std::size_t begin = static_cast<std::size_t>(y) * width;
@@ -57,7 +71,7 @@ void Renderer::render(std::uint64_t sequence, const LedLevels& light, std::uint8
 void Renderer::expose(int rows) noexcept {
   const std::size_t width = loss_row_.size();
   for (int y = exposed_rows_; y < rows; ++y) {
-    truth_.pixels().sample_row(y, loss_, loss_row_);
+    truth_->pixels().sample_row(y, loss_, loss_row_);
     const std::size_t begin = static_cast<std::size_t>(y) * width;
     const std::uint16_t* const light = light_.data() + begin;
     std::uint16_t* const grey = grey_.data() + begin;

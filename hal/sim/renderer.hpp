@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "hal/image/png.hpp"
@@ -19,17 +21,25 @@ class Renderer {
  public:
   /// Solves the scene's contacts. Throws std::runtime_error as Truth does.
   Renderer(const Scene& scene, std::uint64_t seed);
+  /// The same presses under the camera, optics and light of `scene`, whose camera mode and layer
+  /// must be the truth's: contact is solved once for many lights.
+  Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::uint64_t seed);
 
   /// Frame `sequence` in full-range luma: the first `rows` rows, `stride` bytes apart.
   void render(std::uint64_t sequence, const LedLevels& light, std::uint8_t* luma,
               std::ptrdiff_t stride, int rows) noexcept;
 
-  [[nodiscard]] const Truth& truth() const noexcept { return truth_; }
+  /// The image of that frame before noise and rounding, Q6, row-major. Valid until the next call.
+  [[nodiscard]] std::span<const std::uint16_t> render_clean(std::uint64_t sequence,
+                                                            const LedLevels& light) noexcept;
+
+  [[nodiscard]] const Truth& truth() const noexcept { return *truth_; }
 
  private:
+  void update(std::uint64_t sequence, const LedLevels& light, int rows) noexcept;
   void expose(int rows) noexcept;
 
-  Truth truth_;
+  std::shared_ptr<const Truth> truth_;
   Optics optics_;
   LightField field_;
   Noise noise_;

@@ -168,7 +168,7 @@ def draw_points(axes, rows, value, front):
     for row in rows:
         if row[value] is None:
             continue
-        colour = shade(COLOURS[row["method"]], SHADES.get(row["smoothing_mm"], 1.0))
+        colour = shade(COLOURS[row["method"]], SHADES.get(row["smoothing_mm"], 1.0) if row["method"] == "list" else 1.0)
         axes.plot(row[value], max(row["error_um"], 0.1), MARKS[row["resolution"]], color=colour,
                   markerfacecolor=colour if row["tiles"] else "white", markersize=5.5,
                   markeredgewidth=1.1)

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "hal/sim/renderer.hpp"
 #include "hal/sim/scene.hpp"
 
 namespace dtact::chart {
@@ -38,19 +37,25 @@ std::string press(const std::string& object, const std::string& place, double de
 
 }  // namespace
 
+Shot truth_of(const hal::sim::Renderer& renderer, std::uint64_t sequence) {
+  Shot shot;
+  std::vector<float> truth;
+  renderer.truth().indentation_mm(sequence, truth);
+  shot.truth_mm = crop(truth);
+  std::vector<std::uint8_t> contact;
+  renderer.truth().contact(sequence, contact);
+  shot.judged = crop(contact);
+  return shot;
+}
+
 Shot shoot(const std::string& name, const std::string& press_toml, int frames) {
   const hal::sim::Scene scene = hal::sim::parse_scene(press_toml, name);
   hal::sim::Renderer renderer(scene, kSeed);
-  Shot shot{.name = name, .frames = {}, .truth_mm = {}, .judged = {}};
+  Shot shot = truth_of(renderer, kAtRest);
+  shot.name = name;
   for (int i = 0; i < frames; ++i) {
     shot.frames.push_back(render(renderer, kAtRest + static_cast<std::uint64_t>(i)));
   }
-  std::vector<float> truth;
-  renderer.truth().indentation_mm(kAtRest, truth);
-  shot.truth_mm = crop(truth);
-  std::vector<std::uint8_t> contact;
-  renderer.truth().contact(kAtRest, contact);
-  shot.judged = crop(contact);
   if (press_toml.empty()) std::ranges::fill(shot.judged, std::uint8_t{255});
   return shot;
 }
@@ -72,6 +77,17 @@ image::Grey16 make_reference() {
 
 Shot make_calibration_press() {
   return shoot("calibration", press("\"ball\"\nradius_mm = 4.0", "x = 0.8, y = -0.5", 1.3), 32);
+}
+
+std::vector<Shot> make_calibration_presses() {
+  std::vector<Shot> shots;
+  for (int i = 0; i < 11; ++i) {
+    const std::string place = "x = " + std::to_string(i * 7 % 11 - 5) +
+                              ".0, y = " + std::to_string(i * 4 % 11 - 5) + ".0";
+    shots.push_back(shoot("press " + std::to_string(i + 1),
+                          press("\"ball\"\nradius_mm = 4.0", place, 0.4 + 0.1 * i), kShotFrames));
+  }
+  return shots;
 }
 
 std::vector<Shot> make_shots() {

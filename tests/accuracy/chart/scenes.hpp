@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "hal/image/png.hpp"
+#include "hal/sim/renderer.hpp"
 
 /// What the chart measures on: the built-in simulated sensor (hal/sim), its truth never shown to
 /// the methods. Depth is asked for on the paper's crop: 580×580 of 800×600 pixels, 24×24 mm.
@@ -26,11 +27,18 @@ struct Shot {
   std::vector<std::uint8_t> judged;
 };
 
+/// What is true of one frame, without frames.
+[[nodiscard]] Shot truth_of(const hal::sim::Renderer& renderer, std::uint64_t sequence);
+
 /// The untouched sensor: the mean of many frames, Q8.
 [[nodiscard]] image::Grey16 make_reference();
 
 /// A ball of 4 mm radius pressed 1.3 mm deep near the centre: what calibrates.
 [[nodiscard]] Shot make_calibration_press();
+
+/// The same ball at eleven places, 0.4 to 1.4 mm deep: what calibrates where several presses are
+/// taken.
+[[nodiscard]] std::vector<Shot> make_calibration_presses();
 
 /// A ball of 5 mm radius 1.2 mm deep, three set screws 0.8 mm deep, a flat disc that covers most of
 /// the field 0.25 mm deep, nothing.

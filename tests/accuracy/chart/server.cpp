@@ -56,9 +56,8 @@ std::vector<float> published_list_mm(const std::vector<Setting>& settings) {
 
 struct Lab {
   image::Grey16 reference = make_reference();
-  Shot calibration_press = make_calibration_press();
   std::vector<Shot> shots = make_shots();
-  std::vector<Setting> settings = make_settings(reference, calibration_press);
+  std::vector<Setting> settings = make_settings(reference);
   std::unique_ptr<Worker> worker;
 
   void use(const std::string& what) {
@@ -112,7 +111,7 @@ std::string answer(Lab& lab, const std::string& verb, const std::string& rest) {
   }
   if (!lab.worker) throw std::runtime_error("'use SHOT|NAME' comes first");
   if (verb == "error") {
-    const Worker::Error error = lab.worker->error();
+    const Error error = lab.worker->error();
     return fmt::format("{} {}", error.mean_absolute_mm, error.untrusted_share);
   }
   if (verb == "run") {

@@ -3,10 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
 #include "daemon/calibration/build.hpp"
+#include "daemon/calibration/press_set.hpp"
 #include "daemon/recon/decimate.hpp"
 
 namespace dtact::chart {
@@ -21,6 +23,18 @@ std::shared_ptr<const recon::Model> calibrate(const image::Grey16& reference, co
                              .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide},
                              .method = method})
       .model;
+}
+
+calibration::BallPresses several(const image::Grey16& reference) {
+  calibration::BallPresses set;
+  set.reference_q8 = reference;
+  for (const Shot& shot : make_calibration_presses()) {
+    set.presses.push_back({.name = shot.name, .frames = shot.frames, .depth_mm = {}});
+  }
+  set.ball_radius_mm = 4.0;
+  set.mm_per_px = kMmPerPx;
+  set.crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide};
+  return set;
 }
 
 /// A map's value at a place between its pixels; none where one of the four is untrusted.
@@ -47,12 +61,17 @@ std::optional<double> bilinear(const std::vector<std::int16_t>& map, int width, 
 
 }  // namespace
 
-std::vector<Setting> make_settings(const image::Grey16& reference, const Shot& calibration_press) {
+std::vector<Setting> make_settings(const image::Grey16& reference) {
+  const Shot calibration_press = make_calibration_press();
   std::vector<Setting> settings;
   settings.push_back({"published full", "published", 1, false, 0,
                       calibrate(reference, calibration_press, recon::Method::published)});
+  const calibration::BallPresses presses = several(reference);
+  settings.push_back(
+      {"regression full", "regression", 1, false, 0, calibration::build_regression(presses).model});
   const auto list = calibrate(reference, calibration_press, recon::Method::list);
-  constexpr const char* kShare[] = {"", "full", "half", "", "quarter"};
+  constexpr std::array<const char*, 5> kShare{"", "full", "half", "", "quarter"};
+  const auto ours = calibration::build(presses).model;
   for (const double smoothing_mm : {0.05, 0.1, 0.2, 0.4}) {
     recon::Model smoothed = *list;
     smoothed.smoothing_px = smoothing_mm / kMmPerPx;
@@ -60,11 +79,18 @@ std::vector<Setting> make_settings(const image::Grey16& reference, const Shot& c
       const auto model =
           std::make_shared<const recon::Model>(recon::decimate(smoothed, decimation));
       for (const bool tiles : {false, true}) {
-        settings.push_back({fmt::format("list {}{} {:.2f}", kShare[decimation],
-                                        tiles ? " tiles" : "", smoothing_mm),
-                            "list", decimation, tiles, smoothing_mm, model});
+        settings.push_back(
+            {fmt::format("list {}{} {:.2f}", kShare.at(static_cast<std::size_t>(decimation)),
+                         tiles ? " tiles" : "", smoothing_mm),
+             "list", decimation, tiles, smoothing_mm, model});
       }
     }
+  }
+  for (const int decimation : {1, 2, 4}) {
+    const auto model = std::make_shared<const recon::Model>(recon::decimate(*ours, decimation));
+    settings.push_back(
+        {fmt::format("ours {} tiles 0.10", kShare.at(static_cast<std::size_t>(decimation))), "ours",
+         decimation, true, 0.1, model});
   }
   return settings;
 }
@@ -90,32 +116,39 @@ void Worker::once() {
   }
 }
 
-Worker::Error Worker::error() {
-  const recon::RectifyTable& table = setting_.model->rectify;
-  const double scale = 1.0 / setting_.decimation;
+Error Worker::error() {
+  // The look for what changed has seen a few frames, as it has in a running daemon.
+  for (std::size_t i = 0; i < frames_.size(); ++i) once();
+  Error mean;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    once();
+    const Error one = error_of(depth_um_, setting_.decimation, shot_);
+    mean.mean_absolute_mm += one.mean_absolute_mm / static_cast<double>(frames_.size());
+    mean.untrusted_share += one.untrusted_share / static_cast<double>(frames_.size());
+  }
+  return mean;
+}
+
+Error error_of(const std::vector<std::int16_t>& depth_um, int decimation, const Shot& shot) {
+  const int width = kSide / decimation;
+  const double scale = 1.0 / decimation;
   double sum_mm = 0;
   std::int64_t trusted = 0;
   std::int64_t judged = 0;
-  // The look for what changed has seen a few frames, as it has in a running daemon.
-  for (std::size_t i = 0; i < frames_.size(); ++i) once();
-  for (std::size_t i = 0; i < frames_.size(); ++i) {
-    once();
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x) {
-        const auto at = static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x);
-        if (shot_.judged[at] == 0) continue;
-        ++judged;
-        const auto um = bilinear(depth_um_, table.width, table.height, (x + 0.5) * scale - 0.5,
-                                 (y + 0.5) * scale - 0.5);
-        if (!um) continue;
-        ++trusted;
-        sum_mm += std::abs(*um / 1000.0 - double{shot_.truth_mm[at]});
-      }
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
+      const auto at = static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x);
+      if (shot.judged[at] == 0) continue;
+      ++judged;
+      const auto um =
+          bilinear(depth_um, width, width, (x + 0.5) * scale - 0.5, (y + 0.5) * scale - 0.5);
+      if (!um) continue;
+      ++trusted;
+      sum_mm += std::abs(*um / 1000.0 - double{shot.truth_mm[at]});
     }
   }
-  return {
-      trusted == 0 ? NAN : sum_mm / static_cast<double>(trusted),
-      1 - static_cast<double>(trusted) / static_cast<double>(std::max<std::int64_t>(1, judged))};
+  return {trusted == 0 ? NAN : sum_mm / static_cast<double>(trusted),
+          judged == 0 ? 0 : 1 - static_cast<double>(trusted) / static_cast<double>(judged)};
 }
 
 }  // namespace dtact::chart

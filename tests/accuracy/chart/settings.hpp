@@ -13,16 +13,26 @@ namespace dtact::chart {
 /// One way to reconstruct.
 struct Setting {
   std::string name;           ///< "list full tiles 0.10", unique.
-  std::string method;         ///< "published", "list".
+  std::string method;         ///< "published", "regression", "list", "ours".
   int decimation = 1;         ///< 1, 2 or 4.
   bool tiles = false;         ///< Only what changed.
   double smoothing_mm = 0.1;  ///< Standard deviation; 0: the method's own.
   std::shared_ptr<const recon::Model> model;
 };
 
-/// All of them, each calibrated with make_calibration_press() and nothing else.
-[[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference,
-                                                 const Shot& calibration_press);
+/// All of them, calibrated with make_calibration_press() or, "regression" and "ours", with
+/// make_calibration_presses(), and nothing else.
+[[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference);
+
+struct Error {
+  double mean_absolute_mm = 0;  ///< Over judged, trusted pixels.
+  double untrusted_share = 0;   ///< Of the judged pixels.
+};
+
+/// Of one map at 1/decimation of the crop's resolution, against the truth at every pixel of the
+/// crop: a coarser map is read bilinearly.
+[[nodiscard]] Error error_of(const std::vector<std::int16_t>& depth_um, int decimation,
+                             const Shot& shot);
 
 /// A setting at work on one shot, frame after frame.
 class Worker {
@@ -31,11 +41,7 @@ class Worker {
   /// Reconstructs the next of the shot's frames.
   void once();
 
-  struct Error {
-    double mean_absolute_mm = 0;  ///< Over judged, trusted pixels and all frames of the shot.
-    double untrusted_share = 0;   ///< Of the judged pixels.
-  };
-  /// Against the truth at every pixel of the crop; a coarser map is read bilinearly.
+  /// The mean over all frames of the shot.
   [[nodiscard]] Error error();
 
  private:

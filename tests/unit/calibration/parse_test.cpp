@@ -106,8 +106,24 @@ TEST(ParseCalibration, ReadsBackTheLens) {
 
 TEST(ParseCalibration, ReservedTablesMayBeEmptyOrAbsentButNotFilled) {
   const std::string png = format(sample()).reference_png;
-  EXPECT_NO_THROW((void)parse(with("[surface]\n[gain]\n", ""), png, "upload"));
-  expect_refused(with("[gain]\n", "[gain]\nmap = 1\n"), "gain", "reserved");
+  EXPECT_NO_THROW((void)parse(with("[surface]\n", ""), png, "upload"));
+  expect_refused(with("[surface]\n", "[surface]\nr = 1\n"), "surface", "reserved");
+}
+
+TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {
+  expect_refused(with("\"radial\"", "\"square\""), "gain.shape", "\"uniform\"");
+  expect_refused(with("per_mm = -0.0125", "per_mm = -2"), "gain.per_mm", "from -1 to 1");
+  expect_refused(with("per_mm = -0.0125", ""), "gain.per_mm", "missing");
+  expect_refused(with("  0.25, 1.1,", "  1.1, 0.25,"), "uncertainty.depth_mm", "ascending");
+  expect_refused(with("  0.25, 1.1,", "  0.25,"), "uncertainty.error_um", "one for each");
+  expect_refused(with("  12.5, 20,", "  12.5, -1,"), "uncertainty.error_um", "entry 2");
+  const Files files = format(sample());
+  std::string old = files.toml;
+  const auto from = old.find("[gain]");
+  old.replace(from, old.find("# Indentation", from) - from, "[gain]\n");
+  const Calibration parsed = parse(old, files.reference_png, "upload");
+  EXPECT_EQ(parsed.model->gain.shape, recon::GainShape::none);
+  EXPECT_TRUE(parsed.model->uncertainty.empty());
 }
 
 TEST(ParseCalibration, RefusesAnotherReference) {

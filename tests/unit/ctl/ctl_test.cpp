@@ -118,7 +118,7 @@ TEST(Led, ShowsAndChanges) {
             R"("ffffff","ffffff"]})"
             "\n");
   EXPECT_EQ(ctl(rig, {"led", "--scheme", "scheme1"}).out,
-            "brightness 128, LEDs ffffff 000000 ffffff 000000 ffffff 000000 ffffff 000000\n");
+            "brightness 128, LEDs ffffff ffffff 000000 000000 ffffff ffffff 000000 000000\n");
 }
 
 TEST(Led, ChangesSingleOnes) {

@@ -171,11 +171,22 @@ TEST_F(GreyDecoderTest, DamageBelowTheCropIsTold) {
   EXPECT_EQ(decode(jpeg), Status::ok);
 }
 
-TEST_F(GreyDecoderTest, ACropOutsideThePictureIsRefused) {
-  EXPECT_THROW(decoder.set_crop({0, 0, 65, 1}), std::invalid_argument);
-  EXPECT_THROW(decoder.set_crop({60, 0, 5, 1}), std::invalid_argument);
-  EXPECT_THROW(decoder.set_crop({0, -1, 5, 5}), std::invalid_argument);
-  EXPECT_THROW(decoder.set_crop({0, 0, 0, 5}), std::invalid_argument);
+TEST_F(GreyDecoderTest, ACropOutsideThePictureMeansTheWholePicture) {
+  const Bytes jpeg = make_jpeg({}, slope);
+  ASSERT_EQ(decode(jpeg), Status::ok);
+  const auto whole = std::vector(out.data(), out.data() + out.stride() * out.height());
+  for (const Area crop :
+       {Area{0, 0, 65, 1}, Area{60, 0, 5, 1}, Area{0, -1, 5, 5}, Area{0, 0, 0, 5}}) {
+    std::fill_n(out.data(), out.stride() * out.height(), std::uint8_t{0});
+    decoder.set_crop(crop);
+    ASSERT_EQ(decode(jpeg), Status::ok);
+    for (int y = 0; y < out.height(); ++y) {
+      for (int x = 0; x < out.width(); ++x) {
+        ASSERT_EQ(out.data()[y * out.stride() + x],
+                  whole[static_cast<std::size_t>(y * out.stride() + x)]);
+      }
+    }
+  }
 }
 
 TEST_F(GreyDecoderTest, MovesWithItsMemory) {

@@ -132,8 +132,8 @@ TEST(ClientLibrary, CommandsAndRefusals) {
   Client client(options(rig));
   const auto light = client.set_light({50, "scheme1", {}});
   EXPECT_EQ(light.brightness, 50);
-  EXPECT_EQ(light.leds[1], client::Rgb{});
-  EXPECT_EQ(light.leds[2], (client::Rgb{255, 255, 255}));
+  EXPECT_EQ(light.leds[1], (client::Rgb{255, 255, 255}));
+  EXPECT_EQ(light.leds[2], client::Rgb{});
   try {
     client.rezero();
     FAIL() << "not refused";

@@ -18,9 +18,9 @@ std::string lit(std::string_view name) {
 
 TEST(LightSchemes, AreAllOrFourOfTheEight) {
   EXPECT_EQ(lit("all"), "11111111");
-  EXPECT_EQ(lit("scheme1"), "10101010");
-  EXPECT_EQ(lit("scheme2"), "01010101");
-  EXPECT_EQ(lit("scheme3"), "11001100");
+  EXPECT_EQ(lit("scheme1"), "11001100");
+  EXPECT_EQ(lit("scheme2"), "00110011");
+  EXPECT_EQ(lit("scheme3"), "01100110");
   EXPECT_EQ(lit("scheme4"), "11000011");
 }
 

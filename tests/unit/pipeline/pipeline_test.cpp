@@ -176,6 +176,27 @@ TEST_F(PipelineTest, ACoarserMapHoldsTheSameSurface) {
   EXPECT_NEAR(frame->contact.y_mm, 0.1, 0.1);
 }
 
+TEST_F(PipelineTest, AutoTakesTheCoarsestMapWithinTheBound) {
+  config.reconstruction.decimation = 0;
+  config.reconstruction.max_error_um = 1000;
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth && f.decimation == 4; }));
+  EXPECT_EQ(frame->width, 36);
+  EXPECT_NEAR(frame->uncertainty_um, 20, 1);  // a list that says nothing of itself, nothing pressed
+  camera.press(1);
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  EXPECT_GT(frame->uncertainty_um, 20);
+  EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.05);
+}
+
+TEST_F(PipelineTest, AutoTakesFullResolutionWhereTheBoundIsOutOfReach) {
+  config.reconstruction.decimation = 0;
+  config.reconstruction.max_error_um = 10;
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth && f.decimation == 1; }));
+  EXPECT_EQ(frame->width, 144);
+}
+
 TEST_F(PipelineTest, LumaIsWholeThoughDepthReadsAPart) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());

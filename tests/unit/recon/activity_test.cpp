@@ -73,6 +73,54 @@ class ActivityTest : public testing::Test {
   std::normal_distribution<double> normal_;
 };
 
+// Ten rows of cells, from the frame's first row on.
+TEST_F(ActivityTest, TellsWhichRowsAreNotNew) {
+  const auto first = untouched();
+  (void)active_tiles(first);
+  auto second = untouched();
+  (void)active_tiles(second);
+  EXPECT_EQ(report_.unchanged_rows, 0);
+  (void)active_tiles(second);
+  EXPECT_EQ(report_.unchanged_rows, 10);
+  auto torn = untouched();
+  std::copy(second.begin() + 82 * kFrameWidth, second.end(), torn.begin() + 82 * kFrameWidth);
+  (void)active_tiles(torn);
+  EXPECT_EQ(report_.unchanged_rows, 4);  // from row 96 on; the torn one is new in part
+}
+
+TEST_F(ActivityTest, WhiteRowsAreNotCalledRepeated) {
+  const std::vector<std::uint8_t> white(untouched().size(), 255);
+  (void)active_tiles(white);
+  (void)active_tiles(white);
+  EXPECT_EQ(report_.unchanged_rows, 0);
+}
+
+TEST_F(ActivityTest, MeasuresNoiseWhetherQuietOrNot) {
+  settle();
+  EXPECT_NEAR(report_.rough_noise, 1.0, 0.1);
+  for (int i = 0; i < 3; ++i) (void)active_tiles(frame([](int, int) { return 20.0; }, 4));
+  EXPECT_NEAR(report_.rough_noise, 4.0, 0.4);
+}
+
+TEST_F(ActivityTest, WanderingBandsRippleAndAPressDoesNot) {
+  const auto bands = [&](double phase) {
+    return frame([phase](int, int y) { return 3 * std::sin(0.07 * y + phase); });
+  };
+  const auto press = [&](double levels) {
+    return frame([levels](int x, int y) {
+      return levels * std::exp(-(std::pow(x - 100, 2) + std::pow(y - 70, 2)) / 1800);
+    });
+  };
+  settle();
+  EXPECT_LT(report_.ripple, 0.2);
+  (void)active_tiles(press(30));
+  (void)active_tiles(press(31));  // a millimetre in half a second
+  EXPECT_LT(report_.ripple, 0.3);
+  (void)active_tiles(bands(0));
+  (void)active_tiles(bands(3));
+  EXPECT_GT(report_.ripple, 1.5);
+}
+
 TEST_F(ActivityTest, NoiseAloneTouchesNothing) {
   for (int i = 0; i < 500; ++i) ASSERT_EQ(active_tiles(untouched()), 0) << i;
   EXPECT_EQ(report_.tiles, 10 * 7);  // 208 × 145 pixels in tiles of 32 × 16

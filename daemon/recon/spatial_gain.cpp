@@ -1,0 +1,46 @@
+#include "daemon/recon/spatial_gain.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "daemon/recon/kernels.hpp"
+
+namespace dtact::recon {
+namespace {
+
+std::int16_t saturated(double q6) noexcept {
+  return static_cast<std::int16_t>(std::clamp(std::lround(q6), 0L, long{INT16_MAX}));
+}
+
+}  // namespace
+
+void apply(const SpatialGain& gain, const PlaneShape& shape,
+           std::span<std::int16_t> reference_q6) noexcept {
+  const auto row = [&](int y) {
+    return reference_q6.data() + static_cast<std::ptrdiff_t>(y) * shape.stride;
+  };
+  if (gain.shape == GainShape::uniform) {
+    double sum = 0;
+    double count = 0;
+    for (int y = 0; y < shape.height; ++y) {
+      for (int x = 0; x < shape.width; ++x) {
+        if (row(y)[x] < kernels::kDarkest_q6) continue;
+        sum += row(y)[x];
+        count += 1;
+      }
+    }
+    const std::int16_t mean = saturated(count > 0 ? sum / count : 0);
+    for (int y = 0; y < shape.height; ++y) std::fill_n(row(y), shape.width, mean);
+  } else if (gain.shape == GainShape::radial) {
+    for (int y = 0; y < shape.height; ++y) {
+      for (int x = 0; x < shape.width; ++x) {
+        const double right = (x - 0.5 * (shape.width - 1)) * shape.mm_per_px - gain.centre_x_mm;
+        const double down = (y - 0.5 * (shape.height - 1)) * shape.mm_per_px - gain.centre_y_mm;
+        row(y)[x] = saturated(row(y)[x] * (1 + gain.per_mm * std::hypot(right, down)));
+      }
+    }
+  }
+}
+
+}  // namespace dtact::recon

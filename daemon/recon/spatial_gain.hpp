@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+namespace dtact::recon {
+
+/// How much the same indentation darkens at different places.
+enum class GainShape : std::uint8_t {
+  none,     ///< Alike everywhere.
+  uniform,  ///< As the untouched image is bright there: darkening is a share of the light.
+  radial    ///< 1 + per_mm × distance from a centre (the paper's linear regression).
+};
+
+/// The part of a calibration that differs from pixel to pixel, in as few numbers as it takes.
+struct SpatialGain {
+  GainShape shape = GainShape::none;
+  // Of `radial`. Millimetres from the map's centre, x right, y down.
+  double centre_x_mm = 0;
+  double centre_y_mm = 0;
+  double per_mm = 0;  ///< −1 … 1
+};
+
+/// A map's size and scale; rows of a plane are `stride` values apart.
+struct PlaneShape {
+  int width = 0;
+  int height = 0;
+  int stride = 0;
+  double mm_per_px = 0;
+};
+
+/// Turns the smoothed calibration reference (Q6 luma) into what the darkening is brought to: the
+/// per-pixel gain is this plane over the present, smoothed reference. `none` leaves it as it is,
+/// `uniform` makes it its own mean over what is not dark, `radial` multiplies.
+void apply(const SpatialGain& gain, const PlaneShape& shape,
+           std::span<std::int16_t> reference_q6) noexcept;
+
+}  // namespace dtact::recon

@@ -1,0 +1,155 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hal/sim/objects.hpp"
+#include "hal/sim/optics.hpp"
+#include "tests/accuracy/atlas/methods.hpp"
+#include "tests/accuracy/atlas/rows.hpp"
+#include "tests/accuracy/atlas/scenes.hpp"
+
+namespace dtact::atlas {
+namespace {
+
+const Method& ours() { return methods().back(); }
+
+Row row(std::string_view id) {
+  const auto all = rows();
+  const auto found = std::ranges::find(all, id, &Row::id);
+  if (found == all.end()) throw std::invalid_argument("no such row");
+  return *found;
+}
+
+Outcome at(std::string_view id, double value) {
+  return run(ours().calibration, row(id).script(value));
+}
+
+double nominal_mm() {
+  static const double error = at("noise", 1).error_mm();
+  return error;
+}
+
+struct Case {
+  std::string_view id;
+  double harmless;  ///< Within twice the nominal error, and nothing is said.
+  double broken;    ///< Beyond it, or no depth, and it is said.
+};
+
+class Condition : public ::testing::TestWithParam<Case> {};
+
+TEST_P(Condition, IsToldWhereItBreaksAndNotBefore) {
+  const Outcome harmless = at(GetParam().id, GetParam().harmless);
+  EXPECT_LT(harmless.error_mm(), 2 * nominal_mm());
+  EXPECT_EQ(harmless.flagged, 0) << conditions_of(harmless);
+  const Outcome broken = at(GetParam().id, GetParam().broken);
+  EXPECT_FALSE(broken.error_mm() <= 2 * nominal_mm()) << broken.error_mm();
+  EXPECT_TRUE(broken.told());
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Atlas, Condition,
+    ::testing::Values(Case{"brightness_down", 0.995, 0.96}, Case{"brightness_up", 1.005, 1.02},
+                      Case{"dead_leds", 0, 1}, Case{"colour", 0.01, 0.1},
+                      Case{"saturation", 1.2, 1.8}, Case{"near_dark", 0.3, 0.05},
+                      Case{"leak", 2, 10}, Case{"banding", 0, 0.05},
+                      Case{"banding_fast", 0.01, 0.1}, Case{"dead_pixels", 500, 10000},
+                      Case{"frozen", 0, 4}, Case{"torn", 0, 0.5}, Case{"truncated", 0, 1},
+                      Case{"bulge", 0.5, 1.6}, Case{"full_field", 3, 10}),
+    [](const auto& one) { return std::string(one.param.id); });
+
+TEST(Atlas, CleanScenesAreNotFlagged) {
+  double flagged = 0;
+  int frames = 0;
+  for (const Script& script : clean_scripts()) {
+    const Outcome outcome = run(ours().calibration, script);
+    flagged += outcome.flagged * outcome.frames;
+    frames += outcome.frames;
+  }
+  EXPECT_LT(flagged, 0.01 * frames);
+}
+
+TEST(Atlas, FaintLastingPressIsNotAbsorbed) {
+  // Half a minute; the limit on what drift may take is one grey level, 0.03 mm.
+  const Outcome outcome = at("faint", 0.1);
+  EXPECT_LT(outcome.inside_mm, 0.035);
+}
+
+TEST(Atlas, ReferenceUnderAPressIsToldFromAFifthOfAMillimetreOn) {
+  EXPECT_TRUE(at("touched", 0.2).told());
+  EXPECT_LT(at("touched", 0.1).error_mm(), 2 * nominal_mm());
+}
+
+// What the page calls undecidable: two causes, one image. Differences are those of frames with the
+// same noise, in grey levels, of which noise of a single pixel is 1.0.
+double greatest_difference(Spoiler& a, const Shot& shot_a, Spoiler& b, const Shot& shot_b,
+                           double reach_mm) {
+  const hal::LumaView first = a.make(shot_a, 1);
+  std::vector<std::uint8_t> kept;
+  for (int y = 0; y < first.height; ++y) {
+    kept.insert(kept.end(), first.row(y), first.row(y) + first.width);
+  }
+  const auto width = static_cast<std::size_t>(first.width);
+  const auto at = [width](int x, int y) {
+    return static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+  };
+  const hal::LumaView second = b.make(shot_b, 1);
+  // Means over cells of 16 × 16 pixels, so that rounding to whole levels averages out.
+  const int reach = static_cast<int>(reach_mm / a.truth().scene().camera.mm_per_px / 16);
+  double greatest = 0;
+  for (int cy = 18 - reach; cy < 18 + reach; ++cy) {
+    for (int cx = 25 - reach; cx < 25 + reach; ++cx) {
+      int sum = 0;
+      for (int y = cy * 16; y < cy * 16 + 16; ++y) {
+        for (int x = cx * 16; x < cx * 16 + 16; ++x) {
+          sum += second.row(y)[x] - kept[at(x, y)];
+        }
+      }
+      greatest = std::max(greatest, std::abs(sum / 256.0));
+    }
+  }
+  return greatest;
+}
+
+TEST(Undecidable, ShiftedUntouchedLayerLooksLikeItself) {
+  Spoiler spoiler(ball_truth(), 5);
+  Shot shifted;
+  shifted.shift_px = 5;
+  // 0.7 levels at the crop's edge, as when the LEDs drift by 0.4 %; nothing has a place of its own.
+  EXPECT_LT(greatest_difference(spoiler, {}, spoiler, shifted, 10), 1.0);
+}
+
+TEST(Undecidable, FullFieldPressLooksLikeDimmedLight) {
+  // A disc of 16 mm covers the field; the light that shows the same grey at the centre.
+  const auto truth = solve({{hal::sim::disc(16), 0, 0, 0.5}});
+  Spoiler pressed(truth, 5);
+  Spoiler dimmed(ball_truth(), 5);
+  Shot press;
+  press.moment = moment_of(0);
+  Shot dim;
+  dim.exposure = 1 - hal::sim::response(truth->scene().optics, 0.5);
+  // 0.5 mm darkens by 16 levels; what is left between the two causes is a tenth of one.
+  EXPECT_GT(greatest_difference(dimmed, {}, pressed, press, 8), 14);
+  EXPECT_LT(greatest_difference(dimmed, dim, pressed, press, 8), 0.4);
+}
+
+TEST(Undecidable, FineGroovesLookLikeAPlate) {
+  // Grooves of 0.3 mm pitch under a plate 0.4 mm deep against a flat one that is as dark.
+  const auto truth = solve(
+      {{hal::sim::grating(0.3, 0.05, 6), 0, 0, 0.4}, {hal::sim::grating(6, 0.0, 6), 0, 0, 0.4}});
+  Spoiler grooves(truth, 5);
+  Shot fine;
+  fine.moment = moment_of(0);
+  Shot flat;
+  flat.moment = moment_of(1);
+  EXPECT_LT(greatest_difference(grooves, fine, grooves, flat, 1.5), 1.0);
+}
+
+}  // namespace
+}  // namespace dtact::atlas

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "daemon/calibration/calibration.hpp"
+
+namespace dtact::atlas {
+
+/// A method calibrated on the clean simulated sensor, by the table's protocol.
+struct Method {
+  std::string_view name;
+  std::shared_ptr<const calibration::Calibration> calibration;
+};
+
+/// The table's methods, each calibrated once.
+[[nodiscard]] const std::vector<Method>& methods();
+
+}  // namespace dtact::atlas

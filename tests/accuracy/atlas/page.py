@@ -1,0 +1,136 @@
+#!/usr/bin/python3
+"""Makes the stability atlas's page: README.md and a picture for each group of rows, from atlas.csv."""
+
+import argparse
+import csv
+import math
+import pathlib
+
+import matplotlib
+
+matplotlib.use("svg")
+matplotlib.rcParams["svg.hashsalt"] = "dtact"  # the same picture from the same numbers
+import matplotlib.pyplot as plt  # noqa: E402  (the back end is chosen first)
+
+GROUPS = ["light", "image", "scene", "reference"]
+COLOURS = ["#9a6324", "#1f77b4", "#2ca02c", "#7b3fa0"]
+
+
+def number(text):
+    return float(text) if text else math.nan
+
+
+class Run:
+    """One value of one row with one method."""
+
+    def __init__(self, line):
+        self.value = float(line["value"])
+        inside, outside = number(line["inside_mm"]), number(line["outside_mm"])
+        errors = [e for e in (inside, outside) if not math.isnan(e)]
+        self.error = max(errors) if errors else math.nan
+        self.told = number(line["flagged"]) >= 0.5 or number(line["withheld"]) >= 0.5
+        self.stated = number(line["stated_mm"])
+        self.conditions = line["conditions"].replace("_", " ")
+
+
+def read(path):
+    rows, methods = {}, []
+    with open(path, encoding="utf-8") as file:
+        for line in csv.DictReader(file):
+            row = rows.setdefault(line["row"], {"line": line, "runs": {}})
+            row["runs"].setdefault(line["method"], []).append(Run(line))
+            if line["method"] and line["method"] not in methods:
+                methods.append(line["method"])
+    return rows, methods
+
+
+def verdict(runs, nominal):
+    """Where the error leaves twice the nominal one, and what was said there."""
+    wrong = [r for r in runs if r.error > 2 * nominal or math.isnan(r.error)]
+    if not wrong:
+        return "stays within", "–", False, False
+    first = wrong[0]
+    silent = [r for r in wrong if not r.told and r.error > 2 * r.stated]
+    said = first.conditions or ("no depth given" if first.told else "no condition")
+    if not first.told:
+        said += f", stated uncertainty {first.stated:.3f} mm"
+    if silent:
+        said += f"; **silent at {', '.join(f'{r.value:g}' for r in silent)}**"
+    size = "no depth" if math.isnan(first.error) else f"{first.error:.3f} mm"
+    return f"{first.value:g} ({size})", said, bool(silent), not all(r.told for r in wrong)
+
+
+def draw(group, rows, methods, nominal, folder):
+    chosen = [(name, row) for name, row in rows.items() if row["line"]["group"] == group]
+    columns = 4
+    lines = math.ceil(len(chosen) / columns)
+    figure, axes = plt.subplots(lines, columns, figsize=(13, 2.9 * lines), squeeze=False)
+    for axis in axes.flat[len(chosen):]:
+        axis.axis("off")
+    for axis, (_, row) in zip(axes.flat, chosen):
+        for method, colour in zip(methods, COLOURS):
+            runs = row["runs"][method]
+            at = range(len(runs))
+            axis.plot(at, [r.error for r in runs], color=colour, lw=1.2, label=method)
+            for i, run in zip(at, runs):
+                axis.plot(i, run.error, "o", ms=5, mec=colour, mfc=colour if run.told else "white")
+                if math.isnan(run.error):
+                    axis.plot(i, 2, "x", ms=5, color=colour)
+            axis.axhline(2 * nominal[method], color=colour, lw=0.7, ls=":")
+        axis.set_yscale("log")
+        axis.set_ylim(0.008, 2.5)
+        values = [f"{r.value:g}" for r in row["runs"][methods[0]]]
+        axis.set_xticks(range(len(values)), values, fontsize=7)
+        axis.tick_params(axis="y", labelsize=7)
+        title = row["line"]["title"]
+        axis.set_title(title if len(title) < 48 else title[:46] + " …", fontsize=8)
+        axis.set_xlabel(row["line"]["unit"], fontsize=7)
+    for axis in axes[:, 0]:
+        axis.set_ylabel("error, mm", fontsize=8)
+    axes.flat[0].legend(fontsize=6, loc="upper left")
+    figure.tight_layout()
+    figure.savefig(folder / f"{group}.svg", metadata={"Date": None})
+    plt.close(figure)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("csv", type=pathlib.Path)
+    parser.add_argument("folder", type=pathlib.Path)
+    arguments = parser.parse_args()
+    rows, methods = read(arguments.csv)
+    clean = rows.pop("clean")["runs"][""][0] if "clean" in rows else None
+    nominal = {m: rows["noise"]["runs"][m][0].error for m in methods}
+    text = (pathlib.Path(__file__).parent / "page.in.md").read_text(encoding="utf-8")
+    parts = []
+    ours = [m for m in methods if m.startswith("ours")]
+    silent = dict.fromkeys(methods, 0)
+    unflagged = dict.fromkeys(methods, 0)
+    for group in GROUPS:
+        draw(group, rows, methods, nominal, arguments.folder)
+        parts.append(f"## {group.capitalize()}\n\n![{group}]({group}.svg)\n")
+        parts.append("| condition | method | leaves 2 × nominal at | what was said then |")
+        parts.append("| --- | --- | --- | --- |")
+        for row in rows.values():
+            if row["line"]["group"] != group:
+                continue
+            for method in methods:
+                where, said, is_silent, is_unflagged = verdict(row["runs"][method], nominal[method])
+                silent[method] += is_silent
+                unflagged[method] += is_unflagged
+                parts.append(f"| {row['line']['title']} ({row['line']['unit']}) | {method} | {where} | {said} |")
+        for row in rows.values():
+            if row["line"]["group"] == group and row["line"]["undecidable"]:
+                parts.append(f"\n*{row['line']['title']}* cannot be told from one luma image: "
+                             f"{row['line']['undecidable']}.")
+        parts.append("")
+    text = text.replace("@NOMINAL@", ", ".join(f"{nominal[m]:.3f} mm ({m})" for m in methods))
+    for place, counts in (("@SILENT@", silent), ("@UNFLAGGED@", unflagged)):
+        text = text.replace(place, ", ".join(f"{counts[m]} of {len(rows)} rows ({m})" for m in ours))
+    if clean is not None:
+        text = text.replace("@CLEAN@", f"{100 * clean.error:.2f} % of {clean.value:.0f}")
+    (arguments.folder / "README.md").write_text(text.replace("@ROWS@", "\n".join(parts)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

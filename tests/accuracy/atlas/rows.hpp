@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+#include <string_view>
+#include <vector>
+
+#include "tests/accuracy/atlas/run.hpp"
+
+namespace dtact::atlas {
+
+/// One condition, swept from harmless to broken.
+struct Row {
+  std::string_view group;  ///< light, image, scene or reference: its picture.
+  std::string_view id;     ///< Of its lines in the CSV.
+  std::string_view title;
+  std::string_view unit;       ///< Of the swept value.
+  std::vector<double> values;  ///< The first is harmless; its error is nominal.
+  std::function<Script(double)> script;
+  /// Why one luma image cannot tell this condition; empty where it can. See the page.
+  std::string_view undecidable;
+};
+
+/// Every row of the atlas.
+[[nodiscard]] std::vector<Row> rows();
+
+/// Scenes in which nothing is wrong: whatever is flagged there is flagged falsely.
+[[nodiscard]] std::vector<Script> clean_scripts();
+
+}  // namespace dtact::atlas

@@ -1,0 +1,203 @@
+#include "tests/accuracy/atlas/run.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "daemon/pipeline/capture_loop.hpp"
+#include "hal/null/null_ring.hpp"
+#include "proto/dtact.pb.h"
+#include "tests/accuracy/table/judge.hpp"
+#include "tests/fakes/fake_clock.hpp"
+
+namespace dtact::atlas {
+namespace {
+
+constexpr double kFps = 60;
+constexpr std::int64_t kPeriodNs = 16'666'667;
+
+std::uint64_t true_moment(const Script& script, int n) {
+  return script.moment ? script.moment(n) : script.shot(n).moment;
+}
+
+/// Adds up what the loop made of the judged frames.
+class Judge {
+ public:
+  explicit Judge(const Script& script) : script_(script) {}
+
+  void take(int n, const pipeline::DepthFrame* frame, std::uint32_t health) {
+    if (n < script_.frames - script_.judged) return;
+    ++outcome_.frames;
+    for (std::size_t i = 0; i < outcome_.conditions.size(); ++i) {
+      outcome_.conditions[i] += static_cast<int>(health >> i & 1U);
+    }
+    flagged_ += health != 0 ? 1 : 0;
+    if (frame == nullptr || !frame->has_depth) {
+      ++withheld_;
+      return;
+    }
+    ++depths_;
+    stated_um_ += frame->uncertainty_um;
+    look_up(true_moment(script_, n));
+    table::Error inside;
+    table::Error outside;
+    for (std::size_t i = 0; i < frame->depth_um.size(); ++i) {
+      table::Error& error = truth_.contact[i] != 0 ? inside : outside;
+      const std::int16_t um = frame->depth_um[i];
+      if (um == recon::kUntrusted) {
+        ++error.untrusted;
+      } else {
+        error.add(0.001 * um - static_cast<double>(truth_.indentation_mm[i]));
+      }
+    }
+    if (inside.untrusted > 0) {
+      withheld_ += static_cast<double>(inside.untrusted) /
+                   static_cast<double>(inside.untrusted + inside.pixels);
+    }
+    inside_ += inside;
+    outside_ += outside;
+  }
+
+  [[nodiscard]] Outcome outcome() {
+    const double frames = std::max(1, outcome_.frames);
+    outcome_.inside_mm = inside_.mean_mm();
+    outcome_.outside_mm = outside_.mean_mm();
+    outcome_.withheld = withheld_ / frames;
+    outcome_.flagged = flagged_ / frames;
+    outcome_.stated_mm = 0.001 * stated_um_ / std::max(1, depths_);
+    return outcome_;
+  }
+
+ private:
+  void look_up(std::uint64_t moment) {
+    if (std::exchange(moment_, moment) == moment) return;
+    truth_ = table::true_press(*script_.truth, moment);
+  }
+
+  const Script& script_;
+  Outcome outcome_;
+  table::Error inside_;
+  table::Error outside_;
+  table::TruePress truth_;
+  std::optional<std::uint64_t> moment_;
+  double withheld_ = 0;
+  double flagged_ = 0;
+  double stated_um_ = 0;
+  int depths_ = 0;
+};
+
+/// Between two frames it hands the one before to the judge; its clock is the loop's.
+class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
+ public:
+  ScriptedCamera(const Script& script, fakes::FakeClock& clock)
+      : script_(script), clock_(clock), spoiler_(script.truth, 5), judge_(script) {}
+
+  void attach(pipeline::Exchange& exchange) { exchange_ = &exchange; }
+  [[nodiscard]] Outcome outcome() { return judge_.outcome(); }
+
+  [[nodiscard]] hal::CameraInfo info() const override {
+    hal::CameraInfo info;
+    info.backend = "sim";
+    info.identity = "sim:atlas";
+    info.width = script_.truth->scene().camera.width;
+    info.height = script_.truth->scene().camera.height;
+    info.fps = kFps;
+    return info;
+  }
+  [[nodiscard]] hal::CameraReport report() const override { return {}; }
+  void start() override {}
+
+  [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
+                                     std::chrono::nanoseconds /*timeout*/) noexcept override {
+    harvest();
+    const int n = next_++;
+    if (n >= script_.frames) {
+      exchange_->stop = true;
+      return hal::GrabStatus::timeout;
+    }
+    clock_.now = std::max(clock_.now.load() + 1, (n + 1) * kPeriodNs);
+    const Shot shot = script_.shot(n);
+    const hal::LumaView view = spoiler_.make(shot, static_cast<std::uint64_t>(n));
+    if (shot.damaged) return hal::GrabStatus::damaged;
+    hal::FrameInfo info;
+    info.sequence = static_cast<std::uint64_t>(n);
+    info.timestamp_ns = clock_.now;
+    info.ready_ns = clock_.now;
+    info.meaning = hal::TimestampMeaning::end_of_frame;
+    out = hal::Frame(*this, 0, view, info);
+    return hal::GrabStatus::ok;
+  }
+
+ private:
+  void give_back(int /*index*/) noexcept override {}
+
+  void harvest() {
+    if (next_ > 0) {
+      const pipeline::DepthFrame* const frame = exchange_->slot.fetch();
+      judge_.take(next_ - 1, frame,
+                  frame != nullptr ? frame->health.bits() : exchange_->health.load());
+    }
+    pipeline::Report report;
+    while (exchange_->reports.pop(report)) {
+    }
+    if (script_.rezero == next_) {
+      (void)exchange_->orders.push(pipeline::RezeroOrder{1, script_.force});
+    }
+  }
+
+  const Script& script_;
+  fakes::FakeClock& clock_;
+  Spoiler spoiler_;
+  Judge judge_;
+  pipeline::Exchange* exchange_ = nullptr;
+  int next_ = 0;
+};
+
+}  // namespace
+
+double Outcome::error_mm() const noexcept {
+  if (std::isnan(inside_mm)) return outside_mm;
+  if (std::isnan(outside_mm)) return inside_mm;
+  return std::max(inside_mm, outside_mm);
+}
+
+Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
+            const Script& script) {
+  fakes::FakeClock clock;
+  ScriptedCamera camera(script, clock);
+  pipeline::DepthFrame prototype;
+  const recon::RectifyTable& table = calibration->model->rectify;
+  prototype.depth_um.resize(static_cast<std::size_t>(table.width) *
+                            static_cast<std::size_t>(table.height));
+  pipeline::Exchange exchange(prototype);
+  exchange.want_depth = true;
+  camera.attach(exchange);
+  pipeline::PipelineConfig config;
+  config.reference.frames = 16;
+  config.reconstruction.decimation = 1;
+  pipeline::LightDriver light(std::make_unique<hal::null::NullRing>(), config.light, clock,
+                              exchange.wake);
+  pipeline::ReferenceWriter writer(table.frame_width, table.frame_height, {});
+  pipeline::CaptureLoop loop({camera, light, writer, exchange, clock}, config,
+                             pipeline::activate(calibration, camera.info(), config.reconstruction),
+                             false);
+  loop.run();
+  return camera.outcome();
+}
+
+std::string conditions_of(const Outcome& outcome) {
+  std::string names;
+  for (std::size_t i = 0; i < outcome.conditions.size(); ++i) {
+    if (outcome.conditions[i] * 10 < outcome.frames || outcome.conditions[i] == 0) continue;
+    std::string name = v1::Health_Name(static_cast<v1::Health>(i + 1)).substr(7);
+    std::ranges::transform(name, name.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    names += (names.empty() ? "" : ", ") + name;
+  }
+  return names;
+}
+
+}  // namespace dtact::atlas

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/calibration/calibration.hpp"
+#include "daemon/pipeline/health.hpp"
+#include "hal/sim/truth.hpp"
+#include "tests/accuracy/atlas/disturbance.hpp"
+
+namespace dtact::atlas {
+
+/// One run of the daemon's capture loop before the simulated camera, in its own time.
+struct Script {
+  std::shared_ptr<const hal::sim::Truth> truth;
+  int frames = 0;             ///< Asked of the camera, damaged ones included.
+  int judged = 12;            ///< The last so many are judged.
+  std::optional<int> rezero;  ///< The frame before which a new reference is asked for.
+  bool force = true;  ///< It is taken although something touches, as the darkened field seems to.
+  std::function<Shot(int)> shot;  ///< Of frame n.
+  /// The moment whose indentation is true at frame n, where it is not the one shown.
+  std::function<std::uint64_t(int)> moment;
+};
+
+/// The frames from start-up until the reference is taken: settling (8) and averaging (16).
+inline constexpr int kReady = 30;
+
+/// What came of a run's judged frames.
+struct Outcome {
+  double inside_mm = 0;   ///< Mean absolute error where the object touches; NaN: no depth there.
+  double outside_mm = 0;  ///< And elsewhere.
+  double withheld = 0;   ///< Share of the frames without depth, or of the contact marked untrusted.
+  double flagged = 0;    ///< Share of the frames that carried a condition.
+  double stated_mm = 0;  ///< The uncertainty that the frames with depth carried, mean.
+  std::array<int, pipeline::kHealthCount> conditions{};  ///< Frames that carried each.
+  int frames = 0;
+
+  /// The larger of the two errors; NaN when there was no depth at all.
+  [[nodiscard]] double error_mm() const noexcept;
+  /// The user was told, or was given nothing: in at least half of the frames.
+  [[nodiscard]] bool told() const noexcept { return flagged >= 0.5 || withheld >= 0.5; }
+};
+
+/// Runs the loop on this thread: the camera's clock is the only one, so a minute takes seconds and
+/// the same script gives the same outcome. Without real-time settings, state folder or ring.
+[[nodiscard]] Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
+                          const Script& script);
+
+/// Names of the conditions that at least a tenth of the frames carried, comma separated.
+[[nodiscard]] std::string conditions_of(const Outcome& outcome);
+
+}  // namespace dtact::atlas

@@ -1,0 +1,133 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "daemon/calibration/build.hpp"
+#include "daemon/pipeline/active_calibration.hpp"
+#include "daemon/pipeline/uncertainty.hpp"
+#include "hal/sim/renderer.hpp"
+#include "tests/accuracy/chart/scenes.hpp"
+#include "tests/accuracy/chart/settings.hpp"
+
+namespace dtact::chart {
+namespace {
+
+/// One frame of the scripted run, worked by every resolution and by the chosen one.
+struct Judged {
+  int chosen = 0;             ///< Decimation.
+  double error_um = 0;        ///< Of the chosen, true.
+  double full_error_um = 0;   ///< Of full resolution, true.
+  double uncertainty_um = 0;  ///< As the frame would carry it.
+};
+
+/// All objects one after the other (config/scenes/all_objects.toml), as the capture loop works:
+/// each frame's resolution is chosen by the one before.
+std::vector<Judged> scripted_run(double max_error_um) {
+  const image::Grey16 reference = make_reference();
+  const auto calibration = std::make_shared<const calibration::Calibration>(
+      calibration::build({.reference_q8 = reference,
+                          .frames = make_calibration_press().frames,
+                          .ball_radius_mm = 4.0,
+                          .mm_per_px = kMmPerPx,
+                          .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide}}));
+  hal::CameraInfo camera;
+  camera.width = kWidth;
+  camera.height = kHeight;
+  camera.fps = 60;
+  const auto active =
+      pipeline::activate(calibration, camera, {.decimation = 0, .max_error_um = max_error_um});
+  active->set_reference(reference.pixels);
+  active->use_decimation(4);
+  recon::Reconstructor full(calibration->model);
+  full.set_reference(reference.pixels);
+  pipeline::ResolutionChooser chooser(max_error_um);
+
+  const hal::sim::Scene scene =
+      hal::sim::load_scene(DTACT_SOURCE_DIR "/config/scenes/all_objects.toml");
+  hal::sim::Renderer renderer(scene, 11);
+  std::vector<std::uint8_t> luma(std::size_t{kWidth} * kHeight + recon::kLumaPadding);
+  std::vector<std::int16_t> depth(std::size_t{kSide} * kSide);
+  std::vector<std::int16_t> full_depth(depth);
+  std::array<recon::DrawnTiles, 5> drawn;  // by decimation
+  std::vector<Judged> run;
+  for (std::uint64_t sequence = 0; sequence < 1920; sequence += 6) {
+    renderer.render(sequence, hal::sim::led_levels(hal::Light{}), luma.data(), kWidth, kHeight);
+    recon::Reconstructor& reconstructor = active->reconstructor();
+    const int decimation = reconstructor.model().rectify.decimation;
+    recon::DrawnTiles& marks = drawn[static_cast<std::size_t>(decimation)];
+    marks.rest = 0;  // one buffer for all resolutions
+    recon::ActivityReport report;
+    const recon::TileGrid& grid = reconstructor.grid();
+    depth.resize(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height));
+    reconstructor.run_active(luma.data(), kWidth, depth, marks, report);
+    const double bend =
+        pipeline::bend_um(depth, grid, marks.tiles, reconstructor.model().mm_per_px, 100);
+    Judged judged{
+        .chosen = decimation,
+        .error_um = 0,
+        .full_error_um = 0,
+        .uncertainty_um = pipeline::uncertainty_at_um(pipeline::kUnstatedListUm, bend, decimation)};
+    active->use_decimation(chooser.next(pipeline::kUnstatedListUm, bend));
+
+    const Shot shot = truth_of(renderer, sequence);
+    if (std::ranges::count_if(shot.judged, [](std::uint8_t c) { return c != 0; }) < 300) continue;
+    full.run(luma.data(), kWidth, full_depth);
+    judged.error_um = 1000 * error_of(depth, decimation, shot).mean_absolute_mm;
+    judged.full_error_um = 1000 * error_of(full_depth, 1, shot).mean_absolute_mm;
+    run.push_back(judged);
+  }
+  return run;
+}
+
+template <typename Predicate>
+double share(const std::vector<Judged>& run, Predicate predicate) {
+  return static_cast<double>(std::ranges::count_if(run, predicate)) /
+         static_cast<double>(run.size());
+}
+
+TEST(Auto, KeepsTheBoundWhereverFullResolutionDoesAndSavesPixels) {
+  for (const double bound : {60.0, 100.0, 150.0, 250.0}) {
+    const std::vector<Judged> run = scripted_run(bound);
+    ASSERT_GT(run.size(), 150U);
+    const double full_inside =
+        share(run, [&](const Judged& j) { return j.full_error_um <= bound; });
+    const double inside = share(run, [&](const Judged& j) { return j.error_um <= bound; });
+    double pixels = 0;
+    for (const Judged& j : run) pixels += 1.0 / (j.chosen * j.chosen);
+    std::printf(
+        "bound %3.0f um: inside %.1f %% (full resolution %.1f %%), full %.0f %%, half %.0f "
+        "%%, quarter %.0f %% of frames, pixels %.0f %%\n",
+        bound, 100 * inside, 100 * full_inside,
+        100 * share(run, [](const Judged& j) { return j.chosen == 1; }),
+        100 * share(run, [](const Judged& j) { return j.chosen == 2; }),
+        100 * share(run, [](const Judged& j) { return j.chosen == 4; }),
+        100 * pixels / static_cast<double>(run.size()));
+    EXPECT_GE(inside, 0.95 * full_inside);
+    if (bound == 250.0) {
+      EXPECT_GE(inside, 0.95);
+    }
+  }
+}
+
+TEST(Uncertainty, IsHonestOnEveryObject) {
+  const std::vector<Judged> run = scripted_run(60);
+  std::vector<double> ratios;
+  ratios.reserve(run.size());
+  for (const Judged& j : run) ratios.push_back(j.error_um / j.uncertainty_um);
+  std::ranges::sort(ratios);
+  const auto at = [&](double part) {
+    return ratios[static_cast<std::size_t>(part * static_cast<double>(ratios.size() - 1))];
+  };
+  std::printf("true error / stated uncertainty: 5 %% %.2f, median %.2f, 95 %% %.2f, most %.2f\n",
+              at(0.05), at(0.5), at(0.95), at(1));
+  EXPECT_GT(at(0.5), 0.7);
+  EXPECT_LT(at(0.5), 1.3);
+  EXPECT_LT(at(0.95), 1.7);
+  EXPECT_LT(at(1), 2.5);
+}
+
+}  // namespace
+}  // namespace dtact::chart

@@ -1,0 +1,77 @@
+#include "tests/accuracy/table/methods.hpp"
+
+#include <array>
+#include <string>
+
+#include "daemon/calibration/build.hpp"
+#include "daemon/calibration/press_set.hpp"
+
+namespace dtact::table {
+namespace {
+
+std::shared_ptr<const recon::Model> from_one(const Material& material, recon::Method method) {
+  calibration::BallPress press;
+  press.reference_q8 = material.reference_q8;
+  press.frames = material.centre;
+  press.ball_radius_mm = material.trial->centre.radius_mm;
+  press.mm_per_px = kMmPerPx;
+  press.crop = calibration::Crop{kCropCol, kCropRow, kCrop, kCrop};
+  press.method = method;
+  return calibration::build(press).model;
+}
+
+std::shared_ptr<const recon::Model> published_single(const Material& material) {
+  return from_one(material, recon::Method::published);
+}
+
+std::shared_ptr<const recon::Model> ours_single(const Material& material) {
+  return from_one(material, recon::Method::list);
+}
+
+calibration::BallPresses many_presses(const Material& material) {
+  calibration::BallPresses set;
+  set.reference_q8 = material.reference_q8;
+  for (std::size_t i = 0; i < material.many.size(); ++i) {
+    set.presses.push_back(
+        {.name = "press " + std::to_string(i + 1), .frames = material.many[i], .depth_mm = {}});
+  }
+  set.ball_radius_mm = material.trial->centre.radius_mm;
+  set.mm_per_px = kMmPerPx;
+  set.crop = calibration::Crop{kCropCol, kCropRow, kCrop, kCrop};
+  return set;
+}
+
+std::shared_ptr<const recon::Model> published_regression(const Material& material) {
+  const RegressionCentre& centre = material.regression_centre;
+  return calibration::build_regression(many_presses(material), centre.right_mm, centre.down_mm)
+      .model;
+}
+
+std::shared_ptr<const recon::Model> ours_many(const Material& material) {
+  return calibration::build(many_presses(material)).model;
+}
+
+constexpr std::array<Method, 4> kMethods = {{
+    {"published single image", published_single},
+    {"published regression", published_regression},
+    {"ours, one press", ours_single},
+    {"ours, many presses", ours_many},
+}};
+
+}  // namespace
+
+Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& centre) {
+  Material material;
+  material.trial = &trial;
+  material.regression_centre = centre;
+  material.reference_q8 = sensor.reference(kReferenceFrames);
+  material.centre = sensor.press(0, kPressFrames);
+  for (std::size_t i = 0; i < trial.many.size(); ++i) {
+    material.many.push_back(sensor.press(1 + i, kPressFrames));
+  }
+  return material;
+}
+
+std::span<const Method> methods() { return kMethods; }
+
+}  // namespace dtact::table

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "daemon/recon/model.hpp"
+#include "hal/image/png.hpp"
+#include "tests/accuracy/table/sensor.hpp"
+#include "tests/accuracy/table/trial.hpp"
+
+namespace dtact::table {
+
+/// The images a calibration is made from.
+struct Material {
+  const Trial* trial = nullptr;  ///< For the balls' radii.
+  RegressionCentre regression_centre;
+  image::Grey16 reference_q8;
+  std::vector<image::Grey8> centre;             ///< Of the press near the centre.
+  std::vector<std::vector<image::Grey8>> many;  ///< Of the presses anywhere.
+};
+
+/// "We average images within a small time window": so many of each press, and of the untouched
+/// layer.
+inline constexpr std::size_t kPressFrames = 8;
+inline constexpr std::size_t kReferenceFrames = 32;
+
+[[nodiscard]] Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& centre);
+
+/// A row of the table.
+struct Method {
+  std::string_view name;
+  std::shared_ptr<const recon::Model> (*calibrate)(const Material& material) = nullptr;
+};
+
+[[nodiscard]] std::span<const Method> methods();
+
+}  // namespace dtact::table

@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# Makes the tables, plots and pages that lie beside this file from the simulated sensor:
+# tables.sh BIN [table|atlas|thickness ...], all of them without a name. BIN: where the accuracy
+# tests were built.
+set -euo pipefail
+here=$(dirname "$(readlink -f "$0")")
+bin=$1
+shift
+(($#)) || set -- table atlas thickness
+for part in "$@"; do
+  case $part in
+    table)
+      "$bin/table/paper_table" --out "$here/table"
+      ;;
+    atlas)
+      "$bin/atlas/stability_atlas" --out "$here/atlas" >/dev/null
+      /usr/bin/python3 "$here/atlas/page.py" "$here/atlas/atlas.csv" "$here/atlas"
+      echo "atlas: tests/accuracy/atlas/README.md"
+      ;;
+    thickness)
+      "$bin/thickness/layer_thickness" --out "$here/thickness" >/dev/null
+      /usr/bin/python3 "$here/thickness/plot.py" "$here/thickness/thickness.csv" "$here/thickness/thickness.svg"
+      echo "thickness: tests/accuracy/thickness/thickness.svg"
+      ;;
+    *)
+      echo "tables.sh: '$part' is none of table, atlas, thickness" >&2
+      exit 2
+      ;;
+  esac
+done

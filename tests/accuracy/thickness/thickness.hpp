@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dtact::thickness {
+
+/// The thicknesses the paper made, millimetres.
+inline constexpr std::array<double, 5> kThicknesses = {1.0, 1.5, 2.0, 2.5, 3.0};
+
+/// How a groove is judged. A plate of 6 mm with square ridges half a pitch wide is pressed in until
+/// the ridges are `depth` deep; the grooves are 0.4 mm deep or as deep as the press. What the depth
+/// map shows is the difference between its mean over the ridges' middles and that over the
+/// grooves', across the middle of the plate, as a share of the same difference in the true surface.
+/// A pitch is resolved while that share is at least a half and the difference is at least 0.02 mm,
+/// which is above noise and list.
+struct Groove {
+  double pitch_mm = 0;
+  double true_mm = 0;   ///< Ridge minus groove, in the layer's surface.
+  double shown_mm = 0;  ///< The same in the depth map.
+  [[nodiscard]] bool resolved() const noexcept {
+    return shown_mm >= 0.02 && shown_mm >= 0.5 * true_mm;
+  }
+};
+
+/// How a press is judged: a ball of 5 mm radius. Measured while the mean error where it touches is
+/// at most a tenth of its depth and under 5 % of its pixels are marked untrusted.
+struct Press {
+  double depth_mm = 0;
+  double error_mm = 0;
+  double untrusted = 0;  ///< Share of the contact.
+  [[nodiscard]] bool measured() const noexcept {
+    return untrusted < 0.05 && error_mm <= 0.1 * depth_mm;
+  }
+};
+
+struct Result {
+  double thickness_mm = 0;
+  std::vector<Groove> grooves;  ///< From coarse to fine.
+  std::vector<Press> presses;   ///< From shallow to deep.
+  /// The finest pitch that is resolved with all coarser ones.
+  [[nodiscard]] std::optional<double> finest_mm() const;
+  /// The deepest press that is measured.
+  [[nodiscard]] std::optional<double> deepest_mm() const;
+};
+
+/// Calibrates the simulated sensor with that layer by one press of a 4 mm ball, 0.85 of the
+/// thickness deep, and measures. The fitted optics belong to 2 mm: the width of
+/// the scattering is scaled with the thickness, and the share of light that a press takes with the
+/// share of the thickness that it takes. Neither was measured on a real layer of another thickness.
+[[nodiscard]] Result measure(double thickness_mm);
+
+[[nodiscard]] std::string to_csv(const std::vector<Result>& results);
+
+}  // namespace dtact::thickness

@@ -1,0 +1,145 @@
+#include "daemon/calibration/press_set.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+
+#include "daemon/calibration/chain_fit.hpp"
+#include "tests/unit/calibration/ball.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// Rings of a 4 mm ball `depth_mm` deep out to `reach_mm`, where darkening = 30 · depth.
+SagProfile rings(double depth_mm, double reach_mm) {
+  SagProfile profile;
+  for (double r = 0; r < reach_mm; r += 0.05) {
+    const double sag = 4 - std::sqrt(16 - r * r);
+    profile.rings.push_back({30 * (depth_mm - sag), sag, 10 + r});
+  }
+  return profile;
+}
+
+double um_at(const recon::DepthList& list, double level) {
+  return list.um[static_cast<std::size_t>(std::lround(level * 64) - list.first_q6)];
+}
+
+TEST(FitChain, FindsDepthsThatNobodyMeasured) {
+  const ChainFit fit = fit_chain({rings(0.4, 1.2), rings(0.9, 1.8), rings(1.4, 2.2)});
+  EXPECT_TRUE(fit.gaps.empty());
+  EXPECT_NEAR(fit.depth_mm[0], 0.4, 0.003);
+  EXPECT_NEAR(fit.depth_mm[1], 0.9, 0.003);
+  EXPECT_NEAR(fit.depth_mm[2], 1.4, 0.003);
+  for (const Knot& knot : fit.knots) EXPECT_NEAR(knot.depth_mm, knot.level / 30, 0.003);
+}
+
+TEST(FitChain, AMeasuredDepthTiesTheChain) {
+  // The rings say 1.4 mm if no darkening is no depth; a gauge says 1.5.
+  SagProfile measured = rings(1.4, 2.2);
+  measured.depth_mm = 1.5;
+  const ChainFit fit = fit_chain({rings(0.9, 1.8), measured});
+  EXPECT_NEAR(fit.depth_mm[1], 1.5, 0.001);
+  EXPECT_NEAR(fit.depth_mm[0], 1.0, 0.02);
+}
+
+TEST(FitChain, NamesWhatNoPressShows) {
+  const ChainFit shallow = fit_chain({rings(1.0, 0.9), rings(1.4, 1.2)});
+  ASSERT_EQ(shallow.gaps.size(), 2U);
+  EXPECT_EQ(shallow.gaps[0].from_mm, 0);
+  EXPECT_NEAR(shallow.gaps[0].to_mm, 0.9, 0.1);
+}
+
+TEST(FitChain, NeedsADarkRing) {
+  EXPECT_THROW((void)fit_chain({}), std::invalid_argument);
+  EXPECT_THROW((void)fit_chain({SagProfile{.rings = {{-1, 0, 1}}, .depth_mm = {}}}),
+               std::invalid_argument);
+}
+
+BallPresses set_of(const std::vector<Ball>& balls) {
+  BallPresses set;
+  set.reference_q8 = balls.front().untouched_q8();
+  for (std::size_t i = 0; i < balls.size(); ++i) {
+    set.presses.push_back({"press " + std::to_string(i + 1), {balls[i].frame()}, {}});
+  }
+  set.ball_radius_mm = 4;
+  set.mm_per_px = 0.05;
+  return set;
+}
+
+TEST(BuildFromPresses, ReadsALinearResponse) {
+  PressReport report;
+  const Calibration made =
+      build(set_of({Ball{.depth_mm = 0.5}, Ball{.depth_mm = 0.75},
+                    Ball{.col = 130, .row = 125, .depth_mm = 1.0}, Ball{.depth_mm = 1.5}}),
+            &report);
+  for (const double level : {0.0, 8.0, 15.0, 30.0, 40.0}) {
+    EXPECT_NEAR(um_at(made.model->list, level), level / 30 * 1000, 15) << level;
+  }
+  ASSERT_EQ(report.presses.size(), 4U);
+  EXPECT_NEAR(report.presses[2].depth_mm, 1.0, 0.015);
+  EXPECT_EQ(made.model->gain.shape, recon::GainShape::none) << "the light is even";
+  EXPECT_FALSE(made.model->uncertainty.empty());
+  for (const auto& row : made.model->uncertainty) {
+    EXPECT_GT(row.error_um, 50 * row.depth_mm - 1) << "what another ball would read otherwise";
+    EXPECT_LT(row.error_um, 50 * row.depth_mm + 15);
+  }
+}
+
+TEST(BuildFromPresses, UnevenLightPaysForAGain) {
+  BallPresses set = set_of({Ball{.depth_mm = 0.5}, Ball{.col = 90, .row = 90, .depth_mm = 1.0},
+                            Ball{.depth_mm = 0.7}, Ball{.col = 165, .row = 140, .depth_mm = 1.0},
+                            Ball{.depth_mm = 1.5}});
+  // From left to right the light falls to seven tenths, and darkening with it.
+  const auto light = [&](std::size_t i) { return 1 - 0.3 * static_cast<double>(i % 260) / 259; };
+  for (std::size_t i = 0; i < set.reference_q8.pixels.size(); ++i) {
+    set.reference_q8.pixels[i] = static_cast<std::uint16_t>(51200 * light(i));
+  }
+  for (auto& press : set.presses) {
+    for (std::size_t i = 0; i < press.frames[0].pixels.size(); ++i) {
+      auto& pixel = press.frames[0].pixels[i];
+      pixel = static_cast<std::uint8_t>(std::lround(pixel * light(i)));
+    }
+  }
+  PressReport report;
+  const Calibration made = build(set, &report);
+  EXPECT_EQ(made.model->gain.shape, recon::GainShape::uniform);
+  EXPECT_LT(report.uniform_gain_mm, 0.5 * report.without_gain_mm);
+  EXPECT_NEAR(report.presses[1].depth_mm, 1.0, 0.03);
+  EXPECT_NEAR(report.presses[3].depth_mm, 1.0, 0.03);
+}
+
+TEST(BuildFromPresses, SaysWhatToPressNext) {
+  EXPECT_THAT(
+      [] { (void)build(set_of({Ball{.depth_mm = 1.4}, Ball{.depth_mm = 1.5}})); },
+      ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("no press shows indentations from 0.00 to"),
+                                              HasSubstr("press the ball about"))));
+  EXPECT_THROW((void)build(set_of({Ball{}})), std::runtime_error);
+  BallPresses with_nothing = set_of({Ball{}, Ball{.depth_mm = 0.0}});
+  EXPECT_THAT([&] { (void)build(with_nothing); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("press 2")));
+}
+
+TEST(BuildRegression, FindsOneSlopeWhereThereIsOne) {
+  const Calibration made =
+      build_regression(set_of({Ball{.depth_mm = 1.0}, Ball{.col = 90, .row = 90, .depth_mm = 1.2},
+                               Ball{.col = 165, .row = 140, .depth_mm = 0.8}}));
+  EXPECT_EQ(made.model->gain.shape, recon::GainShape::radial);
+  // Few presses: the line still sees that slopes are lower at the circles' rims.
+  EXPECT_NEAR(made.model->gain.per_mm, 0, 0.1);
+  // The circle is at three levels, 0.1 mm deep, and the sphere is put to zero there.
+  EXPECT_GT(um_at(made.model->list, 30), 800);
+  EXPECT_LT(um_at(made.model->list, 30), 1000);
+  EXPECT_EQ(um_at(made.model->list, 0), 0);
+}
+
+TEST(BuildRegression, NeedsPressesInSeveralPlaces) {
+  EXPECT_THROW((void)build_regression(set_of({Ball{.depth_mm = 0.0}})), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace dtact::calibration

@@ -1,0 +1,100 @@
+#include "daemon/pipeline/image_watch.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace dtact::pipeline {
+namespace {
+
+constexpr int kWidth = 160;
+constexpr int kHeight = 120;
+
+/// A reference of grey 100 and frames that differ from it.
+class ImageWatchTest : public ::testing::Test {
+ protected:
+  ImageWatchTest() {
+    const std::vector<std::uint16_t> reference(pixels_.size(), 100 * 256);
+    watch_.set_reference(reference, kWidth, kHeight, {});
+    report_.cells = 80;
+    report_.pixels = 10240;
+    report_.mean_grey = 100;
+    report_.rough_noise = 1;
+  }
+
+  void look() { watch_.look(report_, {pixels_.data(), kWidth, kHeight, kWidth}); }
+  [[nodiscard]] bool has(Health health) const { return watch_.conditions().has(health); }
+
+  std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(std::size_t{kWidth} * kHeight, 100);
+  recon::ActivityReport report_;
+  ImageWatch watch_;
+};
+
+TEST_F(ImageWatchTest, CleanPictureIsFine) {
+  look();
+  EXPECT_TRUE(watch_.conditions().empty());
+}
+
+TEST_F(ImageWatchTest, LightIsComparedOnlyWhereMuchIsActive) {
+  pixels_.assign(pixels_.size(), 97);  // 3 % less
+  look();
+  EXPECT_FALSE(has(Health::light_drifted));
+  report_.active_cells = 80;
+  look();
+  EXPECT_TRUE(has(Health::light_drifted));
+  report_.active_cells = 0;
+  look();
+  EXPECT_FALSE(has(Health::light_drifted));
+}
+
+TEST_F(ImageWatchTest, PressOnAThirdIsNoDrift) {
+  for (std::size_t y = 40; y < 100; ++y) {
+    for (std::size_t x = 40; x < 140; ++x) pixels_[y * kWidth + x] = 80;
+  }
+  report_.active_cells = 30;
+  look();
+  EXPECT_FALSE(has(Health::light_drifted));
+}
+
+TEST_F(ImageWatchTest, LightIsLookedAtEverySixteenFrames) {
+  report_.active_cells = 80;
+  look();
+  pixels_.assign(pixels_.size(), 90);
+  for (int i = 1; i < 16; ++i) look();
+  EXPECT_FALSE(has(Health::light_drifted));
+  look();
+  EXPECT_TRUE(has(Health::light_drifted));
+}
+
+TEST_F(ImageWatchTest, BandsMustLastSixFrames) {
+  report_.ripple = 0.6;
+  for (int i = 0; i < 5; ++i) look();
+  EXPECT_FALSE(has(Health::light_banded));
+  look();
+  EXPECT_TRUE(has(Health::light_banded));
+  watch_.forget();
+  EXPECT_TRUE(watch_.conditions().empty());
+}
+
+TEST_F(ImageWatchTest, StatisticsHaveTheirLimits) {
+  report_.saturated = 103;
+  report_.mean_grey = 19;
+  report_.rough_noise = 2.6;
+  report_.unchanged_rows = 2;
+  look();
+  EXPECT_TRUE(has(Health::image_saturated));
+  EXPECT_TRUE(has(Health::image_dark));
+  EXPECT_TRUE(has(Health::image_noisy));
+  EXPECT_TRUE(has(Health::image_repeated));
+  report_.saturated = 102;
+  report_.mean_grey = 20;
+  report_.rough_noise = 2.5;
+  report_.unchanged_rows = 1;
+  look();
+  EXPECT_TRUE(watch_.conditions().empty());
+}
+
+}  // namespace
+}  // namespace dtact::pipeline

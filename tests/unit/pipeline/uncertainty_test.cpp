@@ -1,0 +1,92 @@
+#include "daemon/pipeline/uncertainty.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "daemon/recon/model.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+constexpr int kSide = 96;
+
+recon::TileRows all_tiles(const recon::TileGrid& grid) {
+  return recon::TileRows(static_cast<std::size_t>(grid.rows()), grid.all());
+}
+
+template <typename Depth>
+double bend_of(Depth depth, double mm_per_px) {
+  std::vector<std::int16_t> map;
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) map.push_back(static_cast<std::int16_t>(depth(x, y)));
+  }
+  const recon::TileGrid grid(kSide, kSide);
+  return bend_um(map, grid, all_tiles(grid), mm_per_px, 100);
+}
+
+TEST(Bend, PlanesHaveNone) {
+  EXPECT_EQ(bend_of([](int, int) { return 500; }, 0.0415), 0);
+  EXPECT_EQ(bend_of([](int x, int y) { return 500 + 3 * x + 2 * y; }, 0.0415), 0);
+}
+
+TEST(Bend, AParabolaHasTheSameWhereverAndHoweverFine) {
+  // 2 x² µm at 0.0415 mm a pixel: the second difference over ±4 pixels (0.166 mm) is 64 µm, halved.
+  EXPECT_NEAR(bend_of([](int x, int) { return 200 + 2 * (x - 48) * (x - 48); }, 0.0415), 32, 0.1);
+  // At 0.166 mm a pixel the second difference is 4 µm, halved.
+  EXPECT_NEAR(bend_of([](int x, int) { return 200 + 2 * (x - 48) * (x - 48); }, 0.166), 2, 0.1);
+}
+
+TEST(Bend, OnlyPressedAndTrustedPixelsCount) {
+  EXPECT_EQ(bend_of([](int x, int) { return x % 2 == 0 ? 99 : -400; }, 0.166), 0);
+  EXPECT_EQ(bend_of([](int x, int) { return x % 2 == 0 ? 500 : int{recon::kUntrusted}; }, 0.166),
+            0);
+}
+
+TEST(Bend, OnlyTheDrawnTilesAreLookedAt) {
+  std::vector<std::int16_t> map(std::size_t{kSide} * kSide);
+  for (std::size_t i = 0; i < map.size(); ++i) map[i] = i % 2 == 0 ? 500 : 300;
+  const recon::TileGrid grid(kSide, kSide);
+  const recon::TileRows none(static_cast<std::size_t>(grid.rows()), 0);
+  EXPECT_EQ(bend_um(map, grid, none, 0.166, 100), 0);
+  EXPECT_GT(bend_um(map, grid, all_tiles(grid), 0.166, 100), 0);
+}
+
+TEST(Bend, AMapSmallerThanItsReachHasNone) {
+  const std::vector<std::int16_t> map(16, 500);
+  const recon::TileGrid grid(4, 4);
+  EXPECT_EQ(bend_um(map, grid, all_tiles(grid), 0.02, 100), 0);
+}
+
+TEST(Uncertainty, AddsListAndBlurInSquares) {
+  EXPECT_DOUBLE_EQ(uncertainty_um(30, 0), 30);
+  EXPECT_DOUBLE_EQ(uncertainty_um(28, 3), 35);  // √(28² + 21²)
+  EXPECT_DOUBLE_EQ(uncertainty_at_um(30, 0, 4), 30);
+  EXPECT_DOUBLE_EQ(uncertainty_at_um(28, 3, 4), 35.93);
+}
+
+TEST(ResolutionChooser, GoesFinerAtOnceAndCoarserWithPatience) {
+  ResolutionChooser chooser(50);
+  EXPECT_EQ(chooser.next(20, 0), 4);
+  EXPECT_EQ(chooser.next(20, 6.4), 2);  // √(20² + 44.8²) = 49.06; + 0.54 at half, + 1.98 at quarter
+  for (int i = 1; i < ResolutionChooser::kPatience; ++i) EXPECT_NE(chooser.next(20, 1), 4) << i;
+  int frames = 0;
+  while (chooser.next(20, 1) != 4) ASSERT_LT(++frames, 3 * ResolutionChooser::kPatience);
+}
+
+TEST(ResolutionChooser, TakesFullResolutionWhereNothingIsInside) {
+  ResolutionChooser chooser(50);
+  EXPECT_EQ(chooser.next(60, 0), 1);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(chooser.next(60, 0), 1);
+}
+
+TEST(ResolutionChooser, DoesNotSwingAtTheBound) {
+  // At quarter resolution just outside, at half just inside: never inside by the margin.
+  ResolutionChooser chooser(50);
+  (void)chooser.next(20, 6.3);
+  const int first = chooser.decimation();
+  for (int i = 0; i < 200; ++i) EXPECT_EQ(chooser.next(20, 6.3), first);
+}
+
+}  // namespace
+}  // namespace dtact::pipeline

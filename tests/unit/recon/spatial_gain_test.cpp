@@ -1,0 +1,41 @@
+#include "daemon/recon/spatial_gain.hpp"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+namespace dtact::recon {
+namespace {
+
+// Three columns and one of padding, two rows; 64 is one grey level.
+const PlaneShape kShape{.width = 3, .height = 2, .stride = 4, .mm_per_px = 2};
+const std::vector<std::int16_t> kPlane{6400, 12800, 6400, 7, 6400, 12800, 100, 7};
+
+std::vector<std::int16_t> applied(const SpatialGain& gain) {
+  std::vector<std::int16_t> plane = kPlane;
+  apply(gain, kShape, plane);
+  return plane;
+}
+
+TEST(SpatialGain, NoneLeavesThePlane) { EXPECT_EQ(applied({}), kPlane); }
+
+TEST(SpatialGain, UniformIsTheMeanOfWhatIsNotDark) {
+  // (3 · 6400 + 2 · 12800) / 5; the pixel of 1.6 levels does not count.
+  EXPECT_EQ(applied({.shape = GainShape::uniform}),
+            (std::vector<std::int16_t>{8960, 8960, 8960, 7, 8960, 8960, 8960, 7}));
+}
+
+TEST(SpatialGain, RadialGrowsWithTheDistance) {
+  // From the upper left pixel: 0, 2 and 4 mm in its row, 2, √8 and √20 below.
+  const auto plane =
+      applied({.shape = GainShape::radial, .centre_x_mm = -2, .centre_y_mm = -1, .per_mm = 0.25});
+  EXPECT_EQ(plane, (std::vector<std::int16_t>{6400, 19200, 12800, 7, 9600, 21851, 212, 7}));
+}
+
+TEST(SpatialGain, Saturates) {
+  EXPECT_EQ(applied({.shape = GainShape::radial, .centre_x_mm = -900, .per_mm = 1})[0], INT16_MAX);
+  EXPECT_EQ(applied({.shape = GainShape::radial, .centre_x_mm = -900, .per_mm = -1})[0], 0);
+}
+
+}  // namespace
+}  // namespace dtact::recon
