@@ -107,7 +107,7 @@ Calibration empty_calibration(const image::Grey16& reference_q8, const std::opti
                               double mm_per_px, const std::optional<recon::Lens>& lens) {
   const int width = reference_q8.width;
   const int height = reference_q8.height;
-  const Crop part = crop ? *crop : seen(lens, width, height, mm_per_px);
+  const Crop part = crop.value_or(seen(lens, width, height, mm_per_px));
   auto model = std::make_shared<recon::Model>();
   std::vector<std::uint8_t> outside;
   model->rectify = map_table(lens, width, height,
