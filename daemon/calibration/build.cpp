@@ -22,9 +22,11 @@ template <typename Pixel>
 image::Grey8 rectified(const recon::RectifyTable& table, const Pixel& pixel) {
   image::Grey8 part{table.width, table.height, {}};
   for (const recon::RectifyTable::Entry& e : table.entries) {
-    const auto x = static_cast<std::size_t>(e.x + (e.fx + 64) / 128);
-    const auto y = static_cast<std::size_t>(e.y + (e.fy + 64) / 128);
-    part.pixels.push_back(pixel(y * static_cast<std::size_t>(table.frame_width) + x));
+    const int x = e.x + (e.fx + 64) / 128;
+    const int y = e.y + (e.fy + 64) / 128;
+    part.pixels.push_back(
+        pixel(static_cast<std::size_t>(y) * static_cast<std::size_t>(table.frame_width) +
+              static_cast<std::size_t>(x)));
   }
   return part;
 }
