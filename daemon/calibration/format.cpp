@@ -81,6 +81,7 @@ std::string gain_text(const recon::SpatialGain& gain) {
 std::vector<double> column(const std::vector<recon::Model::Uncertainty>& rows,
                            double recon::Model::Uncertainty::* field) {
   std::vector<double> values;
+  values.reserve(rows.size());
   for (const auto& row : rows) values.push_back(row.*field);
   return values;
 }
