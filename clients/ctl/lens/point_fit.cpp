@@ -220,6 +220,7 @@ ChosenLens choose_lens(std::span<const Mark> marks) {
     const double error = rms(left_out);
     best.left_out_rms_of_each.push_back(error);
     std::vector<double> squares;
+    squares.reserve(left_out.size());
     for (const Point& r : left_out) squares.push_back(square(r));
     if (best.left_out.empty() || clearly_lower(squares, best_squares)) {
       best_squares = std::move(squares);

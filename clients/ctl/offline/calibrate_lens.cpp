@@ -70,6 +70,7 @@ void run_chessboard(const Options& options) {
   const ImageSet images = load_images(options.chessboard, "--chessboard");
   const auto [cols, rows] = pair_of(options.squares, "--squares");
   std::vector<std::string> names;
+  names.reserve(images.sources.size());
   for (const auto& source : images.sources) names.push_back(source.name);
   const ChessboardLens made =
       calibrate_chessboards(grey_images(images), names, {cols, rows, options.square_mm});
