@@ -38,7 +38,8 @@ void print_text(const SurveyedCamera& camera, std::ostream& out) {
   if (!others.empty()) fmt::print(out, "  or {}\n", others);
   fmt::print(out, "  modes\n");
   for (const Mode& mode : camera.modes) {
-    fmt::print(out, "    {}{}\n", hal::v4l2::describe({mode}), mode.usable() ? "" : " (not usable)");
+    fmt::print(out, "    {}{}\n", hal::v4l2::describe({mode}),
+               mode.usable() ? "" : " (not usable)");
   }
   fmt::print(out, "  controls\n");
   for (const OfferedControl& control : camera.controls) {

@@ -22,9 +22,11 @@ template <typename Pixel>
 image::Grey8 rectified(const recon::RectifyTable& table, const Pixel& pixel) {
   image::Grey8 part{table.width, table.height, {}};
   for (const recon::RectifyTable::Entry& e : table.entries) {
-    const auto x = static_cast<std::size_t>(e.x + (e.fx + 64) / 128);
-    const auto y = static_cast<std::size_t>(e.y + (e.fy + 64) / 128);
-    part.pixels.push_back(pixel(y * static_cast<std::size_t>(table.frame_width) + x));
+    const int x = e.x + (e.fx + 64) / 128;
+    const int y = e.y + (e.fy + 64) / 128;
+    part.pixels.push_back(
+        pixel(static_cast<std::size_t>(y) * static_cast<std::size_t>(table.frame_width) +
+              static_cast<std::size_t>(x)));
   }
   return part;
 }
@@ -107,7 +109,7 @@ Calibration empty_calibration(const image::Grey16& reference_q8, const std::opti
                               double mm_per_px, const std::optional<recon::Lens>& lens) {
   const int width = reference_q8.width;
   const int height = reference_q8.height;
-  const Crop part = crop ? *crop : seen(lens, width, height, mm_per_px);
+  const Crop part = crop.value_or(seen(lens, width, height, mm_per_px));
   auto model = std::make_shared<recon::Model>();
   std::vector<std::uint8_t> outside;
   model->rectify = map_table(lens, width, height,

@@ -45,16 +45,16 @@ struct BallPress {
   recon::Method method = recon::Method::list;
 };
 
-/// A calibration without a list: frame, lens, crop, scale, smoothing, reference. Throws
-/// std::invalid_argument when the crop leaves the frame.
+/// A calibration without a list: frame, crop (none: all that the frame shows), scale, lens,
+/// smoothing, reference. Throws std::invalid_argument when the crop leaves the frame.
 [[nodiscard]] Calibration empty_calibration(const image::Grey16& reference_q8,
                                             const std::optional<Crop>& crop, double mm_per_px,
                                             const std::optional<recon::Lens>& lens);
 
-/// The reference as the depth map shows it, to whole grey levels.
+/// The depth map's part of the reference, the nearest pixels, to whole grey levels.
 [[nodiscard]] image::Grey8 rectified_reference(const recon::RectifyTable& table,
                                                const image::Grey16& q8);
-/// The mean of the frames as the depth map shows it, to whole grey levels.
+/// The same of the mean of the frames.
 [[nodiscard]] image::Grey8 rectified_mean(const recon::RectifyTable& table,
                                           const std::vector<image::Grey8>& frames);
 

@@ -102,7 +102,8 @@ ChainFit fit_chain(const std::vector<SagProfile>& presses) {
         normal.add({{unknown(below), 1 - part}, upper, {depth, -1}}, -ring.sag_mm, ring.weight);
       }
     }
-    if (presses[p].depth_mm) normal.add({{depth, 1}}, *presses[p].depth_mm, kMeasured);
+    const std::optional<double>& measured = presses[p].depth_mm;
+    if (measured) normal.add({{depth, 1}}, *measured, kMeasured);
   }
   double straight = 0;
   for (const SagProfile& press : presses) {

@@ -81,6 +81,7 @@ std::string gain_text(const recon::SpatialGain& gain) {
 std::vector<double> column(const std::vector<recon::Model::Uncertainty>& rows,
                            double recon::Model::Uncertainty::* field) {
   std::vector<double> values;
+  values.reserve(rows.size());
   for (const auto& row : rows) values.push_back(row.*field);
   return values;
 }
@@ -144,8 +145,7 @@ Files format(const Calibration& calibration) {
   t += fmt::format(
       "[lens]  # where the surface appears in the frame; empty: the frame as it is\n{}\n",
       calibration.lens ? format_lens(*calibration.lens) : "");
-  t += "# Reserved for a curved surface. Empty: none.\n"
-       "[surface]\n\n";
+  t += "# Reserved for a curved surface. Empty: none.\n[surface]\n\n";
   t += gain_text(model.gain);
   if (!model.uncertainty.empty()) {
     t += "[uncertainty]  # of the list: mean absolute error in micrometres at some indentations\n";

@@ -89,6 +89,7 @@ std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set
 Fitted fit(std::vector<SettledPress> presses, const BallPresses& set) {
   Fitted fitted{.presses = std::move(presses), .profiles = {}, .chain = {}};
   std::vector<double> reach_mm;
+  reach_mm.reserve(fitted.presses.size());
   for (const SettledPress& press : fitted.presses) {
     reach_mm.push_back(kSure * press.contact.radius_mm);
   }

@@ -18,10 +18,9 @@ struct BallPresses {
   };
   std::vector<Press> presses;
   double ball_radius_mm = 0;
-  double mm_per_px = 0;             ///< Of the depth map.
+  double mm_per_px = 0;
+  std::optional<Crop> crop;         ///< None: all that the frame shows.
   std::optional<recon::Lens> lens;  ///< None: the frame as it is.
-  /// Of the frame or, with a lens, of the rectified image; none: all that the frame shows.
-  std::optional<Crop> crop;
 };
 
 /// What build() found out on the way.

@@ -84,21 +84,22 @@ Calibration build_regression(const BallPresses& set, double centre_x_mm, double 
   if (set.presses.empty()) throw std::invalid_argument("no press");
   Calibration calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
   auto model = std::make_shared<recon::Model>(*calibration.model);
-  const recon::RectifyTable& map = model->rectify;
-  const image::Grey8 reference = rectified_reference(map, set.reference_q8);
+  const Crop crop{calibration.crop_col, calibration.crop_row, model->rectify.width,
+                  model->rectify.height};
+  const image::Grey8 reference = rectified_reference(model->rectify, set.reference_q8);
   PixelSlopes slopes{std::vector<double>(reference.pixels.size()),
                      std::vector<double>(reference.pixels.size())};
   for (const BallPresses::Press& press : set.presses) {
-    add_press(reference, rectified_mean(map, press.frames), press.name, set.ball_radius_mm,
-              set.mm_per_px, slopes);
+    add_press(reference, rectified_mean(model->rectify, press.frames), press.name,
+              set.ball_radius_mm, set.mm_per_px, slopes);
   }
   LineFit fit;
   std::size_t at = 0;
-  for (int y = 0; y < map.height; ++y) {
-    for (int x = 0; x < map.width; ++x, ++at) {
+  for (int y = 0; y < crop.height; ++y) {
+    for (int x = 0; x < crop.width; ++x, ++at) {
       if (slopes.level_level[at] == 0) continue;
-      fit.add(std::hypot((x - 0.5 * (map.width - 1)) * set.mm_per_px - centre_x_mm,
-                         (y - 0.5 * (map.height - 1)) * set.mm_per_px - centre_y_mm),
+      fit.add(std::hypot((x - 0.5 * (crop.width - 1)) * set.mm_per_px - centre_x_mm,
+                         (y - 0.5 * (crop.height - 1)) * set.mm_per_px - centre_y_mm),
               slopes.depth_level[at] / slopes.level_level[at]);
     }
   }

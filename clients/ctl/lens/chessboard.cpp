@@ -105,6 +105,7 @@ recon::Lens lens_of(const Camera& camera, LensModel model, const Corners& corner
 
 std::vector<Mark> marks_of(const Corners& corners, const std::vector<cv::Point3f>& points) {
   std::vector<Mark> marks;
+  marks.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     marks.push_back({{points[i].x, points[i].y}, {corners[i].x, corners[i].y}});
   }
@@ -171,6 +172,7 @@ ChessboardLens calibrate_chessboards(const std::vector<cv::Mat1b>& images,
   }
   const std::vector<cv::Point3f> points = board_points(board);
   std::vector<Corners> corners;
+  corners.reserve(images.size());
   for (std::size_t i = 0; i < images.size(); ++i) {
     corners.push_back(find_corners(images[i], names[i], board));
   }

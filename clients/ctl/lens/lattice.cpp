@@ -63,6 +63,7 @@ Net largest_net(const std::vector<Candidate>& candidates, std::size_t enough) {
   for (std::size_t seed = 0; seed < std::min(kSeeds, candidates.size()); ++seed) {
     const cv::Point2d at = candidates[seed].px;
     std::vector<cv::Point2d> near;
+    near.reserve(candidates.size());
     for (const Candidate& c : candidates) near.push_back(c.px - at);
     const std::size_t count = std::min(kNeighbours + 1, near.size());
     std::ranges::partial_sort(near, near.begin() + static_cast<std::ptrdiff_t>(count), {},

@@ -186,7 +186,9 @@ double neighbours_height(const std::vector<double>& heights, const Lattice& latt
   for (int y = std::max(0, row - 1); y <= std::min(lattice.rows - 1, row + 1); ++y) {
     for (int x = std::max(0, col - 1); x <= std::min(lattice.cols - 1, col + 1); ++x) {
       if (x == col && y == row) continue;
-      around.push_back(heights[static_cast<std::size_t>(y * lattice.cols + x)]);
+      around.push_back(
+          heights[static_cast<std::size_t>(y) * static_cast<std::size_t>(lattice.cols) +
+                  static_cast<std::size_t>(x)]);
     }
   }
   std::ranges::sort(around);
@@ -244,7 +246,9 @@ Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, con
 bool same_places(const Lattice& a, const Lattice& b, double apart) {
   if (a.rows != b.rows) return false;
   for (std::size_t i = 0; i < a.places.size(); ++i) {
-    if (a.places[i] && b.places[i] && cv::norm(*a.places[i] - *b.places[i]) > apart) return false;
+    const auto& here = a.places[i];
+    const auto& there = b.places[i];
+    if (here && there && cv::norm(*here - *there) > apart) return false;
   }
   return true;
 }

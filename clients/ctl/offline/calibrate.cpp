@@ -51,20 +51,21 @@ recon::Lens lens_for(const std::string& path, const ImageSet& images) {
   return file.lens;
 }
 
-/// The lens and the map's scale, of which at least one is given.
-struct Optics {
+/// What says how large a pixel is, and where the camera sees it.
+struct Scale {
   std::optional<recon::Lens> lens;
   double mm_per_px = 0;
 };
-Optics optics_of(const Options& options, const ImageSet& images) {
-  Optics optics{.lens = {}, .mm_per_px = options.mm_per_px};
+
+Scale scale_of(const Options& options, const ImageSet& reference) {
+  Scale scale{{}, options.mm_per_px};
   if (!options.lens.empty()) {
-    optics.lens = lens_for(options.lens, images);
-    if (optics.mm_per_px == 0) optics.mm_per_px = recon::central_mm_per_px(*optics.lens);
-  } else if (optics.mm_per_px == 0) {
+    scale.lens = lens_for(options.lens, reference);
+    if (scale.mm_per_px == 0) scale.mm_per_px = recon::central_mm_per_px(*scale.lens);
+  } else if (scale.mm_per_px == 0) {
     throw std::runtime_error("--mm-per-px or --lens is required: one of them says the scale");
   }
-  return optics;
+  return scale;
 }
 
 /// "FOLDER@0.8": the press's images and the depth that was measured.
@@ -95,13 +96,13 @@ calibration::BallPresses::Press load_press(const std::string& text, const ImageS
 calibration::Calibration make_from_one(const Options& options, const ImageSet& reference) {
   const ImageSet ball = load_images(options.ball, "--ball");
   require_same_size(reference, "--reference", ball, "--ball");
-  const Optics optics = optics_of(options, reference);
+  const Scale scale = scale_of(options, reference);
   calibration::Calibration made = calibration::build(
       {.reference_q8 = reference.mean_q8(),
        .frames = ball.frames(),
        .ball_radius_mm = options.radius_mm,
-       .mm_per_px = optics.mm_per_px,
-       .lens = optics.lens,
+       .mm_per_px = scale.mm_per_px,
+       .lens = scale.lens,
        .crop = crop_of(options, reference.width(), reference.height()),
        .method = options.method == "published" ? recon::Method::published : recon::Method::list});
   made.origin.sources = reference.sources;
@@ -111,15 +112,15 @@ calibration::Calibration make_from_one(const Options& options, const ImageSet& r
 
 /// From several.
 calibration::Calibration make_from_many(const Options& options, const ImageSet& reference) {
-  const Optics optics = optics_of(options, reference);
   calibration::Origin origin;
   origin.sources = reference.sources;
+  const Scale scale = scale_of(options, reference);
   calibration::BallPresses set{.reference_q8 = reference.mean_q8(),
                                .presses = {},
                                .ball_radius_mm = options.radius_mm,
-                               .mm_per_px = optics.mm_per_px,
-                               .lens = optics.lens,
-                               .crop = crop_of(options, reference.width(), reference.height())};
+                               .mm_per_px = scale.mm_per_px,
+                               .crop = crop_of(options, reference.width(), reference.height()),
+                               .lens = scale.lens};
   for (const std::string& text : options.presses) {
     set.presses.push_back(load_press(text, reference, origin));
   }

@@ -107,7 +107,7 @@ TEST(ParseCalibration, ReadsBackTheLens) {
 TEST(ParseCalibration, ReservedTablesMayBeEmptyOrAbsentButNotFilled) {
   const std::string png = format(sample()).reference_png;
   EXPECT_NO_THROW((void)parse(with("[surface]\n", ""), png, "upload"));
-  expect_refused(with("[surface]\n", "[surface]\nk1 = 0.1\n"), "surface", "reserved");
+  expect_refused(with("[surface]\n", "[surface]\nr = 1\n"), "surface", "reserved");
 }
 
 TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {
