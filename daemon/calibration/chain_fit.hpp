@@ -34,8 +34,9 @@ struct ChainFit {
 /// The list M, linear between knots two grey levels apart with M(0) = 0, and a depth g for each
 /// press, so that M(level) = g − sag holds in the rings of all: one linear least-squares solve. No
 /// circle is needed: inside one press only the slope of M is seen, presses of several depths chain
-/// from zero upward, and a press of known depth ties the chain to it. Where nothing is seen M goes
-/// on as straight as it can (a faint penalty on its bends). Then M is made to rise.
+/// from zero upward, and a press of known depth ties the chain to it. M is kept
+/// straight by a penalty on its bends, and where nothing is seen it goes on straight. Then M is
+/// made to rise.
 ///
 /// Throws std::invalid_argument when there is no ring.
 [[nodiscard]] ChainFit fit_chain(const std::vector<SagProfile>& presses);
