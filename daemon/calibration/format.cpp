@@ -7,28 +7,13 @@
 
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/map_table.hpp"
+#include "daemon/calibration/sensor_file.hpp"
 #include "daemon/calibration/sha256.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
 
 namespace dtact::calibration {
 namespace {
-
-/// A TOML basic string.
-std::string toml_string(std::string_view text) {
-  std::string out = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) {
-      out += fmt::format("\\u{:04X}", static_cast<unsigned>(static_cast<unsigned char>(c)));
-    } else {
-      out += c;
-    }
-  }
-  return out + "\"";
-}
 
 /// A TOML array, broken into lines that an editor can show.
 template <typename Value>
@@ -120,18 +105,7 @@ Files format(const Calibration& calibration) {
       calibration.crop_col, calibration.crop_row, map.width, map.height);
   t += fmt::format("[reference]  # {}: 16-bit grey, grey level times 256\nsha256 = {}\n\n",
                    kReferenceName, toml_string(sha256_hex(files.reference_png)));
-  t += fmt::format(
-      "[camera]  # empty or 0: not recorded\nidentity = {}\npixel_format = {}\n"
-      "fps = {}\n\n[camera.controls]\n",
-      toml_string(calibration.origin.camera), toml_string(calibration.origin.pixel_format),
-      calibration.origin.fps);
-  for (const Control& control : calibration.origin.controls) {
-    t += fmt::format("{} = {}\n", toml_string(control.name), control.value);
-  }
-  t += fmt::format(
-      "\n[light]  # r, g, b of each LED after brightness; empty: not recorded\n"
-      "leds = [{}]\n\n",
-      fmt::join(calibration.origin.leds, ", "));
+  t += format_camera_and_light(calibration.origin);
   for (const Origin::Source& source : calibration.origin.sources) {
     t += fmt::format("[[source]]\nname = {}\nsha256 = {}\n\n", toml_string(source.name),
                      toml_string(source.sha256));

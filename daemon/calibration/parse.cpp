@@ -7,6 +7,7 @@
 #include "daemon/calibration/key_reader.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/map_table.hpp"
+#include "daemon/calibration/sensor_file.hpp"
 #include "daemon/calibration/sha256.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
@@ -84,25 +85,6 @@ void read_reference(KeyReader reader, const std::string& png, const std::string&
         "", fmt::format("{} has values above 65280 (grey level 255 times 256)", kReferenceName));
   }
   model.reference_q8 = std::move(image.pixels);
-}
-
-void read_camera(KeyReader camera, Origin& origin) {
-  origin.camera = camera.text("identity");
-  origin.pixel_format = camera.text("pixel_format");
-  origin.fps = camera.number("fps", 0, 100000);
-  KeyReader controls = camera.table("controls");
-  for (const std::string& name : controls.keys()) {
-    origin.controls.push_back({name, controls.integer(name, INT64_MIN, INT64_MAX)});
-  }
-  camera.finish();
-}
-
-void read_light(KeyReader light, Origin& origin) {
-  for (const std::int64_t value : light.integers("leds", 0, 255)) {
-    origin.leds.push_back(static_cast<std::uint8_t>(value));
-  }
-  if (origin.leds.size() % 3 != 0) light.fail("leds", "expected r, g, b of each LED");
-  light.finish();
 }
 
 void read_gain(KeyReader reader, recon::SpatialGain& gain) {
@@ -187,8 +169,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   read_list(top.table("list"), model->method == recon::Method::list, model->list);
   if (top.has("gain")) read_gain(top.table("gain"), model->gain);
   if (top.has("uncertainty")) read_uncertainty(top.table("uncertainty"), model->uncertainty);
-  read_camera(top.table("camera"), calibration.origin);
-  read_light(top.table("light"), calibration.origin);
+  read_camera_and_light(top, calibration.origin);
   for (KeyReader& source : top.tables("source")) {
     calibration.origin.sources.push_back({source.text("name"), sha256_key(source)});
     source.finish();
