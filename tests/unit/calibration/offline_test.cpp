@@ -110,6 +110,25 @@ TEST_F(Offline, AFolderStandsForItsImages) {
   EXPECT_EQ(made.origin.sources.size(), 3U);
 }
 
+TEST_F(Offline, AFolderSaysUnderWhichCameraAndLight) {
+  fs::create_directory(at("frames"));
+  write("frames/1.png", Ball{}.untouched());
+  base::write_file_atomically(at("frames/sensor.toml"),
+                              "version = 1\n[camera]\nidentity = \"usb-1\"\npixel_format = "
+                              "\"GREY\"\nfps = 60.0\n[camera.controls]\ngain = 5\n[light]\nleds = "
+                              "[9, 8, 7]\n");
+  std::vector<std::string> arguments = calibrate();
+  run(arguments);
+  EXPECT_EQ(calibration::load(at("cal")).origin.camera, "") << "images alone say nothing";
+  arguments[3] = at("frames");
+  run(arguments);
+  const calibration::Origin origin = calibration::load(at("cal")).origin;
+  EXPECT_EQ(origin.camera, "usb-1");
+  EXPECT_EQ(origin.controls.at(0).value, 5);
+  EXPECT_EQ(origin.leds, (std::vector<std::uint8_t>{9, 8, 7}));
+  EXPECT_EQ(origin.sources.size(), 2U);
+}
+
 TEST_F(Offline, EvaluatesInSentencesAndJson) {
   run(calibrate());
   const std::vector<std::string> evaluate{"evaluate",     "--calibration",     at("cal"),
