@@ -25,5 +25,7 @@ void add_led(CLI::App& app, Context& context);
 void add_rezero(CLI::App& app, Context& context);
 void add_snapshot(CLI::App& app, Context& context);
 void add_calibration(CLI::App& app, Context& context);
+/// To the command `calibrate`, which has to be there.
+void add_guided_calibration(CLI::App& app, Context& context);
 
 }  // namespace dtact::ctl

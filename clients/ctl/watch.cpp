@@ -4,12 +4,12 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <csignal>
 #include <iostream>
 #include <memory>
 #include <utility>
 
 #include "clients/ctl/exit_codes.hpp"
+#include "clients/ctl/interruptible.hpp"
 #include "clients/ctl/json.hpp"
 #include "clients/ctl/online.hpp"
 #include "clients/ctl/watch_meter.hpp"
@@ -19,28 +19,6 @@ namespace dtact::ctl {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
-
-volatile std::sig_atomic_t interrupted = 0;
-
-/// Ctrl-C and SIGTERM end the watch with its summary, while it lasts.
-class Interruptible {
- public:
-  Interruptible() {
-    interrupted = 0;
-    interrupt_ = std::signal(SIGINT, [](int) { interrupted = 1; });
-    terminate_ = std::signal(SIGTERM, [](int) { interrupted = 1; });
-  }
-  ~Interruptible() {
-    (void)std::signal(SIGINT, interrupt_);
-    (void)std::signal(SIGTERM, terminate_);
-  }
-  Interruptible(const Interruptible&) = delete;
-  Interruptible& operator=(const Interruptible&) = delete;
-
- private:
-  void (*interrupt_)(int);
-  void (*terminate_)(int);
-};
 
 struct WatchOptions {
   double seconds = 0;  ///< 0: until Ctrl-C
@@ -66,7 +44,7 @@ class Watch {
       loop();
     } catch (const client::ConnectionError&) {
       // One Ctrl-C may end the daemon as well.
-      if (interrupted == 0) throw;
+      if (!Interruptible::happened()) throw;
     }
     finish();
   }
@@ -80,7 +58,7 @@ class Watch {
                                     : INT64_MAX;
     const std::int64_t interval_ns = terminal_ ? kSecondNs / 2 : kSecondNs;
     std::int64_t next_line_ns = start_ns_ + interval_ns;
-    while (interrupted == 0 && now() < end_ns) {
+    while (!Interruptible::happened() && now() < end_ns) {
       const auto wait_ns = std::min(next_line_ns, end_ns) - now();
       // At most 100 ms, so that a signal is soon seen.
       auto message = client_.next(

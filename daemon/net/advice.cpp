@@ -19,9 +19,9 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::camera_trouble, "The camera gives no frames."},
     {Health::ring_trouble, "The last write to the LED ring failed."},
     {Health::uncalibrated,
-     "No calibration: save an untouched image and one with a ball pressed in (dtactctl snapshot "
-     "--luma -o FILE.png), then run dtactctl calibrate depth --reference R.png --ball B.png "
-     "--radius-mm MM --mm-per-px S -o cal/ and dtactctl calibration upload cal/."},
+     "No calibration: dtactctl calibrate --radius-mm MM --mm-per-px S guides through one with a "
+     "ball "
+     "of known radius. From images: dtactctl calibrate depth, then dtactctl calibration upload."},
     {Health::camera_mismatch,
      "Camera, mode or controls differ from the calibration's: restore them in the configuration "
      "or calibrate again."},

@@ -23,17 +23,19 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// Starts a program with both output streams in `output`.
+/// Starts a program with both output streams in `output`. It reads `input`.
 pid_t spawn(const std::vector<std::string>& arguments, const fs::path& output,
-            const std::string& notify_socket) {
+            const fs::path& input, const std::string& notify_socket) {
   std::vector<char*> argv;
   argv.reserve(arguments.size() + 1);
   for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
   argv.push_back(nullptr);
   const base::UniqueFd log(::open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
+  const base::UniqueFd in(::open(input.c_str(), O_RDONLY | O_CLOEXEC));
   const pid_t pid = ::fork();
   if (pid < 0) throw std::runtime_error("cannot fork");
   if (pid == 0) {
+    ::dup2(in.get(), STDIN_FILENO);
     ::dup2(log.get(), STDOUT_FILENO);
     ::dup2(log.get(), STDERR_FILENO);
     if (!notify_socket.empty()) ::setenv("NOTIFY_SOCKET", notify_socket.c_str(), 1);
@@ -60,9 +62,11 @@ TempFolder::~TempFolder() {
   fs::remove_all(path_, ignored);
 }
 
-int run_program(const std::vector<std::string>& arguments, std::string* output) {
+int run_program(const std::vector<std::string>& arguments, std::string* output,
+                const std::string& input) {
   const TempFolder folder;
-  const pid_t pid = spawn(arguments, folder.path() / "log", "");
+  base::write_file_atomically(folder.path() / "input", input);
+  const pid_t pid = spawn(arguments, folder.path() / "log", folder.path() / "input", "");
   int status = 0;
   ::waitpid(pid, &status, 0);
   if (output != nullptr) *output = base::read_file(folder.path() / "log");
@@ -80,7 +84,7 @@ DaemonProcess::DaemonProcess(const std::vector<std::string>& arguments) {
   }
   std::vector<std::string> command{DTACTD_PROGRAM};
   command.insert(command.end(), arguments.begin(), arguments.end());
-  pid_ = spawn(command, folder_.path() / "log", socket_path);
+  pid_ = spawn(command, folder_.path() / "log", "/dev/null", socket_path);
   wait_until_ready();
 }
 

@@ -25,8 +25,9 @@ class TempFolder {
 };
 
 /// Runs a program to its end. Returns its exit status (128 + signal when it was killed); `output`
-/// receives what it printed on both streams.
-int run_program(const std::vector<std::string>& arguments, std::string* output = nullptr);
+/// receives what it printed on both streams; `input` is what it reads.
+int run_program(const std::vector<std::string>& arguments, std::string* output = nullptr,
+                const std::string& input = "");
 
 /// A dtactd of the test's own on a loopback port that the system chose. Started the way systemd
 /// starts it: ready when it says READY=1 on its notify socket.

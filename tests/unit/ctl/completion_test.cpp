@@ -80,6 +80,7 @@ TEST(Completion, KnowsEveryOptionOfEveryCommand) {
                                                           {"snapshot"},
                                                           {"calibration", "upload"},
                                                           {"calibration", "show"},
+                                                          {"calibrate"},
                                                           {"calibrate", "depth"},
                                                           {"reconstruct"},
                                                           {"evaluate"}};

@@ -34,7 +34,8 @@ ROOMS = {
     "clients/cpp": ["hal/base", "proto"],
     "clients/ctl/lens": ["daemon/recon"],
     "clients/ctl/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/ctl/lens"],
-    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/cpp", "clients/ctl/offline"],
+    "clients/ctl/guided": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/ctl/offline"],
+    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/cpp", "clients/ctl/offline", "clients/ctl/guided"],
 }
 # Only standard headers and Highway may stand in angle brackets here.
 STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}

@@ -1,0 +1,371 @@
+#include "clients/ctl/guided/session.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "clients/ctl/guided/fitness.hpp"
+#include "hal/base/atomic_file.hpp"
+
+namespace dtact::ctl::guided {
+namespace {
+
+constexpr const char* kReference = "reference";
+constexpr const char* kCalibration = "calibration";
+// As the daemon judges its own picture (daemon/pipeline/image_watch.cpp).
+constexpr double kDarkGrey = 20;
+constexpr double kWhiteShare = 0.01;
+constexpr std::uint8_t kWhite = 254;
+constexpr double kNoise = 2.5;
+
+/// The part of the frame that the map is read from.
+recon::FrameRegion region_of(const recon::RectifyTable& table) {
+  int left = table.frame_width;
+  int right = 0;
+  int top = table.frame_height;
+  int bottom = 0;
+  for (const auto& entry : table.entries) {
+    left = std::min<int>(left, entry.x);
+    right = std::max<int>(right, entry.x + 2);
+    top = std::min<int>(top, entry.y);
+    bottom = std::max<int>(bottom, entry.y + 2);
+  }
+  return {left, top, right - left, bottom - top};
+}
+
+/// What is wrong with an untouched picture, with the remedy; empty: nothing.
+std::string fault_of(const Still& still, const recon::RectifyTable& table) {
+  const double mean = std::accumulate(still.cells.begin(), still.cells.end(), 0.0) /
+                      static_cast<double>(still.cells.size());
+  if (mean < kDarkGrey) {
+    return fmt::format(
+        "the picture is too dark (mean grey {:.0f}): raise the light (dtactctl led) "
+        "or the exposure",
+        mean);
+  }
+  const image::Grey8 map = calibration::rectified_mean(table, {still.frames.front()});
+  const auto white = std::ranges::count_if(map.pixels, [](auto grey) { return grey >= kWhite; });
+  const double share = static_cast<double>(white) / static_cast<double>(map.pixels.size());
+  if (share > kWhiteShare) {
+    return fmt::format(
+        "{:.0f} % of the picture is white: lower the light (dtactctl led) or the "
+        "exposure",
+        100 * share);
+  }
+  if (still.noise_levels > kNoise) {
+    return fmt::format(
+        "pixels are noisy ({:.1f} grey levels from frame to frame, {} are allowed): "
+        "raise the light and lower the camera's gain",
+        still.noise_levels, kNoise);
+  }
+  return {};
+}
+
+/// The daemon's name for a calibration: letters, digits, '-' and '_'.
+std::string name_of(const std::filesystem::path& folder) {
+  std::string name = std::filesystem::weakly_canonical(folder).filename().string();
+  std::ranges::replace_if(
+      name,
+      [](char c) {
+        return !((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                 c == '-' || c == '_');
+      },
+      '-');
+  return name.empty() ? "calibration" : name.substr(0, 64);
+}
+
+}  // namespace
+
+Session::Session(Sensor& sensor, Console& console, Plan plan)
+    : sensor_(sensor),
+      console_(console),
+      plan_(std::move(plan)),
+      folder_(plan_.folder),
+      view_(console, folder_) {}
+
+Outcome Session::run() {
+  const auto kept = [this] {
+    console_.say(
+        fmt::format("What was taken lies in {}. To go on: {}", plan_.folder.string(), plan_.again));
+  };
+  try {
+    return guide();
+  } catch (const Ended& ended) {
+    console_.say(ended.why == Ended::Why::input ? "The input ended before there was a calibration."
+                                                : "Ended.");
+    kept();
+    return Outcome::unfinished;
+  } catch (const std::exception&) {
+    if (folder_.has_reference()) kept();
+    throw;
+  }
+}
+
+Outcome Session::guide() {
+  greet();
+  if (folder_.has_reference()) {
+    resume();
+  } else {
+    console_.say("\nStep 1 of 3: the untouched surface");
+    reference_step();
+  }
+  console_.say(
+      fmt::format("\nStep 2 of 3: press a ball of {:g} mm radius, at different places and depths",
+                  plan_.ball_radius_mm));
+  press_steps();
+  console_.say("\nStep 3 of 3: the calibration");
+  return finish();
+}
+
+void Session::greet() {
+  const client::Status status = sensor_.status();
+  const auto lit = std::ranges::count_if(status.light.leds, [](const client::Rgb& led) {
+    return led.r > 0 || led.g > 0 || led.b > 0;
+  });
+  console_.say(
+      fmt::format("{}: camera {}, {}x{} {} at {:g} fps; light {} of 255, {} of {} LEDs lit; {}",
+                  sensor_.program(), status.camera.identity, status.camera.width,
+                  status.camera.height, status.camera.pixel_format, status.camera.fps,
+                  status.light.brightness, lit, status.light.leds.size(),
+                  status.calibration ? "calibration in use: " + status.calibration->name
+                                     : std::string("no calibration yet")));
+  const std::string wrong = unfit(status);
+  if (!wrong.empty()) {
+    throw std::runtime_error("the sensor is not fit to be calibrated: " + wrong);
+  }
+  prepare_map(status);
+}
+
+void Session::prepare_map(const client::Status& status) {
+  const auto width = static_cast<int>(status.camera.width);
+  const auto height = static_cast<int>(status.camera.height);
+  const MapChoice map = choose_map(plan_.map, width, height);
+  image::Grey16 black{width, height, {}};
+  black.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  empty_ = calibration::empty_calibration(black, map.crop, map.mm_per_px, map.lens);
+  grid_ = CellGrid(region_of(empty_.model->rectify));
+  cell_mm_ = grid_.cell_px() * (map.lens ? recon::central_mm_per_px(*map.lens) : map.mm_per_px);
+  view_.use(empty_, {}, cell_mm_);
+  capture_.emplace(sensor_, console_, grid_, Capture::Rules{plan_.patience_s},
+                   [this](const Look& look, const std::string& words) { view_.show(look, words); });
+}
+
+void Session::load() {
+  images_ = begin_presses({folder_.at(kReference)}, plan_.ball_radius_mm, plan_.map);
+  for (const std::string& name : folder_.presses()) add_press(images_, folder_.at(name));
+  const calibration::BallPresses& set = images_.set;
+  empty_ = calibration::empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
+}
+
+void Session::resume() {
+  load();
+  require_same_sensor();
+  untouched_ = grid_.of(images_.set.reference_q8.pixels, images_.set.reference_q8.width);
+  view_.use(empty_, untouched_, cell_mm_);
+  console_.say(
+      fmt::format("{}: the reference and {} press(es) are there; camera and light are "
+                  "still the same",
+                  plan_.folder.string(), images_.set.presses.size()));
+  judge();
+  (void)ask("[Enter] go on   [q] quit");
+}
+
+void Session::require_same_sensor() {
+  const client::Status status = sensor_.status();
+  const std::string wrong = unfit(status);
+  if (!wrong.empty()) throw std::runtime_error(wrong);
+  const image::Grey16& reference = images_.set.reference_q8;
+  const std::vector<std::string> found =
+      differences(images_.origin, status, reference.width, reference.height);
+  if (found.empty()) {
+    capture_->expect_light(images_.origin.leds);
+    return;
+  }
+  throw std::runtime_error(fmt::format(
+      "since the reference in {} was taken, the sensor changed: {}. Set it back (camera: the "
+      "daemon's configuration; light: dtactctl led), or begin again in another --folder",
+      plan_.folder.string(), fmt::join(found, "; ")));
+}
+
+std::string Session::ask(const std::string& prompt) {
+  if (!console_.interactive()) console_.say(prompt);
+  view_.set_prompt(prompt + " > ");
+  for (;;) {
+    const Typed typed = console_.typed();
+    switch (typed.kind) {
+      case Typed::Kind::interrupted:
+        throw Ended{Ended::Why::interrupt};
+      case Typed::Kind::end:
+        throw Ended{Ended::Why::input};
+      case Typed::Kind::line:
+        if (typed.line == "q") throw Ended{Ended::Why::quit};
+        view_.set_prompt("");
+        return typed.line;
+      case Typed::Kind::nothing:
+        break;
+    }
+    if (const Look* look = capture_->next()) view_.show(*look, "live");
+  }
+}
+
+void Session::reference_step() {
+  capture_->expect_light({});
+  for (;;) {
+    (void)ask("Take your hands off: nothing may touch the surface.   [Enter] take   [q] quit");
+    try {
+      const Still still = capture_->untouched(plan_.reference_frames);
+      const std::string fault = fault_of(still, empty_.model->rectify);
+      if (!fault.empty()) throw NotTaken("not taken: " + fault);
+      const client::Status status = sensor_.status();
+      const std::string wrong = unfit(status);
+      if (!wrong.empty()) throw NotTaken("not taken: " + wrong);
+      folder_.save_reference(still.frames, origin_of(status));
+      console_.say(
+          fmt::format("reference taken: {} frames, steady within {:.2f} grey levels, noise {:.1f}",
+                      still.frames.size(), still.drift_levels, still.noise_levels));
+      load();
+      capture_->expect_light(images_.origin.leds);
+      untouched_ = still.cells;
+      view_.use(empty_, untouched_, cell_mm_);
+      view_.still(still.frames.back(), std::nullopt);
+      return;
+    } catch (const NotTaken& e) {
+      if (!console_.interactive()) throw;
+      console_.say(e.what());
+    }
+  }
+}
+
+std::string Session::press_prompt() const {
+  const std::size_t taken = images_.set.presses.size();
+  std::string text =
+      fmt::format("Press {} of {}: ", taken + 1,
+                  std::max<std::size_t>(taken + 1, static_cast<std::size_t>(plan_.presses)));
+  if (taken >= 2 && !coverage_.made) {
+    text += "the one that is missing";
+  } else {
+    const double depth = next_depth_mm(coverage_.depths_mm, plan_.ball_radius_mm);
+    text += fmt::format("about {:.1f} mm deep (contact {:.1f} mm wide)", depth,
+                        contact_width_mm(depth, plan_.ball_radius_mm));
+  }
+  text += taken == 0 ? ", anywhere; hold still\n" : ", elsewhere; hold still\n";
+  text += fmt::format("[Enter] take  [r] retake {}  [p] preview  [s] finish  [q] quit",
+                      taken == 0 ? std::string(kReference) : folder_.presses().back());
+  return text;
+}
+
+void Session::press_steps() {
+  for (;;) {
+    const std::size_t taken = images_.set.presses.size();
+    if (coverage_.made && taken >= static_cast<std::size_t>(plan_.presses)) return;
+    const std::string line = ask(press_prompt());
+    try {
+      if (line.empty()) {
+        take_press(folder_.next_press());
+      } else if (line == "r" && taken == 0) {
+        reference_step();
+      } else if (line == "r") {
+        take_press(folder_.presses().back());
+      } else if (line == "p") {
+        if (const Look* look = capture_->next()) {
+          view_.still({look->frame.luma->width, look->frame.luma->height, look->frame.luma->values},
+                      std::nullopt);
+        }
+        console_.say("preview: " + folder_.at("preview.png"));
+      } else if (line == "s") {
+        if (coverage_.made) return;
+        console_.say("that is not yet enough: " + coverage_.missing);
+      } else {
+        console_.say("\"" + line + "\" means nothing here");
+      }
+    } catch (const NotTaken& e) {
+      if (!console_.interactive()) throw;
+      console_.say(e.what());
+    } catch (const ReferenceTouched&) {
+      console_.say(
+          "the surface is brighter than the reference: something touched when that was taken. It "
+          "has to be taken again");
+      reference_step();
+      judge();
+    }
+  }
+}
+
+void Session::take_press(const std::string& name) {
+  require_same_sensor();
+  console_.say(fmt::format("waiting up to {:g} s for a press that holds still{}", plan_.patience_s,
+                           console_.interactive() ? "; [Enter] takes it as it is" : ""));
+  const Still still = capture_->press(plan_.press_frames, untouched_, last_);
+  last_ = still.cells;
+  std::optional<calibration::SettledPress> settled;
+  try {
+    settled = calibration::settle(*empty_.model, images_.set.reference_q8.pixels, still.frames,
+                                  plan_.ball_radius_mm);
+  } catch (const std::runtime_error& e) {
+    console_.say(fmt::format("not taken: {}", e.what()));
+    view_.still(still.frames.back(), std::nullopt);
+    return;
+  }
+  const bool again = std::ranges::count(folder_.presses(), name) > 0;
+  folder_.save_press(name, still.frames);
+  if (again) {
+    load();
+  } else {
+    add_press(images_, folder_.at(name));
+  }
+  view_.still(still.frames.back(), settled->contact);
+  console_.say(fmt::format(
+      "{} taken: a contact {:.1f} mm wide at column {:.0f}, row {:.0f} of the map, darkest {:.0f} "
+      "grey levels, about {:.1f} mm deep",
+      name, 2 * settled->contact.radius_mm, settled->contact.col, settled->contact.row,
+      settled->contact.peak_levels,
+      depth_of_width_mm(2 * settled->contact.radius_mm, plan_.ball_radius_mm)));
+  judge();
+}
+
+void Session::judge() {
+  coverage_ = cover(images_, empty_);
+  if (!coverage_.made) {
+    if (!images_.set.presses.empty()) console_.say("not yet a list: " + coverage_.missing);
+    return;
+  }
+  for (const std::string& press : coverage_.report.left_out) console_.say("left out: " + press);
+  std::vector<std::string> depths;
+  for (const double depth : coverage_.depths_mm) depths.push_back(fmt::format("{:.2f}", depth));
+  console_.say(fmt::format("the list covers 0 to {:.2f} mm; presses of {} mm",
+                           covered_mm(*coverage_.made), fmt::join(depths, ", ")));
+}
+
+Outcome Session::finish() {
+  calibration::save(*coverage_.made, folder_.path() / kCalibration);
+  console_.say(report_text(coverage_.report, *coverage_.made->model) +
+               list_text(*coverage_.made->model) + "saved in " + folder_.at(kCalibration));
+  const std::string line = ask(fmt::format(
+      "Upload it to the daemon as {}?   [Enter] yes   [n] not now", name_of(plan_.folder)));
+  if (line.empty() || line == "y") {
+    upload();
+    return Outcome::uploaded;
+  }
+  console_.say("not uploaded; later: dtactctl calibration upload " + folder_.at(kCalibration));
+  return Outcome::kept;
+}
+
+void Session::upload() {
+  const std::string name = name_of(plan_.folder);
+  sensor_.upload({name, base::read_file(folder_.path() / kCalibration / "calibration.toml"),
+                  base::read_file(folder_.path() / kCalibration / "reference.png")});
+  const client::Status status = sensor_.status();
+  if (!status.calibration || status.calibration->created != coverage_.made->origin.created) {
+    throw std::runtime_error(
+        "the daemon took the calibration but uses another: see dtactctl status");
+  }
+  console_.say(
+      fmt::format("the daemon uses calibration {} from now on; take the ball away, so that "
+                  "it sees the untouched surface",
+                  status.calibration->name));
+}
+
+}  // namespace dtact::ctl::guided

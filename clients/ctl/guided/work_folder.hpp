@@ -1,0 +1,45 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "daemon/calibration/calibration.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::ctl::guided {
+
+/// What a session has taken, so that another one can go on and `dtactctl calibrate depth` can read
+/// it:
+///
+///     FOLDER/reference/00.png … sensor.toml     the untouched surface, camera and light
+///     FOLDER/press-01/00.png …                  each press
+///     FOLDER/calibration/                       what was made of them
+///     FOLDER/preview.png                        the last picture
+///
+/// A reference or a press is there as a whole or not at all.
+class WorkFolder {
+ public:
+  /// Makes the folder. Throws std::filesystem::filesystem_error.
+  explicit WorkFolder(std::filesystem::path path);
+
+  [[nodiscard]] bool has_reference() const;
+  /// Names of the presses, in order.
+  [[nodiscard]] std::vector<std::string> presses() const;
+  /// The name that the press after these gets.
+  [[nodiscard]] std::string next_press() const;
+
+  void save_reference(const std::vector<image::Grey8>& frames, const calibration::Origin& origin);
+  /// `name`: next_press(), or one that is there and is replaced.
+  void save_press(const std::string& name, const std::vector<image::Grey8>& frames);
+  void save_preview(const image::Rgb8& picture);
+
+  /// Of something in the folder, as the command line takes it.
+  [[nodiscard]] std::string at(const std::string& name) const { return (path_ / name).string(); }
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+}  // namespace dtact::ctl::guided

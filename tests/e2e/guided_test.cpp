@@ -1,0 +1,159 @@
+// The guided calibration by piped input, on a scene in which a ball is pressed again and again, and
+// what the calibration measures then.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <csignal>
+#include <fstream>
+
+#include "hal/sim/scene.hpp"
+#include "tests/e2e/depth_error.hpp"
+#include "tests/e2e/sensor.hpp"
+
+namespace dtact::e2e {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+/// Exit codes of dtactctl (clients/ctl/exit_codes.hpp).
+constexpr int kDone = 0;
+constexpr int kFailed = 1;
+constexpr int kNoConnection = 3;
+constexpr int kNotMet = 4;
+
+std::string enters(int count) { return std::string(static_cast<std::size_t>(count), '\n'); }
+
+/// `dtactctl calibrate` in the sensor's folder, with these lines typed.
+int guide(const Sensor& sensor, const std::string& typed, std::string* output,
+          const std::vector<std::string>& more = {}) {
+  std::vector<std::string> arguments = {DTACTCTL_PROGRAM,
+                                        "--port",
+                                        std::to_string(sensor.daemon->port()),
+                                        "calibrate",
+                                        "--radius-mm",
+                                        "4.0",
+                                        "--mm-per-px",
+                                        "0.0413793",
+                                        "--centre",
+                                        "300,400",
+                                        "--crop",
+                                        "580,580",
+                                        "--folder",
+                                        (sensor.folder.path() / "ball").string()};
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  return run_program(arguments, output, typed);
+}
+
+bool there(const Sensor& sensor, const std::string& name) {
+  return fs::exists(sensor.folder.path() / "ball" / name);
+}
+
+TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
+  Sensor sensor(scene_file("calibration_presses.toml"), false);
+  std::string output;
+  // More than are needed: a press may come out too light, or its like have been taken.
+  ASSERT_EQ(guide(sensor, enters(60), &output), kDone) << output;
+  EXPECT_THAT(output, AllOf(HasSubstr("Step 1 of 3"), HasSubstr("press-06 taken"),
+                            HasSubstr("the daemon uses calibration ball from now on")));
+  EXPECT_TRUE(there(sensor, "preview.png"));
+
+  // Another ball, of 5 mm, which the calibration has not seen.
+  const std::string scene = "camera.sim.scene=";
+  for (std::string& argument : sensor.arguments) {
+    if (argument.starts_with(scene)) argument = scene;
+  }
+  sensor.restart();
+  client::Client client = sensor.connect();
+  client.subscribe({});
+  const hal::sim::Truth truth(hal::sim::default_scene());
+  std::vector<double> inside;
+  double worst_untouched = 0;
+  std::uint64_t judged = 0;
+  ASSERT_TRUE(read_until(
+      client,
+      [&](const Item& item) {
+        const auto* frame = std::get_if<client::Frame>(&item);
+        if (frame == nullptr || !frame->depth) return false;
+        EXPECT_FALSE(has(frame->health, "camera_mismatch"));
+        EXPECT_FALSE(has(frame->health, "light_mismatch"));
+        const std::uint64_t place = frame->sequence % 720;  // of the scene's loop
+        if (place > 345 || frame->sequence < judged + 10) return inside.size() >= 10;
+        judged = frame->sequence;
+        const DepthError error = depth_error(*frame, truth);
+        if (error.inside_pixels > 5000) {
+          inside.push_back(error.inside_mm);
+        } else if (error.inside_pixels == 0) {
+          worst_untouched = std::max(worst_untouched, error.outside_mm);
+        }
+        return false;
+      },
+      std::chrono::seconds(120)));
+  const double worst = *std::max_element(inside.begin(), inside.end());
+  std::sort(inside.begin(), inside.end());
+  std::printf(
+      "ball of 5 mm, simulated sensor, guided calibration with 6 presses of a 4 mm ball: mean "
+      "absolute error inside the true contact %.4f mm (median of %zu frames), worst frame %.4f mm; "
+      "untouched %.4f mm\n",
+      inside[inside.size() / 2], inside.size(), worst, worst_untouched);
+  EXPECT_LE(worst, 0.05);
+  EXPECT_LE(worst_untouched, 0.01);
+}
+
+TEST(Guided, QuitRetakeAndGoOn) {
+  const Sensor sensor(scene_file("calibration_presses.toml"), false);
+  std::string output;
+  EXPECT_EQ(guide(sensor, "\n\n\nr\nq\n", &output), kNotMet) << output;
+  EXPECT_THAT(output, AllOf(HasSubstr("[r] retake press-02"), HasSubstr("To go on: dtactctl")));
+  EXPECT_TRUE(there(sensor, "reference/sensor.toml"));
+  EXPECT_TRUE(there(sensor, "press-02/15.png"));
+  EXPECT_FALSE(there(sensor, "press-03"));
+
+  EXPECT_EQ(guide(sensor, "\n\n", &output), kNotMet) << output;
+  EXPECT_THAT(output, AllOf(HasSubstr("2 press(es) are there"), HasSubstr("The input ended")));
+  EXPECT_TRUE(there(sensor, "press-03"));
+
+  ASSERT_EQ(run_program({DTACTCTL_PROGRAM, "--port", std::to_string(sensor.daemon->port()), "led",
+                         "--brightness", "100"},
+                        &output),
+            kDone);
+  EXPECT_EQ(guide(sensor, "\n\n", &output), kFailed) << output;
+  EXPECT_THAT(output, AllOf(HasSubstr("LED 0 shows 100 100 100 but showed 255 255 255"),
+                            HasSubstr("dtactctl led")));
+}
+
+TEST(Guided, SaysWhatIsNotFit) {
+  Sensor sensor({}, false, {"ring.brightness=10"});
+  std::string output;
+  EXPECT_EQ(guide(sensor, "\n", &output), kNotMet) << output;
+  EXPECT_THAT(output, AllOf(HasSubstr("too dark"), HasSubstr("dtactctl led")));
+  EXPECT_FALSE(there(sensor, "reference"));
+  const std::uint16_t port = sensor.daemon->port();
+  EXPECT_EQ(sensor.daemon->stop(SIGTERM), 0);
+  EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "--port", std::to_string(port), "calibrate",
+                         "--radius-mm", "4", "--mm-per-px", "0.05"},
+                        &output),
+            kNoConnection);
+  EXPECT_THAT(output, HasSubstr("dtactd"));
+}
+
+TEST(Guided, RefusesACameraThatIsAway) {
+  const TempFolder folder;
+  const fs::path scene = folder.path() / "unplugged.toml";
+  std::ofstream(scene) << "[[fault]]\nkind = \"unplug\"\nframe = 60\nframes = 1000000\n";
+  const Sensor away(scene, false);
+  client::Client client = away.connect();
+  ASSERT_TRUE(read_until(client, [](const Item& item) {
+    const auto* event = std::get_if<client::Event>(&item);
+    const auto* state = event == nullptr ? nullptr : std::get_if<client::StateChanged>(event);
+    return state != nullptr && state->state == "camera_lost";
+  }));
+  std::string output;
+  EXPECT_EQ(guide(away, "\n", &output), kFailed) << output;
+  EXPECT_THAT(output, HasSubstr("not fit to be calibrated"));
+}
+
+}  // namespace
+}  // namespace dtact::e2e

@@ -1,0 +1,141 @@
+#pragma once
+
+#include <cmath>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/ctl/guided/console.hpp"
+#include "clients/ctl/guided/sensor.hpp"
+
+namespace dtact::ctl::guided::test {
+
+/// What the fake sensor shows for some frames: a ball of 4 mm on a surface of grey 200 that darkens
+/// by 30 levels a millimetre, 0.05 mm a pixel; 0 deep: untouched.
+struct Scene {
+  double depth_mm = 0;
+  double x_px = 160;  ///< Of the lowest point.
+  double y_px = 150;
+  int frames = 60;
+  double step_mm = 0;  ///< Deeper with each frame: a press in motion.
+};
+
+inline constexpr int kWidth = 320;
+inline constexpr int kHeight = 300;
+
+inline client::LumaMap picture(const Scene& scene, double depth_mm, std::uint32_t seed) {
+  client::LumaMap map{kWidth, kHeight, {}};
+  std::uint32_t noise = seed * 2654435761U + 1;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double r = 0.05 * std::hypot(x - scene.x_px, y - scene.y_px);
+      const double sag = 4 - std::sqrt(std::max(0.0, 16 - r * r));
+      const double dark = 30 * std::max(0.0, depth_mm - sag);
+      noise = noise * 1664525U + 1013904223U;
+      const int grain = static_cast<int>(noise >> 30U) - 1;  // −1 … 2
+      map.values.push_back(static_cast<std::uint8_t>(std::lround(200 - dark) + grain));
+    }
+  }
+  return map;
+}
+
+/// Plays scenes one after another, the last without end, 60 frames a second of its own time.
+class FakeSensor : public Sensor {
+ public:
+  explicit FakeSensor(std::vector<Scene> scenes) : scenes_(std::move(scenes)) {
+    now.state = "uncalibrated";
+    now.health = {"uncalibrated"};
+    now.camera.identity = "fake:1";
+    now.camera.pixel_format = "mjpeg";
+    now.camera.width = kWidth;
+    now.camera.height = kHeight;
+    now.camera.fps = 60;
+    now.camera.controls = {{"exposure", 100, true, ""}};
+    now.light.brightness = 255;
+    now.light.leds.assign(8, client::Rgb{255, 255, 255});
+  }
+
+  [[nodiscard]] std::string program() const override { return "fake 1.0"; }
+  [[nodiscard]] client::Status status() override {
+    if (on_status) on_status(now);
+    return now;
+  }
+  [[nodiscard]] std::optional<client::Frame> next(std::chrono::milliseconds) override {
+    if (frames_until_gone == 0) throw client::ConnectionError("the daemon ended the connection");
+    if (frames_until_gone > 0) --frames_until_gone;
+    if (silent) return std::nullopt;
+    while (scene_ + 1 < scenes_.size() && in_scene_ >= scenes_[scene_].frames) {
+      ++scene_;
+      in_scene_ = 0;
+    }
+    const Scene& scene = scenes_[scene_];
+    client::Frame frame;
+    frame.sequence = ++sequence_;
+    frame.monotonic_ns = static_cast<std::int64_t>(sequence_) * 16'666'667;
+    frame.health = now.health;
+    frame.light = now.light;
+    frame.luma = picture(scene, scene.depth_mm + in_scene_ * scene.step_mm,
+                         static_cast<std::uint32_t>(sequence_));
+    ++in_scene_;
+    return frame;
+  }
+  void upload(const client::CalibrationFiles& files) override {
+    uploaded = files;
+    client::Status::Calibration calibration;
+    calibration.name = files.name;
+    const std::size_t at = files.toml.find("created = \"") + 11;
+    calibration.created = files.toml.substr(at, 20);
+    now.calibration = calibration;
+  }
+
+  client::Status now;
+  std::function<void(client::Status&)> on_status;
+  std::optional<client::CalibrationFiles> uploaded;
+  bool silent = false;
+  int frames_until_gone = -1;  ///< Negative: never.
+
+ private:
+  std::vector<Scene> scenes_;
+  std::size_t scene_ = 0;
+  int in_scene_ = 0;
+  std::uint64_t sequence_ = 0;
+};
+
+/// Types lines that lie ready, then ends. "~30" types nothing the next 30 times.
+class FakeConsole : public Console {
+ public:
+  explicit FakeConsole(std::deque<std::string> lines) : lines_(std::move(lines)) {}
+
+  [[nodiscard]] bool interactive() const override { return person; }
+  [[nodiscard]] Typed typed() override {
+    if (!lines_.empty() && lines_.front().starts_with('~')) {
+      pauses_ = std::stoi(lines_.front().substr(1));
+      lines_.pop_front();
+    }
+    if (pauses_ > 0) {
+      --pauses_;
+      return {};
+    }
+    if (lines_.empty()) return {Typed::Kind::end, {}};
+    Typed typed{Typed::Kind::line, lines_.front()};
+    lines_.pop_front();
+    return typed;
+  }
+  [[nodiscard]] bool interrupted() const override { return ctrl_c; }
+  void say(const std::string& text) override { said += text + "\n"; }
+  void live(const std::vector<std::string>& lines) override { drawn = lines; }
+
+  std::string said;
+  std::vector<std::string> drawn;
+  bool person = false;
+  bool ctrl_c = false;
+
+ private:
+  int pauses_ = 0;
+  std::deque<std::string> lines_;
+};
+
+}  // namespace dtact::ctl::guided::test

@@ -1,0 +1,164 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <sstream>
+
+#include "clients/ctl/guided/cells.hpp"
+#include "clients/ctl/guided/console.hpp"
+#include "clients/ctl/guided/coverage.hpp"
+#include "clients/ctl/guided/fitness.hpp"
+#include "clients/ctl/guided/preview.hpp"
+
+namespace dtact::ctl::guided {
+namespace {
+
+using testing::ElementsAre;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+TEST(HalfBlocks, ShowsTwoPixelsACharacter) {
+  // Black above white on the left, white above black on the right.
+  const image::Grey8 picture{2, 2, {0, 255, 255, 0}};
+  EXPECT_THAT(half_blocks(picture, 2), ElementsAre("\x1b[38;5;232m\x1b[48;5;255m\u2580"
+                                                   "\x1b[38;5;255m\x1b[48;5;232m\u2580\x1b[0m"));
+}
+
+TEST(HalfBlocks, AveragesAndKeepsTheShape) {
+  image::Grey8 picture{80, 40, {}};
+  for (int i = 0; i < 80 * 40; ++i) picture.pixels.push_back(i % 2 == 0 ? 100 : 140);
+  const auto lines = half_blocks(picture, 20);
+  ASSERT_THAT(lines, SizeIs(5)) << "half as high as wide, two pixels a line";
+  // Grey 120 is the twelfth of 24: 232 + 11.
+  EXPECT_THAT(lines.front(), HasSubstr("\x1b[38;5;243m\x1b[48;5;243m"));
+  EXPECT_THAT(half_blocks({1, 2, {7, 7}}, 50), SizeIs(1)) << "no wider than the picture";
+}
+
+TEST(Picture, IsDarkWhereTheSurfaceIs) {
+  const image::Grey8 untouched{3, 1, {150, 150, 150}};
+  const image::Grey8 frame{3, 1, {150, 140, 155}};
+  EXPECT_THAT(darkening_picture(untouched, frame).pixels, ElementsAre(200, 160, 220));
+}
+
+TEST(Cells, MeansOverThePartOfTheFrame) {
+  // 120 × 100 pixels from (4, 2) on: cells of 12 × 12, ten across and eight down.
+  std::vector<std::uint8_t> luma(130 * 130, 10);
+  luma[2 * 130 + 4] = 10 + 144;
+  const CellGrid grid({4, 2, 120, 100});
+  EXPECT_EQ(grid.cell_px(), 12);
+  const CellMeans cells = grid.of(luma, 130);
+  ASSERT_THAT(cells, SizeIs(10 * 8));
+  EXPECT_EQ(cells[0], 11);
+  EXPECT_EQ(cells[1], 10);
+  EXPECT_EQ(CellGrid({0, 0, 1200, 960}).cell_px(), 20);
+  EXPECT_THROW(CellGrid({0, 0, 200, 95}), std::invalid_argument);
+}
+
+TEST(Cells, ADimmedLightIsNoTouch) {
+  const CellMeans untouched(100, 150);
+  CellMeans now(100, 147);
+  now[5] = 137;
+  const Seen seen = compare(untouched, now);
+  EXPECT_EQ(seen.light, 3);
+  EXPECT_EQ(seen.darkest, 10);
+  EXPECT_EQ(seen.brightest, 0);
+  EXPECT_EQ(seen.dark_cells, 1);
+}
+
+TEST(Steady, CountsFromTheFrameThatDiffers) {
+  Steadiness steadiness(1.0);
+  EXPECT_EQ(steadiness.add({10, 10}), 1);
+  EXPECT_EQ(steadiness.add({10, 10.75F}), 2);
+  EXPECT_EQ(steadiness.add({10, 11.5F}), 1) << "slow motion adds up";
+  EXPECT_EQ(steadiness.broke_at(), 1.5);
+  EXPECT_EQ(steadiness.add({10, 11}), 2);
+}
+
+TEST(NextDepth, FillsTheWidestGap) {
+  EXPECT_NEAR(next_depth_mm({}, 4), 1.2, 1e-9);
+  EXPECT_NEAR(next_depth_mm({1.2}, 4), 0.75, 1e-9) << "half-way from the lightest that shows";
+  EXPECT_NEAR(next_depth_mm({1.2, 0.75}, 4), 0.525, 1e-9);
+  EXPECT_NEAR(next_depth_mm({1.2, 0.75, 0.5}, 4), 0.975, 1e-9);
+}
+
+TEST(ContactWidth, OfABall) {
+  // A ball of 4 mm 1.5 mm deep cuts the surface in a circle of 3.122 mm radius; the layer's
+  // contact is 3.04 (daemon/calibration/press_set.cpp).
+  EXPECT_NEAR(contact_width_mm(1.5, 4), 6.06, 0.02);
+  EXPECT_NEAR(depth_of_width_mm(6.06, 4), 1.5, 0.01);
+}
+
+TEST(Fitness, NamesWhatKeepsFromCalibrating) {
+  client::Status status;
+  status.state = "uncalibrated";
+  status.health = {"uncalibrated", "not_realtime", "reference_stale"};
+  EXPECT_EQ(unfit(status), "");
+  status.health = {"image_saturated"};
+  status.advice = "Much of the picture is white.";
+  EXPECT_EQ(unfit(status), "Much of the picture is white.");
+  status.health = {};
+  status.advice = "";
+  status.state = "camera_lost";
+  EXPECT_THAT(unfit(status), HasSubstr("camera_lost"));
+  EXPECT_TRUE(passing_trouble({"light_unsettled"}));
+  EXPECT_FALSE(passing_trouble({"light_drifted", "frames_lost"}));
+}
+
+/// A console that reads a pipe.
+class Piped : public testing::Test {
+ protected:
+  Piped() {
+    if (::pipe(ends_.data()) != 0) throw std::runtime_error("no pipe");
+  }
+  ~Piped() override {
+    ::close(ends_[0]);
+    end_input();
+  }
+  void type(const std::string& text) const {
+    ASSERT_EQ(::write(ends_[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
+  }
+  void end_input() {
+    if (ends_[1] >= 0) ::close(ends_[1]);
+    ends_[1] = -1;
+  }
+
+  std::array<int, 2> ends_{};
+  std::ostringstream out_;
+  bool ctrl_c_ = false;
+};
+
+TEST_F(Piped, GivesLinesOneByOneAndThenTheEnd) {
+  StreamConsole console(ends_[0], out_, false, [this] { return ctrl_c_; });
+  EXPECT_EQ(console.typed().kind, Typed::Kind::nothing);
+  type("\n r \nq");
+  Typed typed = console.typed();
+  EXPECT_EQ(typed.kind, Typed::Kind::line);
+  EXPECT_EQ(typed.line, "");
+  EXPECT_EQ(console.typed().line, "r");
+  EXPECT_EQ(console.typed().kind, Typed::Kind::nothing) << "a line that is not complete";
+  end_input();
+  typed = console.typed();
+  EXPECT_EQ(typed.kind, Typed::Kind::line);
+  EXPECT_EQ(typed.line, "q");
+  EXPECT_EQ(console.typed().kind, Typed::Kind::end);
+  ctrl_c_ = true;
+  EXPECT_EQ(console.typed().kind, Typed::Kind::interrupted);
+}
+
+TEST_F(Piped, LiveLinesAreForPeople) {
+  StreamConsole machine(ends_[0], out_, false, [] { return false; });
+  machine.live({"picture", "> "});
+  EXPECT_EQ(out_.str(), "");
+  StreamConsole person(ends_[0], out_, true, [] { return false; });
+  person.live({"picture", "> "});
+  EXPECT_THAT(out_.str(), HasSubstr("picture\n> "));
+  person.live({"other", "> "});
+  EXPECT_THAT(out_.str(), HasSubstr("\r\x1b[1A\x1b[J\x1b[?7lother")) << "in place of a line below";
+  person.say("done");
+  EXPECT_THAT(out_.str(), EndsWith("\r\x1b[1A\x1b[Jdone\n")) << "nothing live stays";
+}
+
+}  // namespace
+}  // namespace dtact::ctl::guided

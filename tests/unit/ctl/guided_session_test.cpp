@@ -1,0 +1,266 @@
+// The session against a sensor and a console that the tests play.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "clients/ctl/guided/session.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "tests/unit/ctl/guided_fakes.hpp"
+
+namespace dtact::ctl::guided {
+namespace {
+
+namespace fs = std::filesystem;
+using test::FakeConsole;
+using test::FakeSensor;
+using test::Scene;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+using testing::ThrowsMessage;
+
+const Scene kUntouched{.frames = 60};
+
+class GuidedSession : public testing::Test {
+ protected:
+  GuidedSession() {
+    std::string name = (fs::temp_directory_path() / "dtact_guided_XXXXXX").string();
+    plan_.folder = fs::path(::mkdtemp(name.data())) / "ball";
+    plan_.ball_radius_mm = 4;
+    plan_.map.mm_per_px = 0.05;
+    plan_.presses = 4;
+    plan_.reference_frames = 8;
+    plan_.press_frames = 4;
+    plan_.patience_s = 20;
+    plan_.again = "dtactctl calibrate --folder X";
+  }
+  ~GuidedSession() override { fs::remove_all(plan_.folder.parent_path()); }
+
+  Outcome run(FakeSensor& sensor, FakeConsole& console) {
+    return Session(sensor, console, plan_).run();
+  }
+  [[nodiscard]] bool has(const std::string& name) const { return fs::exists(plan_.folder / name); }
+
+  Plan plan_;
+};
+
+/// Untouched, then presses with untouched pauses in between.
+std::vector<Scene> presses(const std::vector<Scene>& each) {
+  std::vector<Scene> scenes{kUntouched};
+  for (const Scene& press : each) {
+    scenes.push_back(press);
+    scenes.push_back(kUntouched);
+  }
+  return scenes;
+}
+
+const std::vector<Scene> kEnough = presses({{.depth_mm = 1.3},
+                                            {.depth_mm = 0.5, .x_px = 130, .y_px = 170},
+                                            {.depth_mm = 0.75, .x_px = 180},
+                                            {.depth_mm = 1.0, .y_px = 140}});
+
+TEST_F(GuidedSession, GoesFromNothingToAnUpload) {
+  FakeSensor sensor(kEnough);
+  FakeConsole console({"", "", "", "", "", ""});
+  EXPECT_EQ(run(sensor, console), Outcome::uploaded) << console.said;
+  ASSERT_TRUE(sensor.uploaded.has_value());
+  EXPECT_EQ(sensor.uploaded->name, "ball");
+  EXPECT_THAT(console.said,
+              AllOf(HasSubstr("fake 1.0: camera fake:1, 320x300 mjpeg at 60 fps"),
+                    HasSubstr("reference taken: 8 frames"), HasSubstr("press-04 taken"),
+                    HasSubstr("the daemon uses calibration ball from now on")));
+  EXPECT_TRUE(has("preview.png"));
+  // What the daemon compares itself with.
+  const calibration::Calibration made = calibration::load(plan_.folder / "calibration");
+  EXPECT_EQ(made.origin.camera, "fake:1");
+  EXPECT_EQ(made.origin.pixel_format, "mjpeg");
+  EXPECT_EQ(made.origin.fps, 60);
+  ASSERT_EQ(made.origin.controls.size(), 1U);
+  EXPECT_EQ(made.origin.controls[0].value, 100);
+  EXPECT_EQ(made.origin.leds, std::vector<std::uint8_t>(24, 255));
+  // 30 grey levels a millimetre, within what four presses of noisy frames determine.
+  const recon::DepthList& list = made.model->list;
+  for (const double mm : {0.3, 0.6, 0.9, 1.2}) {
+    const auto q6 = static_cast<std::size_t>(std::lround(mm * 30 * 64) - list.first_q6);
+    EXPECT_NEAR(list.um[q6], 1000 * mm, 30) << mm;
+  }
+}
+
+TEST_F(GuidedSession, TheBatchCommandReadsTheWorkFolder) {
+  FakeSensor sensor(kEnough);
+  FakeConsole console({"", "", "", "", "", "n"});
+  EXPECT_EQ(run(sensor, console), Outcome::kept);
+  EXPECT_FALSE(sensor.uploaded.has_value());
+  PressImages images = begin_presses({(plan_.folder / "reference").string()}, 4, plan_.map);
+  for (const char* name : {"press-01", "press-02", "press-03", "press-04"}) {
+    add_press(images, (plan_.folder / name).string());
+  }
+  calibration::PressReport report;
+  const calibration::Calibration batch = build_list(images, &report);
+  const calibration::Calibration guided = calibration::load(plan_.folder / "calibration");
+  EXPECT_EQ(batch.model->list.um, guided.model->list.um);
+  EXPECT_EQ(batch.origin.leds, guided.origin.leds);
+}
+
+TEST_F(GuidedSession, GoesOnAfterQuit) {
+  {
+    FakeSensor sensor(kEnough);
+    FakeConsole console({"", "", "", "q"});
+    EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+    EXPECT_THAT(console.said, HasSubstr("To go on: dtactctl calibrate --folder X"));
+  }
+  EXPECT_TRUE(has("reference/sensor.toml"));
+  EXPECT_TRUE(has("press-02/03.png"));
+  EXPECT_FALSE(has("press-03"));
+  FakeSensor sensor(presses({{.depth_mm = 0.75, .x_px = 180}, {.depth_mm = 1.0}}));
+  FakeConsole console({"", "", "", ""});
+  EXPECT_EQ(run(sensor, console), Outcome::uploaded) << console.said;
+  EXPECT_THAT(console.said, AllOf(HasSubstr("2 press(es) are there"), Not(HasSubstr("Step 1"))));
+}
+
+TEST_F(GuidedSession, InputThatEndsLosesNothing) {
+  FakeSensor sensor(kEnough);
+  FakeConsole console({"", ""});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  EXPECT_THAT(console.said, HasSubstr("The input ended"));
+  EXPECT_TRUE(has("press-01/00.png"));
+}
+
+TEST_F(GuidedSession, CtrlCLosesNothing) {
+  FakeSensor sensor(kEnough);
+  FakeConsole console({"", ""});
+  sensor.on_status = [&](client::Status&) {
+    console.ctrl_c = fs::exists(plan_.folder / "press-01");
+  };
+  FakeConsole* seen = &console;
+  EXPECT_EQ(run(sensor, *seen), Outcome::unfinished);
+  EXPECT_TRUE(has("reference/00.png"));
+}
+
+TEST_F(GuidedSession, ADaemonThatGoesSaysHowToGoOn) {
+  FakeSensor sensor(kEnough);
+  sensor.frames_until_gone = 100;
+  FakeConsole console({"", "", "", ""});
+  EXPECT_THROW((void)run(sensor, console), client::ConnectionError);
+  EXPECT_THAT(console.said, HasSubstr("To go on: dtactctl calibrate --folder X"));
+  EXPECT_TRUE(has("press-01/00.png"));
+}
+
+TEST_F(GuidedSession, RetakesTheLastPress) {
+  FakeSensor sensor(kEnough);
+  FakeConsole console({"", "", "", "r", "q"});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  EXPECT_TRUE(has("press-02"));
+  EXPECT_FALSE(has("press-03"));
+  EXPECT_THAT(console.said, HasSubstr("[r] retake press-02"));
+  // The third press stands where the second was: at column 180.
+  EXPECT_THAT(console.said, HasSubstr("press-02 taken: a contact"));
+  const std::size_t last = console.said.rfind("press-02 taken");
+  EXPECT_THAT(console.said.substr(last, 80), HasSubstr("column 180, row 150"));
+}
+
+TEST_F(GuidedSession, APressThatStaysIsNotTakenTwice) {
+  FakeSensor sensor({kUntouched, {.depth_mm = 1.3}});
+  FakeConsole console({"", "", ""});
+  EXPECT_THAT([&] { (void)run(sensor, console); },
+              ThrowsMessage<NotTaken>(HasSubstr("this press is taken already")));
+  EXPECT_TRUE(has("press-01"));
+  EXPECT_FALSE(has("press-02"));
+}
+
+TEST_F(GuidedSession, WaitsForAPressToHoldStill) {
+  // Half a millimetre a second, to 1.3 mm; then it rests.
+  FakeSensor sensor(
+      {kUntouched, {.depth_mm = 0, .frames = 156, .step_mm = 0.5 / 60}, {.depth_mm = 1.3}});
+  FakeConsole console({"", "", "q"});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  // 0.3 mm of the ball's radius below the darkening of 3 grey levels: 1.3 mm were pressed.
+  EXPECT_THAT(console.said, HasSubstr("darkest 39 grey levels"));
+}
+
+TEST_F(GuidedSession, APersonMayTakeWhatDoesNotHoldStill) {
+  FakeSensor sensor({kUntouched, {.depth_mm = 0.5, .frames = 1000, .step_mm = 0.001}});
+  FakeConsole console({"", "~25", "", "~3", "", "~50", "q"});
+  console.person = true;
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  EXPECT_THAT(console.said, HasSubstr("press-01 taken"));
+}
+
+TEST_F(GuidedSession, ATooLightPressIsRefusedAndNotKept) {
+  FakeSensor sensor(presses({{.depth_mm = 0.22}}));
+  FakeConsole console({"", "", "q"});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  EXPECT_THAT(console.said, HasSubstr("not taken: no contact found"));
+  EXPECT_FALSE(has("press-01"));
+}
+
+TEST_F(GuidedSession, NamesThePressThatIsMissing) {
+  FakeSensor sensor(presses({{.depth_mm = 1.5}, {.depth_mm = 1.4, .x_px = 130}}));
+  FakeConsole console({"", "", "", "s", "q"});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  EXPECT_THAT(console.said,
+              AllOf(HasSubstr("that is not yet enough: no press shows indentations from 0.00 to"),
+                    HasSubstr("Press 3 of 4: the one that is missing")));
+}
+
+TEST_F(GuidedSession, AReferenceUnderTouchIsTakenAgain) {
+  FakeSensor sensor({{.depth_mm = 1.0, .frames = 30}, kUntouched, {.depth_mm = 0.9}});
+  FakeConsole console({"", "", "", "", "q"});
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  EXPECT_THAT(console.said, AllOf(HasSubstr("something touched when that was taken"),
+                                  HasSubstr("press-01 taken"), HasSubstr("darkest 27 grey")));
+}
+
+TEST_F(GuidedSession, RefusesAnUnfitDaemon) {
+  FakeSensor sensor(kEnough);
+  sensor.now.state = "camera_lost";
+  sensor.now.health = {"camera_trouble"};
+  sensor.now.advice = "The camera gives no frames. Plug it in.";
+  FakeConsole console({""});
+  EXPECT_THAT([&] { (void)run(sensor, console); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("Plug it in")));
+}
+
+TEST_F(GuidedSession, SaysWhyNothingComes) {
+  FakeSensor sensor(kEnough);
+  sensor.silent = true;
+  sensor.now.advice = "Look at the cable.";
+  FakeConsole console({""});
+  EXPECT_THAT([&] { (void)run(sensor, console); },
+              ThrowsMessage<NotTaken>(HasSubstr("Look at the cable.")));
+}
+
+TEST_F(GuidedSession, AnotherLightIsRefused) {
+  {
+    FakeSensor sensor(kEnough);
+    FakeConsole console({"", "", "q"});
+    EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  }
+  FakeSensor sensor(kEnough);
+  sensor.now.light.brightness = 128;
+  FakeConsole console({"", ""});
+  EXPECT_THAT([&] { (void)run(sensor, console); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("LED 0 shows 128 128 128 but showed 255 255 255"),
+                        HasSubstr("dtactctl led"), HasSubstr("another --folder"))));
+  sensor.now.light.brightness = 255;
+  sensor.now.camera.controls[0].value = 50;
+  EXPECT_THAT(
+      [&] { (void)run(sensor, console); },
+      ThrowsMessage<std::runtime_error>(HasSubstr("the control exposure is 50 but was 100")));
+}
+
+TEST_F(GuidedSession, DrawsForAPerson) {
+  FakeSensor sensor(kEnough);
+  FakeConsole console({"~30", "", "~25", "p", "~30", "q"});
+  console.person = true;
+  EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  EXPECT_THAT(console.said, HasSubstr("preview.png"));
+  ASSERT_GE(console.drawn.size(), 23U) << "a picture of 44 by 40 places, words and a prompt";
+  EXPECT_THAT(console.drawn.back(), HasSubstr("[q] quit > "));
+}
+
+}  // namespace
+}  // namespace dtact::ctl::guided
