@@ -11,6 +11,11 @@
 namespace dtact::ctl::guided {
 namespace {
 
+bool ready(int descriptor) {
+  pollfd waiting{descriptor, POLLIN, 0};
+  return ::poll(&waiting, 1, 0) > 0;
+}
+
 std::string trimmed(const std::string& text) {
   constexpr const char* kBlanks = " \t\r";
   const std::size_t first = text.find_first_not_of(kBlanks);
@@ -30,8 +35,7 @@ StreamConsole::~StreamConsole() {
 }
 
 bool StreamConsole::fetch() {
-  pollfd waiting{in_, POLLIN, 0};
-  if (::poll(&waiting, 1, 0) <= 0) return true;
+  if (!ready(in_)) return true;
   std::array<char, 4096> chunk{};
   const ssize_t count = ::read(in_, chunk.data(), chunk.size());
   if (count < 0) return errno == EINTR || errno == EAGAIN;
@@ -67,7 +71,8 @@ void StreamConsole::say(const std::string& text) {
 }
 
 void StreamConsole::live(const std::vector<std::string>& lines) {
-  if (!interactive_) return;
+  // A line that waits to be read has moved the cursor already.
+  if (!interactive_ || ready(in_)) return;
   clear_live();
   // A line that is too long for the terminal must not become two.
   out_ << "\x1b[?7l";

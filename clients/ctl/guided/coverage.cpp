@@ -31,7 +31,7 @@ std::vector<double> rough_depths_mm(const PressImages& images,
 Coverage cover(const PressImages& images, const calibration::Calibration& empty) {
   Coverage coverage;
   if (images.set.presses.size() < 2) {
-    coverage.missing = "a list needs at least two presses, of different depths";
+    coverage.missing = "at least two presses of different depths are needed";
   } else {
     try {
       coverage.made = build_list(images, &coverage.report);

@@ -67,11 +67,11 @@ void LiveView::show(const Look& look, const std::string& words) {
   folder_.save_preview(annotated(shown, model_->mm_per_px, std::nullopt));
 }
 
-void LiveView::still(const image::Grey8& frame,
-                     const std::optional<calibration::Contact>& contact) {
+void LiveView::still(const image::Grey8& frame, const std::optional<calibration::Contact>& contact,
+                     bool touched) {
   const image::Grey8 shown = picture(frame);
   folder_.save_preview(annotated(shown, model_->mm_per_px, contact));
-  if (!console_.interactive()) return;
+  if (!touched || !console_.interactive()) return;
   std::string text;
   for (const std::string& line : half_blocks(shown, kColumns)) text += line + "\n";
   console_.say(text);

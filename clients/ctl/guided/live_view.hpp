@@ -26,8 +26,10 @@ class LiveView {
   /// Draws at most four times a second of the frames' time, and saves once a second; only where a
   /// person watches.
   void show(const Look& look, const std::string& words);
-  /// Draws and saves one frame, with the contact where it is known.
-  void still(const image::Grey8& frame, const std::optional<calibration::Contact>& contact);
+  /// Saves one frame, with the contact where it is known, and draws it to stay where something
+  /// touches.
+  void still(const image::Grey8& frame, const std::optional<calibration::Contact>& contact,
+             bool touched = true);
 
  private:
   [[nodiscard]] image::Grey8 picture(const image::Grey8& frame) const;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "clients/ctl/offline/drawing.hpp"
 
@@ -80,10 +81,15 @@ std::vector<std::string> half_blocks(const image::Grey8& picture, int columns) {
   std::vector<std::string> lines;
   for (int row = 0; row < rows; ++row) {
     std::string line;
+    int upper = 0;
+    int lower = 0;
     for (int column = 0; column < columns; ++column) {
-      line += fmt::format("\x1b[38;5;{}m\x1b[48;5;{}m\u2580",
-                          grey_at(picture, columns, 2 * rows, column, 2 * row),
-                          grey_at(picture, columns, 2 * rows, column, 2 * row + 1));
+      const int above = grey_at(picture, columns, 2 * rows, column, 2 * row);
+      const int below = grey_at(picture, columns, 2 * rows, column, 2 * row + 1);
+      // A colour holds until the next: most of a picture is one grey, and this travels over ssh.
+      if (above != std::exchange(upper, above)) line += fmt::format("\x1b[38;5;{}m", above);
+      if (below != std::exchange(lower, below)) line += fmt::format("\x1b[48;5;{}m", below);
+      line += "\u2580";
     }
     lines.push_back(line + "\x1b[0m");
   }

@@ -88,8 +88,9 @@ Session::Session(Sensor& sensor, Console& console, Plan plan)
 
 Outcome Session::run() {
   const auto kept = [this] {
-    console_.say(
-        fmt::format("What was taken lies in {}. To go on: {}", plan_.folder.string(), plan_.again));
+    console_.say(folder_.has_reference() ? fmt::format("What was taken lies in {}. To go on: {}",
+                                                       plan_.folder.string(), plan_.again)
+                                         : std::string("Nothing was taken yet."));
   };
   try {
     return guide();
@@ -230,7 +231,7 @@ void Session::reference_step() {
       capture_->expect_light(images_.origin.leds);
       untouched_ = still.cells;
       view_.use(empty_, untouched_, cell_mm_);
-      view_.still(still.frames.back(), std::nullopt);
+      view_.still(still.frames.back(), std::nullopt, false);
       return;
     } catch (const NotTaken& e) {
       if (!console_.interactive()) throw;
@@ -261,6 +262,7 @@ void Session::press_steps() {
   for (;;) {
     const std::size_t taken = images_.set.presses.size();
     if (coverage_.made && taken >= static_cast<std::size_t>(plan_.presses)) return;
+    if (taken > 0) console_.say("");
     const std::string line = ask(press_prompt());
     try {
       if (line.empty()) {
