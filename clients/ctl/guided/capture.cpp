@@ -23,10 +23,6 @@ constexpr double kStill = 1.5;
 constexpr double kDrift = 0.5;
 /// A press that differs less from the one before, somewhere, is the same.
 constexpr double kSamePress = 2.0;
-/// Grey levels brighter than the reference that tell of a reference taken under touch. The bulge
-/// round a contact is brighter too (by 22 round a ball 1.7 mm deep on a real sensor), but less than
-/// the contact is darker.
-constexpr double kBrighter = 8;
 constexpr int kBrighterFrames = 5;
 /// Waits for a frame in vain until the user is told, two seconds.
 constexpr int kMisses = 20;
@@ -179,7 +175,7 @@ Still Capture::press(int count, const CellMeans& untouched, const CellMeans& las
   int brighter = 0;
   return hold(count, true, [&](const Look& look) -> std::string {
     const Seen seen = compare(untouched, look.cells);
-    brighter = seen.brightest > std::max(kBrighter, seen.darkest) ? brighter + 1 : 0;
+    brighter = reference_was_touched(seen) ? brighter + 1 : 0;
     if (brighter == kBrighterFrames) throw ReferenceTouched{};
     if (brighter > 0) return "brighter than the reference somewhere";
     if (seen.darkest < kTouchLevels) return "nothing touches the surface";

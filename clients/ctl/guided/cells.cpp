@@ -10,6 +10,8 @@ namespace {
 constexpr int kCellsAcross = 48;
 constexpr int kLeastPx = 12;
 constexpr int kLeastCells = 8;
+/// Grey levels that a surface without any contact does not reach.
+constexpr double kBrighter = 8;
 
 }  // namespace
 
@@ -67,6 +69,10 @@ Seen compare(const CellMeans& untouched, const CellMeans& now) {
   seen.dark_cells = static_cast<double>(
       std::ranges::count_if(darker, [&](float d) { return d - seen.light > kEdgeLevels; }));
   return seen;
+}
+
+bool reference_was_touched(const Seen& seen) {
+  return seen.brightest > std::max(kBrighter, seen.darkest);
 }
 
 double largest_change(const CellMeans& a, const CellMeans& b) {

@@ -47,6 +47,10 @@ inline constexpr double kEdgeLevels = 3;
 inline constexpr double kTouchLevels = 4;
 
 [[nodiscard]] Seen compare(const CellMeans& untouched, const CellMeans& now);
+/// Something touched when the reference was taken and does not now: the surface is brighter there.
+/// The bulge round a contact is brighter too, but by less than the contact is darker (0.35 and 0.71
+/// of it on two real sensors).
+[[nodiscard]] bool reference_was_touched(const Seen& seen);
 /// The largest difference of two cells at one place, grey levels.
 [[nodiscard]] double largest_change(const CellMeans& a, const CellMeans& b);
 

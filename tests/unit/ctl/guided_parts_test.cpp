@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <filesystem>
 #include <sstream>
 
 #include "clients/ctl/guided/cells.hpp"
@@ -67,6 +68,23 @@ TEST(Cells, ADimmedLightIsNoTouch) {
   EXPECT_EQ(seen.darkest, 10);
   EXPECT_EQ(seen.brightest, 0);
   EXPECT_EQ(seen.dark_cells, 1);
+}
+
+TEST(Cells, ARealBallsBrightRingIsNoTouchedReference) {
+  namespace fs = std::filesystem;
+  if (!fs::exists(DTACT_SHARED_DIR "/data")) GTEST_SKIP() << "no real images beside the repository";
+  for (const char* sensor : {"sensor_a", "sensor_b"}) {
+    const fs::path folder = fs::path(DTACT_SHARED_DIR) / "data" / sensor;
+    const image::Grey8 untouched = image::read_png_grey8(folder / "ball_reference.png");
+    const image::Grey8 pressed = image::read_png_grey8(folder / "ball.png");
+    const CellGrid grid({0, 0, untouched.width, untouched.height});
+    const CellMeans before = grid.of(untouched.pixels, untouched.width);
+    const CellMeans now = grid.of(pressed.pixels, pressed.width);
+    const Seen seen = compare(before, now);
+    EXPECT_GT(seen.darkest, 30) << sensor;
+    EXPECT_FALSE(reference_was_touched(seen)) << sensor;
+    EXPECT_TRUE(reference_was_touched(compare(now, before))) << sensor << " the other way round";
+  }
 }
 
 TEST(Steady, CountsFromTheFrameThatDiffers) {
