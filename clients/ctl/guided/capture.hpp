@@ -8,7 +8,7 @@
 #include "clients/ctl/guided/cells.hpp"
 #include "clients/ctl/guided/console.hpp"
 #include "clients/ctl/guided/sensor.hpp"
-#include "hal/image/png.hpp"
+#include "clients/ctl/guided/still.hpp"
 
 namespace dtact::ctl::guided {
 
@@ -31,14 +31,6 @@ struct ReferenceTouched {};
 struct Look {
   client::Frame frame;
   CellMeans cells;
-};
-
-/// Frames of a surface that held still.
-struct Still {
-  std::vector<image::Grey8> frames;
-  CellMeans cells;          ///< Mean of all.
-  double drift_levels = 0;  ///< The largest change of a cell from the first half to the last.
-  double noise_levels = 0;  ///< Standard deviation of a pixel from frame to frame.
 };
 
 /// Watches the sensor's frames and takes some where they hold still. It goes by what the frames

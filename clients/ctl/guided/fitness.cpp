@@ -5,12 +5,20 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <numeric>
 #include <string_view>
 
+#include "daemon/calibration/build.hpp"
 #include "daemon/calibration/mismatch.hpp"
 
 namespace dtact::ctl::guided {
 namespace {
+
+// As the daemon judges its own picture (daemon/pipeline/image_watch.cpp).
+constexpr double kDarkGrey = 20;
+constexpr double kWhiteShare = 0.01;
+constexpr std::uint8_t kWhite = 254;
+constexpr double kNoise = 2.5;
 
 bool has_any(const std::vector<std::string>& health,
              std::initializer_list<std::string_view> names) {
@@ -32,6 +40,33 @@ std::string unfit(const client::Status& status) {
 
 bool passing_trouble(const std::vector<std::string>& health) {
   return has_any(health, {"starting", "light_unsettled", "image_repeated", "camera_trouble"});
+}
+
+std::string fault_of(const Still& still, const recon::RectifyTable& table) {
+  const double mean = std::accumulate(still.cells.begin(), still.cells.end(), 0.0) /
+                      static_cast<double>(still.cells.size());
+  if (mean < kDarkGrey) {
+    return fmt::format(
+        "the picture is too dark (mean grey {:.0f}): raise the light (dtactctl led) "
+        "or the exposure",
+        mean);
+  }
+  const image::Grey8 map = calibration::rectified_mean(table, {still.frames.front()});
+  const auto white = std::ranges::count_if(map.pixels, [](auto grey) { return grey >= kWhite; });
+  const double share = static_cast<double>(white) / static_cast<double>(map.pixels.size());
+  if (share > kWhiteShare) {
+    return fmt::format(
+        "{:.0f} % of the picture is white: lower the light (dtactctl led) or the "
+        "exposure",
+        100 * share);
+  }
+  if (still.noise_levels > kNoise) {
+    return fmt::format(
+        "pixels are noisy ({:.1f} grey levels from frame to frame, {} are allowed): "
+        "raise the light and lower the camera's gain",
+        still.noise_levels, kNoise);
+  }
+  return {};
 }
 
 calibration::Origin origin_of(const client::Status& status) {

@@ -4,12 +4,17 @@
 #include <vector>
 
 #include "clients/cpp/types.hpp"
+#include "clients/ctl/guided/still.hpp"
 #include "daemon/calibration/calibration.hpp"
 
 namespace dtact::ctl::guided {
 
 /// What keeps a calibration from being made now, with the remedy; empty when nothing does.
 [[nodiscard]] std::string unfit(const client::Status& status);
+
+/// What is wrong with a picture of the untouched surface, with the remedy; empty: nothing. `table`:
+/// where the map lies in its frames.
+[[nodiscard]] std::string fault_of(const Still& still, const recon::RectifyTable& table);
 
 /// The frame cannot be used, though the next may: a light change under way, a repeated picture.
 [[nodiscard]] bool passing_trouble(const std::vector<std::string>& health);

@@ -4,22 +4,18 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "clients/ctl/guided/fitness.hpp"
+#include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::ctl::guided {
 namespace {
 
-constexpr const char* kReference = "reference";
+namespace fs = std::filesystem;
+
 constexpr const char* kCalibration = "calibration";
-// As the daemon judges its own picture (daemon/pipeline/image_watch.cpp).
-constexpr double kDarkGrey = 20;
-constexpr double kWhiteShare = 0.01;
-constexpr std::uint8_t kWhite = 254;
-constexpr double kNoise = 2.5;
 
 /// The part of the frame that the map is read from.
 recon::FrameRegion region_of(const recon::RectifyTable& table) {
@@ -34,47 +30,6 @@ recon::FrameRegion region_of(const recon::RectifyTable& table) {
     bottom = std::max<int>(bottom, entry.y + 2);
   }
   return {left, top, right - left, bottom - top};
-}
-
-/// What is wrong with an untouched picture, with the remedy; empty: nothing.
-std::string fault_of(const Still& still, const recon::RectifyTable& table) {
-  const double mean = std::accumulate(still.cells.begin(), still.cells.end(), 0.0) /
-                      static_cast<double>(still.cells.size());
-  if (mean < kDarkGrey) {
-    return fmt::format(
-        "the picture is too dark (mean grey {:.0f}): raise the light (dtactctl led) "
-        "or the exposure",
-        mean);
-  }
-  const image::Grey8 map = calibration::rectified_mean(table, {still.frames.front()});
-  const auto white = std::ranges::count_if(map.pixels, [](auto grey) { return grey >= kWhite; });
-  const double share = static_cast<double>(white) / static_cast<double>(map.pixels.size());
-  if (share > kWhiteShare) {
-    return fmt::format(
-        "{:.0f} % of the picture is white: lower the light (dtactctl led) or the "
-        "exposure",
-        100 * share);
-  }
-  if (still.noise_levels > kNoise) {
-    return fmt::format(
-        "pixels are noisy ({:.1f} grey levels from frame to frame, {} are allowed): "
-        "raise the light and lower the camera's gain",
-        still.noise_levels, kNoise);
-  }
-  return {};
-}
-
-/// The daemon's name for a calibration: letters, digits, '-' and '_'.
-std::string name_of(const std::filesystem::path& folder) {
-  std::string name = std::filesystem::weakly_canonical(folder).filename().string();
-  std::ranges::replace_if(
-      name,
-      [](char c) {
-        return !((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                 c == '-' || c == '_');
-      },
-      '-');
-  return name.empty() ? "calibration" : name.substr(0, 64);
 }
 
 }  // namespace
@@ -155,7 +110,7 @@ void Session::prepare_map(const client::Status& status) {
 }
 
 void Session::load() {
-  images_ = begin_presses({folder_.at(kReference)}, plan_.ball_radius_mm, plan_.map);
+  images_ = begin_presses({folder_.at(WorkFolder::kReference)}, plan_.ball_radius_mm, plan_.map);
   for (const std::string& name : folder_.presses()) add_press(images_, folder_.at(name));
   const calibration::BallPresses& set = images_.set;
   empty_ = calibration::empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
@@ -240,113 +195,12 @@ void Session::reference_step() {
   }
 }
 
-std::string Session::press_prompt() const {
-  const std::size_t taken = images_.set.presses.size();
-  std::string text =
-      fmt::format("Press {} of {}: ", taken + 1,
-                  std::max<std::size_t>(taken + 1, static_cast<std::size_t>(plan_.presses)));
-  if (taken >= 2 && !coverage_.made) {
-    text += "the one that is missing";
-  } else {
-    const double depth = next_depth_mm(coverage_.depths_mm, plan_.ball_radius_mm);
-    text += fmt::format("about {:.1f} mm deep (contact {:.1f} mm wide)", depth,
-                        contact_width_mm(depth, plan_.ball_radius_mm));
-  }
-  text += taken == 0 ? ", anywhere; hold still\n" : ", elsewhere; hold still\n";
-  text += fmt::format("[Enter] take  [r] retake {}  [p] preview  [s] finish  [q] quit",
-                      taken == 0 ? std::string(kReference) : folder_.presses().back());
-  return text;
-}
-
-void Session::press_steps() {
-  for (;;) {
-    const std::size_t taken = images_.set.presses.size();
-    if (coverage_.made && taken >= static_cast<std::size_t>(plan_.presses)) return;
-    if (taken > 0) console_.say("");
-    const std::string line = ask(press_prompt());
-    try {
-      if (line.empty()) {
-        take_press(folder_.next_press());
-      } else if (line == "r" && taken == 0) {
-        reference_step();
-      } else if (line == "r") {
-        take_press(folder_.presses().back());
-      } else if (line == "p") {
-        if (const Look* look = capture_->next()) {
-          view_.still({look->frame.luma->width, look->frame.luma->height, look->frame.luma->values},
-                      std::nullopt);
-        }
-        console_.say("preview: " + folder_.at("preview.png"));
-      } else if (line == "s") {
-        if (coverage_.made) return;
-        console_.say("that is not yet enough: " + coverage_.missing);
-      } else {
-        console_.say("\"" + line + "\" means nothing here");
-      }
-    } catch (const NotTaken& e) {
-      if (!console_.interactive()) throw;
-      console_.say(e.what());
-    } catch (const ReferenceTouched&) {
-      console_.say(
-          "the surface is brighter than the reference: something touched when that was taken. It "
-          "has to be taken again");
-      reference_step();
-      judge();
-    }
-  }
-}
-
-void Session::take_press(const std::string& name) {
-  require_same_sensor();
-  console_.say(fmt::format("waiting up to {:g} s for a press that holds still{}", plan_.patience_s,
-                           console_.interactive() ? "; [Enter] takes it as it is" : ""));
-  const Still still = capture_->press(plan_.press_frames, untouched_, last_);
-  last_ = still.cells;
-  std::optional<calibration::SettledPress> settled;
-  try {
-    settled = calibration::settle(*empty_.model, images_.set.reference_q8.pixels, still.frames,
-                                  plan_.ball_radius_mm);
-  } catch (const std::runtime_error& e) {
-    console_.say(fmt::format("not taken: {}", e.what()));
-    view_.still(still.frames.back(), std::nullopt);
-    return;
-  }
-  const bool again = std::ranges::count(folder_.presses(), name) > 0;
-  folder_.save_press(name, still.frames);
-  if (again) {
-    load();
-  } else {
-    add_press(images_, folder_.at(name));
-  }
-  view_.still(still.frames.back(), settled->contact);
-  console_.say(fmt::format(
-      "{} taken: a contact {:.1f} mm wide at column {:.0f}, row {:.0f} of the map, darkest {:.0f} "
-      "grey levels, about {:.1f} mm deep",
-      name, 2 * settled->contact.radius_mm, settled->contact.col, settled->contact.row,
-      settled->contact.peak_levels,
-      depth_of_width_mm(2 * settled->contact.radius_mm, plan_.ball_radius_mm)));
-  judge();
-}
-
-void Session::judge() {
-  coverage_ = cover(images_, empty_);
-  if (!coverage_.made) {
-    if (!images_.set.presses.empty()) console_.say("not yet a list: " + coverage_.missing);
-    return;
-  }
-  for (const std::string& press : coverage_.report.left_out) console_.say("left out: " + press);
-  std::vector<std::string> depths;
-  for (const double depth : coverage_.depths_mm) depths.push_back(fmt::format("{:.2f}", depth));
-  console_.say(fmt::format("the list covers 0 to {:.2f} mm; presses of {} mm",
-                           covered_mm(*coverage_.made), fmt::join(depths, ", ")));
-}
-
 Outcome Session::finish() {
   calibration::save(*coverage_.made, folder_.path() / kCalibration);
   console_.say(report_text(coverage_.report, *coverage_.made->model) +
                list_text(*coverage_.made->model) + "saved in " + folder_.at(kCalibration));
   const std::string line = ask(fmt::format(
-      "Upload it to the daemon as {}?   [Enter] yes   [n] not now", name_of(plan_.folder)));
+      "Upload it to the daemon as {}?   [Enter] yes   [n] not now", folder_.calibration_name()));
   if (line.empty() || line == "y") {
     upload();
     return Outcome::uploaded;
@@ -356,9 +210,9 @@ Outcome Session::finish() {
 }
 
 void Session::upload() {
-  const std::string name = name_of(plan_.folder);
-  sensor_.upload({name, base::read_file(folder_.path() / kCalibration / "calibration.toml"),
-                  base::read_file(folder_.path() / kCalibration / "reference.png")});
+  const fs::path made = folder_.path() / kCalibration;
+  sensor_.upload({folder_.calibration_name(), base::read_file(made / calibration::kTomlName),
+                  base::read_file(made / calibration::kReferenceName)});
   const client::Status status = sensor_.status();
   if (!status.calibration || status.calibration->created != coverage_.made->origin.created) {
     throw std::runtime_error(

@@ -14,7 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kReference = "reference";
 constexpr std::size_t kMostFrames = 100;
 
 std::string frame_name(std::size_t number) { return fmt::format("{:02}.png", number); }
@@ -71,6 +70,18 @@ void WorkFolder::save_press(const std::string& name, const std::vector<image::Gr
 
 void WorkFolder::save_preview(const image::Rgb8& picture) {
   base::write_file_atomically(path_ / "preview.png", image::encode_png(picture));
+}
+
+std::string WorkFolder::calibration_name() const {
+  std::string name = fs::weakly_canonical(path_).filename().string();
+  std::ranges::replace_if(
+      name,
+      [](char c) {
+        return !((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                 c == '-' || c == '_');
+      },
+      '-');
+  return name.empty() ? "calibration" : name.substr(0, 64);
 }
 
 }  // namespace dtact::ctl::guided

@@ -20,6 +20,8 @@ namespace dtact::ctl::guided {
 /// A reference or a press is there as a whole or not at all.
 class WorkFolder {
  public:
+  static constexpr const char* kReference = "reference";
+
   /// Makes the folder. Throws std::filesystem::filesystem_error.
   explicit WorkFolder(std::filesystem::path path);
 
@@ -34,6 +36,9 @@ class WorkFolder {
   void save_press(const std::string& name, const std::vector<image::Grey8>& frames);
   void save_preview(const image::Rgb8& picture);
 
+  /// The folder's name as the daemon takes it for a calibration: letters, digits, '-' and '_', at
+  /// most 64.
+  [[nodiscard]] std::string calibration_name() const;
   /// Of something in the folder, as the command line takes it.
   [[nodiscard]] std::string at(const std::string& name) const { return (path_ / name).string(); }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }

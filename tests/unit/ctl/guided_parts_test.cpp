@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <sstream>
@@ -124,6 +125,21 @@ TEST(Fitness, NamesWhatKeepsFromCalibrating) {
   EXPECT_THAT(unfit(status), HasSubstr("camera_lost"));
   EXPECT_TRUE(passing_trouble({"light_unsettled"}));
   EXPECT_FALSE(passing_trouble({"light_drifted", "frames_lost"}));
+}
+
+TEST(Fault, OfAnUntouchedPicture) {
+  const recon::RectifyTable table = recon::make_crop_table(100, 100, 0, 0, 100, 100);
+  Still still;
+  still.frames = {{100, 100, std::vector<std::uint8_t>(10000, 150)}};
+  still.cells.assign(64, 150);
+  still.noise_levels = 1;
+  EXPECT_EQ(fault_of(still, table), "");
+  still.noise_levels = 3;
+  EXPECT_THAT(fault_of(still, table), HasSubstr("gain"));
+  std::fill_n(still.frames[0].pixels.begin(), 200, std::uint8_t{255});
+  EXPECT_THAT(fault_of(still, table), HasSubstr("2 % of the picture is white"));
+  still.cells.assign(64, 12);
+  EXPECT_THAT(fault_of(still, table), HasSubstr("too dark (mean grey 12)"));
 }
 
 /// A console that reads a pipe.

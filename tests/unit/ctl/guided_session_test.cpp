@@ -252,6 +252,10 @@ TEST_F(GuidedSession, AnotherLightIsRefused) {
       ThrowsMessage<std::runtime_error>(HasSubstr("the control exposure is 50 but was 100")));
 }
 
+TEST_F(GuidedSession, TheFoldersNameSuitsTheDaemon) {
+  EXPECT_EQ(WorkFolder(plan_.folder / "left hand.2/").calibration_name(), "left-hand-2");
+}
+
 TEST_F(GuidedSession, DrawsForAPerson) {
   FakeSensor sensor(kEnough);
   FakeConsole console({"~30", "", "~25", "p", "~30", "q"});
