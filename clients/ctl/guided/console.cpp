@@ -3,18 +3,15 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <ostream>
+#include <string_view>
 #include <utility>
 
 namespace dtact::ctl::guided {
 namespace {
-
-bool ready(int descriptor) {
-  pollfd waiting{descriptor, POLLIN, 0};
-  return ::poll(&waiting, 1, 0) > 0;
-}
 
 std::string trimmed(const std::string& text) {
   constexpr const char* kBlanks = " \t\r";
@@ -34,27 +31,30 @@ StreamConsole::~StreamConsole() {
   out_.flush();
 }
 
-bool StreamConsole::fetch() {
-  if (!ready(in_)) return true;
+void StreamConsole::fetch() {
+  pollfd waiting{in_, POLLIN, 0};
+  if (ended_ || ::poll(&waiting, 1, 0) <= 0) return;
   std::array<char, 4096> chunk{};
   const ssize_t count = ::read(in_, chunk.data(), chunk.size());
-  if (count < 0) return errno == EINTR || errno == EAGAIN;
-  buffer_.append(chunk.data(), static_cast<std::size_t>(count));
-  return count > 0;
+  if (count < 0) {
+    ended_ = errno != EINTR && errno != EAGAIN;
+    return;
+  }
+  ended_ = count == 0;
+  const std::string_view text(chunk.data(), static_cast<std::size_t>(count));
+  buffer_ += text;
+  // The terminal has echoed them: the cursor stands so much below the live lines.
+  if (live_lines_ > 0) {
+    live_lines_ += static_cast<std::size_t>(std::ranges::count(text, '\n'));
+  }
 }
 
 Typed StreamConsole::typed() {
   if (interrupted_()) return {Typed::Kind::interrupted, {}};
-  std::size_t end = buffer_.find('\n');
-  if (end == std::string::npos && !ended_) {
-    ended_ = !fetch();
-    end = buffer_.find('\n');
-  }
-  if (end != std::string::npos) {
+  fetch();
+  if (const std::size_t end = buffer_.find('\n'); end != std::string::npos) {
     Typed line{Typed::Kind::line, trimmed(buffer_.substr(0, end))};
     buffer_.erase(0, end + 1);
-    // The terminal has echoed the end of the line: the cursor stands below the live lines.
-    if (live_lines_ > 0) ++live_lines_;
     return line;
   }
   if (!ended_) return {};
@@ -71,8 +71,7 @@ void StreamConsole::say(const std::string& text) {
 }
 
 void StreamConsole::live(const std::vector<std::string>& lines) {
-  // A line that waits to be read has moved the cursor already.
-  if (!interactive_ || ready(in_)) return;
+  if (!interactive_) return;
   clear_live();
   // A line that is too long for the terminal must not become two.
   out_ << "\x1b[?7l";
@@ -83,6 +82,7 @@ void StreamConsole::live(const std::vector<std::string>& lines) {
 
 void StreamConsole::clear_live() {
   if (live_lines_ == 0) return;
+  fetch();  // what was typed meanwhile has moved the cursor
   out_ << '\r';
   if (live_lines_ > 1) out_ << "\x1b[" << live_lines_ - 1 << 'A';
   out_ << "\x1b[J";

@@ -49,8 +49,8 @@ class StreamConsole : public Console {
   void live(const std::vector<std::string>& lines) override;
 
  private:
-  /// Reads what lies ready. False at the end of the input.
-  bool fetch();
+  /// Reads what lies ready.
+  void fetch();
   void clear_live();
 
   int in_;

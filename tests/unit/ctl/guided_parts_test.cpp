@@ -194,6 +194,11 @@ TEST_F(Piped, LiveLinesAreForPeople) {
   EXPECT_THAT(out_.str(), HasSubstr("\r\x1b[1A\x1b[J\x1b[?7lother")) << "in place of a line below";
   person.say("done");
   EXPECT_THAT(out_.str(), EndsWith("\r\x1b[1A\x1b[Jdone\n")) << "nothing live stays";
+  person.live({"picture", "> "});
+  type("\n");  // and the terminal's echo has moved the cursor
+  person.say("done");
+  EXPECT_THAT(out_.str(), EndsWith("\r\x1b[2A\x1b[Jdone\n"));
+  EXPECT_EQ(person.typed().kind, Typed::Kind::line);
 }
 
 }  // namespace
