@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "daemon/calibration/gain_table.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/sensor_file.hpp"
@@ -45,22 +46,6 @@ std::vector<std::int64_t> runs_of(const std::vector<std::uint8_t>& mask) {
     ++runs.back();
   }
   return runs;
-}
-
-std::string gain_text(const recon::SpatialGain& gain) {
-  switch (gain.shape) {
-    case recon::GainShape::none:
-      break;
-    case recon::GainShape::uniform:
-      return "[gain]  # darkening counts as a share of the light at its place\n"
-             "shape = \"uniform\"\n\n";
-    case recon::GainShape::radial:
-      return fmt::format(
-          "[gain]  # darkening is multiplied by 1 + per_mm * distance from the centre\n"
-          "shape = \"radial\"\ncentre_x_mm = {}\ncentre_y_mm = {}\nper_mm = {}\n\n",
-          gain.centre_x_mm, gain.centre_y_mm, gain.per_mm);
-  }
-  return "[gain]  # the same at every place\nshape = \"none\"\n\n";
 }
 
 std::vector<double> column(const std::vector<recon::Model::Uncertainty>& rows,
@@ -120,7 +105,7 @@ Files format(const Calibration& calibration) {
       "[lens]  # where the surface appears in the frame; empty: the frame as it is\n{}\n",
       calibration.lens ? format_lens(*calibration.lens) : "");
   t += "# Reserved for a curved surface. Empty: none.\n[surface]\n\n";
-  t += gain_text(model.gain);
+  t += format_gain(model.gain);
   if (!model.uncertainty.empty()) {
     t += "[uncertainty]  # of the list: mean absolute error in micrometres at some indentations\n";
     t += fmt::format("depth_mm = {}\nerror_um = {}\n\n",

@@ -32,6 +32,7 @@ pid_t spawn(const std::vector<std::string>& arguments, const fs::path& output,
   argv.push_back(nullptr);
   const base::UniqueFd log(::open(output.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600));
   const base::UniqueFd in(::open(input.c_str(), O_RDONLY | O_CLOEXEC));
+  if (log.get() < 0 || in.get() < 0) throw std::runtime_error("cannot open " + output.string());
   const pid_t pid = ::fork();
   if (pid < 0) throw std::runtime_error("cannot fork");
   if (pid == 0) {

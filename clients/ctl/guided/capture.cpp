@@ -35,8 +35,8 @@ class Patience {
     if (look == nullptr) {
       without_s_ += std::chrono::duration<double>(kFrameWait).count();
     } else {
-      if (first_ns_ == 0) first_ns_ = look->frame.monotonic_ns;
-      with_s_ = 1e-9 * static_cast<double>(look->frame.monotonic_ns - first_ns_);
+      if (first_ns_ == 0) first_ns_ = look->time_ns;
+      with_s_ = 1e-9 * static_cast<double>(look->time_ns - first_ns_);
     }
     return std::max(with_s_, without_s_) > seconds_;
   }
@@ -80,14 +80,15 @@ Capture::Capture(Sensor& sensor, Console& console, const CellGrid& grid, const R
 const Look* Capture::next() {
   if (console_.interrupted()) throw Ended{Ended::Why::interrupt};
   auto frame = sensor_.next(kFrameWait);
-  if (!frame || passing_trouble(frame->health)) return nullptr;
+  if (!frame || !frame->luma || passing_trouble(frame->health)) return nullptr;
   if (!leds_.empty() && leds_of(frame->light) != leds_) {
     throw std::runtime_error(
         "the light is another than when the reference was taken: set it back with dtactctl led, or "
         "begin again in another --folder");
   }
-  look_.cells = grid_.of(frame->luma->values, frame->luma->width);
-  look_.frame = *std::move(frame);
+  look_.image = {frame->luma->width, frame->luma->height, std::move(frame->luma->values)};
+  look_.time_ns = frame->monotonic_ns;
+  look_.cells = grid_.of(look_.image.pixels, look_.image.width);
   return &look_;
 }
 
@@ -147,8 +148,7 @@ Still Capture::hold(int count, bool forcible, const Objection& objection) {
       shown_(*look, "not still");
       continue;
     }
-    still.frames.push_back(
-        {look->frame.luma->width, look->frame.luma->height, look->frame.luma->values});
+    still.frames.push_back(look->image);
     cells.push_back(look->cells);
     shown_(*look, fmt::format("still, {} of {} frames", still.frames.size(), count));
     if (still.frames.size() < static_cast<std::size_t>(count)) continue;

@@ -29,7 +29,8 @@ struct ReferenceTouched {};
 
 /// A frame and its cells.
 struct Look {
-  client::Frame frame;
+  image::Grey8 image;
+  std::int64_t time_ns = 0;  ///< Its capture, of the daemon's clock.
   CellMeans cells;
 };
 

@@ -34,7 +34,8 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty)
     coverage.missing = "at least two presses of different depths are needed";
   } else {
     try {
-      coverage.made = build_list(images, &coverage.report);
+      coverage.made =
+          std::make_shared<const calibration::Calibration>(build_list(images, &coverage.report));
     } catch (const std::exception& e) {
       coverage.missing = e.what();
     }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <optional>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -10,9 +10,9 @@ namespace dtact::ctl::guided {
 
 /// What the presses so far come to.
 struct Coverage {
-  std::optional<calibration::Calibration> made;  ///< Where they determine a list.
-  calibration::PressReport report;               ///< Of `made`.
-  std::string missing;                           ///< Where they do not: why, and what to press.
+  std::shared_ptr<const calibration::Calibration> made;  ///< Null where they determine no list.
+  calibration::PressReport report;                       ///< Of `made`.
+  std::string missing;            ///< Where they do not: why, and what to press.
   std::vector<double> depths_mm;  ///< Of the presses: as fitted, else by their contacts' width.
 };
 

@@ -53,11 +53,10 @@ std::string LiveView::words_on(const Look& look, const std::string& words) const
 
 void LiveView::show(const Look& look, const std::string& words) {
   if (!console_.interactive()) return;
-  const std::int64_t now_ns = look.frame.monotonic_ns;
+  const std::int64_t now_ns = look.time_ns;
   if (now_ns - drawn_ns_ < kSecond / 4) return;
   drawn_ns_ = now_ns;
-  const image::Grey8 shown =
-      picture({look.frame.luma->width, look.frame.luma->height, look.frame.luma->values});
+  const image::Grey8 shown = picture(look.image);
   std::vector<std::string> lines = half_blocks(shown, kColumns);
   lines.push_back(words_on(look, words));
   lines.insert(lines.end(), prompt_.begin(), prompt_.end());

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "clients/ctl/guided/fitness.hpp"
@@ -105,8 +106,9 @@ void Session::prepare_map(const client::Status& status) {
   grid_ = CellGrid(region_of(empty_.model->rectify));
   cell_mm_ = grid_.cell_px() * (map.lens ? recon::central_mm_per_px(*map.lens) : map.mm_per_px);
   view_.use(empty_, {}, cell_mm_);
-  capture_.emplace(sensor_, console_, grid_, Capture::Rules{plan_.patience_s},
-                   [this](const Look& look, const std::string& words) { view_.show(look, words); });
+  capture_ = std::make_unique<Capture>(
+      sensor_, console_, grid_, Capture::Rules{plan_.patience_s},
+      [this](const Look& look, const std::string& words) { view_.show(look, words); });
 }
 
 void Session::load() {

@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "clients/ctl/guided/capture.hpp"
@@ -69,7 +68,7 @@ class Session {
   LiveView view_;
   CellGrid grid_;
   double cell_mm_ = 0;
-  std::optional<Capture> capture_;
+  std::unique_ptr<Capture> capture_;
   PressImages images_;
   calibration::Calibration empty_;  ///< The map and the reference, without a list.
   CellMeans untouched_;

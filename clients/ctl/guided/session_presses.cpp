@@ -41,8 +41,7 @@ void Session::press_steps() {
         take_press(folder_.presses().back());
       } else if (line == "p") {
         if (const Look* look = capture_->next()) {
-          view_.still({look->frame.luma->width, look->frame.luma->height, look->frame.luma->values},
-                      std::nullopt);
+          view_.still(look->image, std::nullopt);
         }
         console_.say("preview: " + folder_.at("preview.png"));
       } else if (line == "s") {
@@ -70,10 +69,11 @@ void Session::take_press(const std::string& name) {
                            console_.interactive() ? "; [Enter] takes it as it is" : ""));
   const Still still = capture_->press(plan_.press_frames, untouched_, last_);
   last_ = still.cells;
-  std::optional<calibration::SettledPress> settled;
+  calibration::Contact contact;
   try {
-    settled = calibration::settle(*empty_.model, images_.set.reference_q8.pixels, still.frames,
-                                  plan_.ball_radius_mm);
+    contact = calibration::settle(*empty_.model, images_.set.reference_q8.pixels, still.frames,
+                                  plan_.ball_radius_mm)
+                  .contact;
   } catch (const std::runtime_error& e) {
     console_.say(fmt::format("not taken: {}", e.what()));
     view_.still(still.frames.back(), std::nullopt);
@@ -86,13 +86,12 @@ void Session::take_press(const std::string& name) {
   } else {
     add_press(images_, folder_.at(name));
   }
-  view_.still(still.frames.back(), settled->contact);
+  view_.still(still.frames.back(), contact);
   console_.say(fmt::format(
       "{} taken: a contact {:.1f} mm wide at column {:.0f}, row {:.0f} of the map, darkest {:.0f} "
       "grey levels, about {:.1f} mm deep",
-      name, 2 * settled->contact.radius_mm, settled->contact.col, settled->contact.row,
-      settled->contact.peak_levels,
-      depth_of_width_mm(2 * settled->contact.radius_mm, plan_.ball_radius_mm)));
+      name, 2 * contact.radius_mm, contact.col, contact.row, contact.peak_levels,
+      depth_of_width_mm(2 * contact.radius_mm, plan_.ball_radius_mm)));
   judge();
 }
 

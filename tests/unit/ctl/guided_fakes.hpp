@@ -28,6 +28,7 @@ inline constexpr int kHeight = 300;
 
 inline client::LumaMap picture(const Scene& scene, double depth_mm, std::uint32_t seed) {
   client::LumaMap map{kWidth, kHeight, {}};
+  map.values.reserve(std::size_t{kWidth} * kHeight);
   std::uint32_t noise = seed * 2654435761U + 1;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {

@@ -30,8 +30,8 @@ TEST(HalfBlocks, ShowsTwoPixelsACharacter) {
 }
 
 TEST(HalfBlocks, AveragesAndKeepsTheShape) {
-  image::Grey8 picture{80, 40, {}};
-  for (int i = 0; i < 80 * 40; ++i) picture.pixels.push_back(i % 2 == 0 ? 100 : 140);
+  image::Grey8 picture{80, 40, std::vector<std::uint8_t>(3200, 100)};
+  for (std::size_t i = 1; i < picture.pixels.size(); i += 2) picture.pixels[i] = 140;
   const auto lines = half_blocks(picture, 20);
   ASSERT_THAT(lines, SizeIs(5)) << "half as high as wide, two pixels a line";
   // Grey 120 is the twelfth of 24: 232 + 11.
@@ -144,7 +144,7 @@ TEST(Fault, OfAnUntouchedPicture) {
 
 /// A console that reads a pipe.
 class Piped : public testing::Test {
- protected:
+ public:
   Piped() {
     if (::pipe(ends_.data()) != 0) throw std::runtime_error("no pipe");
   }
@@ -152,6 +152,8 @@ class Piped : public testing::Test {
     ::close(ends_[0]);
     end_input();
   }
+
+ protected:
   void type(const std::string& text) const {
     ASSERT_EQ(::write(ends_[1], text.data(), text.size()), static_cast<ssize_t>(text.size()));
   }

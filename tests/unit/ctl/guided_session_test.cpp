@@ -24,7 +24,7 @@ using testing::ThrowsMessage;
 const Scene kUntouched{.frames = 60};
 
 class GuidedSession : public testing::Test {
- protected:
+ public:
   GuidedSession() {
     std::string name = (fs::temp_directory_path() / "dtact_guided_XXXXXX").string();
     plan_.folder = fs::path(::mkdtemp(name.data())) / "ball";
@@ -38,6 +38,7 @@ class GuidedSession : public testing::Test {
   }
   ~GuidedSession() override { fs::remove_all(plan_.folder.parent_path()); }
 
+ protected:
   Outcome run(FakeSensor& sensor, FakeConsole& console) {
     return Session(sensor, console, plan_).run();
   }
