@@ -103,6 +103,7 @@ void Session::judge() {
   }
   for (const std::string& press : coverage_.report.left_out) console_.say("left out: " + press);
   std::vector<std::string> depths;
+  depths.reserve(coverage_.depths_mm.size());
   for (const double depth : coverage_.depths_mm) depths.push_back(fmt::format("{:.2f}", depth));
   console_.say(fmt::format("the list covers 0 to {:.2f} mm; presses of {} mm",
                            covered_mm(*coverage_.made), fmt::join(depths, ", ")));

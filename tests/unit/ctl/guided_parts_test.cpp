@@ -48,8 +48,8 @@ TEST(Picture, IsDarkWhereTheSurfaceIs) {
 
 TEST(Cells, MeansOverThePartOfTheFrame) {
   // 120 × 100 pixels from (4, 2) on: cells of 12 × 12, ten across and eight down.
-  std::vector<std::uint8_t> luma(130 * 130, 10);
-  luma[2 * 130 + 4] = 10 + 144;
+  std::vector<std::uint8_t> luma(std::size_t{130} * 130, 10);
+  luma[264] = 10 + 144;
   const CellGrid grid({4, 2, 120, 100});
   EXPECT_EQ(grid.cell_px(), 12);
   const CellMeans cells = grid.of(luma, 130);
