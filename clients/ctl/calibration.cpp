@@ -5,7 +5,7 @@
 #include <memory>
 #include <ostream>
 
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 #include "clients/ctl/online.hpp"
 #include "hal/base/atomic_file.hpp"
 

@@ -8,7 +8,7 @@
 #include <ostream>
 #include <string>
 
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 
 namespace dtact::ctl {
 namespace {

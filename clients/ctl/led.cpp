@@ -2,7 +2,7 @@
 #include <memory>
 #include <ostream>
 
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 #include "clients/ctl/light_text.hpp"
 #include "clients/ctl/online.hpp"
 

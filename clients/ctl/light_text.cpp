@@ -5,7 +5,7 @@
 #include <charconv>
 #include <stdexcept>
 
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 
 namespace dtact::ctl {
 namespace {

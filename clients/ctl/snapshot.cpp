@@ -6,7 +6,7 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 #include "clients/ctl/offline/depth_file.hpp"
 #include "clients/ctl/online.hpp"
 #include "hal/base/atomic_file.hpp"

@@ -4,7 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <ostream>
 
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 #include "clients/ctl/light_text.hpp"
 #include "clients/ctl/online.hpp"
 

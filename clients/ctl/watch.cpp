@@ -10,7 +10,7 @@
 
 #include "clients/ctl/exit_codes.hpp"
 #include "clients/ctl/interruptible.hpp"
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 #include "clients/ctl/online.hpp"
 #include "clients/ctl/watch_meter.hpp"
 #include "hal/base/clock.hpp"

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 
 namespace dtact::ctl {
 

@@ -93,7 +93,7 @@ std::vector<float> read(const cv::Mat1f& image, std::span<const Mark> marks, dou
 }  // namespace
 
 std::string PinGain::describe() const {
-  std::string text = fmt::format(
+  const std::string text = fmt::format(
       "gain: pins differ from what the others predict by {:.1f} % as they are, {:.1f} % as a share "
       "of the light, {:.1f} % with a quadratic: ",
       100 * left_out_of_each[0], 100 * left_out_of_each[1], 100 * left_out_of_each[2]);

@@ -105,22 +105,30 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
   return p;
 }
 
+/// By differences, of the first `n` parameters.
+cv::Mat1d jacobian_of(const Parameters& p, const cv::Mat1d& errors, const Units& u,
+                      std::span<const Mark> marks, int n) {
+  constexpr double kStep = 1e-6;  // of parameters of the order of one
+  std::vector<cv::Mat1d> columns;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(n); ++c) {
+    Parameters changed = p;
+    changed[c] += kStep;
+    columns.emplace_back((errors_of(changed, u, marks) - errors) / kStep);
+  }
+  cv::Mat1d jacobian;
+  cv::hconcat(columns, jacobian);
+  return jacobian;
+}
+
 void minimise(Parameters& p, const Units& u, std::span<const Mark> marks, LensModel model) {
   constexpr int kIterations = 60;
-  constexpr double kStep = 1e-6;      // of parameters of the order of one
   constexpr double kSettled = 1e-12;  // relative change of the sum of squares
   const int n = parameters(model);    // the first ones of p
   double damping = 1e-3;
   cv::Mat1d errors = errors_of(p, u, marks);
   double sum = errors.dot(errors);
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    cv::Mat1d jacobian(errors.rows, n);
-    for (int c = 0; c < n; ++c) {
-      Parameters moved = p;
-      moved[static_cast<std::size_t>(c)] += kStep;
-      const cv::Mat1d column((errors_of(moved, u, marks) - errors) / kStep);
-      column.copyTo(jacobian.col(c));
-    }
+    const cv::Mat1d jacobian = jacobian_of(p, errors, u, marks, n);
     const cv::Mat1d normal(jacobian.t() * jacobian);
     const cv::Mat1d gradient(jacobian.t() * errors);
     bool lower = false;

@@ -33,6 +33,7 @@ calibration::Calibration make_from_one(const Options& options) {
        .mm_per_px = map.mm_per_px,
        .lens = map.lens,
        .crop = map.crop,
+       .gain = map.gain,
        .method = options.method == "published" ? recon::Method::published : recon::Method::list});
   made.origin = recorded_origin(options.reference);
   made.origin.created = utc_now();

@@ -26,15 +26,15 @@ std::optional<calibration::Crop> crop_of(const MapOptions& options, int width, i
                            options.crop[1], options.crop[0]};
 }
 
-recon::Lens lens_for(const std::string& path, int width, int height) {
-  const calibration::LensFile file = calibration::load_lens(path);
+calibration::LensFile lens_for(const std::string& path, int width, int height) {
+  calibration::LensFile file = calibration::load_lens(path);
   if (file.frame_width != width || file.frame_height != height) {
     throw std::runtime_error(fmt::format(
         "--lens: {} was measured on {}x{} but the images are {}x{}; both must come from one camera "
         "mode",
         path, file.frame_width, file.frame_height, width, height));
   }
-  return file.lens;
+  return file;
 }
 
 /// "FOLDER@0.8": the images and the depth that was measured.
@@ -60,7 +60,8 @@ void add_map_options(CLI::App& command, MapOptions& options) {
   command.add_option("--mm-per-px", options.mm_per_px,
                      "Scale of the depth map, mm per pixel (default: the lens's in the middle)");
   command.add_option("--lens", options.lens,
-                     "Lens file of calibrate lens, or a calibration folder: rectifies the map");
+                     "Lens file of calibrate lens, or a calibration folder: rectifies the map; a "
+                     "list of one press takes its gain as well, several presses tell their own");
   command
       .add_option("--centre", options.centre,
                   "Middle of the crop in the frame (default: the frame's)")
@@ -74,9 +75,11 @@ void add_map_options(CLI::App& command, MapOptions& options) {
 }
 
 MapChoice choose_map(const MapOptions& options, int frame_width, int frame_height) {
-  MapChoice map{{}, options.mm_per_px, crop_of(options, frame_width, frame_height)};
+  MapChoice map{{}, {}, options.mm_per_px, crop_of(options, frame_width, frame_height)};
   if (!options.lens.empty()) {
-    map.lens = lens_for(options.lens, frame_width, frame_height);
+    const calibration::LensFile file = lens_for(options.lens, frame_width, frame_height);
+    map.lens = file.lens;
+    map.gain = file.gain;
     if (map.mm_per_px == 0) map.mm_per_px = recon::central_mm_per_px(*map.lens);
   } else if (map.mm_per_px == 0) {
     throw std::runtime_error("--mm-per-px or --lens is required: one of them says the scale");

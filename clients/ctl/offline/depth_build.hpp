@@ -24,6 +24,7 @@ void add_map_options(CLI::App& command, MapOptions& options);
 /// The same, for a frame of known size.
 struct MapChoice {
   std::optional<recon::Lens> lens;
+  recon::SpatialGain gain;  ///< Of the lens file: what its board's pins ask for.
   double mm_per_px = 0;
   std::optional<calibration::Crop> crop;
 };

@@ -6,7 +6,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 #include "clients/ctl/offline/folder_evaluation.hpp"
 #include "clients/ctl/offline/images.hpp"
 #include "clients/ctl/offline/offline.hpp"
@@ -109,7 +109,7 @@ void print_text(const calibration::Evaluation& e) {
 
 void run_folder(const Options& options, bool json) {
   constexpr double kUsualRadius = 4.0;  // mm, of the ball that this kind of sensor comes with
-  std::filesystem::path folder = std::filesystem::weakly_canonical(options.folder);
+  const std::filesystem::path folder = std::filesystem::weakly_canonical(options.folder);
   const FolderEvaluation e = evaluate_folder(
       folder, options.board, options.radius_mm > 0 ? options.radius_mm : kUsualRadius);
   if (!options.page.empty()) write_page(e, folder.filename().string(), options.page);

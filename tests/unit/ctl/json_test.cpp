@@ -1,4 +1,4 @@
-#include "clients/ctl/json.hpp"
+#include "clients/ctl/json/json.hpp"
 
 #include <gtest/gtest.h>
 

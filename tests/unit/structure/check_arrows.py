@@ -32,10 +32,11 @@ ROOMS = {
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
+    "clients/ctl/json": [],
     "clients/ctl/lens": ["daemon/recon"],
-    "clients/ctl/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/ctl/lens"],
+    "clients/ctl/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/ctl/lens", "clients/ctl/json"],
     "clients/ctl/guided": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/ctl/offline"],
-    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/cpp", "clients/ctl/offline", "clients/ctl/guided"],
+    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/cpp", "clients/ctl/json", "clients/ctl/offline", "clients/ctl/guided"],
 }
 # Only standard headers and Highway may stand in angle brackets here.
 STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}
