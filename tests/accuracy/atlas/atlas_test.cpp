@@ -175,6 +175,89 @@ TEST(Undecidable, AMovedCameraLooksLikeAMovedObject) {
   EXPECT_LT(greatest_difference(spoiler, turned, spoiler, around, 10), 1.0);
 }
 
+/// The greatest difference of two true indentations, millimetres.
+double greatest_true_difference(const hal::sim::Truth& truth, std::size_t a, std::size_t b) {
+  std::vector<float> first;
+  std::vector<float> second;
+  truth.indentation_mm(moment_of(a), first);
+  truth.indentation_mm(moment_of(b), second);
+  float greatest = 0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    greatest = std::max(greatest, std::abs(first[i] - second[i]));
+  }
+  return static_cast<double>(greatest);
+}
+
+/// A round object whose indentation is that of a ball 1 mm deep, blurred by `sigma_mm`.
+hal::sim::Object blunted_ball(double sigma_mm, double& depth_mm) {
+  const auto truth = solve({{hal::sim::ball(5), 0, 0, 1.0}});
+  std::vector<float> map;
+  truth->indentation_mm(moment_of(0), map);
+  const auto& camera = truth->scene().camera;
+  // Indentation at r from the centre, along the frame's middle row.
+  const auto sharp = [&](double r) {
+    const auto column = static_cast<std::size_t>(0.5 * camera.width + r / camera.mm_per_px);
+    const auto row = static_cast<std::size_t>(camera.height / 2);
+    return static_cast<double>(map[row * static_cast<std::size_t>(camera.width) + column]);
+  };
+  constexpr double kStep = 0.02;
+  std::vector<double> profile;
+  for (double r = 0; r < 4.5; r += kStep) {
+    double sum = 0;
+    double weights = 0;
+    for (double dy = -3 * sigma_mm; dy <= 3 * sigma_mm; dy += 0.05) {
+      for (double dx = -3 * sigma_mm; dx <= 3 * sigma_mm; dx += 0.05) {
+        const double weight = std::exp(-0.5 * (dx * dx + dy * dy) / (sigma_mm * sigma_mm));
+        sum += weight * sharp(std::hypot(r + dx, dy));
+        weights += weight;
+      }
+    }
+    profile.push_back(sum / weights);
+  }
+  depth_mm = profile.front();
+  return {"blunted_ball", 4.5, [profile](double x, double y) {
+            const auto i = static_cast<std::size_t>(std::hypot(x, y) / kStep);
+            return i < profile.size() && profile[i] > 0 ? profile.front() - profile[i]
+                                                        : hal::sim::kNoSurface;
+          }};
+}
+
+TEST(Undecidable, ADefocusedBallLooksLikeABlunterObject) {
+  const double mm_per_px = hal::sim::default_scene().camera.mm_per_px;
+  double depth_mm = 0;
+  const hal::sim::Object blunted = blunted_ball(12 * mm_per_px, depth_mm);
+  const auto truth = solve({{hal::sim::ball(5), 0, 0, 1.0}, {blunted, 0, 0, depth_mm}});
+  Spoiler spoiler(truth, 5);
+  Shot ball;
+  ball.moment = moment_of(0);
+  Shot defocused = ball;
+  defocused.blur_px = 12;
+  Shot blunt;
+  blunt.moment = moment_of(1);
+  EXPECT_GT(greatest_difference(spoiler, ball, spoiler, defocused, 8), 1.4);
+  EXPECT_LT(greatest_difference(spoiler, defocused, spoiler, blunt, 8), 0.8);
+  EXPECT_GT(greatest_true_difference(*truth, 0, 1), 0.05);
+}
+
+TEST(Undecidable, SteepWallsLookLikeSlopingOnes) {
+  // A cube 0.8 mm deep, and one whose walls rise over 0.4 mm instead of at once. At the wall they
+  // differ by a quarter of a millimetre, in the image by one of 25 levels.
+  const hal::sim::Object sloping{"sloping", 4.5, [](double x, double y) {
+                                   const double r = std::max(std::abs(x), std::abs(y));
+                                   return r <= 3.3 ? std::max(0.0, (r - 2.9) * 0.8 / 0.4)
+                                                   : hal::sim::kNoSurface;
+                                 }};
+  const auto truth = solve({{hal::sim::cube(6), 0, 0, 0.8}, {sloping, 0, 0, 0.8}});
+  Spoiler spoiler(truth, 5);
+  Shot steep;
+  steep.moment = moment_of(0);
+  Shot slope;
+  slope.moment = moment_of(1);
+  EXPECT_GT(greatest_difference(spoiler, {}, spoiler, steep, 8), 20);
+  EXPECT_LT(greatest_difference(spoiler, steep, spoiler, slope, 8), 1.2);
+  EXPECT_GT(greatest_true_difference(*truth, 0, 1), 0.2);
+}
+
 TEST(Undecidable, FullFieldPressLooksLikeDimmedLight) {
   // A disc of 16 mm covers the field; the light that shows the same grey at the centre.
   const auto truth = solve({{hal::sim::disc(16), 0, 0, 0.5}});
