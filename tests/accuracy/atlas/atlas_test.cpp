@@ -242,7 +242,7 @@ TEST(Undecidable, ADefocusedBallLooksLikeABlunterObject) {
 TEST(Undecidable, SteepWallsLookLikeSlopingOnes) {
   // A cube 0.8 mm deep, and one whose walls rise over 0.4 mm instead of at once. At the wall they
   // differ by a quarter of a millimetre, in the image by one of 25 levels.
-  const hal::sim::Object sloping{"sloping", 4.5, [](double x, double y) {
+  const hal::sim::Object sloping{"sloping", 4.7, [](double x, double y) {
                                    const double r = std::max(std::abs(x), std::abs(y));
                                    return r <= 3.3 ? std::max(0.0, (r - 2.9) * 0.8 / 0.4)
                                                    : hal::sim::kNoSurface;

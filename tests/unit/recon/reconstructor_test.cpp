@@ -83,9 +83,9 @@ TEST(ReconstructorList, HalfTheLightReadsTheSameDepth) {
 
 TEST(ReconstructorList, LightThatChangedByAFactorReadsTheSameDepth) {
   Bench bench(model_of(Method::list));
-  bench.reconstructor.set_light(0.5);
-  EXPECT_THAT(bench.run(80), Each(0));
-  EXPECT_THAT(bench.run(65), Each(960));
+  bench.reconstructor.set_light(0.8);
+  EXPECT_THAT(bench.run(128), Each(0));
+  EXPECT_THAT(bench.run(104), Each(960));  // 24 levels of the dimmed light are 30
   bench.reconstructor.set_light(0.975);  // 156; replaces the other factor
   EXPECT_THAT(bench.run(156), Each(0));
   // 30 levels × 160/156 = 1969.2 Q6; half of 1969 is 984 µm.
