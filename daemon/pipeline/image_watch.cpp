@@ -16,8 +16,7 @@ constexpr int kActiveShare = 4;
 constexpr int kCheckEvery = 16;
 /// Grey levels. Noise makes 0.05, a press in motion up to 0.3 for as long as it moves.
 constexpr double kRipple = 0.5;
-/// The same of fine bands, which smoothing makes less of: 0.07 and 0.1; 4 levels are bands of 0.7
-/// %.
+/// The same of fine bands, of which smoothing leaves less: noise makes 0.07, 4 are bands of 0.7 %.
 constexpr double kFineRipple = 4;
 /// A press that comes down at once ripples in one or two frames.
 constexpr int kBandedFrames = 6;

@@ -14,9 +14,8 @@ namespace dtact::pipeline {
 ///
 /// - A slow change goes through: up to the rate, and as much more as the rate allows for the time
 ///   that the light could not be seen because something touched, if it was followed before that.
-/// - A step beyond kStep is not followed, however long it lasts: it may be a flat press of the
-/// whole
-///   field, which looks the same. Nor is anything beyond the limit. Both are told.
+/// - A step beyond kStep is not followed, however long it lasts: it may be a flat press of all of
+///   the field, which looks the same. Nor is anything beyond the limit. Both are told.
 ///
 /// What it can lose is therefore a press that covers the field evenly: kStep (8 µm) at once, and up
 /// to the limit (0.1 mm with the default) if it comes more slowly than the rate.
