@@ -182,6 +182,7 @@ Status to_status(const v1::Status& message) {
   status.version = message.version();
   status.uptime_s = message.uptime_s();
   status.encoded = message.encoded();
+  status.light_followed = message.light_followed();
   const auto& usage = message.capture_thread();
   status.capture_thread = {usage.minor_faults(), usage.major_faults(), usage.waits(),
                            usage.preemptions()};

@@ -197,6 +197,7 @@ struct Status {
   std::string version;
   double uptime_s = 0;
   std::uint64_t encoded = 0;  ///< Frame messages, however many clients each went to.
+  double light_followed = 0;  ///< By the reference since it was taken: a share, negative = dimmer.
   /// What the kernel counted of the capture thread since start.
   struct Usage {
     std::uint64_t minor_faults = 0;  ///< Pages mapped without reading from a disk.

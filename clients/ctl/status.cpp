@@ -58,6 +58,9 @@ void print(const Status& status, std::ostream& out) {
   if (!status.ring.message.empty()) fmt::print(out, "             {}\n", status.ring.message);
   fmt::print(out, "light        {}\n", text_of(status.light));
   print_calibration(status, out);
+  if (status.light_followed != 0) {
+    fmt::print(out, "reference    follows the light by {:+.2f} %\n", 100 * status.light_followed);
+  }
   fmt::print(out, "frames       {} published, {} skipped, {} encoded, {:.1f} fps\n", status.frames,
              status.skipped, status.encoded, status.fps);
   for (const auto& stage : status.stages) {
@@ -121,6 +124,7 @@ std::string as_json(const Status& status) {
   add_light(status.light, json);
   add_calibration_summary(status, json);
   json.member("frames", status.frames).member("skipped", status.skipped).member("fps", status.fps);
+  json.member("light_followed", status.light_followed);
   json.member("realtime_refused", status.realtime_refused).key("stages").open('[');
   for (const auto& stage : status.stages) {
     json.open('{').member("name", stage.name).member("p50_us", stage.p50_us);

@@ -294,6 +294,10 @@ std::vector<Key> bind_keys(Config& c) {
       real("reference.settle_grey", p.reference.settle_grey, 0.01, 16, "(grey levels)"),
       integer("reference.patience_frames", p.reference.patience_frames, 10, 100000, "(frames)"),
 
+      real("reference.drift_limit_percent", p.drift.limit_percent, 0, 5, "(percent; 0 = off)"),
+      real("reference.drift_percent_per_minute", p.drift.percent_per_minute, 0.01, 60,
+           "(percent a minute)"),
+
       real("contact.made_mm", p.contact.made_mm, 0.005, 5, "(millimetres)"),
       real("contact.lost_mm", p.contact.lost_mm, 0.001, 5, "(millimetres)"),
       real("contact.area_mm2", p.contact.area_mm2, 0, 1000, "(square millimetres)"),

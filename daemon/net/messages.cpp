@@ -193,6 +193,7 @@ void fill(const pipeline::Status& status, v1::Status& out) {
   out.set_fps(status.fps);
   for (const auto& refused : status.realtime) out.add_realtime_refused(refused);
   for (const auto& stage : status.stages) fill(stage, *out.add_stages());
+  out.set_light_followed(status.light_followed);
   auto& usage = *out.mutable_capture_thread();
   usage.set_minor_faults(status.capture_thread.minor_faults);
   usage.set_major_faults(status.capture_thread.major_faults);

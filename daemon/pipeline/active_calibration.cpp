@@ -103,10 +103,26 @@ double ActiveCalibration::list_um(double depth_mm) const noexcept {
                    (depth_mm - below->depth_mm) / (above->depth_mm - below->depth_mm));
 }
 
+double ActiveCalibration::light_um(double share) const noexcept {
+  const recon::DepthList& list = calibration->model->list;
+  // The list's slope over the darkening of a light press; 20 grey levels are about 0.6 mm.
+  constexpr int kLevels = 20;
+  const auto at = [&](int level) {
+    const int last = static_cast<int>(list.um.size()) - 1;
+    const int i = std::clamp(level * recon::kEntriesPerLevel - list.first_q6, 0, last);
+    return static_cast<double>(list.um[static_cast<std::size_t>(i)]);
+  };
+  return std::abs(share) * grid.mean * (at(kLevels) - at(0)) / kLevels;
+}
+
 void ActiveCalibration::set_reference(std::span<const std::uint16_t> reference_q8) noexcept {
   for (recon::Reconstructor& reconstructor : reconstructors) {
     reconstructor.set_reference(reference_q8);
   }
+}
+
+void ActiveCalibration::set_light(double factor) noexcept {
+  for (recon::Reconstructor& reconstructor : reconstructors) reconstructor.set_light(factor);
 }
 
 void ActiveCalibration::use_decimation(int decimation) noexcept {

@@ -33,7 +33,12 @@ struct ActiveCalibration {
   /// What the list is uncertain by at an indentation, micrometres: as the calibration says, else
   /// kUnstatedListUm.
   [[nodiscard]] double list_um(double depth_mm) const noexcept;
+  /// What a light that differs from the reference's by `share` adds to or takes off every
+  /// indentation, micrometres.
+  [[nodiscard]] double light_um(double share) const noexcept;
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+  /// The light is the reference's times `factor`.
+  void set_light(double factor) noexcept;
   /// From the next frame on the map has 1/`decimation` of the resolution, where there is one such.
   void use_decimation(int decimation) noexcept;
 };

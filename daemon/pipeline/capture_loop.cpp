@@ -45,6 +45,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       contact_(config.contact),
       chooser_(config.reconstruction.max_error_um),
       watch_(period_ns_),
+      follower_(config.drift),
       timeline_(config.light, camera_.info().light_delay_frames, period_ns_),
       teller_(exchange_),
       whole_{0, 0, camera_.info().width, camera_.info().height},
@@ -205,7 +206,10 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
   recon::ActivityReport activity;
   const hal::LumaView& luma = frame_.luma();
   reconstructor.run_active(luma.data, luma.stride, out.depth_um, out.drawn, activity, &steps);
-  image_watch_.look(activity, luma);
+  image_watch_.look(activity, luma, follower_.factor());
+  if (keeper_.footing() == Footing::fresh) {
+    follow_due_ = follower_.look(activity, out.camera.timestamp_ns);
+  }
   out.times.activity_ns = steps.activity_ns;
   out.times.rectify_ns = steps.rectify_ns;
   out.times.smooth_ns = steps.smooth_ns;
@@ -222,6 +226,9 @@ void CaptureLoop::reconstruct(DepthFrame& out) noexcept {
 void CaptureLoop::use_reference() noexcept {
   active_->set_reference(keeper_.reference());
   const recon::Model& model = *active_->calibration->model;
+  follower_.restart(model.method == recon::Method::list);
+  follow_due_.reset();
+  exchange_.light_followed.store(0, std::memory_order_relaxed);
   const recon::RectifyTable& table = model.rectify;
   image_watch_.set_reference(keeper_.reference(), table.frame_width, table.frame_height,
                              active_->region);
@@ -237,6 +244,7 @@ void CaptureLoop::judge(DepthFrame& out) noexcept {
   // Half of the deepest is about the mean over a contact.
   double list_um = active_->list_um(0.5 * out.contact.deepest_mm);
   if (keeper_.footing() == Footing::stale) list_um = std::hypot(list_um, kStaleReferenceUm);
+  list_um = std::hypot(list_um, active_->light_um(follower_.left()));
   out.decimation = out.drawn_decimation;
   out.uncertainty_um = uncertainty_at_um(list_um, bend, out.decimation);
   if (config_.reconstruction.decimation == 0) {
@@ -272,6 +280,11 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
 }
 
 void CaptureLoop::mind_reference(bool settled) noexcept {
+  if (active_ && follow_due_) {
+    active_->set_light(*follow_due_);
+    exchange_.light_followed.store(*follow_due_ - 1, std::memory_order_relaxed);
+    follow_due_.reset();
+  }
   if (!active_ || !settled || (keeper_.looks() && area_ != whole_)) return;
   const KeeperStep step = keeper_.step(frame_.luma());
   if (step.reference_changed) {
@@ -353,6 +366,7 @@ HealthSet CaptureLoop::health(bool settled, std::int64_t now_ns) const noexcept 
   set.set(Health::camera_trouble, watch_.trouble());
   set.set(Health::ring_trouble, light_.trouble());
   set.add(image_watch_.conditions());
+  if (follower_.drifted()) set.set(Health::light_drifted);
   set.set(Health::not_realtime, exchange_.not_realtime.load(std::memory_order_relaxed));
   return set;
 }

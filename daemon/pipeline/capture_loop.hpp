@@ -9,6 +9,7 @@
 #include "daemon/pipeline/exchange.hpp"
 #include "daemon/pipeline/image_watch.hpp"
 #include "daemon/pipeline/light_driver.hpp"
+#include "daemon/pipeline/light_follower.hpp"
 #include "daemon/pipeline/light_timeline.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/pipeline/reference_keeper.hpp"
@@ -82,6 +83,7 @@ class CaptureLoop {
   ResolutionChooser chooser_;
   CameraWatch watch_;
   ImageWatch image_watch_;
+  LightFollower follower_;
   LightTimeline timeline_;
   Teller teller_;
   hal::Frame frame_;
@@ -94,6 +96,7 @@ class CaptureLoop {
   bool beyond_ = false;          // in the newest frame
   bool controls_moved_ = false;  // as the newest frame says
   std::int64_t beyond_until_ns_ = INT64_MIN;
+  std::optional<double> follow_due_;     // the light's factor waits to be applied
   bool keep_due_ = false;                // the reference in use waits to be written
   std::optional<std::uint64_t> rezero_;  // ticket of the one under way
 };

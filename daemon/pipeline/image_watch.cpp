@@ -16,6 +16,8 @@ constexpr int kActiveShare = 4;
 constexpr int kCheckEvery = 16;
 /// Grey levels. Noise makes 0.05, a press in motion up to 0.3 for as long as it moves.
 constexpr double kRipple = 0.5;
+/// The same of fine bands, of which smoothing leaves less: noise makes 0.07, 4 are bands of 0.7 %.
+constexpr double kFineRipple = 4;
 /// A press that comes down at once ripples in one or two frames.
 constexpr int kBandedFrames = 6;
 constexpr int kBandedMost = 12;
@@ -45,10 +47,12 @@ void ImageWatch::forget() noexcept {
   conditions_ = {};
 }
 
-void ImageWatch::look(const recon::ActivityReport& report, const hal::LumaView& luma) noexcept {
+void ImageWatch::look(const recon::ActivityReport& report, const hal::LumaView& luma,
+                      double light) noexcept {
   if (report.cells == 0) return;
-  compare_light(report, luma);
-  banded_ = std::clamp(banded_ + (report.ripple > kRipple ? 1 : -1), 0, kBandedMost);
+  compare_light(report, luma, light);
+  const bool bands = report.ripple > kRipple || report.fine_ripple > kFineRipple;
+  banded_ = std::clamp(banded_ + (bands ? 1 : -1), 0, kBandedMost);
   conditions_.set(Health::light_drifted, drifted_);
   conditions_.set(Health::light_banded, banded_ >= kBandedFrames);
   conditions_.set(Health::image_saturated, report.saturated * kSaturatedShare > report.pixels);
@@ -57,8 +61,8 @@ void ImageWatch::look(const recon::ActivityReport& report, const hal::LumaView& 
   conditions_.set(Health::image_repeated, report.unchanged_rows >= kUnchangedRows);
 }
 
-void ImageWatch::compare_light(const recon::ActivityReport& report,
-                               const hal::LumaView& luma) noexcept {
+void ImageWatch::compare_light(const recon::ActivityReport& report, const hal::LumaView& luma,
+                               double light) noexcept {
   if (!have_reference_ || report.active_cells * kActiveShare < report.cells) {
     drifted_ = false;
     until_check_ = 0;
@@ -72,7 +76,7 @@ void ImageWatch::compare_light(const recon::ActivityReport& report,
   int cells = 0;
   for (int y = region_.y0; y < region_.y1; ++y) {
     for (int x = region_.x0; x < region_.x1; ++x) {
-      change += std::abs(field_[cell_at(x, y)] - 1);
+      change += std::abs(field_[cell_at(x, y)] / light - 1);
       ++cells;
     }
   }

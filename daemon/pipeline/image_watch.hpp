@@ -20,8 +20,9 @@ class ImageWatch {
   void set_reference(std::span<const std::uint16_t> reference_q8, int width, int height,
                      const CellRegion& region) noexcept;
   /// The next frame. Cheap, but for every sixteenth one while a quarter of the picture is active:
-  /// then the light is compared, in up to half a millisecond.
-  void look(const recon::ActivityReport& report, const hal::LumaView& luma) noexcept;
+  /// then the light is compared, in up to half a millisecond. `light`: the factor on the reference
+  /// that is followed.
+  void look(const recon::ActivityReport& report, const hal::LumaView& luma, double light) noexcept;
   /// No depth is measured at present, so nothing is said about it.
   void forget() noexcept;
 
@@ -30,7 +31,8 @@ class ImageWatch {
   [[nodiscard]] const HealthSet& conditions() const noexcept { return conditions_; }
 
  private:
-  void compare_light(const recon::ActivityReport& report, const hal::LumaView& luma) noexcept;
+  void compare_light(const recon::ActivityReport& report, const hal::LumaView& luma,
+                     double light) noexcept;
 
   TouchCheck check_;
   CellRegion region_;

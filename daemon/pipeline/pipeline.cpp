@@ -211,6 +211,7 @@ Status Pipeline::status() const {
   status.realtime = realtime_;
   status.stages = exchange_.statistics.stages();
   status.capture_thread = exchange_.statistics.usage();
+  status.light_followed = exchange_.light_followed.load(std::memory_order_relaxed);
   status.storage_message = writer_.message();
   if (status.storage_message.empty()) status.storage_message = restore_failure_;
   return status;

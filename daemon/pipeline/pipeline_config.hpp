@@ -23,6 +23,12 @@ struct ReconstructionRules {
   double max_error_um = 50;
 };
 
+/// How far the reference follows the light as a whole (light_follower.hpp).
+struct DriftRules {
+  double limit_percent = 2;       ///< At most so far from the reference as it was taken; 0 = never.
+  double percent_per_minute = 2;  ///< At most so fast.
+};
+
 /// How the untouched image is taken.
 struct ReferenceRules {
   int frames = 32;            ///< Averaged into one reference, 1 … 256.
@@ -39,6 +45,7 @@ struct PipelineConfig {
   hal::Light light;         ///< What the ring shows at start.
   ContactRules contact;
   ReferenceRules reference;
+  DriftRules drift;
   ReconstructionRules reconstruction;
   /// More of the calibration's pixels than this beyond the list: Health::beyond_calibration.
   int beyond_pixels = 64;

@@ -95,6 +95,8 @@ struct Status {
   double fps = 0;                     ///< Over the last second.
   std::vector<std::string> realtime;  ///< One sentence for each real-time setting refused.
   std::vector<StageStatistics> stages;
+  /// How far the reference follows the light since it was taken: a share, negative = dimmer.
+  double light_followed = 0;
   ThreadUsage capture_thread;  ///< Renewed once a second.
   /// Why the calibration or the last good reference could not be used or kept, and what to do;
   /// empty when all is well.

@@ -21,6 +21,24 @@ constexpr double kNoiseWeight = 1.0 / 64;
 /// Standard deviation over mean magnitude of a Gaussian's difference of two draws: √(π/2)/√2.
 constexpr double kFromDifference = 0.8862;
 
+/// Root mean square of the second difference of the values that are added one after the other.
+class Ripple {
+ public:
+  void add(double value) noexcept {
+    last_ = {value, last_[0], last_[1]};
+    const double bend = last_[0] - 2 * last_[1] + last_[2];
+    if (++count_ > 2) squares_ += bend * bend;
+  }
+  [[nodiscard]] double root_mean_square() const noexcept {
+    return std::sqrt(squares_ / std::max(1, count_ - 2));
+  }
+
+ private:
+  std::array<double, 3> last_{};
+  double squares_ = 0;
+  int count_ = 0;
+};
+
 std::int32_t q16(double levels) { return static_cast<std::int32_t>(std::lround(levels * kQ16)); }
 
 }  // namespace
@@ -50,7 +68,8 @@ Activity::Activity(const RectifyTable& table, int radius, const ActivitySettings
   stride_ = vec::padded_cells(columns_);
   const std::size_t cells = at(0, rows_);
   margin_ = static_cast<std::size_t>(stride_) + vec::kCellBlock;
-  for (auto* plane : {&reference_, &drift_, &expected_, &sum_, &sum_before_, &rough_, &cell_}) {
+  for (auto* plane : {&taken_, &reference_, &drift_, &expected_, &sum_, &sum_before_, &upper_,
+                      &upper_before_, &rough_, &cell_}) {
     plane->resize(cells);
   }
   for (auto* plane : {&change_, &window_, &active_}) plane->resize(cells + 2 * margin_);
@@ -74,6 +93,8 @@ void Activity::follow(const Activity& other) noexcept {
   expected_ = other.expected_;
   sum_ = other.sum_;
   sum_before_ = other.sum_before_;
+  upper_ = other.upper_;
+  upper_before_ = other.upper_before_;
   cell_ = other.cell_;
   window_ = other.window_;
   active_ = other.active_;
@@ -134,14 +155,24 @@ void Activity::set_reference(std::span<const std::uint16_t> reference_q8) noexce
             kCell);
         sum = std::accumulate(line.begin(), line.end(), sum);
       }
-      reference_[at(column, row)] = sum * (256 / vec::kCellPixels);  // Q8 to a mean in Q16
+      taken_[at(column, row)] = sum * (256 / vec::kCellPixels);  // Q8 to a mean in Q16
     }
   }
-  expected_ = reference_;
   for (auto* plane : {&drift_, &cell_, &window_, &active_}) std::ranges::fill(*plane, 0);
   mean_drift_ = 0;
   active_cells_ = 0;
   frames_ = 0;
+  set_light(1);
+}
+
+void Activity::set_light(double factor) noexcept {
+  double sum = 0;
+  for (std::size_t i = 0; i < taken_.size(); ++i) {
+    reference_[i] = static_cast<std::int32_t>(std::lround(factor * taken_[i]));
+    expected_[i] = reference_[i] + drift_[i];
+    sum += reference_[i];
+  }
+  mean_reference_ = sum / kQ16 / std::max(1, columns_ * rows_);
 }
 
 vec::ChangeLimits Activity::limits() const noexcept {
@@ -157,16 +188,17 @@ vec::ChangeLimits Activity::limits() const noexcept {
 void Activity::sum(const std::uint8_t* luma, std::ptrdiff_t stride,
                    vec::CellCounts& counts) noexcept {
   std::swap(sum_, sum_before_);
+  std::swap(upper_, upper_before_);
   const bool overlap = x_ + columns_ * kCell > frame_width_;
   for (int row = 0; row < rows_; ++row) {
     const std::uint8_t* const from = luma + y_of(row) * stride;
     const std::size_t i = at(0, row);
     vec::sum_cells(from + x_, stride, overlap ? columns_ - 1 : columns_, settings_.limits, &sum_[i],
-                   &rough_[i], counts);
+                   &upper_[i], &rough_[i], counts);
     if (overlap) {
       const std::size_t last = at(columns_ - 1, row);
       vec::sum_cells(from + x_of(columns_ - 1), stride, 1, settings_.limits, &sum_[last],
-                     &rough_[last], counts);
+                     &upper_[last], &rough_[last], counts);
     }
   }
 }
@@ -237,24 +269,58 @@ void Activity::follow_drift() noexcept {
   mean_drift_ = static_cast<double>(total) / cells / kQ16;
 }
 
+void Activity::compare_light(const vec::ChangeLimits& limits, bool all_quiet,
+                             ActivityReport& report) const noexcept {
+  const int cells = columns_ * rows_;
+  double change = report.quiet_change;  // levels
+  if (!all_quiet) {
+    // A light that changed enough to make any cell active makes most of them active.
+    if (active_cells_ > 0 && 2 * active_cells_ < cells) return;
+    std::int64_t total = 0;
+    for (int row = 0; row < rows_; ++row) {
+      const std::int32_t* const from = &change_[margin_ + at(0, row)];
+      total = std::accumulate(from, from + columns_, total);
+    }
+    change = static_cast<double>(total) / kQ16 / cells;
+    const auto factor = static_cast<float>(change / (mean_reference_ + mean_drift_));
+    const auto most = static_cast<float>(limits.cell_on);
+    int unlike = 0;
+    for (int row = 0; row < rows_; ++row) {
+      const std::int32_t* const changes = &change_[margin_ + at(0, row)];
+      const std::int32_t* const expected = &expected_[at(0, row)];
+      for (int i = 0; i < columns_; ++i) {
+        const float left =
+            static_cast<float>(changes[i]) - factor * static_cast<float>(expected[i]);
+        unlike += static_cast<int>(std::abs(left) > most);
+      }
+    }
+    if (unlike > 0) return;
+  }
+  report.light_alone = mean_reference_ > 0;
+  if (report.light_alone) report.light_change = (change + mean_drift_) / mean_reference_;
+}
+
 void Activity::compare_with_before(ActivityReport& report) const noexcept {
-  // A row's mean change, of this row and the two above.
-  std::array<double, 3> change{};
-  double squares = 0;
+  Ripple ripple;
+  Ripple fine;
   std::int64_t rough = 0;
   const std::int32_t darkest = settings_.limits.dark * vec::kCellPixels;
   const std::int32_t brightest = settings_.limits.saturated * vec::kCellPixels;
   for (int row = 0; row < rows_; ++row) {
     const std::int32_t* const now = &sum_[at(0, row)];
     const std::int32_t* const before = &sum_before_[at(0, row)];
+    const std::int32_t* const upper_now = &upper_[at(0, row)];
+    const std::int32_t* const upper_before = &upper_before_[at(0, row)];
     const std::int32_t* const roughness = &rough_[at(0, row)];
     // Sums over one row fit 32 bits, which the compiler turns into vector code.
     std::int32_t step = 0;
+    std::int32_t upper_step = 0;
     std::int32_t rough_row = 0;
     std::int32_t changed = 0;
     std::int32_t open = 0;  // cells that are not clipped
     for (int i = 0; i < columns_; ++i) {
       step += now[i] - before[i];
+      upper_step += upper_now[i] - upper_before[i];
       rough_row += roughness[i];
       changed |= now[i] ^ before[i];
       open += static_cast<std::int32_t>(now[i] > darkest) &
@@ -262,12 +328,13 @@ void Activity::compare_with_before(ActivityReport& report) const noexcept {
     }
     rough += rough_row;
     report.unchanged_rows += changed == 0 && 2 * open > columns_ ? 1 : 0;
-    change = {static_cast<double>(step), change[0], change[1]};
-    const double bend = change[0] - 2 * change[1] + change[2];
-    if (row >= 2) squares += bend * bend;
+    ripple.add(step);
+    fine.add(upper_step);
+    fine.add(step - upper_step);
   }
-  report.ripple = std::sqrt(squares / std::max(1, rows_ - 2)) /
-                  (static_cast<double>(columns_) * vec::kCellPixels);
+  const double pixels = static_cast<double>(columns_) * vec::kCellPixels;
+  report.ripple = ripple.root_mean_square() / pixels;
+  report.fine_ripple = fine.root_mean_square() / (pixels / 2);
   report.rough_noise =
       kFromDifference * static_cast<double>(rough) / (columns_ * rows_) / vec::kRoughPixels;
 }
@@ -283,12 +350,13 @@ const TileRows& Activity::look(const std::uint8_t* luma, std::ptrdiff_t stride,
   sum(luma, stride, counts);
   const int cells = columns_ * rows_;
   const int quiet = cells - active_cells_;
+  const vec::ChangeLimits change_limits = limits();
   const vec::CellTotals totals = vec::compare_cells(
       {stride_, rows_, columns_ - (x_of(columns_ - 1) < x_ + (columns_ - 1) * kCell ? 2 : 1),
        rows_ - (y_of(rows_ - 1) < y_ + (rows_ - 1) * kCell ? 2 : 1), sum_.data(),
        sum_before_.data(), rough_.data(), expected_.data(), change_.data() + margin_, cell_.data(),
        window_.data() + margin_, active_.data() + margin_},
-      limits());
+      change_limits);
   active_cells_ = totals.active;
   mark();
   const auto mean = [quiet](std::int64_t total) {
@@ -306,6 +374,7 @@ const TileRows& Activity::look(const std::uint8_t* luma, std::ptrdiff_t stride,
   report.cell_noise = noise_;
   report.quiet_change = mean(totals.quiet_change) / 256;
   report.drift = mean_drift_;
+  compare_light(change_limits, quiet == cells && active_cells_ == 0, report);
   report.pixels = std::int64_t{cells} * vec::kCellPixels;
   report.saturated = counts.saturated;
   report.dark = counts.dark;

@@ -42,6 +42,11 @@ struct ActivityReport {
   double cell_noise = 0;    ///< Of a quiet cell's mean, from frame to frame, slowly averaged.
   double quiet_change = 0;  ///< Frame − untouched image (drift followed), mean of quiet cells.
   double drift = 0;         ///< Mean of what was followed since the reference was set.
+  /// The one factor that brings the reference (set_light() included) to this frame, less one, if
+  /// `light_alone`: it leaves no cell active, so nothing but the light changed, or all of the field
+  /// is pressed alike. Else 0.
+  double light_change = 0;
+  bool light_alone = false;
   std::int64_t pixels = 0;
   std::int64_t saturated = 0;  ///< Pixels at least as bright as CellLimits::saturated.
   std::int64_t dark = 0;       ///< Pixels at most as bright as CellLimits::dark.
@@ -53,6 +58,8 @@ struct ActivityReport {
   /// How unevenly the rows of cells changed since the frame before: root mean square of the second
   /// difference, along the columns, of each row's mean change. Bands that wander, not a press.
   double ripple = 0;
+  /// The same of half rows of cells: bands too fine for whole ones, down to about twelve pixels.
+  double fine_ripple = 0;
   int cells = 0;
   int active_cells = 0;
   int tiles = 0;  ///< Of the depth map.
@@ -69,6 +76,9 @@ class Activity {
 
   /// The untouched image: frame sized, Q8, row-major without padding. Forgets drift and activity.
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+
+  /// The light has changed by a factor since set_reference(); replaces an earlier one.
+  void set_light(double factor) noexcept;
 
   /// Goes on where `other` is, when both look at the same cells.
   void follow(const Activity& other) noexcept;
@@ -101,6 +111,10 @@ class Activity {
   [[nodiscard]] bool touched(int column, int row) const noexcept;
   void mark() noexcept;
   void follow_drift() noexcept;
+  /// Fills in what a change of the light alone would be. `all_quiet`: no cell is active, nor was in
+  /// the frame before, so that report.quiet_change is the mean of all.
+  void compare_light(const vec::ChangeLimits& limits, bool all_quiet,
+                     ActivityReport& report) const noexcept;
   /// Fills in what the comparison with the frame before tells.
   void compare_with_before(ActivityReport& report) const noexcept;
 
@@ -117,11 +131,14 @@ class Activity {
   // Planes of cells, as vec::CellPlanes has them; grey levels in Q16. The first plane's values
   // begin at `margin_` where there is one.
   std::size_t margin_ = 0;
-  std::vector<std::int32_t> reference_;
+  std::vector<std::int32_t> taken_;      ///< The reference as it was set …
+  std::vector<std::int32_t> reference_;  ///< … and in the present light.
   std::vector<std::int32_t> drift_;
   std::vector<std::int32_t> expected_;  ///< reference_ + drift_
   std::vector<std::int32_t> sum_;
   std::vector<std::int32_t> sum_before_;
+  std::vector<std::int32_t> upper_;  ///< Sums over the upper halves.
+  std::vector<std::int32_t> upper_before_;
   std::vector<std::int32_t> rough_;
   std::vector<std::int32_t> change_;
   std::vector<std::int32_t> cell_;
@@ -130,6 +147,7 @@ class Activity {
   TileRows tiles_;
   double noise_ = 0;       ///< Of a cell's mean, levels.
   double mean_drift_ = 0;  ///< Levels.
+  double mean_reference_ = 0;
   int active_cells_ = 0;
   std::uint64_t frames_ = 0;  ///< Since the reference was set.
 };

@@ -14,11 +14,12 @@ namespace hn = hwy::HWY_NAMESPACE;
 #if HWY_TARGET == HWY_SCALAR
 
 void SumCells(const uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits limits,
-              int32_t* sum, int32_t* rough, CellCounts& counts) {
+              int32_t* sum, int32_t* upper, int32_t* rough, CellCounts& counts) {
   for (int cell = 0; cell < cells; ++cell) {
     sum[cell] = 0;
     rough[cell] = 0;
     for (int y = 0; y < kCell; y += kRowStep) {
+      if (y == kCell / 2) upper[cell] = sum[cell];
       const uint8_t* row = luma + y * stride + cell * kCell;
       for (int x = 0; x < kCell; ++x) {
         sum[cell] += row[x];
@@ -51,16 +52,18 @@ HWY_NOINLINE void CountPixels(const uint8_t* luma, std::ptrdiff_t stride, size_t
 /// As many cells as `d8` has room for.
 template <class D8>
 HWY_INLINE void SumVector(D8 d8, const uint8_t* luma, std::ptrdiff_t stride, CellLimits limits,
-                          int32_t* sum, int32_t* rough, CellCounts& counts) {
+                          int32_t* sum, int32_t* upper, int32_t* rough, CellCounts& counts) {
   const hn::Repartition<uint64_t, D8> d64;
   constexpr size_t kCells = hn::MaxLanes(D8()) / kCell;
   auto sums = hn::Zero(d64);
+  auto uppers = hn::Zero(d64);
   auto steps = hn::Zero(d64);
   auto brightest = hn::Zero(d8);
   auto darkest = hn::Set(d8, 255);
   auto before = hn::Zero(d8);
   for (int y = 0; y < kCell; y += kRowStep) {
     const auto row = hn::LoadU(d8, luma + y * stride);
+    if (y == kCell / 2) uppers = sums;
     sums = hn::Add(sums, hn::SumsOf8(row));
     brightest = hn::Max(brightest, row);
     darkest = hn::Min(darkest, row);
@@ -70,13 +73,16 @@ HWY_INLINE void SumVector(D8 d8, const uint8_t* luma, std::ptrdiff_t stride, Cel
     }
     before = row;
   }
-  HWY_ALIGN uint64_t halves[4 * kCells];
-  hn::Store(sums, d64, halves);
-  hn::Store(steps, d64, halves + 2 * kCells);
-  for (size_t i = 0; i < kCells; ++i) {
-    sum[i] = static_cast<int32_t>(halves[2 * i] + halves[2 * i + 1]);
-    rough[i] = static_cast<int32_t>(halves[2 * (kCells + i)] + halves[2 * (kCells + i) + 1]);
-  }
+  HWY_ALIGN uint64_t halves[2 * kCells];
+  const auto store = [&](auto eights, int32_t* out) HWY_ATTR {
+    hn::Store(eights, d64, halves);
+    for (size_t i = 0; i < kCells; ++i) {
+      out[i] = static_cast<int32_t>(halves[2 * i] + halves[2 * i + 1]);
+    }
+  };
+  store(sums, sum);
+  store(uppers, upper);
+  store(steps, rough);
   const auto bright = hn::Max(brightest, hn::Set(d8, limits.saturated));
   const auto dark = hn::Min(darkest, hn::Set(d8, limits.dark));
   if (HWY_UNLIKELY(!hn::AllFalse(d8, hn::Or(hn::Eq(bright, brightest), hn::Eq(dark, darkest))))) {
@@ -85,18 +91,18 @@ HWY_INLINE void SumVector(D8 d8, const uint8_t* luma, std::ptrdiff_t stride, Cel
 }
 
 void SumCells(const uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits limits,
-              int32_t* sum, int32_t* rough, CellCounts& counts) {
+              int32_t* sum, int32_t* upper, int32_t* rough, CellCounts& counts) {
   const hn::ScalableTag<uint8_t> wide;
   const hn::CappedTag<uint8_t, kCell> narrow;
   constexpr int kWide = static_cast<int>(hn::MaxLanes(wide) / kCell);
   int cell = 0;
   for (; cell + kWide <= cells; cell += kWide) {
-    SumVector(wide, luma + std::ptrdiff_t{cell} * kCell, stride, limits, sum + cell, rough + cell,
-              counts);
+    SumVector(wide, luma + std::ptrdiff_t{cell} * kCell, stride, limits, sum + cell, upper + cell,
+              rough + cell, counts);
   }
   for (; cell < cells; ++cell) {
-    SumVector(narrow, luma + std::ptrdiff_t{cell} * kCell, stride, limits, sum + cell, rough + cell,
-              counts);
+    SumVector(narrow, luma + std::ptrdiff_t{cell} * kCell, stride, limits, sum + cell, upper + cell,
+              rough + cell, counts);
   }
 }
 
@@ -184,8 +190,9 @@ HWY_EXPORT(SumCells);
 HWY_EXPORT(CompareCells);
 
 void sum_cells(const std::uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits limits,
-               std::int32_t* sum, std::int32_t* rough, CellCounts& counts) noexcept {
-  HWY_DYNAMIC_DISPATCH(SumCells)(luma, stride, cells, limits, sum, rough, counts);
+               std::int32_t* sum, std::int32_t* upper, std::int32_t* rough,
+               CellCounts& counts) noexcept {
+  HWY_DYNAMIC_DISPATCH(SumCells)(luma, stride, cells, limits, sum, upper, rough, counts);
 }
 
 CellTotals compare_cells(const CellPlanes& planes, const ChangeLimits& limits) noexcept {

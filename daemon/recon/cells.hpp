@@ -25,11 +25,12 @@ struct CellCounts {
 };
 
 /// One row of `cells` cells that lie side by side from `luma` on, rows `stride` bytes apart.
-/// sum[i]: grey levels of cell i added up. rough[i]: |difference| of its rows 0 and 2 plus that of
-/// its rows 8 and 10, added up over kRoughPixels pairs of pixels; for white noise the mean is
-/// 1.128 standard deviations.
+/// sum[i]: grey levels of cell i added up; upper[i]: those of its upper half. rough[i]:
+/// |difference| of its rows 0 and 2 plus that of its rows 8 and 10, added up over kRoughPixels
+/// pairs of pixels; for white noise the mean is 1.128 standard deviations.
 void sum_cells(const std::uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits limits,
-               std::int32_t* sum, std::int32_t* rough, CellCounts& counts) noexcept;
+               std::int32_t* sum, std::int32_t* upper, std::int32_t* rough,
+               CellCounts& counts) noexcept;
 
 /// Rows of cells are stored in multiples of this, with at least one cell of zeros at the end.
 inline constexpr int kCellBlock = 16;

@@ -162,4 +162,14 @@ void gain_row(const std::int16_t* calibration_q6, const std::int16_t* now_q6, in
   }
 }
 
+void scale_row(const std::int16_t* row, std::int32_t factor_q15, int width,
+               std::int16_t* out) noexcept {
+  // What it changes by: a 16 × 16 → 32 bit product, which every vector unit has.
+  const auto change = static_cast<std::int16_t>(factor_q15 - kFactorOne);
+  for (int x = 0; x < width; ++x) {
+    const std::int32_t scaled = row[x] + round_shift<15>(row[x] * change);
+    out[x] = static_cast<std::int16_t>(scaled < INT16_MAX ? scaled : INT16_MAX);
+  }
+}
+
 }  // namespace dtact::recon::kernels

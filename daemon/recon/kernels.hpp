@@ -84,6 +84,13 @@ void mask_row(const std::uint8_t* untrusted, int width, std::int16_t* depth_um) 
 void gain_row(const std::int16_t* calibration_q6, const std::int16_t* now_q6, int width,
               std::int16_t* gain_q12, std::uint8_t* untrusted) noexcept;
 
+/// out = row × factor, rounded half up, saturated to int16: a reference under light that has
+/// changed by a factor, or a gain under its reciprocal. `factor_q15`: 0 … 65535, kFactorOne is one;
+/// row ≥ 0.
+void scale_row(const std::int16_t* row, std::int32_t factor_q15, int width,
+               std::int16_t* out) noexcept;
+inline constexpr std::int32_t kFactorOne = 1 << 15;
+
 /// Eight grey levels. The response scales with the light: where an untouched pixel at 160 levels
 /// darkens by 31 levels a millimetre, one at 8 darkens by less than two, which is noise.
 inline constexpr int kDarkest_q6 = 8 * 64;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -86,6 +87,7 @@ struct Reconstructor::Impl {
   void rectify_reference(std::span<const std::uint16_t> reference_q8) noexcept;
   void smooth_reference(std::span<std::int16_t> smoothed) noexcept;
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+  void set_light(double factor) noexcept;
   void run_list(const std::uint8_t* luma, const TileRows& tiles, std::int16_t* depth,
                 StepTimes& times, Stopwatch& watch) noexcept;
   void clear_rest(const TileRows& tiles, DrawnTiles& drawn, std::int16_t* depth) const noexcept;
@@ -107,8 +109,11 @@ struct Reconstructor::Impl {
   std::vector<std::int16_t> lookup;  ///< The list as the kernel reads it.
   kernels::LookUp list;
   std::vector<std::int16_t> calibration_q6;  ///< Smoothed reference of the calibration.
-  std::vector<std::int16_t> reference_q6;    ///< Present reference.
-  std::vector<std::int16_t> gain_q12;        ///< 0 where untrusted.
+  // The reference as it was taken and its gain, 0 where untrusted; and both in the present light.
+  std::vector<std::int16_t> taken_q6;
+  std::vector<std::int16_t> taken_gain_q12;
+  std::vector<std::int16_t> reference_q6;
+  std::vector<std::int16_t> gain_q12;
   std::vector<std::uint8_t> untrusted;
   std::uint64_t rest = 0;  ///< Counts the references: each has its own untouched map.
   int beyond = 0;
@@ -147,6 +152,8 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, const Activity
       out(2 * kStrip, grid.width),
       lookup(model->list.um),
       calibration_q6(at(grid.height)),
+      taken_q6(at(grid.height)),
+      taken_gain_q12(at(grid.height)),
       reference_q6(at(grid.height)),
       gain_q12(at(grid.height)),
       untrusted(at(grid.height)) {
@@ -180,7 +187,7 @@ void Reconstructor::Impl::rectify_reference(std::span<const std::uint16_t> refer
       rows[static_cast<std::size_t>(k)] = fine.row(k);
     }
     kernels::average_reference_row(rows.data(), table.decimation, grid.width,
-                                   reference_q6.data() + at(y));
+                                   taken_q6.data() + at(y));
   }
 }
 
@@ -192,8 +199,8 @@ void Reconstructor::Impl::smooth_reference(std::span<std::int16_t> smoothed) noe
   int pushed = 0;
   for (int pair = 0; pair < smoother.pairs(); ++pair) {
     for (; pushed < std::min(smoother.pairs(), pair + smoother.reach() + 1); ++pushed) {
-      copy_row(reference_q6.data() + at(2 * pushed), in.row(0));
-      copy_row(reference_q6.data() + at(std::min(2 * pushed + 1, grid.height - 1)), in.row(1));
+      copy_row(taken_q6.data() + at(2 * pushed), in.row(0));
+      copy_row(taken_q6.data() + at(std::min(2 * pushed + 1, grid.height - 1)), in.row(1));
       smoother.push(pushed, in.row(0), in.row(1), 0, blocks);
     }
     smoother.take(pair, out.row(0), out.row(1), 0, blocks);
@@ -207,24 +214,37 @@ void Reconstructor::Impl::set_reference(std::span<const std::uint16_t> reference
   ++rest;
   rectify_reference(reference_q8);
   // The gain's plane holds the smoothed reference until each of its rows is divided.
-  smooth_reference(gain_q12);
+  smooth_reference(taken_gain_q12);
   for (int y = 0; y < grid.height; ++y) {
     std::uint8_t* const marks = untrusted.data() + at(y);
+    std::int16_t* const gain = taken_gain_q12.data() + at(y);
     if (model->untrusted.empty()) {
       std::fill_n(marks, grid.width, std::uint8_t{0});
     } else {
       std::copy_n(model->untrusted.data() + packed(y), grid.width, marks);
     }
-    kernels::gain_row(calibration_q6.data() + at(y), gain_q12.data() + at(y), grid.width,
-                      gain_q12.data() + at(y), marks);
+    kernels::gain_row(calibration_q6.data() + at(y), gain, grid.width, gain, marks);
     for (int x = 0; x < grid.width; ++x) {
-      if (marks[x] != 0) gain_q12[at(y) + static_cast<std::size_t>(x)] = 0;
+      if (marks[x] != 0) gain[x] = 0;
     }
   }
   if (model->method == Method::published) {
     // The published method subtracts 8-bit images.
-    for (std::int16_t& q6 : reference_q6) q6 = static_cast<std::int16_t>((q6 + 32) / 64 * 64);
+    for (std::int16_t& q6 : taken_q6) q6 = static_cast<std::int16_t>((q6 + 32) / 64 * 64);
   }
+  std::ranges::copy(taken_q6, reference_q6.begin());
+  std::ranges::copy(taken_gain_q12, gain_q12.begin());
+}
+
+void Reconstructor::Impl::set_light(double factor) noexcept {
+  if (model->method == Method::published) return;
+  const auto q15 = [](double f) {
+    return static_cast<std::int32_t>(std::lround(f * kernels::kFactorOne));
+  };
+  const auto count = static_cast<int>(taken_q6.size());
+  kernels::scale_row(taken_q6.data(), q15(factor), count, reference_q6.data());
+  kernels::scale_row(taken_gain_q12.data(), q15(1 / factor), count, gain_q12.data());
+  activity.set_light(factor);
 }
 
 void Reconstructor::Impl::prefetch(const TileRows& tiles, int row,
@@ -411,6 +431,8 @@ int Reconstructor::beyond_pixels() const noexcept { return impl_->beyond; }
 void Reconstructor::set_reference(std::span<const std::uint16_t> reference_q8) noexcept {
   impl_->set_reference(reference_q8);
 }
+
+void Reconstructor::set_light(double factor) noexcept { impl_->set_light(factor); }
 
 void Reconstructor::follow(const Reconstructor& other) noexcept {
   impl_->activity.follow(other.impl_->activity);

@@ -44,8 +44,14 @@ class Reconstructor {
 
   /// Takes the untouched image under the present light: frame sized, Q8 luma, row-major without
   /// padding. Until then the model's own reference is used. Does not allocate, and takes about as
-  /// long as two frames: call it between frames.
+  /// long as six frames: call it between frames.
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+
+  /// The light has changed by a factor since set_reference(), 0.6 … 1.6: from now on as if the
+  /// reference had been taken in it, within one unit of Q6 (0.5 µm) and of the gain. Replaces an
+  /// earlier factor; the untouched map does not change. Method::published subtracts whole levels
+  /// and goes on as it is. Does not allocate, and takes about as long as a frame.
+  void set_light(double factor) noexcept;
 
   /// Takes over how far the untouched image was followed, and what is active, from one that worked
   /// on the frames until now: same reference, another resolution. Does nothing where the two look

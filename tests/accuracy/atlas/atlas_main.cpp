@@ -34,10 +34,10 @@ void work(Job& job) {
   try {
     const atlas::Outcome o = atlas::run(job.method->calibration, job.row->script(job.value));
     job.line = fmt::format(
-        "{},{},\"{}\",\"{}\",\"{}\",\"{}\",{},{:.5f},{:.5f},{:.5f},{:.3f},{:.3f},\"{}\"\n",
+        "{},{},\"{}\",\"{}\",\"{}\",\"{}\",{},{:.5f},{:.5f},{:.5f},{:.5f},{:.3f},{:.3f},\"{}\"\n",
         job.row->group, job.row->id, job.row->title, job.row->unit, job.row->undecidable,
-        job.method->name, job.value, o.inside_mm, o.outside_mm, o.stated_mm, o.withheld, o.flagged,
-        atlas::conditions_of(o));
+        job.method->name, job.value, o.inside_mm, o.outside_mm, o.along_mm, o.stated_mm, o.withheld,
+        o.flagged, atlas::conditions_of(o));
   } catch (...) {
     job.failure = std::current_exception();
   }
@@ -55,7 +55,8 @@ std::string all(std::vector<Job>& jobs, int threads) {
     }
   }
   std::string csv =
-      "group,row,title,unit,undecidable,method,value,inside_mm,outside_mm,stated_mm,withheld,"
+      "group,row,title,unit,undecidable,method,value,inside_mm,outside_mm,along_mm,stated_mm,"
+      "withheld,"
       "flagged,"
       "conditions\n";
   for (const Job& job : jobs) {
@@ -76,7 +77,7 @@ std::string false_flags() {
     flagged += o.flagged * o.frames;
     conditions += atlas::conditions_of(o);
   }
-  return fmt::format("clean,clean,,,,,{},{:.5f},,,,,\"{}\"\n", frames, flagged / frames,
+  return fmt::format("clean,clean,,,,,{},{:.5f},,,,,,\"{}\"\n", frames, flagged / frames,
                      conditions);
 }
 

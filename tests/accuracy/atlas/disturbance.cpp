@@ -21,6 +21,16 @@ std::size_t index_of(int x, int y, int width) {
 
 }  // namespace
 
+Place unmoved(const Shot& shot, int x, int y, int width, int height) {
+  const double angle = shot.turn_deg * std::numbers::pi / 180;
+  const double cx = 0.5 * (width - 1);
+  const double cy = 0.5 * (height - 1);
+  const double dx = x - cx - shot.shift_px;
+  const double dy = y - cy - shot.shift_px;
+  return {cx + std::cos(angle) * dx + std::sin(angle) * dy,
+          cy + std::cos(angle) * dy - std::sin(angle) * dx};
+}
+
 Spoiler::Spoiler(std::shared_ptr<const hal::sim::Truth> truth, std::uint64_t seed)
     : renderer_(truth, truth->scene(), seed),
       seed_(seed),
@@ -37,7 +47,7 @@ Spoiler::Spoiler(std::shared_ptr<const hal::sim::Truth> truth, std::uint64_t see
 hal::LumaView Spoiler::make(const Shot& shot, std::uint64_t sequence) {
   std::swap(frame_, before_);
   light_up(shot, sequence);
-  if (shot.shift_px != 0 || shot.turn_deg != 0) warp(shot);
+  if (moved(shot)) warp(shot);
   if (shot.blur_px > 0) blur(shot.blur_px);
   expose(shot, sequence);
   if (shot.jpeg > 0) compress(shot.jpeg);
@@ -80,17 +90,11 @@ void Spoiler::light_up(const Shot& shot, std::uint64_t sequence) {
 }
 
 void Spoiler::warp(const Shot& shot) {
-  const double angle = shot.turn_deg * std::numbers::pi / 180;
-  const double c = std::cos(angle);
-  const double s = std::sin(angle);
-  const double cx = 0.5 * (width_ - 1);
-  const double cy = 0.5 * (height_ - 1);
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
-      const double dx = x - cx - shot.shift_px;
-      const double dy = y - cy - shot.shift_px;
-      const double u = std::clamp(cx + c * dx + s * dy, 0.0, width_ - 1.001);
-      const double v = std::clamp(cy + c * dy - s * dx, 0.0, height_ - 1.001);
+      const Place from = unmoved(shot, x, y, width_, height_);
+      const double u = std::clamp(from.x, 0.0, width_ - 1.001);
+      const double v = std::clamp(from.y, 0.0, height_ - 1.001);
       const int left = static_cast<int>(u);
       const int top = static_cast<int>(v);
       const auto fx = static_cast<float>(u - left);

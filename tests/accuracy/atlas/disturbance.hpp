@@ -33,6 +33,16 @@ struct Shot {
   bool damaged = false;    ///< The payload is truncated: no frame.
 };
 
+/// Where in the camera's picture of a still sensor the pixel (x, y) of a moved camera's lies.
+struct Place {
+  double x = 0;
+  double y = 0;
+};
+[[nodiscard]] Place unmoved(const Shot& shot, int x, int y, int width, int height);
+[[nodiscard]] inline bool moved(const Shot& shot) {
+  return shot.shift_px != 0 || shot.turn_deg != 0;
+}
+
 /// Makes frames of a solved scene and spoils them. One thread.
 class Spoiler {
  public:

@@ -28,6 +28,7 @@ class Run:
         inside, outside = number(line["inside_mm"]), number(line["outside_mm"])
         errors = [e for e in (inside, outside) if not math.isnan(e)]
         self.error = max(errors) if errors else math.nan
+        self.along = number(line["along_mm"])  # with the truth moved along with the picture
         self.told = number(line["flagged"]) >= 0.5 or number(line["withheld"]) >= 0.5
         self.stated = number(line["stated_mm"])
         self.conditions = line["conditions"].replace("_", " ")
@@ -44,20 +45,51 @@ def read(path):
     return rows, methods
 
 
+def wrong(runs, nominal):
+    """Where the error is beyond twice the nominal one, or there is no depth."""
+    return [r for r in runs if r.error > 2 * nominal or math.isnan(r.error)]
+
+
+def untold(runs, nominal):
+    return [r for r in wrong(runs, nominal) if not r.told]
+
+
+def silent(runs, nominal):
+    """Neither a condition nor the stated uncertainty says it."""
+    return [r for r in untold(runs, nominal) if r.error > 2 * r.stated]
+
+
 def verdict(runs, nominal):
     """Where the error leaves twice the nominal one, and what was said there."""
-    wrong = [r for r in runs if r.error > 2 * nominal or math.isnan(r.error)]
-    if not wrong:
-        return "stays within", "–", False, False
-    first = wrong[0]
-    silent = [r for r in wrong if not r.told and r.error > 2 * r.stated]
+    bad = wrong(runs, nominal)
+    if not bad:
+        return "stays within", "–"
+    first = bad[0]
     said = first.conditions or ("no depth given" if first.told else "no condition")
     if not first.told:
         said += f", stated uncertainty {first.stated:.3f} mm"
-    if silent:
-        said += f"; **silent at {', '.join(f'{r.value:g}' for r in silent)}**"
+    if quiet := silent(runs, nominal):
+        said += f"; **silent at {', '.join(f'{r.value:g}' for r in quiet)}**"
     size = "no depth" if math.isnan(first.error) else f"{first.error:.3f} mm"
-    return f"{first.value:g} ({size})", said, bool(silent), not all(r.told for r in wrong)
+    if not math.isnan(first.along):
+        size += f"; truth moved along {first.along:.3f} mm"
+    return f"{first.value:g} ({size})", said
+
+
+def table_of_untold(rows, methods, nominal):
+    """The worst point of each row that no condition tells, our methods only."""
+    lines = ["| condition | method | worst without a condition | error / stated | truth moved along |",
+             "| --- | --- | --- | --- | --- |"]
+    for row in rows.values():
+        for method in methods:
+            points = untold(row["runs"][method], nominal[method])
+            if not points:
+                continue
+            worst = max(points, key=lambda r: r.error / r.stated)
+            along = "" if math.isnan(worst.along) else f"{worst.along:.3f} mm"
+            lines.append(f"| {row['line']['title']} | {method} | at {worst.value:g}: {worst.error:.3f} mm "
+                         f"| {worst.error / worst.stated:.1f} | {along} |")
+    return "\n".join(lines)
 
 
 def draw(group, rows, methods, nominal, folder):
@@ -104,8 +136,6 @@ def main():
     text = (pathlib.Path(__file__).parent / "page.in.md").read_text(encoding="utf-8")
     parts = []
     ours = [m for m in methods if m.startswith("ours")]
-    silent = dict.fromkeys(methods, 0)
-    unflagged = dict.fromkeys(methods, 0)
     for group in GROUPS:
         draw(group, rows, methods, nominal, arguments.folder)
         parts.append(f"## {group.capitalize()}\n\n![{group}]({group}.svg)\n")
@@ -115,9 +145,7 @@ def main():
             if row["line"]["group"] != group:
                 continue
             for method in methods:
-                where, said, is_silent, is_unflagged = verdict(row["runs"][method], nominal[method])
-                silent[method] += is_silent
-                unflagged[method] += is_unflagged
+                where, said = verdict(row["runs"][method], nominal[method])
                 parts.append(f"| {row['line']['title']} ({row['line']['unit']}) | {method} | {where} | {said} |")
         for row in rows.values():
             if row["line"]["group"] == group and row["line"]["undecidable"]:
@@ -125,8 +153,10 @@ def main():
                              f"{row['line']['undecidable']}.")
         parts.append("")
     text = text.replace("@NOMINAL@", ", ".join(f"{nominal[m]:.3f} mm ({m})" for m in methods))
-    for place, counts in (("@SILENT@", silent), ("@UNFLAGGED@", unflagged)):
+    for place, which in (("@SILENT@", silent), ("@UNTOLD@", untold)):
+        counts = {m: sum(bool(which(row["runs"][m], nominal[m])) for row in rows.values()) for m in ours}
         text = text.replace(place, ", ".join(f"{counts[m]} of {len(rows)} rows ({m})" for m in ours))
+    text = text.replace("@TABLE@", table_of_untold(rows, ours, nominal))
     if clean is not None:
         text = text.replace("@CLEAN@", f"{100 * clean.error:.2f} % of {clean.value:.0f}")
     (arguments.folder / "README.md").write_text(text.replace("@ROWS@", "\n".join(parts)), encoding="utf-8")

@@ -176,9 +176,7 @@ std::vector<Row> image_rows() {
        "pixels right and down",
        {0, 0.5, 1, 2, 3, 5, 10},
        on_ball([](Shot& shot, int, double px) { shot.shift_px = px; }),
-       "an untouched layer has no texture: shifted by 5 pixels it looks as if the LEDs had drifted "
-       "by "
-       "0.4 %"},
+       "an untouched layer has no texture, and pressed it looks as if the object lay elsewhere"},
       {"image",
        "turn",
        "camera rotated since calibration",
@@ -192,8 +190,7 @@ std::vector<Row> image_rows() {
        "standard deviation, pixels",
        {0, 1, 2, 4, 8, 12},
        on_ball([](Shot& shot, int, double blur) { shot.blur_px = blur; }),
-       "the layer blurs by 5 pixels itself, so a lens that blurs as much looks like a smoother "
-       "object"},
+       "the layer blurs by itself, so a lens that blurs as much looks like a blunter object"},
       {"image",
        "dust",
        "specks of dust since the reference",
@@ -290,7 +287,7 @@ std::vector<Row> scene_rows() {
        "depth, mm",
        {0.2, 0.4, 0.6, 0.8, 1.0, 1.2},
        object([](double depth) { return Pose{hal::sim::cube(6), 1, 1, depth}; }),
-       "as for the texture"},
+       "sloping walls make the same image, as for the texture"},
       {"scene",
        "bulge",
        "a large bulge round a long object",
@@ -299,6 +296,29 @@ std::vector<Row> scene_rows() {
        object([](double depth) { return Pose{hal::sim::cylinder(6, 12), 0, 0, depth}; }),
        ""},
   };
+}
+
+constexpr int kSlowFps = 10;
+const std::vector<double> kDrifts = {0, 0.5, 1, 2, 3, 5};
+
+/// From kReady on the light falls by 1 % a minute to so many percent less; a ball presses for two
+/// of every six seconds, and at the end.
+Script drifting(double percent, bool follow) {
+  Script script;
+  script.truth = ball_truth();
+  script.fps = kSlowFps;
+  script.follow = follow;
+  const int minute = 60 * kSlowFps;
+  const int frames = kReady + std::max(minute / 2, static_cast<int>(percent * minute));
+  script.frames = frames;
+  script.shot = [=](int n) {
+    Shot shot;
+    const double passed = std::max(0, n - kReady) / static_cast<double>(frames - kReady);
+    shot.exposure = 1 - 0.01 * percent * passed;
+    if (n >= kPress && (frames - n) % (6 * kSlowFps) <= 2 * kSlowFps) shot.moment = moment_of(0);
+    return shot;
+  };
+  return script;
 }
 
 std::vector<Row> reference_rows() {
@@ -342,6 +362,28 @@ std::vector<Row> reference_rows() {
          return script;
        },
        ""},
+      {"reference", "drift", "LEDs dim by 1 % a minute while a ball comes and goes, followed",
+       "% in all", kDrifts, [](double percent) { return drifting(percent, true); }, ""},
+      {"reference", "drift_kept", "the same, with the reference kept as it was taken", "% in all",
+       kDrifts, [](double percent) { return drifting(percent, false); }, ""},
+      {"reference",
+       "flat",
+       "a faint press of the whole field that lasts for half a minute",
+       "depth, mm",
+       {0, 0.005, 0.01, 0.02, 0.05, 0.1},
+       [](double depth) {
+         Script script;
+         script.truth = solve({{hal::sim::disc(16), 0, 0, std::max(depth, 1e-4)}});
+         script.fps = kSlowFps;
+         script.frames = kReady + 30 * kSlowFps;
+         script.shot = [](int n) {
+           Shot shot;
+           if (n >= kPress) shot.moment = moment_of(0);
+           return shot;
+         };
+         return script;
+       },
+       "a press of the whole field darkens it as a dimmer light does"},
       {"reference",
        "faint",
        "a faint press that lasts for half a minute, drift followed",

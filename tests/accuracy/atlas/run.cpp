@@ -10,14 +10,12 @@
 #include "daemon/pipeline/capture_loop.hpp"
 #include "hal/null/null_ring.hpp"
 #include "proto/dtact.pb.h"
+#include "tests/accuracy/table/configuration.hpp"
 #include "tests/accuracy/table/judge.hpp"
 #include "tests/fakes/fake_clock.hpp"
 
 namespace dtact::atlas {
 namespace {
-
-constexpr double kFps = 60;
-constexpr std::int64_t kPeriodNs = 16'666'667;
 
 std::uint64_t true_moment(const Script& script, int n) {
   return script.moment ? script.moment(n) : script.shot(n).moment;
@@ -42,29 +40,22 @@ class Judge {
     ++depths_;
     stated_um_ += frame->uncertainty_um;
     look_up(true_moment(script_, n));
-    table::Error inside;
-    table::Error outside;
-    for (std::size_t i = 0; i < frame->depth_um.size(); ++i) {
-      table::Error& error = truth_.contact[i] != 0 ? inside : outside;
-      const std::int16_t um = frame->depth_um[i];
-      if (um == recon::kUntrusted) {
-        ++error.untrusted;
-      } else {
-        error.add(0.001 * um - static_cast<double>(truth_.indentation_mm[i]));
-      }
+    const Errors errors = compare(frame->depth_um, truth_);
+    if (errors.inside.untrusted > 0) {
+      withheld_ += static_cast<double>(errors.inside.untrusted) /
+                   static_cast<double>(errors.inside.untrusted + errors.inside.pixels);
     }
-    if (inside.untrusted > 0) {
-      withheld_ += static_cast<double>(inside.untrusted) /
-                   static_cast<double>(inside.untrusted + inside.pixels);
+    placed_ += errors;
+    if (const Shot shot = script_.shot(n); moved(shot)) {
+      along_ += compare(frame->depth_um, moved_along(truth_, shot));
     }
-    inside_ += inside;
-    outside_ += outside;
   }
 
   [[nodiscard]] Outcome outcome() {
     const double frames = std::max(1, outcome_.frames);
-    outcome_.inside_mm = inside_.mean_mm();
-    outcome_.outside_mm = outside_.mean_mm();
+    outcome_.inside_mm = placed_.inside.mean_mm();
+    outcome_.outside_mm = placed_.outside.mean_mm();
+    outcome_.along_mm = std::max(along_.inside.mean_mm(), along_.outside.mean_mm());
     outcome_.withheld = withheld_ / frames;
     outcome_.flagged = flagged_ / frames;
     outcome_.stated_mm = 0.001 * stated_um_ / std::max(1, depths_);
@@ -72,6 +63,48 @@ class Judge {
   }
 
  private:
+  struct Errors {
+    table::Error inside;
+    table::Error outside;
+    Errors& operator+=(const Errors& other) {
+      inside += other.inside;
+      outside += other.outside;
+      return *this;
+    }
+  };
+
+  static Errors compare(const std::vector<std::int16_t>& depth_um, const table::TruePress& truth) {
+    Errors errors;
+    for (std::size_t i = 0; i < depth_um.size(); ++i) {
+      table::Error& error = truth.contact[i] != 0 ? errors.inside : errors.outside;
+      if (depth_um[i] == recon::kUntrusted) {
+        ++error.untrusted;
+      } else {
+        error.add(0.001 * depth_um[i] - static_cast<double>(truth.indentation_mm[i]));
+      }
+    }
+    return errors;
+  }
+
+  /// To the nearest pixel; beyond the crop its edge stands, where nothing touches.
+  static table::TruePress moved_along(const table::TruePress& truth, const Shot& shot) {
+    table::TruePress moved;
+    for (int y = 0; y < table::kCrop; ++y) {
+      for (int x = 0; x < table::kCrop; ++x) {
+        const Place from = unmoved(shot, x + table::kCropCol, y + table::kCropRow,
+                                   table::kFrameWidth, table::kFrameHeight);
+        const auto within = [](double at, int first) {
+          return std::clamp<std::int64_t>(std::lround(at) - first, 0, table::kCrop - 1);
+        };
+        const auto i = static_cast<std::size_t>(within(from.y, table::kCropRow) * table::kCrop +
+                                                within(from.x, table::kCropCol));
+        moved.indentation_mm.push_back(truth.indentation_mm[i]);
+        moved.contact.push_back(truth.contact[i]);
+      }
+    }
+    return moved;
+  }
+
   void look_up(std::uint64_t moment) {
     if (std::exchange(moment_, moment) == moment) return;
     truth_ = table::true_press(*script_.truth, moment);
@@ -79,8 +112,8 @@ class Judge {
 
   const Script& script_;
   Outcome outcome_;
-  table::Error inside_;
-  table::Error outside_;
+  Errors placed_;
+  Errors along_;
   table::TruePress truth_;
   std::optional<std::uint64_t> moment_;
   double withheld_ = 0;
@@ -104,7 +137,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
     info.identity = "sim:atlas";
     info.width = script_.truth->scene().camera.width;
     info.height = script_.truth->scene().camera.height;
-    info.fps = kFps;
+    info.fps = script_.fps;
     return info;
   }
   [[nodiscard]] hal::CameraReport report() const override { return {}; }
@@ -118,7 +151,8 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
       exchange_->stop = true;
       return hal::GrabStatus::timeout;
     }
-    clock_.now = std::max(clock_.now.load() + 1, (n + 1) * kPeriodNs);
+    const auto due_ns = static_cast<std::int64_t>((n + 1) * 1e9 / script_.fps);
+    clock_.now = std::max(clock_.now.load() + 1, due_ns);
     const Shot shot = script_.shot(n);
     const hal::LumaView view = spoiler_.make(shot, static_cast<std::uint64_t>(n));
     if (shot.damaged) return hal::GrabStatus::damaged;
@@ -178,6 +212,7 @@ Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
   pipeline::PipelineConfig config;
   config.reference.frames = 16;
   config.reconstruction.decimation = 1;
+  if (!script.follow) config.drift.limit_percent = 0;
   pipeline::LightDriver light(std::make_unique<hal::null::NullRing>(), config.light, clock,
                               exchange.wake);
   pipeline::ReferenceWriter writer(table.frame_width, table.frame_height, {});

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +21,8 @@ namespace dtact::atlas {
 struct Script {
   std::shared_ptr<const hal::sim::Truth> truth;
   int frames = 0;             ///< Asked of the camera, damaged ones included.
+  double fps = 60;            ///< Fewer let minutes pass in few frames.
+  bool follow = true;         ///< The reference follows the light, as configured by default.
   int judged = 12;            ///< The last so many are judged.
   std::optional<int> rezero;  ///< The frame before which a new reference is asked for.
   bool force = true;  ///< It is taken although something touches, as the darkened field seems to.
@@ -35,6 +38,9 @@ inline constexpr int kReady = 30;
 struct Outcome {
   double inside_mm = 0;   ///< Mean absolute error where the object touches; NaN: no depth there.
   double outside_mm = 0;  ///< And elsewhere.
+  /// As error_mm(), with the truth moved along with a picture that the camera's place moves: what
+  /// is left is wrong in depth, not in place. NaN where the camera did not move.
+  double along_mm = std::numeric_limits<double>::quiet_NaN();
   double withheld = 0;   ///< Share of the frames without depth, or of the contact marked untrusted.
   double flagged = 0;    ///< Share of the frames that carried a condition.
   double stated_mm = 0;  ///< The uncertainty that the frames with depth carried, mean.

@@ -87,6 +87,7 @@ TEST(Status, IsPrinted) {
   status.health.set(pipeline::Health::not_realtime);
   status.camera.backend = "sim";
   status.stages = {{"activity", 3, 9, 20}};
+  status.light_followed = -0.0042;
   status.capture_thread = {5, 6, 7, 8};
   rig.port.set_status(status);
   const auto result = ctl(rig, {"status"});
@@ -96,7 +97,8 @@ TEST(Status, IsPrinted) {
                     HasSubstr("page faults 5 minor, 6 major; context switches 7 waiting, 8 pre")));
   EXPECT_THAT(result.out, AllOf(StartsWith("state        serving\nhealth       not_realtime\n"),
                                 HasSubstr("LimitRTPRIO"), HasSubstr("camera       sim"),
-                                HasSubstr("calibration  none"), HasSubstr("brightness 255")));
+                                HasSubstr("calibration  none"), HasSubstr("brightness 255"),
+                                HasSubstr("reference    follows the light by -0.42 %")));
 }
 
 TEST(Status, IsOneLineOfJson) {

@@ -311,6 +311,7 @@ TEST(GetStatus, TellsEverything) {
   status.fps = 59.9;
   status.realtime = {"no SCHED_FIFO"};
   status.stages = {{"smooth", 400, 900, 1200}};
+  status.light_followed = -0.004;
   status.capture_thread = {5, 6, 7, 8};
   auto calibration = std::make_shared<calibration::Calibration>();
   calibration->name = "ball";
@@ -341,6 +342,7 @@ TEST(GetStatus, TellsEverything) {
   EXPECT_EQ(reply.stages(0).p99_us(), 900.0);
   EXPECT_EQ(reply.stages_size(), 1);  // nothing was sent
   EXPECT_EQ(reply.encoded(), 0U);
+  EXPECT_EQ(reply.light_followed(), -0.004);
   EXPECT_EQ(reply.capture_thread().minor_faults(), 5U);
   EXPECT_EQ(reply.capture_thread().major_faults(), 6U);
   EXPECT_EQ(reply.capture_thread().waits(), 7U);

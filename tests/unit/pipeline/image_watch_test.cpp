@@ -24,11 +24,12 @@ class ImageWatchTest : public ::testing::Test {
     report_.rough_noise = 1;
   }
 
-  void look() { watch_.look(report_, {pixels_.data(), kWidth, kHeight, kWidth}); }
+  void look() { watch_.look(report_, {pixels_.data(), kWidth, kHeight, kWidth}, light_); }
   [[nodiscard]] bool has(Health health) const { return watch_.conditions().has(health); }
 
   std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(std::size_t{kWidth} * kHeight, 100);
   recon::ActivityReport report_;
+  double light_ = 1;
   ImageWatch watch_;
 };
 
@@ -45,6 +46,14 @@ TEST_F(ImageWatchTest, LightIsComparedOnlyWhereMuchIsActive) {
   look();
   EXPECT_TRUE(has(Health::light_drifted));
   report_.active_cells = 0;
+  look();
+  EXPECT_FALSE(has(Health::light_drifted));
+}
+
+TEST_F(ImageWatchTest, WhatIsFollowedIsNoDrift) {
+  pixels_.assign(pixels_.size(), 97);
+  report_.active_cells = 80;
+  light_ = 0.97;
   look();
   EXPECT_FALSE(has(Health::light_drifted));
 }
@@ -76,6 +85,15 @@ TEST_F(ImageWatchTest, BandsMustLastSixFrames) {
   EXPECT_TRUE(has(Health::light_banded));
   watch_.forget();
   EXPECT_TRUE(watch_.conditions().empty());
+}
+
+TEST_F(ImageWatchTest, FineBandsCountAsBands) {
+  report_.fine_ripple = 3.9;
+  for (int i = 0; i < 12; ++i) look();
+  EXPECT_FALSE(has(Health::light_banded));
+  report_.fine_ripple = 4.1;
+  for (int i = 0; i < 6; ++i) look();
+  EXPECT_TRUE(has(Health::light_banded));
 }
 
 TEST_F(ImageWatchTest, StatisticsHaveTheirLimits) {

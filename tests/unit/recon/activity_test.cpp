@@ -121,6 +121,19 @@ TEST_F(ActivityTest, WanderingBandsRippleAndAPressDoesNot) {
   EXPECT_GT(report_.ripple, 1.5);
 }
 
+TEST_F(ActivityTest, FineBandsRippleInHalfRows) {
+  // A period of 18 rows: a cell's 16 rows are nearly all of it.
+  const auto bands = [&](double phase) {
+    return frame([phase](int, int y) { return 3 * std::sin(0.349 * y + phase); });
+  };
+  settle();
+  EXPECT_LT(report_.fine_ripple, 0.4);
+  (void)active_tiles(bands(0));
+  (void)active_tiles(bands(3));
+  EXPECT_LT(report_.ripple, 1);
+  EXPECT_GT(report_.fine_ripple, 8);
+}
+
 TEST_F(ActivityTest, NoiseAloneTouchesNothing) {
   for (int i = 0; i < 500; ++i) ASSERT_EQ(active_tiles(untouched()), 0) << i;
   EXPECT_EQ(report_.tiles, 10 * 7);  // 208 × 145 pixels in tiles of 32 × 16
@@ -230,6 +243,53 @@ TEST_F(ActivityTest, DriftEndsAtItsLimit) {
   EXPECT_DOUBLE_EQ(report_.drift, -0.5);
   EXPECT_DOUBLE_EQ(report_.quiet_change, -0.5);
   EXPECT_GT(darker(3), 0);
+}
+
+TEST_F(ActivityTest, TellsAChangeOfLightFromAPress) {
+  settle();
+  (void)active_tiles(untouched());
+  EXPECT_TRUE(report_.light_alone);
+  EXPECT_NEAR(report_.light_change, 0, 0.0002);
+  const auto dimmed = [&](double share, double press) {
+    return frame([=](int x, int y) {
+      const double spot = std::hypot(x - 60, y - 70) < 20 ? press : 0;
+      return 150 * share + spot;
+    });
+  };
+  for (int i = 0; i < 2; ++i) {  // as it comes, and while it lasts
+    (void)active_tiles(dimmed(0.02, 0));
+    EXPECT_TRUE(report_.light_alone);
+    EXPECT_NEAR(report_.light_change, -0.02, 0.0002);
+  }
+  (void)active_tiles(dimmed(0.02, 1));
+  EXPECT_FALSE(report_.light_alone) << "one level on a twenty-fifth of the field";
+  EXPECT_EQ(report_.light_change, 0);
+  (void)active_tiles(dimmed(0, 10));
+  EXPECT_FALSE(report_.light_alone);
+}
+
+TEST_F(ActivityTest, KnowsTheLightItWasTold) {
+  const auto dimmed = [this] { return frame([](int, int) { return 3.0; }); };
+  EXPECT_GT(active_tiles(dimmed()), 0);
+  activity_.set_light(0.98);
+  for (int i = 0; i < 10; ++i) (void)active_tiles(dimmed());  // what was active lets go
+  EXPECT_EQ(active_tiles(dimmed()), 0);
+  EXPECT_NEAR(report_.light_change, 0, 0.0002);
+  EXPECT_GT(active_tiles(untouched()), 0);
+  activity_.set_reference(model_.reference_q8);
+  EXPECT_EQ(active_tiles(untouched()), 0) << "a new reference is under its own light";
+}
+
+TEST_F(ActivityTest, WhatWasFollowedBeforeIsPartOfTheLight) {
+  ActivitySettings settings;
+  settings.cell_floor = settings.cell_ceiling = 3;
+  settings.window_floor = settings.window_ceiling = 2;
+  settings.drift_per_frame = 0.1;
+  activity_ = Activity(model_.rectify, 6, settings);
+  activity_.set_reference(model_.reference_q8);
+  for (int i = 0; i < 100; ++i) (void)active_tiles(frame([](int, int) { return 0.3; }));
+  EXPECT_LT(report_.drift, -0.2);
+  EXPECT_NEAR(report_.light_change, -0.3 / 150, 0.0002);
 }
 
 TEST_F(ActivityTest, ANewReferenceForgetsEverything) {

@@ -217,6 +217,17 @@ TEST(Gain, WorksInPlace) {
   EXPECT_EQ(value, 8192);
 }
 
+TEST(Scale, RoundsHalfUpAndSaturates) {
+  const std::array<std::int16_t, 5> row{0, 1, 3, 16320, 32767};
+  std::array<std::int16_t, 5> out{};
+  scale_row(row.data(), kFactorOne, 5, out.data());
+  EXPECT_EQ(out, row);
+  scale_row(row.data(), kFactorOne / 2, 5, out.data());
+  EXPECT_EQ(out, (std::array<std::int16_t, 5>{0, 1, 2, 8160, 16384}));
+  scale_row(row.data(), 65535, 5, out.data());  // 1.99997
+  EXPECT_EQ(out, (std::array<std::int16_t, 5>{0, 2, 6, 32640, 32767}));
+}
+
 TEST(Padded, RoundsUpToWholeBlocks) {
   EXPECT_EQ(padded(1), 32);
   EXPECT_EQ(padded(32), 32);

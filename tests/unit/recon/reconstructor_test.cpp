@@ -81,6 +81,26 @@ TEST(ReconstructorList, HalfTheLightReadsTheSameDepth) {
   EXPECT_THAT(bench.run(65), Each(960));  // 15 levels of half the light are 30 of the whole
 }
 
+TEST(ReconstructorList, LightThatChangedByAFactorReadsTheSameDepth) {
+  Bench bench(model_of(Method::list));
+  bench.reconstructor.set_light(0.8);
+  EXPECT_THAT(bench.run(128), Each(0));
+  EXPECT_THAT(bench.run(104), Each(960));  // 24 levels of the dimmed light are 30
+  bench.reconstructor.set_light(0.975);  // 156; replaces the other factor
+  EXPECT_THAT(bench.run(156), Each(0));
+  // 30 levels × 160/156 = 1969.2 Q6; half of 1969 is 984 µm.
+  EXPECT_THAT(bench.run(126), Each(984));
+  bench.reference(160);
+  EXPECT_THAT(bench.run(160), Each(0)) << "a new reference is under its own light";
+}
+
+TEST(ReconstructorPublished, KnowsNoLight) {
+  Bench bench(model_of(Method::published));
+  const std::vector<std::int16_t> before = bench.run(150);
+  bench.reconstructor.set_light(0.9);
+  EXPECT_EQ(bench.run(150), before);
+}
+
 TEST(ReconstructorList, TooLittleLightIsUntrusted) {
   Bench bench(model_of(Method::list));
   bench.reference(7);

@@ -1,0 +1,140 @@
+#include "daemon/pipeline/light_follower.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+
+namespace dtact::pipeline {
+namespace {
+
+constexpr std::int64_t kFrameNs = 100'000'000;  // 10 frames a second
+constexpr int kSecond = 10;
+constexpr int kMinute = 600;
+
+/// Light as a share of the reference's, seen by a follower that is applied at once.
+class LightFollowerTest : public ::testing::Test {
+ protected:
+  void untouched(double light, int frames = 1) { see(light, true, frames); }
+  void touched(double light, int frames) { see(light, false, frames); }
+  /// From the light of now, evenly.
+  void drift(double to, int frames, bool alone = true) {
+    const double from = light_;
+    for (int i = 1; i <= frames; ++i) see(from + (to - from) * i / frames, alone, 1);
+  }
+
+  LightFollower follower_{DriftRules{.limit_percent = 2, .percent_per_minute = 2}};
+
+ private:
+  void see(double light, bool alone, int frames) {
+    for (int i = 0; i < frames; ++i) {
+      recon::ActivityReport report;
+      report.light_alone = alone;
+      if (alone) report.light_change = light / follower_.factor() - 1;
+      now_ns_ += kFrameNs;
+      (void)follower_.look(report, now_ns_);
+    }
+    light_ = light;
+  }
+
+  double light_ = 1;
+  std::int64_t now_ns_ = 0;
+};
+
+TEST_F(LightFollowerTest, StaysAtOneWhileTheLightDoes) {
+  untouched(1, kMinute);
+  EXPECT_EQ(follower_.factor(), 1);
+  EXPECT_FALSE(follower_.drifted());
+}
+
+TEST_F(LightFollowerTest, FollowsSlowDriftToWithinASixteenthOfALevel) {
+  drift(0.99, kMinute);
+  EXPECT_NEAR(follower_.factor(), 0.99, 0.0005);
+  EXPECT_FALSE(follower_.drifted());
+  drift(1.005, 3 * kMinute / 2);
+  EXPECT_NEAR(follower_.factor(), 1.005, 0.0005);
+}
+
+TEST_F(LightFollowerTest, EndsAtTheLimitAndTells) {
+  drift(0.97, 3 * kMinute);
+  EXPECT_NEAR(follower_.factor(), 0.98, 0.0004);
+  EXPECT_NEAR(follower_.left(), -0.0102, 0.0004);
+  EXPECT_TRUE(follower_.drifted());
+  drift(0.99, 2 * kMinute);
+  EXPECT_NEAR(follower_.factor(), 0.99, 0.0005);
+  EXPECT_FALSE(follower_.drifted());
+}
+
+TEST_F(LightFollowerTest, AStepIsToldAndNeverFollowed) {
+  untouched(1, kMinute);
+  untouched(0.995, 2);
+  EXPECT_FALSE(follower_.drifted()) << "a single odd frame says nothing";
+  untouched(0.995);
+  EXPECT_TRUE(follower_.drifted());
+  untouched(0.995, 10 * kMinute);
+  EXPECT_EQ(follower_.factor(), 1);
+  EXPECT_NEAR(follower_.left(), -0.005, 1e-9);
+  untouched(1, 3);
+  EXPECT_FALSE(follower_.drifted());
+}
+
+TEST_F(LightFollowerTest, DriftFasterThanTheRateIsTold) {
+  untouched(1, kMinute);
+  drift(0.96, kMinute);
+  EXPECT_GT(follower_.factor(), 0.98);
+  EXPECT_TRUE(follower_.drifted());
+}
+
+TEST_F(LightFollowerTest, CatchesUpAfterALongPress) {
+  untouched(1, kMinute);
+  drift(0.99, kMinute, false);
+  EXPECT_EQ(follower_.factor(), 1);
+  untouched(0.99, kSecond - 1);
+  EXPECT_EQ(follower_.factor(), 1) << "waits a second";
+  untouched(0.99, 2);
+  EXPECT_NEAR(follower_.factor(), 0.99, 0.0001);
+}
+
+TEST_F(LightFollowerTest, AShortPressAllowsNoStep) {
+  untouched(1, kMinute);
+  touched(1, 2 * kSecond);
+  untouched(0.99, 10 * kMinute);
+  EXPECT_EQ(follower_.factor(), 1);
+  EXPECT_TRUE(follower_.drifted());
+}
+
+TEST_F(LightFollowerTest, WhatWasNotFollowedIsNotAllowedForLater) {
+  untouched(1, kMinute);
+  untouched(0.99, kSecond);
+  for (int i = 0; i < 60; ++i) {  // a flat press that moves a little
+    touched(0.99, 9);
+    untouched(0.99);
+  }
+  untouched(0.99, kMinute);
+  EXPECT_EQ(follower_.factor(), 1);
+}
+
+TEST_F(LightFollowerTest, ANewReferenceBeginsAnew) {
+  drift(0.99, kMinute);
+  untouched(0.95, kSecond);
+  follower_.restart();
+  EXPECT_EQ(follower_.factor(), 1);
+  EXPECT_EQ(follower_.left(), 0);
+  EXPECT_FALSE(follower_.drifted());
+}
+
+TEST_F(LightFollowerTest, OnlyTellsWhereNobodyAppliesIt) {
+  follower_.restart(false);
+  drift(0.99, kMinute);
+  EXPECT_EQ(follower_.factor(), 1);
+  EXPECT_TRUE(follower_.drifted());
+}
+
+TEST_F(LightFollowerTest, ALimitOfZeroOnlyTells) {
+  follower_ = LightFollower(DriftRules{.limit_percent = 0, .percent_per_minute = 2});
+  drift(0.99, kMinute);
+  EXPECT_EQ(follower_.factor(), 1);
+  EXPECT_TRUE(follower_.drifted());
+}
+
+}  // namespace
+}  // namespace dtact::pipeline
