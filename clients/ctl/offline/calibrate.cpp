@@ -134,13 +134,9 @@ calibration::Calibration make_from_many(const Options& options, const ImageSet& 
   for (const auto& press : report.presses) {
     fmt::print("{}: {:.3f} mm deep\n", press.name, press.depth_mm);
   }
-  if (!report.presses.empty()) {
-    fmt::print(
-        "a press under the list of the others: {:.4f} mm off as it is, {:.4f} mm as a share "
-        "of the light at its place: {}\n",
-        report.without_gain_mm, report.uniform_gain_mm,
-        made.model->gain.shape == recon::GainShape::uniform ? "the share is used"
-                                                            : "no gain is used");
+  for (const auto& gain : report.gains) {
+    fmt::print("gain {}: a press is {:.4f} mm off the sphere under the list of the others{}\n",
+               gain.name, gain.error_mm, gain.chosen ? " (used)" : "");
   }
   return made;
 }
