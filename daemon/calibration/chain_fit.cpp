@@ -21,6 +21,9 @@ constexpr double kKnotLevels = 2;  // grey levels from knot to knot
 /// with a third of it 0.026, 0.020 and 0.040, with a straight line 0.057, 0.022 and 0.029.
 constexpr double kStraight = 0.3;
 constexpr int kGainRounds = 3;
+/// A gain a fifth off one weighs as much as all pixels off by a micrometre, which is what presses
+/// agree within: without that a gain that grows without end would scale all levels alike.
+constexpr double kNearOne = 2.5e-5;
 /// Weight of a measured depth, in pixels.
 constexpr double kMeasured = 1e5;
 
@@ -115,7 +118,9 @@ ChainFit solve_once(const std::vector<SagProfile>& presses, const std::vector<do
   std::vector<Normal::Term> row;
   for (std::size_t p = 0; p < presses.size(); ++p) {
     const double here = gain_at(gain, presses[p].place);
+    double pixels = 0;
     for (const auto& ring : presses[p].rings) {
+      pixels += ring.weight;
       const double level = std::max(0.0, here * ring.level);
       const int below = std::min(knots - 1, static_cast<int>(level / step));
       const double part = level / step - below;
@@ -126,7 +131,14 @@ ChainFit solve_once(const std::vector<SagProfile>& presses, const std::vector<do
                                            presses[p].place[static_cast<std::size_t>(t)]});
       }
       normal.add(row, -ring.sag_mm, ring.weight);
-      straight += kStraight * ring.weight;
+    }
+    straight += kStraight * pixels;
+    if (terms > 0) {
+      row.clear();
+      for (int t = 0; t < terms; ++t) {
+        row.push_back({first_term + t, presses[p].place[static_cast<std::size_t>(t)]});
+      }
+      normal.add(row, 1 - here, kNearOne * pixels);
     }
     const std::optional<double>& measured = presses[p].depth_mm;
     if (measured) normal.add(std::array{Normal::Term{depth_of(p), 1}}, *measured, kMeasured);

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -49,6 +50,7 @@ struct Trial {
   const std::vector<SettledPress>* presses = nullptr;
   recon::GainShape shape = recon::GainShape::none;
   std::vector<PressRings> rings;
+  ChainFit fit;  ///< Of all presses.
   LeftOut left_out;
   std::vector<double> errors_mm;  ///< Of each press left out; NaN: nothing to say.
 };
@@ -64,13 +66,30 @@ std::string name_of(const Trial& trial) {
 
 Trial try_gain(const std::vector<SettledPress>& presses, const BallPresses& set,
                recon::GainShape shape, int terms) {
-  Trial trial{.presses = &presses, .shape = shape, .rings = {}, .left_out = {}, .errors_mm = {}};
+  Trial trial{
+      .presses = &presses, .shape = shape, .rings = {}, .fit = {}, .left_out = {}, .errors_mm = {}};
   for (std::size_t p = 0; p < presses.size(); ++p) {
     trial.rings.push_back(rings_of(presses[p], set.presses[p].depth_mm, terms));
   }
+  trial.fit = chain_presses(trial.rings).fit;
   trial.left_out = leave_each_out(trial.rings);
   for (const MetPress& met : trial.left_out.met) trial.errors_mm.push_back(met.mean_error_mm());
   return trial;
+}
+
+/// A gain is fitted where presses are and used everywhere: what halves or doubles at a corner of
+/// the map was not seen but extended there.
+bool reaches_corners(const Trial& trial) {
+  const DifferenceMap& map = trial.presses->front().map;
+  const recon::SpatialGain gain{.polynomial = trial.fit.gain};
+  const double x = 0.5 * map.width * map.mm_per_px;
+  const double y = 0.5 * map.height * map.mm_per_px;
+  return std::ranges::all_of(std::array{-1, 1}, [&](int right) {
+    return std::ranges::all_of(std::array{-1, 1}, [&](int down) {
+      const double factor = gain.polynomial_at(right * x, down * y);
+      return factor > 0.5 && factor < 2;
+    });
+  });
 }
 
 /// Mean of `value(press)` over the presses of which every trial says something, and its standard
@@ -214,10 +233,11 @@ Calibration build(const BallPresses& presses, PressReport* report) {
     trials.push_back(try_gain(seen, set, recon::GainShape::none, terms));
     trials.push_back(try_gain(lit, set, recon::GainShape::uniform, terms));
   }
+  std::erase_if(trials, [](const Trial& trial) { return !reaches_corners(trial); });
   for (const Trial& trial : trials) found.gains.push_back({.name = name_of(trial)});
   const std::size_t choice = simplest(trials, found.gains);
   const Trial& chosen = trials[choice];
-  const ChainFit fit = chain_presses(chosen.rings).fit;
+  const ChainFit& fit = chosen.fit;
   refuse_gaps(fit, set);
 
   auto model =
