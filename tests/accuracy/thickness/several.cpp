@@ -127,20 +127,6 @@ SeveralPresses measure_several(const Specimen& specimen, std::uint64_t seed,
   return result;
 }
 
-std::string to_csv(const std::vector<SeveralPresses>& results) {
-  std::string out =
-      "thickness_mm,taper_per_mm,light,seed,gain,several_mm,one_mm,flat_several_mm,flat_one_mm,"
-      "ratio_median\n";
-  for (const SeveralPresses& r : results) {
-    fmt::format_to(std::back_inserter(out),
-                   "{},{},{},{},\"{}\",{:.4f},{:.4f},{:.4f},{:.4f},{:.2f}\n",
-                   r.specimen.thickness_mm, r.specimen.taper_x,
-                   table::configurations()[r.specimen.configuration].name, r.seed, r.gain,
-                   r.several_mm, r.one_mm, r.flat_several_mm, r.flat_one_mm, median(r.ratios));
-  }
-  return out;
-}
-
 std::string to_markdown(const std::vector<SeveralPresses>& results) {
   using Key = std::tuple<double, double, std::size_t>;
   std::map<Key, std::vector<const SeveralPresses*>> specimens;

@@ -35,7 +35,6 @@ struct SeveralPresses {
 [[nodiscard]] SeveralPresses measure_several(const Specimen& specimen, std::uint64_t seed,
                                              const table::Protocol& protocol = {});
 
-[[nodiscard]] std::string to_csv(const std::vector<SeveralPresses>& results);
 /// One line a specimen: means over the seeds, the median of all ratios.
 [[nodiscard]] std::string to_markdown(const std::vector<SeveralPresses>& results);
 

@@ -52,13 +52,13 @@ int main(int argc, char** argv) {
   try {
     CLI::App app("The list from several presses, by the layer");
     int first = 11;
-    int seeds = 5;
+    int seeds = 3;
     int threads = 2;
     std::filesystem::path out;
     app.add_option("--first-seed", first, "Of the repetitions");
     app.add_option("--seeds", seeds, "Repetitions")->check(CLI::Range(1, 1000));
     app.add_option("--threads", threads, "Repetitions at a time")->check(CLI::Range(1, 64));
-    app.add_option("--out", out, "Folder of several.csv and several.md; without it, only printed");
+    app.add_option("--out", out, "Folder of several.md; without it, only printed");
     CLI11_PARSE(app, argc, argv);
     const std::vector<Specimen> specimens = {
         {.thickness_mm = 1.5}, {.thickness_mm = 2.0}, {.thickness_mm = 2.5}, {.thickness_mm = 3.0},
@@ -67,7 +67,6 @@ int main(int argc, char** argv) {
     const std::string markdown = dtact::thickness::to_markdown(results);
     fmt::print("{}", markdown);
     if (!out.empty()) {
-      dtact::base::write_file_atomically(out / "several.csv", dtact::thickness::to_csv(results));
       dtact::base::write_file_atomically(out / "several.md", markdown);
     }
     return 0;
