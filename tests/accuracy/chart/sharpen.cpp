@@ -105,7 +105,7 @@ void Sharpener::take_mean(std::span<const std::int16_t> level_q6) {
     }
     for (int x = 0; x < coarse_width_; ++x) {
       const int columns = std::min(factor_, width_ - x * factor_);
-      const auto from = sums_.begin() + x * factor_;
+      const auto from = sums_.begin() + std::ptrdiff_t{x} * factor_;
       coarse_[index(x, y, coarse_width_)] =
           static_cast<float>(std::accumulate(from, from + columns, 0)) /
           static_cast<float>(rows * columns);
