@@ -17,12 +17,15 @@ struct SagProfile {
   };
   std::vector<Ring> rings;         ///< From the middle outwards.
   std::optional<double> depth_mm;  ///< Of the lowest point, when somebody measured it.
+  /// What the gain is linear in, at this press's place (gain_terms()); empty: no gain is fitted.
+  std::vector<double> place = {};
 };
 
 /// One list for all presses, and how deep each of them was.
 struct ChainFit {
   std::vector<Knot> knots;       ///< Rising; the first at a darkening above zero.
   std::vector<double> depth_mm;  ///< Of each press's lowest point.
+  std::vector<double> gain;      ///< As recon::SpatialGain::polynomial.
   /// Indentations that no press shows between two that are shown (or zero), millimetres.
   struct Gap {
     double from_mm = 0;
@@ -38,8 +41,14 @@ struct ChainFit {
 /// straight by a penalty on its bends, and where nothing is seen it goes on straight. Then M is
 /// made to rise.
 ///
+/// With places, darkening counts 1 + gain · place times, and the gain is fitted with the rest, by
+/// Gauss and Newton.
+///
 /// Throws std::invalid_argument when there is no ring.
 [[nodiscard]] ChainFit fit_chain(const std::vector<SagProfile>& presses);
+
+/// 1 + gain · place, above zero.
+[[nodiscard]] double gain_at(const std::vector<double>& gain, const std::vector<double>& place);
 
 /// A gap below this is bridged by the list's straightness, millimetres.
 inline constexpr double kBridgedMm = 0.15;

@@ -36,17 +36,20 @@ std::vector<float> mean_depth_um(const recon::Model& model,
   return mean;
 }
 
+void answer_darkening(recon::Model& model) {
+  constexpr int kReach = 255 * recon::kEntriesPerLevel;
+  model.method = recon::Method::list;
+  model.list = {-kReach, {}, -kReach, kReach};
+  for (int q6 = -kReach; q6 <= kReach; ++q6) {
+    model.list.um.push_back(static_cast<std::int16_t>(q6));
+  }
+}
+
 DifferenceMap smoothed_difference(const recon::Model& model,
                                   std::span<const std::uint16_t> reference_q8,
                                   std::span<const image::Grey8> frames) {
-  // A list that answers with the question: its micrometres are the darkening in Q6.
-  constexpr int kReach = 255 * recon::kEntriesPerLevel;
   recon::Model identity = model;
-  identity.method = recon::Method::list;
-  identity.list = {-kReach, {}, -kReach, kReach};
-  for (int q6 = -kReach; q6 <= kReach; ++q6) {
-    identity.list.um.push_back(static_cast<std::int16_t>(q6));
-  }
+  answer_darkening(identity);
   DifferenceMap map{model.rectify.width, model.rectify.height, model.mm_per_px,
                     mean_depth_um(identity, reference_q8, frames)};
   for (float& level : map.levels) level /= recon::kEntriesPerLevel;

@@ -23,6 +23,9 @@ struct DifferenceMap {
   }
 };
 
+/// Gives a model a list that answers with the question: its micrometres are the darkening in Q6.
+void answer_darkening(recon::Model& model);
+
 /// What the list of `model` would be asked for: the reconstruction's own rectification, smoothing
 /// and gain, to 1/64 of a grey level, averaged over `frames`. The model's method and list play no
 /// part. `reference_q8`: the untouched image under the frames' light. Throws std::invalid_argument

@@ -31,18 +31,28 @@ struct PressReport {
   };
   std::vector<Depth> presses;         ///< Those that were used.
   std::vector<std::string> left_out;  ///< The others: name and reason.
-  /// Mean absolute error of each press under the list of all others, inside the sure contact, with
-  /// each gain that was tried, millimetres.
-  double without_gain_mm = 0;
-  double uniform_gain_mm = 0;
+  /// A gain that was tried: how far each press is from the known sphere under the list of all
+  /// others (meet()), the mean over the presses.
+  struct Gain {
+    std::string name;              ///< "none", "share of the light, plane", ...
+    double error_mm = 0;           ///< Mean absolute error.
+    double standard_error_mm = 0;  ///< Of its difference from the best of all; 0: the best.
+    bool chosen = false;
+  };
+  std::vector<Gain> gains;  ///< From the simplest on.
 };
 
-/// Ours. The list follows from the known sphere alone (fit_chain): in the inner three fifths of
-/// each contact, whose radius follows from the fitted depth, not from a circle in the image.
-/// Whether darkening counts as it is or as a share of the light at its place is decided by which
-/// predicts a press better that the list was made without. What the list says of its own
-/// uncertainty is that error, with 5 % of the depth for objects of another shape added in squares.
-/// `origin` is left for the caller to fill.
+/// Ours. The list follows from the known sphere alone (chain_presses()): in the inner three fifths
+/// of each contact, whose radius follows from the fitted depth, not from a circle in the image.
+///
+/// How darkening differs from place to place is told by the gain, as simple as the presses allow:
+/// none, a share of the light at its place, either with a plane, either with a quadratic. Each is
+/// judged by how well it predicts presses that list and gain were made without (leave_each_out());
+/// taken is the simplest within one standard error of the best.
+///
+/// What the list says of its own uncertainty is that error of the chosen one, how much the list
+/// moves with the presses that make it, and 5 % of the depth for objects of another shape, added in
+/// squares. `origin` is left for the caller to fill.
 ///
 /// A press without a contact that can be used (too light, beyond the map) is left out. Throws
 /// std::runtime_error when fewer than two remain, naming those left out, and when the presses leave

@@ -199,8 +199,8 @@ void Session::reference_step() {
 
 Outcome Session::finish() {
   calibration::save(*coverage_.made, folder_.path() / kCalibration);
-  console_.say(report_text(coverage_.report, *coverage_.made->model) +
-               list_text(*coverage_.made->model) + "saved in " + folder_.at(kCalibration));
+  console_.say(report_text(coverage_.report) + list_text(*coverage_.made->model) + "saved in " +
+               folder_.at(kCalibration));
   const std::string line = ask(fmt::format(
       "Upload it to the daemon as {}?   [Enter] yes   [n] not now", folder_.calibration_name()));
   if (line.empty() || line == "y") {

@@ -55,7 +55,7 @@ calibration::Calibration make_from_many(const Options& options) {
   }
   calibration::PressReport report;
   calibration::Calibration made = build_list(images, &report);
-  fmt::print("{}", report_text(report, *made.model));
+  fmt::print("{}", report_text(report));
   return made;
 }
 

@@ -135,17 +135,17 @@ std::string utc_now() {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
-std::string report_text(const calibration::PressReport& report, const recon::Model& model) {
+std::string report_text(const calibration::PressReport& report) {
   std::string text;
   for (const std::string& press : report.left_out) text += fmt::format("left out: {}\n", press);
   for (const auto& press : report.presses) {
     text += fmt::format("{}: {:.3f} mm deep\n", press.name, press.depth_mm);
   }
-  text += fmt::format(
-      "a press under the list of the others: {:.4f} mm off as it is, {:.4f} mm as a share "
-      "of the light at its place: {}\n",
-      report.without_gain_mm, report.uniform_gain_mm,
-      model.gain.shape == recon::GainShape::uniform ? "the share is used" : "no gain is used");
+  for (const auto& gain : report.gains) {
+    text +=
+        fmt::format("gain {}: a press is {:.4f} mm off the sphere under the list of the others{}\n",
+                    gain.name, gain.error_mm, gain.chosen ? " (used)" : "");
+  }
   return text;
 }
 

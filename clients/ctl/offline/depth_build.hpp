@@ -59,8 +59,7 @@ void add_press(PressImages& images, const std::string& press);
 [[nodiscard]] std::string utc_now();
 
 /// Each press's depth, those left out, and what decided about the gain; lines.
-[[nodiscard]] std::string report_text(const calibration::PressReport& report,
-                                      const recon::Model& model);
+[[nodiscard]] std::string report_text(const calibration::PressReport& report);
 /// What the list covers and what it is uncertain by; lines.
 [[nodiscard]] std::string list_text(const recon::Model& model);
 

@@ -1,23 +1,28 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "tests/accuracy/chart/scenes.hpp"
+#include "tests/accuracy/chart/sharpen.hpp"
 
 namespace dtact::chart {
 
 /// One way to reconstruct.
 struct Setting {
   std::string name;           ///< "list full tiles 0.10", unique.
-  std::string method;         ///< "published", "regression", "list", "ours".
+  std::string method;         ///< "published", "regression", "list", "ours", "sharpened".
   int decimation = 1;         ///< 1, 2 or 4.
   bool tiles = false;         ///< Only what changed.
   double smoothing_mm = 0.1;  ///< Standard deviation; 0: the method's own.
   std::shared_ptr<const recon::Model> model;
+  /// After the smoothing, before the list; the model answers with the darkening then.
+  std::optional<Sharpening> sharpening = {};
+  recon::DepthList sharpened_list = {};
 };
 
 /// All of them, calibrated with make_calibration_press() or, "regression" and "ours", with
@@ -50,6 +55,8 @@ class Worker {
   recon::Reconstructor reconstructor_;
   std::vector<std::vector<std::uint8_t>> frames_;  // padded for vector loads
   std::vector<std::int16_t> depth_um_;
+  std::optional<Sharpener> sharpener_;
+  std::vector<std::int16_t> level_q6_;  // what it sharpens
   recon::DrawnTiles drawn_;
   recon::ActivityReport report_;
   std::size_t next_ = 0;

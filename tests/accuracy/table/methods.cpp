@@ -4,7 +4,6 @@
 #include <string>
 
 #include "daemon/calibration/build.hpp"
-#include "daemon/calibration/press_set.hpp"
 
 namespace dtact::table {
 namespace {
@@ -22,10 +21,6 @@ std::shared_ptr<const recon::Model> from_one(const Material& material, recon::Me
 
 std::shared_ptr<const recon::Model> published_single(const Material& material) {
   return from_one(material, recon::Method::published);
-}
-
-std::shared_ptr<const recon::Model> ours_single(const Material& material) {
-  return from_one(material, recon::Method::list);
 }
 
 calibration::BallPresses many_presses(const Material& material) {
@@ -47,15 +42,11 @@ std::shared_ptr<const recon::Model> published_regression(const Material& materia
       .model;
 }
 
-std::shared_ptr<const recon::Model> ours_many(const Material& material) {
-  return calibration::build(many_presses(material)).model;
-}
-
 constexpr std::array<Method, 4> kMethods = {{
     {"published single image", published_single},
     {"published regression", published_regression},
     {"ours, one press", ours_single},
-    {"ours, many presses", ours_many},
+    {"ours, many presses", [](const Material& material) { return ours_many(material); }},
 }};
 
 }  // namespace
@@ -70,6 +61,15 @@ Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& cent
     material.many.push_back(sensor.press(1 + i, kPressFrames));
   }
   return material;
+}
+
+std::shared_ptr<const recon::Model> ours_single(const Material& material) {
+  return from_one(material, recon::Method::list);
+}
+
+std::shared_ptr<const recon::Model> ours_many(const Material& material,
+                                              calibration::PressReport* report) {
+  return calibration::build(many_presses(material), report).model;
 }
 
 std::span<const Method> methods() { return kMethods; }

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/calibration/press_set.hpp"
 #include "daemon/recon/model.hpp"
 #include "hal/image/png.hpp"
 #include "tests/accuracy/table/sensor.hpp"
@@ -27,6 +28,11 @@ inline constexpr std::size_t kPressFrames = 8;
 inline constexpr std::size_t kReferenceFrames = 32;
 
 [[nodiscard]] Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& centre);
+
+/// Ours from the press near the centre, and from those anywhere.
+[[nodiscard]] std::shared_ptr<const recon::Model> ours_single(const Material& material);
+[[nodiscard]] std::shared_ptr<const recon::Model> ours_many(
+    const Material& material, calibration::PressReport* report = nullptr);
 
 /// A row of the table.
 struct Method {

@@ -20,32 +20,17 @@
 namespace dtact::thickness {
 namespace {
 
-constexpr double kFittedMm = 2.0;  // the built-in scene's layer
 constexpr std::array<double, 12> kPitches = {4,    3,   2.5, 2,   1.75, 1.5,
                                              1.25, 1.0, 0.8, 0.6, 0.5,  0.4};
 constexpr double kPlateMm = 6;
 constexpr std::size_t kFrames = 8;
 
-hal::sim::Scene sensor_of(double thickness_mm) {
-  hal::sim::Scene scene = hal::sim::default_scene();
-  const double scale = thickness_mm / kFittedMm;
-  scene.layer.thickness_mm = thickness_mm;
-  scene.layer.grid_mm = 0.1;
-  scene.layer.solve_step_mm = 5;
-  scene.optics.narrow_mm *= scale;
-  scene.optics.wide_mm *= scale;
-  scene.optics.pressed_slope /= scale;
-  scene.optics.pressed_curve /= scale * scale;
-  scene.optics.bulged_slope /= scale;
-  scene.optics.bulged_curve /= scale * scale;
-  scene.presses.clear();
-  scene.loop_from_s = scene.loop_to_s = 0;
-  return scene;
-}
-
 /// An object that comes down after one second and stays.
 hal::sim::Scene with(hal::sim::Scene scene, const hal::sim::Object& object, double depth_mm) {
   scene.presses = {{object, {{1, 0, 0, 0, 0}, {1.1, 0, 0, depth_mm, 0}}}};
+  scene.layer.grid_mm = 0.1;
+  scene.layer.solve_step_mm = 5;
+  scene.loop_from_s = scene.loop_to_s = 0;
   return scene;
 }
 
@@ -128,6 +113,20 @@ class Bench {
 };
 
 }  // namespace
+
+hal::sim::Scene sensor_of(double thickness_mm) {
+  constexpr double kFittedMm = 2.0;  // the built-in scene's layer
+  hal::sim::Scene scene = hal::sim::default_scene();
+  const double scale = thickness_mm / kFittedMm;
+  scene.layer.thickness_mm = thickness_mm;
+  scene.optics.narrow_mm *= scale;
+  scene.optics.wide_mm *= scale;
+  scene.optics.pressed_slope /= scale;
+  scene.optics.pressed_curve /= scale * scale;
+  scene.optics.bulged_slope /= scale;
+  scene.optics.bulged_curve /= scale * scale;
+  return scene;
+}
 
 std::optional<double> Result::finest_mm() const {
   std::optional<double> finest;

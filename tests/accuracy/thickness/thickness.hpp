@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "hal/sim/scene.hpp"
+
 namespace dtact::thickness {
 
 /// The thicknesses the paper made, millimetres.
@@ -46,10 +48,14 @@ struct Result {
   [[nodiscard]] std::optional<double> deepest_mm() const;
 };
 
+/// The simulated sensor with a layer of another thickness, nothing touching. The fitted optics
+/// belong to 2 mm: the width of the scattering is scaled with the thickness, and the share of light
+/// that a press takes with the share of the thickness that it takes. Neither was measured on a real
+/// layer of another thickness.
+[[nodiscard]] hal::sim::Scene sensor_of(double thickness_mm);
+
 /// Calibrates the simulated sensor with that layer by one press of a 4 mm ball, 0.85 of the
-/// thickness deep, and measures. The fitted optics belong to 2 mm: the width of
-/// the scattering is scaled with the thickness, and the share of light that a press takes with the
-/// share of the thickness that it takes. Neither was measured on a real layer of another thickness.
+/// thickness deep, and measures.
 [[nodiscard]] Result measure(double thickness_mm);
 
 [[nodiscard]] std::string to_csv(const std::vector<Result>& results);

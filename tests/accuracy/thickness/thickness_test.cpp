@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+
+#include "tests/accuracy/thickness/several.hpp"
+
 namespace dtact::thickness {
 namespace {
 
@@ -30,6 +34,16 @@ TEST(Thickness, DeepestIsTheDeepestMeasured) {
   result.presses = {{0.4, 0.05, 0}, {0.6, 0.05, 0}, {0.8, 0.05, 0.2}};
   EXPECT_EQ(result.deepest_mm(), 0.6);
   EXPECT_EQ(to_csv({result}).find("thickness_mm,kind"), 0U);
+}
+
+// A layer that is 8 % thicker 8 mm to the right.
+TEST(SeveralPresses, ATaperedLayerGetsAPlane) {
+  const SeveralPresses tapered =
+      measure_several({.taper_x = 0.01}, 21, {.calibration_presses = 16, .test_presses = 4});
+  EXPECT_NE(tapered.gain.find("plane"), std::string::npos) << tapered.gain;
+  EXPECT_LT(tapered.several_mm, 0.02);
+  EXPECT_EQ(tapered.ratios.size(), 4U);
+  EXPECT_NE(to_markdown({tapered}).find("1.0 %/mm thicker to the right"), std::string::npos);
 }
 
 }  // namespace

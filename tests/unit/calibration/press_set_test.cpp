@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "daemon/calibration/chain_fit.hpp"
+#include "daemon/calibration/press_chain.hpp"
 #include "tests/unit/calibration/ball.hpp"
 
 namespace dtact::calibration {
@@ -108,9 +109,79 @@ TEST(BuildFromPresses, UnevenLightPaysForAGain) {
   PressReport report;
   const Calibration made = build(set, &report);
   EXPECT_EQ(made.model->gain.shape, recon::GainShape::uniform);
-  EXPECT_LT(report.uniform_gain_mm, 0.5 * report.without_gain_mm);
+  EXPECT_LT(report.gains[1].error_mm, 0.5 * report.gains[0].error_mm);
   EXPECT_NEAR(report.presses[1].depth_mm, 1.0, 0.03);
   EXPECT_NEAR(report.presses[3].depth_mm, 1.0, 0.03);
+}
+
+/// Eight presses at several places and depths.
+std::vector<Ball> eight_balls() {
+  return {
+      Ball{.col = 95, .row = 100, .depth_mm = 0.5},  Ball{.col = 165, .row = 95, .depth_mm = 0.6},
+      Ball{.col = 130, .row = 140, .depth_mm = 0.7}, Ball{.col = 98, .row = 135, .depth_mm = 0.8},
+      Ball{.col = 160, .row = 138, .depth_mm = 0.9}, Ball{.col = 128, .row = 100, .depth_mm = 1.0},
+      Ball{.col = 100, .row = 118, .depth_mm = 1.1}, Ball{.col = 155, .row = 118, .depth_mm = 1.2}};
+}
+
+TEST(BuildFromPresses, AnEvenSensorGetsNoGain) {
+  PressReport report;
+  const Calibration made = build(set_of(eight_balls()), &report);
+  EXPECT_EQ(made.model->gain.shape, recon::GainShape::none);
+  EXPECT_TRUE(made.model->gain.polynomial.empty());
+  // Presses within 1.8 mm say nothing of a quadratic at the map's corners, 9 mm away.
+  ASSERT_EQ(report.gains.size(), 4U);
+  EXPECT_EQ(report.gains[0].name, "none");
+  EXPECT_TRUE(report.gains[0].chosen);
+  EXPECT_EQ(report.gains[3].name, "share of the light, plane");
+}
+
+TEST(BuildFromPresses, AThickerSidePaysForAPlane) {
+  BallPresses set = set_of(eight_balls());
+  // The same light everywhere, but darkening grows by 6 % a millimetre to the right.
+  for (auto& press : set.presses) {
+    for (std::size_t i = 0; i < press.frames[0].pixels.size(); ++i) {
+      const double x_mm = 0.05 * (static_cast<double>(i % 260) - 129.5);
+      auto& pixel = press.frames[0].pixels[i];
+      pixel = static_cast<std::uint8_t>(std::lround(200 - (200 - pixel) * (1 + 0.06 * x_mm)));
+    }
+  }
+  PressReport report;
+  const Calibration made = build(set, &report);
+  EXPECT_EQ(made.model->gain.shape, recon::GainShape::none);
+  ASSERT_EQ(made.model->gain.polynomial.size(), 2U);
+  // 1 / (1 + 0.06 x) over ±1.7 mm.
+  EXPECT_NEAR(made.model->gain.polynomial[0], -0.06, 0.01);
+  EXPECT_NEAR(made.model->gain.polynomial[1], 0, 0.005);
+  EXPECT_LT(report.gains[2].error_mm, 0.5 * report.gains[0].error_mm);
+  // Within a contact the gain is that of its centre, and a plane is not 1 / (1 + 0.06 x).
+  EXPECT_NEAR(report.presses[0].depth_mm, 0.5, 0.03);
+  EXPECT_NEAR(report.presses[7].depth_mm, 1.2, 0.03);
+}
+
+TEST(LeaveEachOut, FreesOnlyTheDepthOfThePress) {
+  const auto press = [](double depth_mm, double slope) {
+    PressRings rings{.all = {}, .seen_mm = 2, .ball_radius_mm = 4};
+    for (double r = 0; r < 2; r += 0.05) {
+      const double sag = 4 - std::sqrt(16 - r * r);
+      rings.all.rings.push_back({30 * slope * (depth_mm - sag), sag, 10});
+    }
+    return rings;
+  };
+  const ChainFit list = chain_presses({press(0.6, 1), press(0.9, 1), press(1.3, 1)}).fit;
+  // A press that darkens by a tenth more than the list knows: its depth takes up the offset, the
+  // sphere's shape does not fit.
+  const MetPress same = meet(press(0.8, 1), list);
+  const MetPress other = meet(press(0.8, 1.1), list);
+  EXPECT_LT(same.mean_error_mm(), 0.001);
+  EXPECT_NEAR(same.rings.front().depth_mm, 0.8, 0.002);
+  EXPECT_NEAR(other.rings.front().depth_mm, 0.88, 0.02);
+  // A tenth of the sag, whose mean distance from its mean is about a quarter of its range: the
+  // sure contact reaches 1.2 mm, a sag of 0.18 mm.
+  EXPECT_NEAR(other.mean_error_mm(), 0.1 * 0.18 / 4, 0.002);
+  // Where the depth was measured the offset counts, too.
+  PressRings measured = press(0.8, 1.1);
+  measured.all.depth_mm = 0.8;
+  EXPECT_NEAR(meet(measured, list).mean_error_mm(), 0.08, 0.015);
 }
 
 TEST(BuildFromPresses, SaysWhatToPressNext) {

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "tests/accuracy/table/trial.hpp"
+
+namespace dtact::thickness {
+
+/// What a sensor differs in from the built-in one.
+struct Specimen {
+  double thickness_mm = 2.0;
+  double taper_x = 0;             ///< Of the thickness, per mm.
+  std::size_t configuration = 0;  ///< Of the light: into table::configurations().
+};
+
+/// The list from thirty presses of a 4 mm ball and that from one, judged on twenty presses of a
+/// 5 mm ball and on a flat disc of 10 mm radius pressed 0.25 mm deep, against the simulator's
+/// indentation where they touch. Presses are those of the table, at most 0.85 of the layer deep.
+struct SeveralPresses {
+  Specimen specimen;
+  std::uint64_t seed = 0;
+  /// The one chosen; "refused" where the presses show no list (too light for a thick layer), and
+  /// then nothing else is measured.
+  std::string gain;
+  double several_mm = 0;  ///< Mean absolute error under the 5 mm ball.
+  double one_mm = 0;
+  double flat_several_mm = 0;
+  double flat_one_mm = 0;
+  /// Of each press of the 5 mm ball: true error over what the list states for half of its depth.
+  std::vector<double> ratios;
+};
+
+[[nodiscard]] SeveralPresses measure_several(const Specimen& specimen, std::uint64_t seed,
+                                             const table::Protocol& protocol = {});
+
+/// One line a specimen: means over the seeds, the median of all ratios.
+[[nodiscard]] std::string to_markdown(const std::vector<SeveralPresses>& results);
+
+}  // namespace dtact::thickness
