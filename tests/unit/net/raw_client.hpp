@@ -111,6 +111,8 @@ class RawClient {
     message.mutable_subscribe()->set_summary(summary);
     if (!request(message).has_done()) throw std::runtime_error("not subscribed");
   }
+  /// Sends nothing more; the other side sees the end after all that was sent.
+  void finish() { ::shutdown(fd_.get(), SHUT_WR); }
   /// Dies without a word: the other side gets a reset.
   void die() {
     const linger now{1, 0};
