@@ -355,6 +355,7 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
   v1::ServerMessage event;
   event.mutable_event()->mutable_calibration()->set_name(change.name);
   hub_.broadcast(event);
+  config_.log(LogLevel::info, fmt::format("calibration {} is in use", change.name));
   // It is kept only now that the pipeline has taken it, so that a calibration that does not fit
   // this camera never replaces one that does.
   on_worker(
