@@ -89,12 +89,12 @@ void show(const Context& context, const Id& id) {
   }
 }
 
-void activate(const Context& context, const Id& id) {
-  client::Client(context.target).activate_calibration(id.value());
+void activate(const Context& context, const std::string& id) {
+  client::Client(context.target).activate_calibration(parse_id(id));
   if (context.json) {
-    print(context, Json().open('{').member("id", id_of(*id)));
+    print(context, Json().open('{').member("id", id));
   } else {
-    context.out << fmt::format("the daemon uses calibration {} from now on\n", id_of(*id));
+    context.out << fmt::format("the daemon uses calibration {} from now on\n", id);
   }
 }
 
@@ -162,7 +162,7 @@ void add_calibration(CLI::App& app, Context& context) {
       "Use one at once and from every start on; \"configured\" goes back to the "
       "configuration's");
   add_id(use, "As in the list")->required();
-  use->callback([&context, options] { activate(context, options->number()); });
+  use->callback([&context, options] { activate(context, options->id); });
 
   auto* fetch = command->add_subcommand("export", "Save one as a calibration folder");
   add_id(fetch, which);

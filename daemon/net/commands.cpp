@@ -99,7 +99,7 @@ struct Outcome {
 
 /// `failure`: the code when `step` throws something else than NoSuchCalibration.
 template <typename Value, typename Step>
-Outcome<Value> attempt(v1::ErrorCode failure, Step step) {
+Outcome<Value> attempt(v1::ErrorCode failure, const Step& step) {
   try {
     return {step(), v1::ERROR_NONE, {}};
   } catch (const NoSuchCalibration& e) {
@@ -315,11 +315,9 @@ void Commands::upload_calibration(const Who& who, const v1::UploadCalibration& r
                                 "send both files of the calibration folder");
   }
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
-  const auto files = std::make_shared<const CalibrationFiles>(CalibrationFiles{
+  auto files = std::make_shared<const CalibrationFiles>(CalibrationFiles{
       .name = request.name(), .toml = request.calibration_toml(), .png = request.reference_png()});
-  change_calibration(
-      who, [&store = store_, files] { return store.check(*files); },
-      [&store = store_, files] { store.keep(*files); });
+  change_calibration(who, {std::move(files), 0, {}});
 }
 
 void Commands::activate_calibration(const Who& who, const v1::ActivateCalibration& request) {
@@ -330,25 +328,27 @@ void Commands::activate_calibration(const Who& who, const v1::ActivateCalibratio
                                 "shows the numbers there are");
   }
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
-  const std::uint64_t number = request.number();
-  change_calibration(
-      who, [&store = store_, number] { return store.load(number); },
-      [&store = store_, number] { store.make_current(number); });
+  change_calibration(who, {nullptr, request.number(), {}});
 }
 
-template <typename Load>
-void Commands::change_calibration(const Who& who, Load load, std::function<void()> keep) {
+void Commands::change_calibration(const Who& who, CalibrationChange change) {
   changing_ = true;
-  on_worker([load = std::move(load)] { return attempt<Loaded>(v1::ERROR_INVALID, load); },
-            [who, keep = std::move(keep)](Commands& self, Outcome<Loaded> loaded) mutable {
-              if (loaded.failed()) {
-                self.changing_ = false;
-                return who.first->reply_error(who.second, loaded.code, loaded.error);
-              }
-              CalibrationChange change{loaded.value->name, std::move(keep)};
-              self.changing_ = self.submit(who, pipeline::UseCalibration{std::move(loaded.value)},
-                                           std::move(change));
-            });
+  using Loaded = std::shared_ptr<const calibration::Calibration>;
+  on_worker(
+      [&store = store_, change] {
+        return attempt<Loaded>(v1::ERROR_INVALID, [&] {
+          return change.upload != nullptr ? store.check(*change.upload) : store.load(change.number);
+        });
+      },
+      [who, change](Commands& self, Outcome<Loaded> loaded) mutable {
+        if (loaded.failed()) {
+          self.changing_ = false;
+          return who.first->reply_error(who.second, loaded.code, loaded.error);
+        }
+        change.name = loaded.value->name;
+        self.changing_ =
+            self.submit(who, pipeline::UseCalibration{std::move(loaded.value)}, std::move(change));
+      });
 }
 
 void Commands::keep_calibration(const Pending& pending, const CalibrationChange& change) {
@@ -359,9 +359,13 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
   // It is kept only now that the pipeline has taken it, so that a calibration that does not fit
   // this camera never replaces one that does.
   on_worker(
-      [keep = change.keep] {
-        return attempt<bool>(v1::ERROR_STORAGE, [&keep] {
-          keep();
+      [&store = store_, change] {
+        return attempt<bool>(v1::ERROR_STORAGE, [&] {
+          if (change.upload != nullptr) {
+            store.keep(*change.upload);
+          } else {
+            store.make_current(change.number);
+          }
           return true;
         });
       },

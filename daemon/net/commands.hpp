@@ -4,7 +4,6 @@
 #include <boost/asio/thread_pool.hpp>
 #include <chrono>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -44,11 +43,11 @@ class Commands : public std::enable_shared_from_this<Commands> {
   void on_light(const hal::Light& light);
 
  private:
-  using Loaded = std::shared_ptr<const calibration::Calibration>;
-  /// A calibration that the pipeline is to use, and how to make it last.
+  /// An upload, or without one the activation of a number.
   struct CalibrationChange {
-    std::string name;
-    std::function<void()> keep;  ///< On the worker, once the pipeline uses it. Throws.
+    std::shared_ptr<const CalibrationFiles> upload;
+    std::uint64_t number = 0;
+    std::string name;  ///< Once it was read.
   };
   /// A request that the pipeline is working on.
   struct Pending {
@@ -67,9 +66,8 @@ class Commands : public std::enable_shared_from_this<Commands> {
   void list_calibrations(const Who& who);
   void upload_calibration(const Who& who, const v1::UploadCalibration& request);
   void activate_calibration(const Who& who, const v1::ActivateCalibration& request);
-  /// `load` on the worker, then the pipeline uses what it returned, then `keep`.
-  template <typename Load>
-  void change_calibration(const Who& who, Load load, std::function<void()> keep);
+  /// Reads and checks on the worker; then the pipeline uses it, then keep_calibration().
+  void change_calibration(const Who& who, CalibrationChange change);
   void keep_calibration(const Pending& pending, const CalibrationChange& change);
   /// False, with the answer sent, when the pipeline cannot take another command.
   [[nodiscard]] bool submit(const Who& who, decltype(pipeline::Command::what) command,
