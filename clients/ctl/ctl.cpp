@@ -53,7 +53,7 @@ int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostre
   add_calibration(app, context);
   add_snapshot(app, context);
   add_cameras(app, context);
-  add_offline_commands(app);
+  add_offline_commands(app, context.json);
 
   const auto fail = [&](const std::exception& e, ExitCode code) {
     out.flush();

@@ -62,20 +62,31 @@ std::vector<std::int64_t> runs_of(const std::vector<std::uint8_t>& mask) {
   return runs;
 }
 
-std::string gain_text(const recon::SpatialGain& gain) {
+std::string shape_text(const recon::SpatialGain& gain) {
   switch (gain.shape) {
     case recon::GainShape::none:
       break;
     case recon::GainShape::uniform:
-      return "[gain]  # darkening counts as a share of the light at its place\n"
-             "shape = \"uniform\"\n\n";
+      return "[gain]  # darkening counts as a share of the light at its place\nshape = "
+             "\"uniform\"\n";
     case recon::GainShape::radial:
       return fmt::format(
           "[gain]  # darkening is multiplied by 1 + per_mm * distance from the centre\n"
-          "shape = \"radial\"\ncentre_x_mm = {}\ncentre_y_mm = {}\nper_mm = {}\n\n",
+          "shape = \"radial\"\ncentre_x_mm = {}\ncentre_y_mm = {}\nper_mm = {}\n",
           gain.centre_x_mm, gain.centre_y_mm, gain.per_mm);
   }
-  return "[gain]  # the same at every place\nshape = \"none\"\n\n";
+  return "[gain]  # the same at every place\nshape = \"none\"\n";
+}
+
+std::string gain_text(const recon::SpatialGain& gain) {
+  std::string text = shape_text(gain);
+  if (!gain.polynomial.empty()) {
+    text += fmt::format(
+        "# and by 1 + the sum of these times x, y, x^2, xy, y^2, mm from the map's centre\n"
+        "polynomial = [{}]\n",
+        fmt::join(gain.polynomial, ", "));
+  }
+  return text + "\n";
 }
 
 std::vector<double> column(const std::vector<recon::Model::Uncertainty>& rows,

@@ -129,6 +129,12 @@ void read_gain(KeyReader reader, recon::SpatialGain& gain) {
     reader.fail("shape",
                 "\"" + shape + "\" is not allowed; expected \"none\", \"uniform\" or \"radial\"");
   }
+  if (reader.has("polynomial")) {
+    gain.polynomial = reader.numbers("polynomial", -1, 1);
+    if (gain.polynomial.size() != 2 && gain.polynomial.size() != 5) {
+      reader.fail("polynomial", "expected two numbers (a plane) or five (a quadratic)");
+    }
+  }
   reader.finish();
 }
 

@@ -1,6 +1,7 @@
 #include "daemon/recon/spatial_gain.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -14,6 +15,15 @@ std::int16_t saturated(double q6) noexcept {
 }
 
 }  // namespace
+
+double SpatialGain::polynomial_at(double x_mm, double y_mm) const noexcept {
+  const std::array<double, 5> terms{x_mm, y_mm, x_mm * x_mm, x_mm * y_mm, y_mm * y_mm};
+  double factor = 1;
+  for (std::size_t i = 0; i < std::min(terms.size(), polynomial.size()); ++i) {
+    factor += polynomial[i] * terms[i];
+  }
+  return std::max(0.0, factor);
+}
 
 void apply(const SpatialGain& gain, const PlaneShape& shape,
            std::span<std::int16_t> reference_q6) noexcept {
@@ -32,13 +42,17 @@ void apply(const SpatialGain& gain, const PlaneShape& shape,
     }
     const std::int16_t mean = saturated(count > 0 ? sum / count : 0);
     for (int y = 0; y < shape.height; ++y) std::fill_n(row(y), shape.width, mean);
-  } else if (gain.shape == GainShape::radial) {
-    for (int y = 0; y < shape.height; ++y) {
-      for (int x = 0; x < shape.width; ++x) {
-        const double right = (x - 0.5 * (shape.width - 1)) * shape.mm_per_px - gain.centre_x_mm;
-        const double down = (y - 0.5 * (shape.height - 1)) * shape.mm_per_px - gain.centre_y_mm;
-        row(y)[x] = saturated(row(y)[x] * (1 + gain.per_mm * std::hypot(right, down)));
+  }
+  if (gain.shape != GainShape::radial && gain.polynomial.empty()) return;
+  for (int y = 0; y < shape.height; ++y) {
+    for (int x = 0; x < shape.width; ++x) {
+      const double right = (x - 0.5 * (shape.width - 1)) * shape.mm_per_px;
+      const double down = (y - 0.5 * (shape.height - 1)) * shape.mm_per_px;
+      double factor = gain.polynomial_at(right, down);
+      if (gain.shape == GainShape::radial) {
+        factor *= 1 + gain.per_mm * std::hypot(right - gain.centre_x_mm, down - gain.centre_y_mm);
       }
+      row(y)[x] = saturated(row(y)[x] * factor);
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 namespace dtact::recon {
 
@@ -19,6 +20,13 @@ struct SpatialGain {
   double centre_x_mm = 0;
   double centre_y_mm = 0;
   double per_mm = 0;  ///< −1 … 1
+  /// On top of any shape, 1 + Σ polynomial[i] · (x, y, x², xy, y²)[i] of the place in millimetres
+  /// from the map's centre, not below zero: a layer that is thicker on one side or in the middle.
+  /// None, two (a plane) or five (a quadratic).
+  std::vector<double> polynomial = {};
+
+  /// That factor at a place.
+  [[nodiscard]] double polynomial_at(double x_mm, double y_mm) const noexcept;
 };
 
 /// A map's size and scale; rows of a plane are `stride` values apart.
@@ -31,7 +39,7 @@ struct PlaneShape {
 
 /// Turns the smoothed calibration reference (Q6 luma) into what the darkening is brought to: the
 /// per-pixel gain is this plane over the present, smoothed reference. `none` leaves it as it is,
-/// `uniform` makes it its own mean over what is not dark, `radial` multiplies.
+/// `uniform` makes it its own mean over what is not dark, `radial` and the polynomial multiply.
 void apply(const SpatialGain& gain, const PlaneShape& shape,
            std::span<std::int16_t> reference_q6) noexcept;
 

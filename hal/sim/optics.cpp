@@ -10,6 +10,8 @@ namespace {
 
 constexpr std::int32_t kOne = 1 << 15;
 constexpr std::int32_t kHalf = kOne / 2;
+constexpr std::int32_t kShareOne = 1 << 12;
+constexpr double kThinnest = 0.2;  // of the mean thickness, beyond the field of a tapered layer
 
 std::size_t coarse_factor(const OpticsModel& optics, const Grid& grid) {
   // A quarter of the wide blur's width is fine enough to carry it.
@@ -27,6 +29,21 @@ double wide_sigma(const OpticsModel& optics, const Grid& grid, std::size_t count
   const double f2 = factor * factor;
   const double own = factor == 1 ? 0 : (f2 - 1) / 12 + f2 / 6;
   return std::sqrt(std::max(sigma * sigma - own, 0.0)) / factor;
+}
+
+std::vector<std::uint16_t> thickness_shares(const LayerModel& layer, const Grid& grid) {
+  std::vector<std::uint16_t> shares;
+  if (layer.taper_x == 0 && layer.taper_y == 0) return shares;
+  shares.reserve(grid.size());
+  for (int row = 0; row < grid.height; ++row) {
+    for (int column = 0; column < grid.width; ++column) {
+      const double x = grid.x0_mm + column * grid.spacing_mm;
+      const double y = grid.y0_mm + row * grid.spacing_mm;
+      const double thickness = std::max(kThinnest, 1 + layer.taper_x * x + layer.taper_y * y);
+      shares.push_back(static_cast<std::uint16_t>(std::lround(kShareOne / thickness)));
+    }
+  }
+  return shares;
 }
 
 }  // namespace
@@ -86,7 +103,7 @@ void Optics::Blur::run(std::span<const std::int16_t> in, std::span<std::int16_t>
   }
 }
 
-Optics::Optics(const OpticsModel& optics, const Grid& grid)
+Optics::Optics(const OpticsModel& optics, const Grid& grid, const LayerModel& layer)
     : width_(static_cast<std::size_t>(grid.width)),
       height_(static_cast<std::size_t>(grid.height)),
       factor_(coarse_factor(optics, grid)),
@@ -94,6 +111,7 @@ Optics::Optics(const OpticsModel& optics, const Grid& grid)
       coarse_height_(divide_up(height_, factor_)),
       narrow_weight_(static_cast<std::int32_t>(std::lround(optics.narrow_weight * kOne))),
       responses_(1U << 16U),
+      shares_(thickness_shares(layer, grid)),
       narrow_(optics.narrow_mm / grid.spacing_mm, width_, height_),
       wide_(wide_sigma(optics, grid, factor_), coarse_width_, coarse_height_),
       sharp_(grid.size()),
@@ -109,7 +127,9 @@ Optics::Optics(const OpticsModel& optics, const Grid& grid)
 
 void Optics::run(std::span<const std::int16_t> indentation, std::span<std::int16_t> loss) noexcept {
   for (std::size_t i = 0; i < sharp_.size(); ++i) {
-    sharp_[i] = responses_[static_cast<std::uint32_t>(indentation[i] + kOne)];
+    std::int32_t d = indentation[i];
+    if (!shares_.empty()) d = std::clamp((d * shares_[i]) / kShareOne, -kOne, kOne - 1);
+    sharp_[i] = responses_[static_cast<std::uint32_t>(d + kOne)];
   }
   narrow_.run(sharp_, loss);
   if (narrow_weight_ == kOne) return;

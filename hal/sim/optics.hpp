@@ -18,7 +18,8 @@ namespace dtact::hal::sim {
 /// with the blurs' weights fixed at construction. One thread at a time.
 class Optics {
  public:
-  Optics(const OpticsModel& optics, const Grid& grid);
+  /// Of `layer` only the taper counts; left out: the layer is even.
+  Optics(const OpticsModel& optics, const Grid& grid, const LayerModel& layer = {});
 
   /// `indentation` in 1/Truth::kPerMm, `loss` as Q15 share of the local light; both grid sized.
   /// Outside the grid the layer is as at its border.
@@ -50,6 +51,7 @@ class Optics {
   std::size_t coarse_height_;
   std::int32_t narrow_weight_;           // Q15
   std::vector<std::int16_t> responses_;  // by indentation + 2^15, Q15
+  std::vector<std::uint16_t> shares_;    // mean thickness over that at the point, Q12; empty: even
   Blur narrow_;
   Blur wide_;
   std::vector<std::int16_t> sharp_;

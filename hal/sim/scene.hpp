@@ -28,6 +28,8 @@ struct LayerModel {
   double thickness_mm = 0;
   double grid_mm = 0;
   double solve_step_mm = 0;
+  double taper_x = 0;
+  double taper_y = 0;
 };
 
 struct OpticsModel {

@@ -162,7 +162,7 @@ Point place_mm(const Board& board, const Lattice& lattice, int row, int col) {
 [[noreturn]] void refuse(const std::vector<std::string>& missing, int pins) {
   throw std::runtime_error(fmt::format(
       "board: {} of {} pins not found: {} (rows and columns counted from the image's upper left "
-      "corner); press the board in more evenly, with all its pins in the picture",
+      "corner); press the board in more evenly, or give the number of pins that the picture shows",
       missing.size(), pins, fmt::join(missing, "; ")));
 }
 
@@ -193,6 +193,37 @@ double neighbours_height(const std::vector<double>& heights, const Lattice& latt
   }
   std::ranges::sort(around);
   return around[around.size() / 2];
+}
+
+std::string name_of(int row, int col) { return fmt::format("row {}, column {}", row + 1, col + 1); }
+
+/// What lies far off the lens through all of them is no pin but something else in its place, such
+/// as the rim of a leak. Returns whether there was any.
+bool drop_strays(Settled& settled, const Lens& lens, const Board& board) {
+  constexpr double kFar = 6;  // medians of the distances; seven standard deviations if normal
+  std::vector<double> distances;
+  for (const Point& r : residuals_mm(lens, settled.marks)) {
+    distances.push_back(std::hypot(r.x, r.y));
+  }
+  std::vector<double> sorted = distances;
+  std::ranges::sort(sorted);
+  const double limit = kFar * sorted[sorted.size() / 2];
+  std::vector<Mark> kept;
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const Mark& mark = settled.marks[i];
+    if (distances[i] <= limit) {
+      kept.push_back(mark);
+    } else {
+      const auto index = [&](double mm, int count) {
+        return static_cast<int>(std::lround(mm / board.pitch_mm + 0.5 * (count - 1)));
+      };
+      settled.missing.push_back(name_of(index(mark.mm.y, settled.lattice->rows),
+                                        index(mark.mm.x, settled.lattice->cols)));
+    }
+  }
+  const bool any = kept.size() < settled.marks.size();
+  settled.marks = std::move(kept);
+  return any;
 }
 
 Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, const Board& board) {
@@ -232,11 +263,12 @@ Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, con
         settled.marks.push_back({place_mm(board, lattice, row, col),
                                  project(lens, places[static_cast<std::size_t>(pin)])});
       } else {
-        settled.missing.push_back(fmt::format("row {}, column {}", row + 1, col + 1));
+        settled.missing.push_back(name_of(row, col));
       }
     }
     if (2 * settled.missing.size() > lattice.places.size()) return settled;
     lens = fit_lens(settled.marks, LensModel::radial2);
+    if (drop_strays(settled, lens, board)) lens = fit_lens(settled.marks, LensModel::radial2);
   }
   settled.rms_mm = rms(residuals_mm(lens, settled.marks));
   return settled;
@@ -285,6 +317,7 @@ std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
 
 PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Board& board) {
   constexpr std::size_t kTries = 30;
+  constexpr int kMayMiss = 10;  // one in so many: a lattice that is a row off misses more
   const cv::Mat1f image = relative_darkening(reference, frame);
   std::vector<Lattice> lattices = lattices_of(image, board);
   lattices.resize(std::min(lattices.size(), kTries));
@@ -304,8 +337,10 @@ PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Boa
         "the same with the board pressed in, and the numbers of rows and columns",
         board.rows, board.cols));
   }
-  if (!best.missing.empty()) refuse(best.missing, board.rows * board.cols);
-  PinPress press{best.lattice->rows, best.lattice->cols, std::move(best.marks), {}};
+  const int pins = board.rows * board.cols;
+  if (kMayMiss * static_cast<int>(best.missing.size()) > pins) refuse(best.missing, pins);
+  PinPress press{
+      best.lattice->rows, best.lattice->cols, std::move(best.marks), std::move(best.missing), {}};
   press.lens = choose_lens(press.marks);
   level(press.lens.lens, press.marks);
   return press;

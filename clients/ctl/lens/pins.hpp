@@ -15,13 +15,16 @@ struct Board {
   double pitch_mm = 2.5;
 };
 
-/// The board's pins in an image, all of them.
+/// The board's pins in an image.
 struct PinPress {
-  int rows =
-      0;  ///< As the image shows them: a board seen on edge has its rows and columns swapped.
+  /// As the image shows them: a board seen on edge has its rows and columns swapped.
+  int rows = 0;
   int cols = 0;
-  /// Row-major from the upper left; millimetres from the board's middle, with level axes (level()).
+  /// Those found, row-major from the upper left; millimetres from the board's middle, with level
+  /// axes (level()).
   std::vector<Mark> marks;
+  /// "row 7, column 2", counted from 1 at the upper left: at most a tenth, fewer than a row.
+  std::vector<std::string> missing;
   ChosenLens lens;  ///< Through the marks.
 };
 
@@ -37,11 +40,13 @@ struct PinPress {
 ///    pull its centre outwards. Repeated with the better lens.
 /// 3. A pin counts as found when the darkening there is a peak, higher than five times what the
 ///    image's noise makes of it and than a fifth of its neighbours' median, within a quarter of the
-///    pitch of where the others say. The lattice with the most pins wins, then the most regular
-///    one.
+///    pitch of where the others say and within six times their median distance from the lens. The
+///    lattice with the most pins wins, then the most regular one.
 ///
-/// `reference`, `frame`: grey levels, of one size. Throws std::runtime_error that names the missing
-/// pins by row and column, or says that no lattice was found.
+/// Up to a tenth of the pins may be missing (too faint under stray light, broken off): the lens is
+/// sure without them, except where they would have been. `reference`, `frame`: grey levels, of one
+/// size. Throws std::runtime_error that names the missing pins by row and column when there are
+/// more, or says that no lattice was found.
 [[nodiscard]] PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame,
                                  const Board& board);
 

@@ -88,8 +88,13 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
     b(i, 1) = (mark.px.y - u.px.y) / u.px_size;
     ++i;
   }
+  // Places on a line leave one direction of the plane open. The places are in units of their own
+  // extent, so that noise alone stays far below a thousandth.
+  constexpr double kLine = 1e-3;
+  const cv::SVD svd(a);
   cv::Mat1d x;
-  if (!cv::solve(a, b, x, cv::DECOMP_QR)) {
+  svd.backSubst(b, x);
+  if (svd.w.at<double>(2) < kLine * svd.w.at<double>(0)) {
     throw std::runtime_error("lens: the points lie on a line; use a board with several rows");
   }
   Parameters p(kHomography + 2 + terms, 0.0);

@@ -62,8 +62,12 @@ void run_board(const Options& options) {
   const auto [rows, cols] = pair_of(options.pins, "--pins");
   const PinPress press =
       find_pins(mean_levels(reference), mean_levels(pressed), {rows, cols, options.pitch_mm});
-  write(options, reference, press.lens,
-        fmt::format("{}x{} pins, {} mm apart", press.rows, press.cols, options.pitch_mm));
+  std::string what =
+      fmt::format("{}x{} pins, {} mm apart", press.rows, press.cols, options.pitch_mm);
+  if (!press.missing.empty()) {
+    what += fmt::format("; not found: {}", fmt::join(press.missing, "; "));
+  }
+  write(options, reference, press.lens, what);
 }
 
 void run_chessboard(const Options& options) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "clients/ctl/json.hpp"
 #include "clients/ctl/offline/folder_evaluation.hpp"
 #include "clients/ctl/offline/images.hpp"
 #include "clients/ctl/offline/offline.hpp"
@@ -18,24 +19,70 @@ struct Options {
   std::vector<std::string> reference;
   std::vector<std::string> ball;
   double radius_mm = 0;
-  bool json = false;
   std::string folder;
   Board board;
   std::string page;
 };
 
+void add_optional(Json& json, const char* name, std::optional<double> value) {
+  value ? json.member(name, *value) : json.key(name).null();
+}
+
+/// The members of a press's evaluation.
+void add_press(Json& json, const calibration::Evaluation& e) {
+  json.member("centre_row", e.contact.row)
+      .member("centre_col", e.contact.col)
+      .member("contact_radius_mm", e.contact.radius_mm)
+      .member("peak_levels", e.contact.peak_levels)
+      .member("drift_levels", e.drift_levels)
+      .member("offset_mm", e.offset_mm)
+      .member("mae_mm", e.mae_mm)
+      .member("mae_with_offset_mm", e.raw_mae_mm);
+  add_optional(json, "half_mae_mm", e.half_mae_mm);
+  add_optional(json, "half_worst_mm", e.half_worst_mm);
+  json.member("contact_pixels", e.pixels).member("untrusted_pixels", e.untrusted);
+}
+
 void print_json(const calibration::Evaluation& e) {
-  const auto number = [](std::optional<double> value) {
-    return value ? fmt::format("{:.4f}", *value) : std::string("null");
-  };
-  fmt::print(
-      "{{\"centre_row\": {:.2f}, \"centre_col\": {:.2f}, \"contact_radius_mm\": {:.3f}, "
-      "\"peak_levels\": {:.2f}, \"drift_levels\": {:.2f}, \"offset_mm\": {:.4f}, "
-      "\"mae_mm\": {:.4f}, \"mae_with_offset_mm\": {:.4f}, \"half_mae_mm\": {}, "
-      "\"half_worst_mm\": {}, \"contact_pixels\": {}, \"untrusted_pixels\": {}}}\n",
-      e.contact.row, e.contact.col, e.contact.radius_mm, e.contact.peak_levels, e.drift_levels,
-      e.offset_mm, e.mae_mm, e.raw_mae_mm, number(e.half_mae_mm), number(e.half_worst_mm), e.pixels,
-      e.untrusted);
+  Json json;
+  json.open('{');
+  add_press(json, e);
+  fmt::print("{}\n", json.close('}').text());
+}
+
+/// What was skipped is an object with its reason.
+void print_json(const FolderEvaluation& e) {
+  Json json;
+  json.open('{').key("lens").open('{');
+  if (e.pins) {
+    const ChosenLens& lens = e.pins->lens;
+    json.member("pins", e.pins->marks.size())
+        .member("missing", e.pins->missing)
+        .member("rows", e.pins->rows)
+        .member("cols", e.pins->cols)
+        .member("rms_mm", rms(lens.in_sample))
+        .member("left_out_rms_mm", rms(lens.left_out))
+        .member("parameters", parameters(lens.model))
+        .member("mm_per_px", recon::central_mm_per_px(lens.lens));
+  } else {
+    json.member("skipped", e.no_pins);
+  }
+  json.close('}').key("ball").open('{');
+  if (e.ball) {
+    add_press(json, *e.ball);
+  } else {
+    json.member("skipped", e.no_ball);
+  }
+  json.close('}').key("pin_depths").open('{');
+  if (e.pin_depths) {
+    json.member("mean_mm", e.pin_depths->mean_mm)
+        .member("spread", e.pin_depths->spread)
+        .member("tilt_x_um_per_mm", e.pin_depths->tilt_x_um_per_mm)
+        .member("tilt_y_um_per_mm", e.pin_depths->tilt_y_um_per_mm);
+  } else {
+    json.member("skipped", e.no_pin_depths);
+  }
+  fmt::print("{}\n", json.close('}').close('}').text());
 }
 
 void print_text(const calibration::Evaluation& e) {
@@ -59,19 +106,20 @@ void print_text(const calibration::Evaluation& e) {
              100.0 * static_cast<double>(e.untrusted) / static_cast<double>(e.pixels));
 }
 
-void run_folder(const Options& options) {
+void run_folder(const Options& options, bool json) {
   constexpr double kUsualRadius = 4.0;  // mm, of the ball that this kind of sensor comes with
   std::filesystem::path folder = std::filesystem::weakly_canonical(options.folder);
   const FolderEvaluation e = evaluate_folder(
       folder, options.board, options.radius_mm > 0 ? options.radius_mm : kUsualRadius);
+  if (!options.page.empty()) write_page(e, folder.filename().string(), options.page);
+  if (json) return print_json(e);
   for (const std::string& line : lines_of(e)) fmt::print("{}\n", line);
   if (options.page.empty()) return;
-  write_page(e, folder.filename().string(), options.page);
   fmt::print("page: {}\n", (std::filesystem::path(options.page) / "index.html").string());
 }
 
-void run(const Options& options) {
-  if (!options.folder.empty()) return run_folder(options);
+void run(const Options& options, bool json) {
+  if (!options.folder.empty()) return run_folder(options, json);
   if (options.calibration.empty() || options.reference.empty() || options.ball.empty() ||
       options.radius_mm == 0) {
     throw std::runtime_error(
@@ -83,12 +131,12 @@ void run(const Options& options) {
   require_same_size(reference, "--reference", ball, "--ball");
   const calibration::Evaluation evaluation = calibration::evaluate(
       calibration, reference.mean_q8().pixels, ball.frames(), options.radius_mm);
-  options.json ? print_json(evaluation) : print_text(evaluation);
+  json ? print_json(evaluation) : print_text(evaluation);
 }
 
 }  // namespace
 
-void add_evaluate(CLI::App& app) {
+void add_evaluate(CLI::App& app, const bool& json) {
   CLI::App* evaluate =
       app.add_subcommand("evaluate", "Compare a calibration with the press of a ball");
   const auto options = std::make_shared<Options>();
@@ -122,8 +170,7 @@ void add_evaluate(CLI::App& app) {
       ->needs(folder);
   evaluate->add_option("-o,--output", options->page, "Folder for a page of pictures")
       ->needs(folder);
-  evaluate->add_flag("--json", options->json, "One JSON object instead of sentences");
-  evaluate->callback([options] { run(*options); });
+  evaluate->callback([options, &json] { run(*options, json); });
 }
 
 }  // namespace dtact::ctl

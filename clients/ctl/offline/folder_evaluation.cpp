@@ -160,6 +160,9 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
         "{:.4f} mm each left out; {} parameters; {:.5f} mm per pixel in the middle",
         e.pins->marks.size(), e.pins->rows, e.pins->cols, rms(lens.in_sample), rms(lens.left_out),
         parameters(lens.model), recon::central_mm_per_px(lens.lens)));
+    if (!e.pins->missing.empty()) {
+      lines.push_back(fmt::format("lens: pins not found: {}", fmt::join(e.pins->missing, "; ")));
+    }
   } else {
     lines.push_back("lens: skipped: " + e.no_pins);
   }

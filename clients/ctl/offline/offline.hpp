@@ -14,14 +14,15 @@ void add_calibrate(CLI::App& app);
 void add_calibrate_lens(CLI::App& calibrate);
 /// reconstruct --calibration cal/ --reference R.png --frame F.png -o depth.{npy,png,ply}
 void add_reconstruct(CLI::App& app);
-/// evaluate --calibration cal/ --reference R.png --ball B.png --radius-mm 4.0 [--json]
-void add_evaluate(CLI::App& app);
+/// evaluate --calibration cal/ --reference R.png --ball B.png --radius-mm 4.0, or --folder DIR.
+/// `json`: read when the command runs; one JSON object instead of sentences.
+void add_evaluate(CLI::App& app, const bool& json);
 
 /// All of the above.
-inline void add_offline_commands(CLI::App& app) {
+inline void add_offline_commands(CLI::App& app, const bool& json) {
   add_calibrate(app);
   add_reconstruct(app);
-  add_evaluate(app);
+  add_evaluate(app, json);
 }
 
 }  // namespace dtact::ctl

@@ -7,7 +7,7 @@
 
 #include "clients/ctl/offline/folder_evaluation.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "tests/accuracy/real/board_transforms.hpp"
+#include "tests/accuracy/real/press_images.hpp"
 #include "tests/unit/calibration/sample.hpp"
 
 namespace dtact::ctl {

@@ -6,12 +6,11 @@
 #include <string>
 
 #include "clients/ctl/lens/pins.hpp"
-#include "tests/accuracy/real/board_transforms.hpp"
+#include "tests/accuracy/real/press_images.hpp"
 
 namespace dtact::ctl {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
@@ -20,18 +19,24 @@ class RobustPins : public testing::TestWithParam<const char*> {
   void SetUp() override {
     const auto folder = sensor_folder(GetParam());
     if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
-    board_ = load_board(*folder);
+    board_ = load_pair(*folder, "board");
   }
-  /// All pins are found and lie where the grid says, each judged by the lens of the others.
-  static void expect_found(const BoardImages& board, const char* what, double bound_mm = 0.06) {
+  /// The pins are found, but for `faint` at the edge, and lie where the grid says, each judged by
+  /// the lens of the others.
+  static void expect_found(const PressImages& board, const char* what, double bound_mm = 0.06,
+                           std::size_t faint = 0) {
     const PinPress press = find_pins(board.reference, board.frame, {});
     const double error = rms(press.lens.left_out);
     fmt::print("{} {}: left-out RMS {:.4f} mm, {} parameters\n", GetParam(), what, error,
                parameters(press.lens.model));
     EXPECT_LE(error, bound_mm) << what;
-    EXPECT_EQ(press.marks.size(), 63U) << what;
+    EXPECT_EQ(press.marks.size() + press.missing.size(), 63U) << what;
+    EXPECT_LE(press.missing.size(), faint) << what;
   }
-  BoardImages board_;
+  /// The pins darken the image by 8 levels only; some of those at the edge drown in a leak of 30,
+  /// and it is said which.
+  static bool has_faint_pins() { return GetParam() == std::string("sensor_c"); }
+  PressImages board_;
 };
 
 TEST_P(RobustPins, AsTheyAre) { expect_found(board_, "as it is"); }
@@ -43,39 +48,26 @@ TEST_P(RobustPins, Portrait) {
 }
 TEST_P(RobustPins, DarkCorners) { expect_found(dark_corners(board_), "dark corners"); }
 TEST_P(RobustPins, Tilted) { expect_found(tilted(board_), "tilted"); }
-// sensor_c's pins darken the image by 8 levels only; those at the edge drown in the light, and it
-// is said which.
 TEST_P(RobustPins, Leaking) {
-  if (GetParam() == std::string("sensor_c")) {
-    EXPECT_THAT(
-        [&] { (void)find_pins(leaking(board_).reference, leaking(board_).frame, {}); },
-        ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("of 63 pins not found: row 7, "))));
-    return;
-  }
-  expect_found(leaking(board_), "leaking");
+  expect_found(leaking(board_), "leaking", has_faint_pins() ? 0.065 : 0.06,
+               has_faint_pins() ? 3 : 0);
 }
 TEST_P(RobustPins, Everything) {
-  const BoardImages all = leaking(tilted(dark_corners(turned(board_))));
-  if (GetParam() == std::string("sensor_c")) {
-    EXPECT_THAT([&] { (void)find_pins(all.reference, all.frame, {}); },
-                ThrowsMessage<std::runtime_error>(HasSubstr("of 63 pins not found: row 9, ")));
-    return;
-  }
-  expect_found(all, "all of them", 0.07);
+  expect_found(leaking(tilted(dark_corners(turned(board_)))), "all of them",
+               has_faint_pins() ? 0.08 : 0.07, has_faint_pins() ? 3 : 0);
 }
 
 TEST_P(RobustPins, NamesThePinsThatAreMissing) {
   const PinPress whole = find_pins(board_.reference, board_.frame, {});
   // The second row's third and the last row's last; half the pitch is about 25 pixels here.
-  BoardImages gone = board_;
+  PressImages gone = board_;
   for (const std::size_t pin : {11U, 62U}) {
     const recon::Point px = whole.marks[pin].px;
     gone = without_pin(gone, {static_cast<int>(px.x), static_cast<int>(px.y)}, 27);
   }
-  EXPECT_THAT([&] { (void)find_pins(gone.reference, gone.frame, {}); },
-              ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("2 of 63 pins not found"),
-                                                      HasSubstr("row 2, column 3"),
-                                                      HasSubstr("row 7, column 9"))));
+  const PinPress press = find_pins(gone.reference, gone.frame, {});
+  EXPECT_THAT(press.missing, testing::ElementsAre("row 2, column 3", "row 7, column 9"));
+  EXPECT_LE(rms(press.lens.left_out), 0.06);
 }
 
 TEST_P(RobustPins, AnUntouchedSurfaceIsNoBoard) {

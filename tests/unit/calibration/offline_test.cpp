@@ -41,7 +41,10 @@ class Offline : public testing::Test {
   static std::string run(std::vector<std::string> arguments) {
     CLI::App app;
     app.require_subcommand(1);
-    add_offline_commands(app);
+    app.fallthrough();
+    bool json = false;
+    app.add_flag("--json", json);
+    add_offline_commands(app, json);
     std::ranges::reverse(arguments);
     testing::internal::CaptureStdout();
     try {
@@ -117,10 +120,18 @@ TEST_F(Offline, EvaluatesInSentencesAndJson) {
                                           at("ball.png"), "--radius-mm",       "4.0"};
   EXPECT_THAT(run(evaluate), AllOf(HasSubstr("mean absolute error"), HasSubstr("untrusted: 0 of")));
   const std::string json = run(with(evaluate, "--json"));
-  EXPECT_THAT(json, AllOf(HasSubstr("{\"centre_row\": 110.5"), HasSubstr("\"mae_mm\": 0.00"),
-                          HasSubstr("\"untrusted_pixels\": 0}")));
+  EXPECT_THAT(json, AllOf(HasSubstr("{\"centre_row\":110.5"), HasSubstr("\"mae_mm\":0.00"),
+                          HasSubstr("\"untrusted_pixels\":0}")));
   run(with(calibrate(), "--method", "published"));
-  EXPECT_THAT(run(with(evaluate, "--json")), HasSubstr("\"half_mae_mm\": null"));
+  EXPECT_THAT(run(with(evaluate, "--json")), HasSubstr("\"half_mae_mm\":null"));
+}
+
+TEST_F(Offline, SaysWhyItSkipsWhatAFolderLacks) {
+  const std::string reason = "board_reference.png is not there";
+  const std::string folder = std::filesystem::path(at("ball.png")).parent_path().string();
+  EXPECT_THAT(run({"evaluate", "--folder", folder}), HasSubstr("lens: skipped: " + reason));
+  EXPECT_THAT(run({"evaluate", "--folder", folder, "--json"}),
+              HasSubstr("{\"lens\":{\"skipped\":\"" + reason + "\"}"));
 }
 
 TEST_F(Offline, ReconstructsToNpy) {

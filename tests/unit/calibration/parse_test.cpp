@@ -123,6 +123,8 @@ TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {
   expect_refused(with("\"radial\"", "\"square\""), "gain.shape", "\"uniform\"");
   expect_refused(with("per_mm = -0.0125", "per_mm = -2"), "gain.per_mm", "from -1 to 1");
   expect_refused(with("per_mm = -0.0125", ""), "gain.per_mm", "missing");
+  expect_refused(with("polynomial = [0.015625, -0.5]", "polynomial = [0.015625]"),
+                 "gain.polynomial", "two numbers");
   expect_refused(with("  0.25, 1.1,", "  1.1, 0.25,"), "uncertainty.depth_mm", "ascending");
   expect_refused(with("  0.25, 1.1,", "  0.25,"), "uncertainty.error_um", "one for each");
   expect_refused(with("  12.5, 20,", "  12.5, -1,"), "uncertainty.error_um", "entry 2");

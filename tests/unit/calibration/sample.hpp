@@ -26,8 +26,11 @@ inline Calibration sample() {
   model->untrusted.assign(30, 0);
   model->untrusted[0] = model->untrusted[7] = model->untrusted[8] = model->untrusted[29] = 1;
   model->uncertainty = {{0.25, 12.5}, {1.1, 20}};
-  model->gain = {
-      .shape = recon::GainShape::radial, .centre_x_mm = 1.5, .centre_y_mm = -2, .per_mm = -0.0125};
+  model->gain = {.shape = recon::GainShape::radial,
+                 .centre_x_mm = 1.5,
+                 .centre_y_mm = -2,
+                 .per_mm = -0.0125,
+                 .polynomial = {0.015625, -0.5}};
   Calibration calibration;
   calibration.crop_col = 3;
   calibration.crop_row = 2;

@@ -32,6 +32,15 @@ TEST(SpatialGain, RadialGrowsWithTheDistance) {
   EXPECT_EQ(plane, (std::vector<std::int16_t>{6400, 19200, 12800, 7, 9600, 21851, 212, 7}));
 }
 
+TEST(SpatialGain, APolynomialIsOnTopOfTheShape) {
+  // Places: x −2, 0, 2 mm; y −1 in the first row, 1 in the second.
+  EXPECT_EQ(applied({.polynomial = {0.25, -0.5}}),
+            (std::vector<std::int16_t>{6400, 19200, 12800, 7, 0, 6400, 100, 7}));
+  // 1 + x²/4 − xy/4: 1.5, 1, 2.5 and 2.5, 1, 1.5.
+  EXPECT_EQ(applied({.shape = GainShape::uniform, .polynomial = {0, 0, 0.25, -0.25, 0}}),
+            (std::vector<std::int16_t>{13440, 8960, 22400, 7, 22400, 8960, 13440, 7}));
+}
+
 TEST(SpatialGain, Saturates) {
   EXPECT_EQ(applied({.shape = GainShape::radial, .centre_x_mm = -900, .per_mm = 1})[0], INT16_MAX);
   EXPECT_EQ(applied({.shape = GainShape::radial, .centre_x_mm = -900, .per_mm = -1})[0], 0);

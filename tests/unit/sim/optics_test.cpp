@@ -48,6 +48,22 @@ TEST(Optics, EvenIndentationIsNotChangedByScattering) {
   for (const std::int16_t value : loss) ASSERT_NEAR(value, 0.18 * 32768, 2);
 }
 
+TEST(Optics, AThickerSideDarkensLess) {
+  OpticsModel linear = model();
+  linear.pressed_curve = 0;
+  linear.narrow_weight = 1;
+  LayerModel layer;
+  layer.taper_x = 0.02;
+  Optics optics(linear, kGrid, layer);
+  const std::vector<std::int16_t> indentation(kPoints, Truth::kPerMm);  // 1 mm
+  std::vector<std::int16_t> loss(kPoints);
+  optics.run(indentation, loss);
+  // 10 mm to the left and to the right the layer is 0.8 and 1.2 of its mean.
+  EXPECT_NEAR(loss[at(20, 100)], 0.2 / 0.8 * 32768, 10);
+  EXPECT_NEAR(loss[at(100, 20)], 0.2 * 32768, 10);
+  EXPECT_NEAR(loss[at(180, 100)], 0.2 / 1.2 * 32768, 10);
+}
+
 TEST(Optics, ScatteringKeepsTheSumAndHasTheTwoWidths) {
   Optics optics(model(), kGrid);
   std::vector<std::int16_t> indentation(kPoints, 0);

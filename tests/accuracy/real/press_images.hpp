@@ -6,31 +6,32 @@
 
 namespace dtact {
 
-/// A board press: grey levels.
-struct BoardImages {
+/// An untouched surface and an object pressed in, a board of pins or a ball: grey levels.
+struct PressImages {
   cv::Mat1f reference;
   cv::Mat1f frame;
 };
 
 /// The folder of a sensor's real images, or none where they are not beside the repository.
 [[nodiscard]] std::optional<std::filesystem::path> sensor_folder(const char* sensor);
-[[nodiscard]] BoardImages load_board(const std::filesystem::path& folder);
+/// `object`: "board" or "ball".
+[[nodiscard]] PressImages load_pair(const std::filesystem::path& folder, const char* object);
 
 // What other sensors of the family do to such images. Results are rounded to whole grey levels, as
 // a camera would.
 
 /// Portrait: a quarter turn clockwise.
-[[nodiscard]] BoardImages turned(const BoardImages& board);
+[[nodiscard]] PressImages turned(const PressImages& board);
 /// Both images darker towards the corners: 1 − 0.75·(r / corner)².
-[[nodiscard]] BoardImages dark_corners(const BoardImages& board);
+[[nodiscard]] PressImages dark_corners(const PressImages& board);
 /// Pressed in more on one side: the darkening of the whole surface grows by 12 grey levels from the
 /// left to the right edge and by 6 from the top to the bottom.
-[[nodiscard]] BoardImages tilted(const BoardImages& board);
+[[nodiscard]] PressImages tilted(const PressImages& board);
 /// Light that leaks in at the left edge in one image and at the bottom in the other, up to 60
 /// levels.
-[[nodiscard]] BoardImages leaking(const BoardImages& board);
+[[nodiscard]] PressImages leaking(const PressImages& board);
 /// Within `radius` pixels of a place the darkening of the ring around it, with a pixel noise of one
 /// grey level: as if the pin were broken off.
-[[nodiscard]] BoardImages without_pin(const BoardImages& board, cv::Point place, double radius);
+[[nodiscard]] PressImages without_pin(const PressImages& board, cv::Point place, double radius);
 
 }  // namespace dtact

@@ -1,7 +1,8 @@
-#include "tests/accuracy/real/board_transforms.hpp"
+#include "tests/accuracy/real/press_images.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "hal/image/png.hpp"
 
@@ -40,39 +41,40 @@ std::optional<std::filesystem::path> sensor_folder(const char* sensor) {
   return folder;
 }
 
-BoardImages load_board(const std::filesystem::path& folder) {
-  return {load(folder / "board_reference.png"), load(folder / "board.png")};
+PressImages load_pair(const std::filesystem::path& folder, const char* object) {
+  return {load(folder / (std::string(object) + "_reference.png")),
+          load(folder / (std::string(object) + ".png"))};
 }
 
-BoardImages turned(const BoardImages& board) {
-  BoardImages out;
+PressImages turned(const PressImages& board) {
+  PressImages out;
   cv::rotate(board.reference, out.reference, cv::ROTATE_90_CLOCKWISE);
   cv::rotate(board.frame, out.frame, cv::ROTATE_90_CLOCKWISE);
   return out;
 }
 
-BoardImages dark_corners(const BoardImages& board) {
+PressImages dark_corners(const PressImages& board) {
   const auto darken = [](float level, double x, double y) {
     return level * (1 - 0.75 * 2 * ((x - 0.5) * (x - 0.5) + (y - 0.5) * (y - 0.5)));
   };
   return {changed(board.reference, darken), changed(board.frame, darken)};
 }
 
-BoardImages tilted(const BoardImages& board) {
+PressImages tilted(const PressImages& board) {
   return {board.reference.clone(), changed(board.frame, [](float level, double x, double y) {
             return level - 12 * x - 6 * y;
           })};
 }
 
-BoardImages leaking(const BoardImages& board) {
+PressImages leaking(const PressImages& board) {
   return {changed(board.reference, [](float level, double,
                                       double y) { return level + 30 * std::exp(-(1 - y) / 0.03); }),
           changed(board.frame,
                   [](float level, double x, double) { return level + 30 * std::exp(-x / 0.03); })};
 }
 
-BoardImages without_pin(const BoardImages& board, cv::Point place, double radius) {
-  BoardImages out{board.reference.clone(), board.frame.clone()};
+PressImages without_pin(const PressImages& board, cv::Point place, double radius) {
+  PressImages out{board.reference.clone(), board.frame.clone()};
   double sum = 0;
   int count = 0;
   const auto each = [&](double from, double to, const auto& visit) {

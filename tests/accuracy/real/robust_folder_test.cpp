@@ -1,0 +1,73 @@
+// dtactctl evaluate --folder on real images changed as other sensors of the family would change
+// them: what the ball and the pins read must not hang on how the camera is turned or where the
+// light is weak.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <string>
+
+#include "clients/ctl/offline/folder_evaluation.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "hal/image/png.hpp"
+#include "tests/accuracy/real/press_images.hpp"
+#include "tests/unit/calibration/sample.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using Change = PressImages (*)(const PressImages&);
+
+PressImages as_it_is(const PressImages& images) { return images; }
+
+void save(const cv::Mat1f& levels, const std::filesystem::path& path) {
+  image::Grey8 image{levels.cols, levels.rows, {}};
+  for (const float level : levels) image.pixels.push_back(static_cast<std::uint8_t>(level));
+  base::write_file_atomically(path, image::encode_png(image));
+}
+
+/// The folder's evaluation with all four images changed.
+FolderEvaluation changed(const std::filesystem::path& folder, Change change, const char* what) {
+  const calibration::TempFolder temp;
+  for (const char* object : {"board", "ball"}) {
+    const PressImages pair = change(load_pair(folder, object));
+    save(pair.reference, temp.path() / fmt::format("{}_reference.png", object));
+    save(pair.frame, temp.path() / fmt::format("{}.png", object));
+  }
+  FolderEvaluation e = evaluate_folder(temp.path(), {}, 4.0);
+  for (const std::string& line : lines_of(e)) {
+    fmt::print("{} {}: {}\n", folder.filename().string(), what, line);
+  }
+  return e;
+}
+
+class RobustFolder : public testing::TestWithParam<const char*> {};
+
+TEST_P(RobustFolder, ReadsTheBallAsBefore) {
+  const auto folder = sensor_folder(GetParam());
+  if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
+  const FolderEvaluation plain = changed(*folder, as_it_is, "as it is");
+  ASSERT_TRUE(plain.ball && plain.ball->half_mae_mm);
+  struct Row {
+    const char* what;
+    Change change;
+    double times;  ///< Of the half-disc error of the images as they are, at most.
+  };
+  for (const auto& [what, change, times] :
+       {Row{"portrait", turned, 1.05}, Row{"dark corners", dark_corners, 1.3},
+        Row{"tilted", tilted, 1.5}, Row{"leaking", leaking, 1.3}}) {
+    const FolderEvaluation e = changed(*folder, change, what);
+    ASSERT_TRUE(e.ball && e.ball->half_mae_mm) << what << ": " << e.no_ball;
+    EXPECT_LE(*e.ball->half_mae_mm, times * *plain.ball->half_mae_mm) << what;
+    // A tilt of the whole surface is a deeper press on one side.
+    if (change != tilted) {
+      EXPECT_NEAR(e.ball->contact.radius_mm, plain.ball->contact.radius_mm, 0.25) << what;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, RobustFolder, testing::Values("sensor_a", "sensor_b"),
+                         [](const auto& sensor) { return std::string(sensor.param); });
+
+}  // namespace
+}  // namespace dtact::ctl

@@ -1,0 +1,91 @@
+#include "daemon/calibration/lens_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <string>
+
+#include "hal/base/atomic_file.hpp"
+#include "tests/unit/calibration/sample.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr const char* kLens = R"(version = 1
+
+[frame]
+width = 800
+height = 600
+
+[lens]
+homography = [20, 0, 400, 0, 20, 300, 0, 0, 1]
+centre_col = 400
+centre_row = 300
+radius_px = 250
+radial = [-0.1, 0.02]
+)";
+
+class LensFileTest : public testing::Test {
+ protected:
+  /// Loads the sample with `from` replaced by `to`.
+  [[nodiscard]] LensFile load(const std::string& from = "", const std::string& to = "") const {
+    std::string text = kLens;
+    if (!from.empty()) text.replace(text.find(from), from.size(), to);
+    base::write_file_atomically(path(), text);
+    return load_lens(path());
+  }
+  [[nodiscard]] std::filesystem::path path() const { return temp_.path() / "lens.toml"; }
+
+ private:
+  const TempFolder temp_;
+};
+
+TEST_F(LensFileTest, IsRead) {
+  const LensFile file = load();
+  EXPECT_EQ(file.frame_width, 800);
+  EXPECT_EQ(file.frame_height, 600);
+  EXPECT_EQ(file.lens.homography[2], 400);
+  EXPECT_EQ(file.lens.radius_px, 250);
+  EXPECT_EQ(file.lens.radial, (std::vector<double>{-0.1, 0.02}));
+}
+
+TEST_F(LensFileTest, IsReadBackExactly) {
+  LensFile file = load();
+  file.lens.homography[0] = 20.1;  // no binary fraction
+  file.lens.radial = {1.0 / 3, -2.0 / 7};
+  file.notes = {"how it was measured"};
+  base::write_file_atomically(path(), format(file));
+  const LensFile again = load_lens(path());
+  EXPECT_EQ(again.lens.homography, file.lens.homography);
+  EXPECT_EQ(again.lens.radial, file.lens.radial);
+}
+
+TEST_F(LensFileTest, ErrorsNameFileKeyAndRemedy) {
+  const auto says = [](auto... parts) {
+    return ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("lens.toml"), HasSubstr(parts)...));
+  };
+  EXPECT_THAT([&] { (void)load("version = 1", "version = 99"); }, says("version"));
+  EXPECT_THAT([&] { (void)load("width = 800\n", ""); }, says("width"));
+  EXPECT_THAT([&] { (void)load("300, 0, 0, 1]", "300]"); }, says("homography", "nine numbers"));
+  EXPECT_THAT([&] { (void)load("radius_px = 250", "radius_px = 0"); }, says("radius_px"));
+  EXPECT_THAT([&] { (void)load("[-0.1, 0.02]", "[0, 0, 0, 0, 0, 0, 0]"); }, says("radial"));
+  EXPECT_THAT([&] { (void)load("[-0.1, 0.02]", "[nan]"); }, says("radial"));
+  EXPECT_THAT([&] { (void)load("centre_row", "center_row"); }, says("cent"));
+  EXPECT_THAT([&] { (void)load("[lens]", "[lens"); }, says("lens"));
+  // The surface's origin beside the frame, and mirrored.
+  EXPECT_THAT([&] { (void)load("20, 0, 400", "20, 0, 4000"); }, says("lens"));
+  EXPECT_THAT([&] { (void)load("[20, 0", "[-20, 0"); }, says("lens"));
+}
+
+TEST_F(LensFileTest, AFolderWithoutALensSaysHowToMakeOne) {
+  EXPECT_THAT([&] { (void)load_lens(path().parent_path() / "none.toml"); },
+              ThrowsMessage<std::exception>(HasSubstr("none.toml")));
+}
+
+}  // namespace
+}  // namespace dtact::calibration

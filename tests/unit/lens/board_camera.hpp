@@ -1,0 +1,86 @@
+#pragma once
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <opencv2/core.hpp>
+
+namespace dtact::ctl {
+
+/// A camera that looks at a plane, worked out from rays alone: independent of recon::Lens and of
+/// OpenCV's calibration. With (x, y) a ray's slopes and r² = x² + y², it shows the ray at the pixel
+/// centre + focal·(x, y)·(1 + k1·r² + k2·r⁴).
+struct BoardCamera {
+  int width = 640;
+  int height = 480;
+  double focal = 560;  ///< Pixels.
+  cv::Point2d centre{320, 240};
+  double k1 = 0;
+  double k2 = 0;
+  /// The plane: its origin `distance_mm` before the camera and `shift_mm` beside the axis, turned
+  /// about the camera's x, then y, then z axis. Degrees.
+  double distance_mm = 32;
+  cv::Point2d shift_mm{0, 0};
+  double tilt_x = 0;
+  double tilt_y = 0;
+  double turn = 0;
+
+  /// The pixel that shows the plane's point.
+  [[nodiscard]] cv::Point2d pixel(cv::Point2d mm) const {
+    const cv::Vec3d p = axes() * cv::Vec3d(mm.x, mm.y, 0) + place();
+    const cv::Point2d ray(p[0] / p[2], p[1] / p[2]);
+    return centre + focal * factor(ray.dot(ray)) * ray;
+  }
+
+  /// Grey levels of a pattern on the plane, the mean of `samples`² places in each pixel, with
+  /// Gaussian noise.
+  [[nodiscard]] cv::Mat1f photograph(const std::function<double(cv::Point2d mm)>& pattern,
+                                     int samples, double noise) const {
+    const cv::Matx33d to_camera = axes();
+    cv::Mat1f image(height, width);
+    for (int y = 0; y < height; ++y) {
+      for (int x = 0; x < width; ++x) {
+        double sum = 0;
+        for (int s = 0; s < samples * samples; ++s) {
+          const cv::Point2d inside((s % samples + 0.5) / samples - 0.5,
+                                   (s / samples + 0.5) / samples - 0.5);
+          sum += pattern(surface(to_camera, cv::Point2d(x, y) + inside));
+        }
+        image(y, x) = static_cast<float>(sum / (samples * samples));
+      }
+    }
+    cv::Mat1f grain(height, width);
+    cv::RNG random(7);
+    random.fill(grain, cv::RNG::NORMAL, 0, noise);
+    image += grain;
+    return image;
+  }
+
+ private:
+  /// The plane's point that a pixel shows.
+  [[nodiscard]] cv::Point2d surface(const cv::Matx33d& a, cv::Point2d px) const {
+    const cv::Point2d seen = (px - centre) / focal;
+    cv::Point2d ray = seen;
+    for (int i = 0; i < 12; ++i) ray = seen / factor(ray.dot(ray));
+    // a · (X, Y, 0) + place is along the ray: two equations for X and Y.
+    const cv::Vec3d t = place();
+    const cv::Matx22d left(a(0, 0) - ray.x * a(2, 0), a(0, 1) - ray.x * a(2, 1),
+                           a(1, 0) - ray.y * a(2, 0), a(1, 1) - ray.y * a(2, 1));
+    const cv::Vec2d mm = left.inv() * cv::Vec2d(ray.x * t[2] - t[0], ray.y * t[2] - t[1]);
+    return {mm[0], mm[1]};
+  }
+  [[nodiscard]] double factor(double r2) const { return 1 + k1 * r2 + k2 * r2 * r2; }
+  [[nodiscard]] cv::Vec3d place() const { return {shift_mm.x, shift_mm.y, distance_mm}; }
+  [[nodiscard]] cv::Matx33d axes() const {
+    constexpr double kDegree = std::numbers::pi / 180;
+    const double a = tilt_x * kDegree;
+    const double b = tilt_y * kDegree;
+    const double c = turn * kDegree;
+    const cv::Matx33d about_x(1, 0, 0, 0, std::cos(a), -std::sin(a), 0, std::sin(a), std::cos(a));
+    const cv::Matx33d about_y(std::cos(b), 0, std::sin(b), 0, 1, 0, -std::sin(b), 0, std::cos(b));
+    const cv::Matx33d about_z(std::cos(c), -std::sin(c), 0, std::sin(c), std::cos(c), 0, 0, 0, 1);
+    return about_z * about_y * about_x;
+  }
+};
+
+}  // namespace dtact::ctl

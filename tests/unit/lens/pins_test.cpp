@@ -1,0 +1,161 @@
+#include "clients/ctl/lens/pins.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "tests/unit/lens/board_camera.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+/// A board of pins pressed into a surface under uneven light.
+struct Scene {
+  BoardCamera camera;
+  Board board;
+  double depth_levels = 20;
+  double turn = 0;                        ///< Of the board in the plane, degrees.
+  std::set<std::pair<int, int>> missing;  ///< Row, column.
+
+  Scene() {
+    camera.k1 = -0.15;
+    camera.tilt_x = 2;
+  }
+
+  [[nodiscard]] cv::Point2d pin(int row, int col) const {
+    const cv::Point2d flat((col - 0.5 * (board.cols - 1)) * board.pitch_mm,
+                           (row - 0.5 * (board.rows - 1)) * board.pitch_mm);
+    const double angle = turn * std::numbers::pi / 180;
+    return {std::cos(angle) * flat.x - std::sin(angle) * flat.y,
+            std::sin(angle) * flat.x + std::cos(angle) * flat.y};
+  }
+  [[nodiscard]] cv::Mat1f untouched() const { return camera.photograph(light, 1, 0.3); }
+  [[nodiscard]] cv::Mat1f pressed() const {
+    return camera.photograph(
+        [&](cv::Point2d mm) { return light(mm) * (1 - depth_levels / 150 * dent(mm)); }, 1, 0.3);
+  }
+  [[nodiscard]] PinPress find() const { return find_pins(untouched(), pressed(), board); }
+
+ private:
+  /// Of the nearest pin: 1 at its centre.
+  [[nodiscard]] double dent(cv::Point2d mm) const {
+    constexpr double kWidth = 0.45;  // mm, standard deviation of a pin's blurred dent
+    const double angle = turn * std::numbers::pi / 180;
+    const double along = std::cos(angle) * mm.x + std::sin(angle) * mm.y;
+    const double down = std::cos(angle) * mm.y - std::sin(angle) * mm.x;
+    const auto nearest = [&](double place, int count) {
+      const double index = std::round(place / board.pitch_mm + 0.5 * (count - 1));
+      return static_cast<int>(std::clamp(index, 0.0, count - 1.0));
+    };
+    const int row = nearest(down, board.rows);
+    const int col = nearest(along, board.cols);
+    if (missing.contains({row, col})) return 0;
+    const cv::Point2d away = mm - pin(row, col);
+    return std::exp(-away.dot(away) / (2 * kWidth * kWidth));
+  }
+  /// Brighter on one side, a quarter of that in the corners.
+  static double light(cv::Point2d mm) { return 150 + 3 * mm.x - 0.25 * mm.dot(mm); }
+};
+
+/// RMS distance in pixels of the marks from where the camera shows the nearest pin.
+double rms_px(const PinPress& press, const Scene& scene) {
+  double sum = 0;
+  for (const Mark& mark : press.marks) {
+    double nearest = 1e9;
+    for (int row = 0; row < scene.board.rows; ++row) {
+      for (int col = 0; col < scene.board.cols; ++col) {
+        const cv::Point2d truth = scene.camera.pixel(scene.pin(row, col));
+        nearest = std::min(nearest, std::hypot(truth.x - mark.px.x, truth.y - mark.px.y));
+      }
+    }
+    sum += nearest * nearest;
+  }
+  return std::sqrt(sum / static_cast<double>(press.marks.size()));
+}
+
+TEST(Pins, AreFoundUnderUnevenLight) {
+  const Scene scene;
+  const PinPress press = scene.find();
+  ASSERT_EQ(press.marks.size(), 63U);
+  EXPECT_EQ(press.rows, 7);
+  EXPECT_EQ(press.cols, 9);
+  EXPECT_LT(rms_px(press, scene), 0.3);  // 17.5 pixels a millimetre
+  EXPECT_LT(rms(press.lens.left_out), 0.02);
+}
+
+TEST(Pins, AreFoundWithTheBoardTurned) {
+  Scene scene;
+  scene.turn = 7;
+  const PinPress press = scene.find();
+  ASSERT_EQ(press.marks.size(), 63U);
+  EXPECT_LT(rms_px(press, scene), 0.3);
+  // The axes are the picture's, not the board's: the first row's pins lie on a slope of 7 degrees.
+  const auto& first = press.marks.front().mm;
+  const auto& last = press.marks[8].mm;
+  EXPECT_NEAR(std::atan2(last.y - first.y, last.x - first.x) * 180 / std::numbers::pi, 7, 0.3);
+}
+
+TEST(Pins, OfABoardOnEdgeHaveRowsAndColumnsSwapped) {
+  Scene scene;
+  scene.turn = 90;
+  scene.camera.width = 480;
+  scene.camera.height = 640;
+  scene.camera.centre = {240, 320};
+  const PinPress press = scene.find();
+  ASSERT_EQ(press.marks.size(), 63U);
+  EXPECT_EQ(press.rows, 9);
+  EXPECT_EQ(press.cols, 7);
+  EXPECT_LT(rms_px(press, scene), 0.3);
+}
+
+TEST(Pins, OfAnotherBoardAreFound) {
+  Scene scene;
+  scene.board = {5, 6, 3.5};
+  const PinPress press = scene.find();
+  ASSERT_EQ(press.marks.size(), 30U);
+  EXPECT_LT(rms_px(press, scene), 0.3);
+}
+
+TEST(Pins, MissingOnesAreNamed) {
+  Scene scene;
+  scene.missing = {{2, 4}, {6, 8}};
+  const PinPress press = scene.find();
+  EXPECT_EQ(press.marks.size(), 61U);
+  EXPECT_THAT(press.missing, testing::ElementsAre("row 3, column 5", "row 7, column 9"));
+  EXPECT_LT(rms_px(press, scene), 0.3);
+}
+
+TEST(Pins, MoreThanATenthMissingIsRefused) {
+  Scene scene;
+  for (int col = 0; col < 7; ++col) scene.missing.insert({col % 6, col});
+  EXPECT_THAT([&] { (void)scene.find(); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("7 of 63 pins not found"), HasSubstr("row 3, column 3"))));
+}
+
+TEST(Pins, ABoardThatIsARowShortIsRefused) {
+  Scene scene;
+  for (int col = 0; col < 9; ++col) scene.missing.insert({6, col});
+  EXPECT_THAT([&] { (void)scene.find(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("9 of 63 pins not found")));
+}
+
+TEST(Pins, NothingPressedIsNoBoard) {
+  Scene scene;
+  scene.depth_levels = 0;
+  EXPECT_THAT([&] { (void)scene.find(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("no lattice of 7x9 pins found")));
+}
+
+}  // namespace
+}  // namespace dtact::ctl
