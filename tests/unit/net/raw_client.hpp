@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -53,7 +54,9 @@ class RawClient {
   std::optional<v1::ServerMessage> receive() {
     while (decoder_.feed(unread_) != wire::MessageDecoder::Result::message) {
       pollfd readable{fd_.get(), POLLIN, 0};
-      if (::poll(&readable, 1, 60'000) <= 0) throw std::runtime_error("silence");
+      const int ready = ::poll(&readable, 1, 60'000);
+      if (ready < 0 && errno == EINTR) continue;  // libFuzzer's alarm
+      if (ready <= 0) throw std::runtime_error("silence");
       const ssize_t n = ::recv(fd_.get(), buffer_, sizeof buffer_, 0);
       if (n <= 0) return std::nullopt;
       unread_ = {buffer_, static_cast<std::size_t>(n)};
