@@ -70,6 +70,17 @@ Crop seen(const std::optional<recon::Lens>& lens, int width, int height, double 
   return {left, top, right - left + 1, bottom - top + 1};
 }
 
+/// The press's gain with places from the map's centre.
+recon::SpatialGain gain_of(const BallPress& press, const Calibration& calibration) {
+  if (!press.lens) return press.gain;
+  const recon::RectifyTable& map = calibration.model->rectify;
+  const recon::Point centre = surface_point(
+      *press.lens,
+      {calibration.crop_col, calibration.crop_row, map.width, map.height, press.mm_per_px},
+      0.5 * (map.width - 1), 0.5 * (map.height - 1));
+  return moved(press.gain, centre.x, centre.y);
+}
+
 void check(const BallPress& press) {
   if (press.frames.empty()) throw std::invalid_argument("no image of the ball");
   for (const image::Grey8& frame : press.frames) {
@@ -150,6 +161,7 @@ Calibration build(const BallPress& press) {
       empty_calibration(press.reference_q8, press.crop, press.mm_per_px, press.lens);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   model->method = press.method;
+  if (press.method == recon::Method::list) model->gain = gain_of(press, calibration);
 
   const SettledPress settled =
       settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);

@@ -42,6 +42,9 @@ struct BallPress {
   std::optional<recon::Lens> lens;  ///< None: the frame as it is.
   /// Of the frame or, with a lens, of the rectified image; none: all that the frame shows.
   std::optional<Crop> crop;
+  /// Places in millimetres of the lens's surface; without a lens from the map's centre. The
+  /// published method has none.
+  recon::SpatialGain gain = {};
   recon::Method method = recon::Method::list;
 };
 

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "daemon/calibration/gain_table.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/sha256.hpp"
@@ -60,33 +61,6 @@ std::vector<std::int64_t> runs_of(const std::vector<std::uint8_t>& mask) {
     ++runs.back();
   }
   return runs;
-}
-
-std::string shape_text(const recon::SpatialGain& gain) {
-  switch (gain.shape) {
-    case recon::GainShape::none:
-      break;
-    case recon::GainShape::uniform:
-      return "[gain]  # darkening counts as a share of the light at its place\nshape = "
-             "\"uniform\"\n";
-    case recon::GainShape::radial:
-      return fmt::format(
-          "[gain]  # darkening is multiplied by 1 + per_mm * distance from the centre\n"
-          "shape = \"radial\"\ncentre_x_mm = {}\ncentre_y_mm = {}\nper_mm = {}\n",
-          gain.centre_x_mm, gain.centre_y_mm, gain.per_mm);
-  }
-  return "[gain]  # the same at every place\nshape = \"none\"\n";
-}
-
-std::string gain_text(const recon::SpatialGain& gain) {
-  std::string text = shape_text(gain);
-  if (!gain.polynomial.empty()) {
-    text += fmt::format(
-        "# and by 1 + the sum of these times x, y, x^2, xy, y^2, mm from the map's centre\n"
-        "polynomial = [{}]\n",
-        fmt::join(gain.polynomial, ", "));
-  }
-  return text + "\n";
 }
 
 std::vector<double> column(const std::vector<recon::Model::Uncertainty>& rows,
@@ -157,7 +131,7 @@ Files format(const Calibration& calibration) {
       "[lens]  # where the surface appears in the frame; empty: the frame as it is\n{}\n",
       calibration.lens ? format_lens(*calibration.lens) : "");
   t += "# Reserved for a curved surface. Empty: none.\n[surface]\n\n";
-  t += gain_text(model.gain);
+  t += format_gain(model.gain);
   if (!model.uncertainty.empty()) {
     t += "[uncertainty]  # of the list: mean absolute error in micrometres at some indentations\n";
     t += fmt::format("depth_mm = {}\nerror_um = {}\n\n",

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "daemon/calibration/calibration.hpp"
+#include "daemon/calibration/gain_table.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
 
@@ -55,7 +56,7 @@ std::string format(const LensFile& file) {
   for (const std::string& note : file.notes) t += fmt::format("# {}\n", note);
   t += fmt::format("version = {}\n\n[frame]\nwidth = {}\nheight = {}\n\n[lens]\n", kFormatVersion,
                    file.frame_width, file.frame_height);
-  return t + format_lens(file.lens);
+  return t + format_lens(file.lens) + "\n" + format_gain(file.gain);
 }
 
 LensFile load_lens(const std::filesystem::path& path) {
@@ -68,6 +69,7 @@ LensFile load_lens(const std::filesystem::path& path) {
     return {calibration.model->rectify.frame_width,
             calibration.model->rectify.frame_height,
             *calibration.lens,
+            {},
             {}};
   }
   const toml::table document = parse_toml(base::read_file(path), path.string());
@@ -80,6 +82,7 @@ LensFile load_lens(const std::filesystem::path& path) {
   frame.finish();
   const std::optional<recon::Lens> lens =
       read_lens(top.table("lens"), file.frame_width, file.frame_height);
+  if (top.has("gain")) file.gain = read_gain(top.table("gain"));
   top.finish();
   if (!lens) top.fail("lens", "is empty; make a lens with dtactctl calibrate lens");
   file.lens = *lens;

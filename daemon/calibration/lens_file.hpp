@@ -7,14 +7,17 @@
 
 #include "daemon/calibration/key_reader.hpp"
 #include "daemon/recon/lens.hpp"
+#include "daemon/recon/spatial_gain.hpp"
 
 namespace dtact::calibration {
 
-/// A lens and the camera frame it was measured in: what `dtactctl calibrate lens` writes.
+/// A lens and the camera frame it was measured in, and what the same images told of the gain: what
+/// `dtactctl calibrate lens` writes.
 struct LensFile {
   int frame_width = 0;
   int frame_height = 0;
   recon::Lens lens;
+  recon::SpatialGain gain;         ///< Places in millimetres of the lens's surface.
   std::vector<std::string> notes;  ///< Comment lines: how it was measured and how well it fits.
 };
 
@@ -28,7 +31,8 @@ struct LensFile {
 /// The text of a lens file.
 [[nodiscard]] std::string format(const LensFile& file);
 
-/// Reads a lens file, or the lens of a calibration folder. Throws std::runtime_error with file,
+/// Reads a lens file, or the lens of a calibration folder (without its gain, which belongs to its
+/// list). Throws std::runtime_error with file,
 /// line, key and remedy.
 [[nodiscard]] LensFile load_lens(const std::filesystem::path& path);
 

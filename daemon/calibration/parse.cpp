@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "daemon/calibration/gain_table.hpp"
 #include "daemon/calibration/key_reader.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/map_table.hpp"
@@ -114,30 +115,6 @@ void read_light(KeyReader light, Origin& origin) {
   light.finish();
 }
 
-void read_gain(KeyReader reader, recon::SpatialGain& gain) {
-  // A calibration from before there were gains has the table, empty.
-  if (reader.keys().empty()) return;
-  const std::string shape = reader.text("shape");
-  if (shape == "radial") {
-    gain = {.shape = recon::GainShape::radial,
-            .centre_x_mm = reader.number("centre_x_mm", -1000, 1000),
-            .centre_y_mm = reader.number("centre_y_mm", -1000, 1000),
-            .per_mm = reader.number("per_mm", -1, 1)};
-  } else if (shape == "uniform") {
-    gain.shape = recon::GainShape::uniform;
-  } else if (shape != "none") {
-    reader.fail("shape",
-                "\"" + shape + "\" is not allowed; expected \"none\", \"uniform\" or \"radial\"");
-  }
-  if (reader.has("polynomial")) {
-    gain.polynomial = reader.numbers("polynomial", -1, 1);
-    if (gain.polynomial.size() != 2 && gain.polynomial.size() != 5) {
-      reader.fail("polynomial", "expected two numbers (a plane) or five (a quadratic)");
-    }
-  }
-  reader.finish();
-}
-
 void read_uncertainty(KeyReader reader, std::vector<recon::Model::Uncertainty>& out) {
   const std::vector<double> depths = reader.numbers("depth_mm", 0, 16.383);
   const std::vector<double> errors = reader.numbers("error_um", 0, 16383);
@@ -202,7 +179,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
       {calibration.crop_col, calibration.crop_row, width, height, model->mm_per_px}, outside);
 
   read_list(top.table("list"), model->method == recon::Method::list, model->list);
-  if (top.has("gain")) read_gain(top.table("gain"), model->gain);
+  if (top.has("gain")) model->gain = read_gain(top.table("gain"));
   if (top.has("uncertainty")) read_uncertainty(top.table("uncertainty"), model->uncertainty);
   read_camera(top.table("camera"), calibration.origin);
   read_light(top.table("light"), calibration.origin);

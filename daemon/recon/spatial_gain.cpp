@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <stdexcept>
 
 #include "daemon/recon/kernels.hpp"
 
@@ -23,6 +24,20 @@ double SpatialGain::polynomial_at(double x_mm, double y_mm) const noexcept {
     factor += polynomial[i] * terms[i];
   }
   return std::max(0.0, factor);
+}
+
+SpatialGain moved(SpatialGain gain, double x_mm, double y_mm) {
+  gain.centre_x_mm -= x_mm;
+  gain.centre_y_mm -= y_mm;
+  const double here = gain.polynomial_at(x_mm, y_mm);
+  if (!(here > 0)) throw std::invalid_argument("gain: the map lies where it is not above zero");
+  if (gain.polynomial.size() == 5) {  // the slopes at the new centre
+    const double xy = gain.polynomial[3];
+    gain.polynomial[0] += 2 * gain.polynomial[2] * x_mm + xy * y_mm;
+    gain.polynomial[1] += 2 * gain.polynomial[4] * y_mm + xy * x_mm;
+  }
+  for (double& factor : gain.polynomial) factor /= here;
+  return gain;
 }
 
 void apply(const SpatialGain& gain, const PlaneShape& shape,

@@ -29,6 +29,10 @@ struct SpatialGain {
   [[nodiscard]] double polynomial_at(double x_mm, double y_mm) const noexcept;
 };
 
+/// The same gain, up to a factor that is alike everywhere, with places counted from (x_mm, y_mm) of
+/// the old ones. Throws std::invalid_argument when the gain is not above zero there.
+[[nodiscard]] SpatialGain moved(SpatialGain gain, double x_mm, double y_mm);
+
 /// A map's size and scale; rows of a plane are `stride` values apart.
 struct PlaneShape {
   int width = 0;

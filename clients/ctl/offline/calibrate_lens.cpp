@@ -5,10 +5,12 @@
 #include <stdexcept>
 
 #include "clients/ctl/lens/chessboard.hpp"
+#include "clients/ctl/lens/pin_gain.hpp"
 #include "clients/ctl/lens/pins.hpp"
 #include "clients/ctl/offline/board_images.hpp"
 #include "clients/ctl/offline/images.hpp"
 #include "clients/ctl/offline/offline.hpp"
+#include "daemon/calibration/build.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "hal/base/atomic_file.hpp"
 
@@ -41,13 +43,13 @@ std::pair<int, int> pair_of(const std::string& text, const char* option) {
 }
 
 void write(const Options& options, const ImageSet& images, const ChosenLens& chosen,
-           const std::string& what) {
-  calibration::LensFile file{images.width(), images.height(), chosen.lens, {}};
+           const recon::SpatialGain& gain, const std::vector<std::string>& what) {
+  calibration::LensFile file{images.width(), images.height(), chosen.lens, gain, what};
   recon::check(file.lens, file.frame_width, file.frame_height);
-  file.notes = {what,
-                fmt::format("RMS distance from the ideal places: {:.4f} mm, each left out of "
-                            "the lens that judges it {:.4f} mm ({} parameters)",
-                            rms(chosen.in_sample), rms(chosen.left_out), parameters(chosen.model))};
+  file.notes.push_back(
+      fmt::format("RMS distance from the ideal places: {:.4f} mm, each left out of "
+                  "the lens that judges it {:.4f} mm ({} parameters)",
+                  rms(chosen.in_sample), rms(chosen.left_out), parameters(chosen.model)));
   base::write_file_atomically(options.output, calibration::format(file));
   fmt::print("{}: {}\n", options.output, fmt::join(file.notes, "\n"));
   fmt::print("left-out RMS with 6, 8, 11, ... parameters: {:.4f} mm\n",
@@ -60,14 +62,18 @@ void run_board(const Options& options) {
   const ImageSet pressed = load_images(options.board, "--board");
   require_same_size(reference, "--board-reference", pressed, "--board");
   const auto [rows, cols] = pair_of(options.pins, "--pins");
-  const PinPress press =
-      find_pins(mean_levels(reference), mean_levels(pressed), {rows, cols, options.pitch_mm});
+  const cv::Mat1f untouched = mean_levels(reference);
+  const cv::Mat1f frame = mean_levels(pressed);
+  const PinPress press = find_pins(untouched, frame, {rows, cols, options.pitch_mm});
+  const PinGain gain =
+      choose_gain(untouched, frame, press.marks,
+                  calibration::kSmoothingMm / recon::central_mm_per_px(press.lens.lens));
   std::string what =
       fmt::format("{}x{} pins, {} mm apart", press.rows, press.cols, options.pitch_mm);
   if (!press.missing.empty()) {
     what += fmt::format("; not found: {}", fmt::join(press.missing, "; "));
   }
-  write(options, reference, press.lens, what);
+  write(options, reference, press.lens, gain.gain, {what, gain.describe()});
 }
 
 void run_chessboard(const Options& options) {
@@ -78,9 +84,9 @@ void run_chessboard(const Options& options) {
   for (const auto& source : images.sources) names.push_back(source.name);
   const ChessboardLens made =
       calibrate_chessboards(grey_images(images), names, {cols, rows, options.square_mm});
-  write(options, images, made.lens,
-        fmt::format("chessboard of {}x{} squares of {} mm, {} image(s)", cols, rows,
-                    options.square_mm, images.images.size()));
+  write(options, images, made.lens, {},
+        {fmt::format("chessboard of {}x{} squares of {} mm, {} image(s)", cols, rows,
+                     options.square_mm, images.images.size())});
 }
 
 void run(const Options& options) {

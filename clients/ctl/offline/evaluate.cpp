@@ -75,7 +75,8 @@ void print_json(const FolderEvaluation& e) {
   }
   json.close('}').key("pin_depths").open('{');
   if (e.pin_depths) {
-    json.member("mean_mm", e.pin_depths->mean_mm)
+    json.member("pins", e.pin_depths->mm.size())
+        .member("mean_mm", e.pin_depths->mean_mm)
         .member("spread", e.pin_depths->spread)
         .member("tilt_x_um_per_mm", e.pin_depths->tilt_x_um_per_mm)
         .member("tilt_y_um_per_mm", e.pin_depths->tilt_y_um_per_mm);

@@ -35,6 +35,7 @@ void evaluate_ball(FolderEvaluation& e, double radius_mm) {
   press.frames = e.ball_images.frames();
   press.ball_radius_mm = radius_mm;
   press.lens = e.pins->lens.lens;
+  press.gain = e.gain->gain;
   press.mm_per_px = recon::central_mm_per_px(*press.lens);
   e.calibration = calibration::build(press);
   e.ball =
@@ -98,18 +99,21 @@ PinDepths read_pins(const FolderEvaluation& e, const Board& board) {
                                             0, 0);
   const double reach = board.pitch_mm / 5 / model.mm_per_px;
   PinDepths depths;
-  for (const Mark& mark : e.pins->marks) {
+  std::vector<Mark> read;  // Those inside the trusted map.
+  for (std::size_t i = 0; i < e.pins->marks.size(); ++i) {
+    const Mark& mark = e.pins->marks[i];
     const double col = (mark.mm.x - corner.x) / model.mm_per_px;
     const double row = (mark.mm.y - corner.y) / model.mm_per_px;
     const double peak = peak_um(um, width, model.rectify.height, col, row, reach);
-    if (std::isnan(peak)) {
-      throw std::runtime_error(fmt::format(
-          "the pin at {:+.1f}, {:+.1f} mm from the board's middle lies outside the trusted map",
-          mark.mm.x, mark.mm.y));
-    }
-    depths.mm.push_back(0.001 * peak);
+    if (std::isnan(peak)) continue;
+    depths.mm.push_back(0.001 * peak * e.gain->left_out_ratio[i]);
+    read.push_back(mark);
   }
-  judge(depths, e.pins->marks);
+  if (4 * read.size() < 3 * e.pins->marks.size()) {
+    throw std::runtime_error(fmt::format("only {} of {} pins lie inside the trusted map",
+                                         read.size(), e.pins->marks.size()));
+  }
+  judge(depths, read);
   if (!(depths.mean_mm > 0)) throw std::runtime_error("the pins read no depth");
   return depths;
 }
@@ -123,7 +127,12 @@ FolderEvaluation evaluate_folder(const fs::path& folder, const Board& board,
   e.no_pins = load_pair(folder, "board", e.board_reference, e.board);
   if (e.no_pins.empty()) {
     try {
-      e.pins = find_pins(mean_levels(e.board_reference), mean_levels(e.board), board);
+      const cv::Mat1f untouched = mean_levels(e.board_reference);
+      const cv::Mat1f frame = mean_levels(e.board);
+      PinPress pins = find_pins(untouched, frame, board);
+      e.gain = choose_gain(untouched, frame, pins.marks,
+                           calibration::kSmoothingMm / recon::central_mm_per_px(pins.lens.lens));
+      e.pins = std::move(pins);
     } catch (const std::runtime_error& error) {
       e.no_pins = error.what();
     }
@@ -163,6 +172,7 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
     if (!e.pins->missing.empty()) {
       lines.push_back(fmt::format("lens: pins not found: {}", fmt::join(e.pins->missing, "; ")));
     }
+    lines.push_back(e.gain->describe());
   } else {
     lines.push_back("lens: skipped: " + e.no_pins);
   }
@@ -179,9 +189,10 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
   if (e.pin_depths) {
     const PinDepths& p = *e.pin_depths;
     lines.push_back(fmt::format(
-        "pin depths: mean {:.3f} mm, spread (std/mean) {:.1f} % after a tilt of {:+.2f}, {:+.2f} "
+        "pin depths: {} pins, mean {:.3f} mm, spread (std/mean) {:.1f} % after a tilt of {:+.2f}, "
+        "{:+.2f} "
         "um/mm",
-        p.mean_mm, 100 * p.spread, p.tilt_x_um_per_mm, p.tilt_y_um_per_mm));
+        p.mm.size(), p.mean_mm, 100 * p.spread, p.tilt_x_um_per_mm, p.tilt_y_um_per_mm));
   } else {
     lines.push_back("pin depths: skipped: " + e.no_pin_depths);
   }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/ctl/lens/pin_gain.hpp"
 #include "clients/ctl/lens/pins.hpp"
 #include "clients/ctl/offline/images.hpp"
 #include "daemon/calibration/calibration.hpp"
@@ -14,7 +15,9 @@ namespace dtact::ctl {
 
 /// How evenly a calibration reads the pins of a board, which are all of one length.
 struct PinDepths {
-  std::vector<double> mm;  ///< Of each pin, at its centre (a paraboloid about it).
+  /// Of each pin inside the trusted map, at its centre (a paraboloid about it), under the gain that
+  /// the others chose.
+  std::vector<double> mm;
   double mean_mm = 0;
   double tilt_x_um_per_mm = 0;  ///< Of the plane through them that is taken off below.
   double tilt_y_um_per_mm = 0;
@@ -25,6 +28,7 @@ struct PinDepths {
 /// `ball_reference.png` and `ball.png`. What could not be done is empty and has its reason.
 struct FolderEvaluation {
   std::optional<PinPress> pins;
+  std::optional<PinGain> gain;                          ///< That the pins ask for.
   std::string no_pins;                                  ///< Why there is no lens.
   std::optional<calibration::Calibration> calibration;  ///< On the rectified image, of the ball.
   std::optional<calibration::Evaluation> ball;

@@ -41,6 +41,7 @@ TEST(RealFolder, SensorBIsAHardPress) {
   ASSERT_TRUE(e.pins && e.ball && e.pin_depths);
   EXPECT_LE(rms(e.pins->lens.left_out), 0.06);
   EXPECT_LE(e.ball->half_mae_mm.value_or(1), 0.08);  // on the frame as it is: 0.0800
+  EXPECT_LE(e.pin_depths->spread, 0.05);             // each pin left out of the gain that judges it
 }
 
 TEST(RealFolder, SensorCSaysThatThereIsNoBall) {

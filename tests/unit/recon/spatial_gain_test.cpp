@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace dtact::recon {
@@ -44,6 +46,20 @@ TEST(SpatialGain, APolynomialIsOnTopOfTheShape) {
 TEST(SpatialGain, Saturates) {
   EXPECT_EQ(applied({.shape = GainShape::radial, .centre_x_mm = -900, .per_mm = 1})[0], INT16_MAX);
   EXPECT_EQ(applied({.shape = GainShape::radial, .centre_x_mm = -900, .per_mm = -1})[0], 0);
+}
+
+TEST(SpatialGain, IsTheSameFromAnotherPlaceUpToAFactor) {
+  SpatialGain gain{.shape = GainShape::radial, .centre_x_mm = 1, .centre_y_mm = 2, .per_mm = 0.1};
+  gain.polynomial = {0.01, -0.02, 0.003, 0.001, -0.002};
+  const SpatialGain there = moved(gain, 3, -4);
+  EXPECT_EQ(there.centre_x_mm, -2);
+  EXPECT_EQ(there.centre_y_mm, 6);
+  const double factor = gain.polynomial_at(3, -4);
+  for (const auto& [x, y] : {std::pair{0., 0.}, {1.5, 0.}, {-2., 3.}}) {
+    EXPECT_NEAR(there.polynomial_at(x, y), gain.polynomial_at(x + 3, y - 4) / factor, 1e-12);
+  }
+  gain.polynomial = {-0.5, 0};
+  EXPECT_THROW((void)moved(gain, 2, 0), std::invalid_argument);
 }
 
 }  // namespace
