@@ -37,6 +37,7 @@ std::vector<std::string> read_corpus(const fs::path& path) {
   for (const auto& entry : fs::directory_iterator(path)) files.push_back(entry.path());
   std::ranges::sort(files);
   std::vector<std::string> corpus;
+  corpus.reserve(files.size());
   for (const auto& file : files) corpus.push_back(base::read_file(file));
   if (corpus.empty()) throw std::runtime_error(path.string() + ": no seeds");
   return corpus;

@@ -29,10 +29,9 @@ class Decoder {
     decoder_.set_crop({});
     if (status == Status::ok) {
       for (int y = crop.y; y < crop.y + crop.height; ++y) {
-        const auto begin = static_cast<std::size_t>(y * kWidth + crop.x);
-        require(std::equal(whole.begin() + static_cast<std::ptrdiff_t>(begin),
-                           whole.begin() + static_cast<std::ptrdiff_t>(begin) + crop.width,
-                           part.begin() + static_cast<std::ptrdiff_t>(begin)),
+        const std::ptrdiff_t begin = std::ptrdiff_t{y} * kWidth + crop.x;
+        require(std::equal(whole.begin() + begin, whole.begin() + begin + crop.width,
+                           part.begin() + begin),
                 "a crop gives what the whole picture has there");
       }
     }

@@ -1,6 +1,8 @@
 // What a client may send: whatever it is, each answer is a message, and the next client is served.
 // The first byte says whether the rest comes as it is, or as messages behind a Hello, each after
 // its length (two bytes, little-endian) in the input.
+#include <algorithm>
+
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/rig.hpp"
@@ -32,22 +34,25 @@ std::string stream_of(std::string_view input) {
   return stream;
 }
 
-}  // namespace
-}  // namespace dtact::fuzz
-
-int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace dtact::fuzz;
-  dtact::net::test::Rig rig({}, dtact::net::test::answer_done);
+void serve(std::string_view input) {
+  net::test::Rig rig({}, net::test::answer_done);
   RawClient client(rig.tcp_port());
-  client.send_bytes(stream_of({reinterpret_cast<const char*>(data), size}));
-  rig.port.publish(dtact::net::test::make_frame(1));
+  client.send_bytes(stream_of(input));
+  rig.port.publish(net::test::make_frame(1));
   client.finish();
   while (const auto message = client.receive()) {  // throws unless it is a message
     if (!message->has_reply() || !message->reply().has_error()) continue;
-    require(message->reply().error().code() != dtact::v1::ERROR_NONE, "an error has a code");
+    require(message->reply().error().code() != v1::ERROR_NONE, "an error has a code");
     require_sentence(message->reply().error().message());
   }
   RawClient next(rig.tcp_port());
   next.hello();  // throws unless it is answered
+}
+
+}  // namespace
+}  // namespace dtact::fuzz
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  dtact::fuzz::serve({reinterpret_cast<const char*>(data), size});
   return 0;
 }

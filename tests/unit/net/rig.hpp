@@ -60,7 +60,7 @@ class FakeStore : public CalibrationStore {
   }
 
  private:
-  const CalibrationFiles& at(std::uint64_t number) const {
+  [[nodiscard]] const CalibrationFiles& at(std::uint64_t number) const {
     if (number < files_.size()) return files_[number];
     throw NoSuchCalibration("there is no calibration " + std::to_string(number));
   }
