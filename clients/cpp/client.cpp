@@ -15,8 +15,8 @@ namespace {
 
 /// Frames kept while a request waits for its answer; the oldest give way.
 constexpr std::size_t kKeptFrames = 4;
-/// An upload is parsed and written to a disk before it is answered.
-constexpr std::chrono::seconds kUploadTimeout{30};
+/// Calibrations are parsed, and some written to a disk, before the request is answered.
+constexpr std::chrono::seconds kParseTimeout{30};
 
 }  // namespace
 
@@ -26,6 +26,9 @@ struct Client::Impl {
 
   [[nodiscard]] std::optional<v1::ServerMessage> receive(Connection::Deadline deadline);
   [[nodiscard]] v1::Reply request(v1::ClientMessage& message, std::chrono::milliseconds timeout);
+  [[nodiscard]] std::chrono::milliseconds parse_timeout() const {
+    return std::max<std::chrono::milliseconds>(options.timeout, kParseTimeout);
+  }
   void keep(v1::ServerMessage message);
 
   Options options;
@@ -143,12 +146,30 @@ Status Client::status() {
   return to_status(impl_->request(message, impl_->options.timeout).status());
 }
 
-CalibrationFiles Client::calibration() {
+CalibrationFiles Client::calibration(std::optional<std::uint64_t> number) {
   v1::ClientMessage message;
-  message.mutable_get_calibration();
+  auto& request = *message.mutable_get_calibration();
+  if (number.has_value()) request.set_number(*number);
   const auto reply = impl_->request(message, impl_->options.timeout);
   const auto& files = reply.calibration();
-  return {files.name(), files.calibration_toml(), files.reference_png()};
+  CalibrationFiles read{files.name(), files.calibration_toml(), files.reference_png()};
+  if (files.has_number()) read.number = files.number();
+  if (number.has_value() && read.number != number) {
+    throw Refused(Code::invalid,
+                  "this daemon is older and knows only its current calibration: update dtactd");
+  }
+  return read;
+}
+
+std::vector<StoredCalibration> Client::calibrations() {
+  v1::ClientMessage message;
+  message.mutable_list_calibrations();
+  const auto reply = impl_->request(message, impl_->parse_timeout());
+  std::vector<StoredCalibration> calibrations;
+  for (const auto& stored : reply.calibrations().calibrations()) {
+    calibrations.push_back(to_stored(stored));
+  }
+  return calibrations;
 }
 
 void Client::upload_calibration(const CalibrationFiles& files) {
@@ -157,8 +178,13 @@ void Client::upload_calibration(const CalibrationFiles& files) {
   request.set_name(files.name);
   request.set_calibration_toml(files.toml);
   request.set_reference_png(files.png);
-  (void)impl_->request(message,
-                       std::max<std::chrono::milliseconds>(impl_->options.timeout, kUploadTimeout));
+  (void)impl_->request(message, impl_->parse_timeout());
+}
+
+void Client::activate_calibration(std::uint64_t number) {
+  v1::ClientMessage message;
+  message.mutable_activate_calibration()->set_number(number);
+  (void)impl_->request(message, impl_->parse_timeout());
 }
 
 std::optional<std::variant<Frame, Event>> Client::next(std::chrono::milliseconds timeout) {

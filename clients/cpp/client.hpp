@@ -63,9 +63,15 @@ class Client {
   /// Takes the present image as untouched; `force`: although something touches.
   void rezero(bool force = false);
   [[nodiscard]] Status status();
-  [[nodiscard]] CalibrationFiles calibration();
+  /// The files of one calibration; without a number, of the current one.
+  [[nodiscard]] CalibrationFiles calibration(std::optional<std::uint64_t> number = std::nullopt);
+  /// All that the daemon has: the configured one, then the uploaded ones, oldest first. Each is
+  /// read and checked for this; may take a few seconds.
+  [[nodiscard]] std::vector<StoredCalibration> calibrations();
   /// Returns once the daemon uses and has stored it. May take a few seconds.
   void upload_calibration(const CalibrationFiles& files);
+  /// Makes one of calibrations() current. Returns once the daemon uses it and will start with it.
+  void activate_calibration(std::uint64_t number);
 
   /// The next frame or event; nothing when none came in time. Throws a ConnectionError, also for
   /// maps that cannot be decoded.

@@ -67,6 +67,13 @@ DepthMap to_depth(const v1::DepthMap& message) {
   return map;
 }
 
+CalibrationSummary to_summary(const v1::CalibrationSummary& message) {
+  return {message.name(),          message.method(),  message.mm_per_px(),
+          message.width(),         message.height(),  message.covered_from_mm(),
+          message.covered_to_mm(), message.created(), message.frame_width(),
+          message.frame_height()};
+}
+
 LumaMap to_luma(const v1::LumaMap& message) {
   const auto pixels = std::uint64_t{message.width()} * message.height();
   if (message.encoding() != v1::LUMA_GREY8 || message.data().size() != pixels) {
@@ -131,6 +138,17 @@ std::optional<Event> to_event(const v1::Event& message) {
   return std::nullopt;
 }
 
+StoredCalibration to_stored(const v1::StoredCalibration& message) {
+  StoredCalibration stored;
+  stored.number = message.number();
+  stored.name = message.name();
+  stored.uploaded = message.uploaded();
+  stored.current = message.current();
+  if (message.has_summary()) stored.summary = to_summary(message.summary());
+  stored.damage = message.damage();
+  return stored;
+}
+
 Status to_status(const v1::Status& message) {
   Status status;
   status.state = state_of(message.state());
@@ -163,10 +181,7 @@ Status to_status(const v1::Status& message) {
   status.ring = {message.ring().backend(), message.ring().identity(), message.ring().message()};
   status.light = to_light(message.light());
   if (message.has_calibration()) {
-    const auto& c = message.calibration();
-    status.calibration =
-        Status::Calibration{c.name(),   c.method(),          c.mm_per_px(),     c.width(),
-                            c.height(), c.covered_from_mm(), c.covered_to_mm(), c.created()};
+    status.calibration = to_summary(message.calibration());
   }
   status.frames = message.frames();
   status.skipped = message.skipped();

@@ -121,10 +121,38 @@ struct ServerInfo {
   std::string frame_id;
 };
 
+/// The number of the calibration that the daemon's configuration names. Uploaded ones count from 1.
+inline constexpr std::uint64_t kConfiguredCalibration = 0;
+
 struct CalibrationFiles {
   std::string name;
   std::string toml;  ///< calibration.toml
   std::string png;   ///< reference.png
+  /// Under which the daemon keeps it. Empty in an upload and from a daemon that knows only one.
+  std::optional<std::uint64_t> number = std::nullopt;
+};
+
+struct CalibrationSummary {
+  std::string name;
+  std::string method;  ///< "list", "published".
+  double mm_per_px = 0;
+  std::uint32_t width = 0;  ///< Of the depth map at full resolution, pixels.
+  std::uint32_t height = 0;
+  double covered_from_mm = 0;
+  double covered_to_mm = 0;
+  std::string created;            ///< ISO 8601.
+  std::uint32_t frame_width = 0;  ///< Of the camera's image, pixels.
+  std::uint32_t frame_height = 0;
+};
+
+/// One of the calibrations that the daemon has.
+struct StoredCalibration {
+  std::uint64_t number = kConfiguredCalibration;
+  std::string name;
+  std::string uploaded;                       ///< ISO 8601, UTC; empty for the configured one.
+  bool current = false;                       ///< In use, and what the daemon starts with.
+  std::optional<CalibrationSummary> summary;  ///< None when it cannot be read, …
+  std::string damage;                         ///< … and why not.
 };
 
 struct Status {
@@ -165,17 +193,7 @@ struct Status {
     std::string message;
   } ring;
   Light light;
-  struct Calibration {
-    std::string name;
-    std::string method;
-    double mm_per_px = 0;
-    std::uint32_t width = 0;
-    std::uint32_t height = 0;
-    double covered_from_mm = 0;
-    double covered_to_mm = 0;
-    std::string created;
-  };
-  std::optional<Calibration> calibration;
+  std::optional<CalibrationSummary> calibration;  ///< None when uncalibrated.
   std::uint64_t frames = 0;
   std::uint64_t skipped = 0;
   double fps = 0;

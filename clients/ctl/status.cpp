@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <ostream>
 
+#include "clients/ctl/calibration_text.hpp"
 #include "clients/ctl/json/json.hpp"
 #include "clients/ctl/light_text.hpp"
 #include "clients/ctl/online.hpp"
@@ -42,11 +43,7 @@ void print_calibration(const Status& status, std::ostream& out) {
     fmt::print(out, "calibration  none\n");
     return;
   }
-  const auto& c = *status.calibration;
-  fmt::print(out,
-             "calibration  {}, method {}, {}x{} at {:.4f} mm/px, covers {:.2f} to {:.2f} mm, {}\n",
-             c.name, c.method, c.width, c.height, c.mm_per_px, c.covered_from_mm, c.covered_to_mm,
-             c.created);
+  fmt::print(out, "calibration  {}\n", text_of(*status.calibration));
 }
 
 void print(const Status& status, std::ostream& out) {
@@ -100,19 +97,6 @@ void add_camera(const Status::Camera& camera, Json& json) {
   json.close(']').close('}');
 }
 
-void add_calibration_summary(const Status& status, Json& json) {
-  json.key("calibration");
-  if (!status.calibration.has_value()) {
-    json.null();
-    return;
-  }
-  const auto& c = *status.calibration;
-  json.open('{').member("name", c.name).member("method", c.method);
-  json.member("mm_per_px", c.mm_per_px).member("width", c.width).member("height", c.height);
-  json.member("covered_from_mm", c.covered_from_mm).member("covered_to_mm", c.covered_to_mm);
-  json.member("created", c.created).close('}');
-}
-
 std::string as_json(const Status& status) {
   Json json;
   json.open('{').member("state", status.state).member("health", status.health);
@@ -122,7 +106,12 @@ std::string as_json(const Status& status) {
   json.member("identity", status.ring.identity).member("message", status.ring.message).close('}');
   json.key("light");
   add_light(status.light, json);
-  add_calibration_summary(status, json);
+  json.key("calibration");
+  if (status.calibration.has_value()) {
+    add_summary(*status.calibration, json);
+  } else {
+    json.null();
+  }
   json.member("frames", status.frames).member("skipped", status.skipped).member("fps", status.fps);
   json.member("light_followed", status.light_followed);
   json.member("realtime_refused", status.realtime_refused).key("stages").open('[');

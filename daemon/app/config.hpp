@@ -21,7 +21,7 @@ struct Config {
   pipeline::PipelineConfig pipeline;
   net::NetConfig net;
   std::string log_level = "info";  ///< "trace", "debug", "info", "warn", "error".
-  /// Folder to run with as long as none was uploaded; empty = none.
+  /// Folder to run with as long as none that was uploaded is current; empty = none.
   std::filesystem::path calibration;
   /// What outlives a restart: uploaded calibrations, the last good reference. Empty = systemd's
   /// $STATE_DIRECTORY, else /var/lib/dtactd.

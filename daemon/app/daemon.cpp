@@ -45,26 +45,29 @@ fs::path make_state_folder(const Config& config) {
   return folder;
 }
 
-/// The calibration to start with and the folder it came from.
-struct Start {
-  fs::path folder;
-  std::shared_ptr<const calibration::Calibration> calibration;
-};
-
-Start load_calibration(const Config& config, const fs::path& state) {
-  Start start;
-  start.folder = net::FolderCalibrationStore::current(state);
-  if (start.folder.empty()) start.folder = config.calibration;
-  if (start.folder.empty()) {
+/// The calibration to start with; null when there is none, or none that can be read.
+std::shared_ptr<const calibration::Calibration> load_calibration(const fs::path& folder,
+                                                                 const fs::path& configured) {
+  if (folder.empty()) {
     spdlog::warn(
         "no calibration: serving the camera's image only. Make one with `dtactctl calibrate "
         "depth` and send it with `dtactctl calibration upload`");
-    return start;
+    return nullptr;
   }
-  start.calibration =
-      std::make_shared<const calibration::Calibration>(calibration::load(start.folder));
-  spdlog::info("calibration {} from {}", start.calibration->name, start.folder.string());
-  return start;
+  try {
+    auto loaded = std::make_shared<const calibration::Calibration>(calibration::load(folder));
+    spdlog::info("calibration {} from {}", loaded->name, folder.string());
+    return loaded;
+  } catch (const std::exception& e) {
+    // What the configuration names is mended there. An uploaded one can be replaced only by a
+    // daemon that runs.
+    if (folder == configured) throw;
+    spdlog::warn(
+        "{}; serving the camera's image only: `dtactctl calibration list` shows the others and "
+        "`dtactctl calibration activate` takes one of them",
+        e.what());
+    return nullptr;
+  }
 }
 
 net::NetConfig make_net_config(const Config& config) {
@@ -116,8 +119,8 @@ void run_daemon(const Config& config) {
   asio::signal_set signals(io, SIGTERM, SIGINT);
 
   const fs::path state = make_state_folder(config);
-  const Start start = load_calibration(config, state);
-  net::FolderCalibrationStore store(state, start.folder);
+  net::FolderCalibrationStore store(state, config.calibration);
+  const auto calibration = load_calibration(store.current(), config.calibration);
 
   hal::Devices devices = hal::open_devices(config.hal);
   if (const std::string note = devices.ring->report().note; !note.empty()) {
@@ -126,7 +129,7 @@ void run_daemon(const Config& config) {
   pipeline::PipelineConfig settings = config.pipeline;
   settings.state_folder = state;
   if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;
-  pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), start.calibration,
+  pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), calibration,
                               settings);
   net::NetConfig net = make_net_config(config);
   if (net.fifo_priority > 0) {

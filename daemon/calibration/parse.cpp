@@ -16,6 +16,9 @@
 namespace dtact::calibration {
 namespace {
 
+constexpr std::int64_t kMostFramePixels = std::int64_t{1} << 26U;  // 8192×8192, any camera's mode
+constexpr std::int64_t kMostMapPixels = std::int64_t{1} << 23U;    // what a message can carry
+
 std::vector<std::uint8_t> mask_of(KeyReader& reader, std::size_t pixels) {
   const auto limit = static_cast<std::int64_t>(pixels);
   const std::vector<std::int64_t> runs = reader.integers("runs", 0, limit);
@@ -44,6 +47,12 @@ std::string sha256_key(KeyReader& reader) {
     reader.fail("sha256", "expected 64 lower-case hexadecimal digits");
   }
   return digest;
+}
+
+/// Keeps a small file from asking for gigabytes.
+void check_area(const KeyReader& reader, int width, int height, std::int64_t most) {
+  if (std::int64_t{width} * height <= most) return;
+  reader.fail("width", fmt::format("{}x{} pixels are more than {}", width, height, most));
 }
 
 int small(KeyReader& reader, const char* key, int low, int high) {
@@ -135,12 +144,14 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   const int frame_width = small(frame, "width", 2, kMaxPixels);
   const int frame_height = small(frame, "height", 2, kMaxPixels);
   frame.finish();
+  check_area(frame, frame_width, frame_height, kMostFramePixels);
   KeyReader crop = top.table("crop");
   calibration.crop_col = small(crop, "col", 0, frame_width - 1);
   calibration.crop_row = small(crop, "row", 0, frame_height - 1);
   const int width = small(crop, "width", 1, frame_width - calibration.crop_col);
   const int height = small(crop, "height", 1, frame_height - calibration.crop_row);
   crop.finish();
+  check_area(crop, width, height, kMostMapPixels);
   if (top.has("lens")) {
     calibration.lens = read_lens(top.table("lens"), frame_width, frame_height);
   }

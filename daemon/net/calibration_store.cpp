@@ -1,9 +1,12 @@
 #include "daemon/net/calibration_store.hpp"
 
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
-#include <optional>
-#include <stdexcept>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -17,54 +20,131 @@ namespace fs = std::filesystem;
 
 constexpr const char* kLink = "calibration";
 constexpr const char* kFolders = "calibrations";
+// What is being written or removed; left over only by a power cut.
+constexpr const char* kFresh = ".new";
+constexpr const char* kStale = ".old";
 constexpr const char* kToml = "calibration.toml";
 constexpr const char* kPng = "reference.png";
 
 /// "17" → 17. Nothing for whatever else lies in the folder.
-std::optional<unsigned long> number_of(const fs::path& folder) {
+std::optional<std::uint64_t> number_of(const fs::path& folder) {
   const std::string name = folder.filename().string();
-  unsigned long number = 0;
+  std::uint64_t number = 0;
   const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), number);
-  if (error != std::errc{} || end != name.data() + name.size()) return std::nullopt;
+  const bool whole = error == std::errc{} && end == name.data() + name.size();
+  if (!whole || number == 0 || std::to_string(number) != name) return std::nullopt;
   return number;
 }
 
-unsigned long newest_number(const fs::path& folders) {
-  unsigned long newest = 0;
+/// Rising.
+std::vector<std::uint64_t> numbers_in(const fs::path& folders) {
+  std::vector<std::uint64_t> numbers;
+  if (!fs::exists(folders)) return numbers;
   for (const auto& entry : fs::directory_iterator(folders)) {
-    newest = std::max(newest, number_of(entry.path()).value_or(0));
+    if (const auto number = number_of(entry.path())) numbers.push_back(*number);
   }
-  return newest;
-}
-
-/// All but `current` and `previous`, each STATE/calibrations/NUMBER/NAME.
-void remove_others(const fs::path& folders, const fs::path& current, const fs::path& previous) {
-  std::error_code ignored;  // What cannot be removed only takes room.
-  for (const auto& entry : fs::directory_iterator(folders, ignored)) {
-    if (!number_of(entry.path()).has_value()) continue;
-    if (entry.path() == current.parent_path() || entry.path() == previous.parent_path()) continue;
-    fs::remove_all(entry.path(), ignored);
-  }
+  std::ranges::sort(numbers);
+  return numbers;
 }
 
 /// Points STATE/calibration to `target` (relative to STATE) in one step.
 void move_link(const fs::path& state, const fs::path& target) {
-  const fs::path fresh = state / (std::string(kLink) + ".new");
+  const fs::path fresh = state / (std::string(kLink) + kFresh);
   fs::remove(fresh);
   fs::create_directory_symlink(target, fresh);
   fs::rename(fresh, state / kLink);
   base::sync_folder(state);
 }
 
+/// The oldest ones beyond the newest kKept, except those of `needed`.
+void remove_old(const fs::path& folders, const std::vector<std::uint64_t>& needed) {
+  const fs::path stale = folders / kStale;
+  std::error_code ignored;  // What cannot be removed only takes room.
+  auto numbers = numbers_in(folders);
+  if (numbers.size() <= FolderCalibrationStore::kKept) return;
+  numbers.resize(numbers.size() - FolderCalibrationStore::kKept);
+  for (const std::uint64_t number : numbers) {
+    if (std::ranges::find(needed, number) != needed.end()) continue;
+    // Out of the list in one step: half a folder would be listed as a damaged calibration.
+    fs::remove_all(stale, ignored);
+    fs::rename(folders / std::to_string(number), stale, ignored);
+    fs::remove_all(stale, ignored);
+  }
+}
+
+/// Writes FOLDERS/NUMBER/NAME so that a power cut leaves either all of it or nothing with a number.
+void write_folder(const fs::path& folders, std::uint64_t number, const CalibrationFiles& files) {
+  const fs::path fresh = folders / kFresh;
+  fs::remove_all(fresh);
+  try {
+    fs::create_directories(fresh / files.name);
+    base::write_file_atomically(fresh / files.name / kToml, files.toml);
+    base::write_file_atomically(fresh / files.name / kPng, files.png);
+    base::sync_folder(fresh);
+    fs::rename(fresh, folders / std::to_string(number));
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove_all(fresh, ignored);
+    throw;
+  }
+  base::sync_folder(folders);
+}
+
+/// When a number's folder got its content: it is never written again, only renamed.
+std::string time_of(const fs::path& folder) {
+  struct stat about{};
+  if (::stat(folder.c_str(), &about) != 0) {
+    throw std::system_error(errno, std::generic_category(), "cannot read " + folder.string());
+  }
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(about.st_mtim.tv_sec));
+}
+
+/// Of the folder itself, also for "cal/".
+std::string name_of(const fs::path& folder) {
+  return fs::weakly_canonical(folder).filename().string();
+}
+
 }  // namespace
 
-FolderCalibrationStore::FolderCalibrationStore(fs::path state, fs::path in_use)
-    : state_(std::move(state)), in_use_(std::move(in_use)) {}
+FolderCalibrationStore::FolderCalibrationStore(fs::path state, fs::path configured)
+    : state_(std::move(state)), configured_(std::move(configured)) {}
 
-fs::path FolderCalibrationStore::current(const fs::path& state) {
+fs::path FolderCalibrationStore::current() const {
   std::error_code error;
-  const fs::path target = fs::read_symlink(state / kLink, error);
-  return error || target.empty() ? fs::path() : state / target;
+  const fs::path target = fs::read_symlink(state_ / kLink, error);
+  return error || target.empty() ? configured_ : state_ / target;
+}
+
+fs::path FolderCalibrationStore::folder_of(std::uint64_t number) const {
+  if (number == kConfiguredCalibration) {
+    if (!configured_.empty()) return configured_;
+    throw NoSuchCalibration(
+        "the configuration file names no calibration: set its key \"calibration\" and restart "
+        "dtactd, or take one that dtactctl calibration list shows");
+  }
+  const fs::path numbered = state_ / kFolders / std::to_string(number);
+  if (!fs::is_directory(numbered)) {
+    throw NoSuchCalibration(fmt::format(
+        "there is no calibration {}: dtactctl calibration list shows those there are", number));
+  }
+  std::vector<fs::path> folders;
+  for (const auto& entry : fs::directory_iterator(numbered)) {
+    if (entry.is_directory()) folders.push_back(entry.path());
+  }
+  if (folders.size() == 1) return folders.front();
+  throw std::runtime_error(fmt::format(
+      "{}: holds {} folders where one is expected: remove {} and upload the calibration again",
+      numbered.string(), folders.size(), numbered.string()));
+}
+
+std::optional<std::uint64_t> FolderCalibrationStore::current_number() const {
+  std::error_code error;
+  const fs::path target = fs::read_symlink(state_ / kLink, error);
+  if (error || target.empty()) {
+    return configured_.empty() ? std::nullopt : std::optional(kConfiguredCalibration);
+  }
+  const fs::path numbered = target.parent_path();
+  return numbered.parent_path() == kFolders ? number_of(numbered) : std::nullopt;
 }
 
 std::shared_ptr<const calibration::Calibration> FolderCalibrationStore::check(
@@ -77,24 +157,61 @@ std::shared_ptr<const calibration::Calibration> FolderCalibrationStore::check(
 void FolderCalibrationStore::keep(const CalibrationFiles& files) {
   const fs::path folders = state_ / kFolders;
   fs::create_directories(folders);
-  const fs::path previous = current(state_);
-  const fs::path target =
-      fs::path(kFolders) / std::to_string(newest_number(folders) + 1) / files.name;
-  const fs::path folder = state_ / target;
-  fs::create_directories(folder);
-  base::write_file_atomically(folder / kToml, files.toml);
-  base::write_file_atomically(folder / kPng, files.png);
-  base::sync_folder(folder.parent_path());
-  base::sync_folder(folders);
-  move_link(state_, target);
-  in_use_ = folder;
-  remove_others(folders, folder, previous);
+  const auto numbers = numbers_in(folders);
+  // The newest is never removed, so that no number comes again.
+  const std::uint64_t number = numbers.empty() ? 1 : numbers.back() + 1;
+  write_folder(folders, number, files);
+  const auto previous = current_number();
+  move_link(state_, fs::path(kFolders) / std::to_string(number) / files.name);
+  remove_old(folders, {number, previous.value_or(number)});
 }
 
-CalibrationFiles FolderCalibrationStore::read() {
-  if (in_use_.empty()) throw std::runtime_error("no calibration folder is in use");
-  return {in_use_.filename().string(), base::read_file(in_use_ / kToml),
-          base::read_file(in_use_ / kPng)};
+std::vector<StoredCalibration> FolderCalibrationStore::list() {
+  std::vector<StoredCalibration> all;
+  const auto current = current_number();
+  const auto add = [&](std::uint64_t number) {
+    StoredCalibration& stored = all.emplace_back();
+    stored.number = number;
+    stored.current = number == current;
+    try {
+      if (number != kConfiguredCalibration) {
+        stored.uploaded = time_of(state_ / kFolders / std::to_string(number));
+      }
+      const fs::path folder = folder_of(number);
+      stored.name = name_of(folder);
+      stored.summary = summarise(calibration::load(folder));
+    } catch (const std::exception& e) {
+      stored.damage = e.what();
+    }
+  };
+  if (!configured_.empty()) add(kConfiguredCalibration);
+  for (const std::uint64_t number : numbers_in(state_ / kFolders)) add(number);
+  return all;
+}
+
+std::shared_ptr<const calibration::Calibration> FolderCalibrationStore::load(std::uint64_t number) {
+  return std::make_shared<const calibration::Calibration>(calibration::load(folder_of(number)));
+}
+
+void FolderCalibrationStore::make_current(std::uint64_t number) {
+  const fs::path folder = folder_of(number);
+  if (number != kConfiguredCalibration) {
+    return move_link(state_,
+                     fs::path(kFolders) / folder.parent_path().filename() / folder.filename());
+  }
+  fs::remove(state_ / kLink);
+  base::sync_folder(state_);
+}
+
+CalibrationFiles FolderCalibrationStore::read(std::optional<std::uint64_t> number) {
+  if (!number) number = current_number();
+  if (!number) {
+    throw std::runtime_error((state_ / kLink).string() +
+                             " leads to no calibration of the list: activate one of it");
+  }
+  const fs::path folder = folder_of(*number);
+  return {name_of(folder), base::read_file(folder / kToml), base::read_file(folder / kPng),
+          *number};
 }
 
 }  // namespace dtact::net

@@ -1,22 +1,48 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "daemon/calibration/calibration.hpp"
+#include "daemon/net/calibration_summary.hpp"
 
 namespace dtact::net {
+
+/// The number of the calibration that the configuration file names. Uploaded ones count from 1.
+inline constexpr std::uint64_t kConfiguredCalibration = 0;
 
 /// A calibration as it travels: a name and its two files' contents.
 struct CalibrationFiles {
   std::string name;
-  std::string toml;  ///< calibration.toml
-  std::string png;   ///< reference.png, 16-bit grey
+  std::string toml;                               ///< calibration.toml
+  std::string png;                                ///< reference.png, 16-bit grey
+  std::uint64_t number = kConfiguredCalibration;  ///< Of no meaning in an upload.
 };
 
-/// Where uploaded calibrations are checked and kept. Only the network part's worker thread calls
-/// it, one call at a time.
+/// One of those that a store has.
+struct StoredCalibration {
+  std::uint64_t number = kConfiguredCalibration;
+  std::string name;                           ///< Of its folder.
+  std::string uploaded;                       ///< ISO 8601, UTC; empty for the configured one.
+  bool current = false;                       ///< The daemon starts with it.
+  std::optional<CalibrationSummary> summary;  ///< None when it cannot be read, …
+  std::string damage;                         ///< … and why not: file, line, key and remedy.
+};
+
+/// There is none of the number that was asked for.
+class NoSuchCalibration : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Where calibrations are checked and kept. Only the network part's worker thread calls it, one
+/// call at a time. Everything throws std::exception naming the path; what takes a number throws
+/// NoSuchCalibration, too.
 class CalibrationStore {
  public:
   CalibrationStore() = default;
@@ -28,38 +54,57 @@ class CalibrationStore {
   /// and remedy.
   [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files) = 0;
-  /// Makes checked files the ones that the daemon starts with from now on; the ones before stay
-  /// beside them. Throws std::exception naming the path.
+  /// Stores checked files under a new number and makes them current.
   virtual void keep(const CalibrationFiles& files) = 0;
-  /// The files of the calibration in use. Throws std::exception naming the path.
-  [[nodiscard]] virtual CalibrationFiles read() = 0;
+  /// All there are: the configured one, then by number. Reads and checks every one.
+  [[nodiscard]] virtual std::vector<StoredCalibration> list() = 0;
+  /// One, read and checked. Throws as check() does.
+  [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> load(
+      std::uint64_t number) = 0;
+  /// Makes one current.
+  virtual void make_current(std::uint64_t number) = 0;
+  /// The files of one, unchecked; without a number, of the current one.
+  [[nodiscard]] virtual CalibrationFiles read(std::optional<std::uint64_t> number) = 0;
 };
 
 /// Keeps them in the state directory:
 ///
-///     STATE/calibrations/1/ball/calibration.toml, reference.png   the one before
+///     STATE/calibrations/1/ball/calibration.toml, reference.png
 ///     STATE/calibrations/2/ball/…                                 the current one
 ///     STATE/calibration → calibrations/2/ball
 ///
-/// A folder is written and synced as a whole before the link moves to it by a rename, so that at
-/// any moment there is one whole calibration. Only the current one and the one before are kept.
+/// Without the link the configured folder is current. A number's folder is written and synced as a
+/// whole beside the others and takes its name by a rename; then the link moves by a rename. So at
+/// any moment, also after a power cut, there is one whole current calibration.
 class FolderCalibrationStore : public CalibrationStore {
  public:
-  /// `state`: an existing folder. `in_use`: the folder that the daemon has loaded, for read();
-  /// empty when none.
-  FolderCalibrationStore(std::filesystem::path state, std::filesystem::path in_use);
+  /// Uploaded calibrations that stay, besides the current one and the one that was current before
+  /// it. About 0.5 MB each at 800×600.
+  static constexpr std::size_t kKept = 20;
 
-  /// The folder uploaded last, or an empty path: what to load at start before the configured one.
-  [[nodiscard]] static std::filesystem::path current(const std::filesystem::path& state);
+  /// `state`: an existing folder. `configured`: a calibration folder, or empty for none.
+  FolderCalibrationStore(std::filesystem::path state, std::filesystem::path configured);
+
+  /// The folder to start with: where the link points, whether or not that can be read, or else the
+  /// configured one. Empty when there is none.
+  [[nodiscard]] std::filesystem::path current() const;
 
   [[nodiscard]] std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files) override;
   void keep(const CalibrationFiles& files) override;
-  [[nodiscard]] CalibrationFiles read() override;
+  [[nodiscard]] std::vector<StoredCalibration> list() override;
+  [[nodiscard]] std::shared_ptr<const calibration::Calibration> load(std::uint64_t number) override;
+  void make_current(std::uint64_t number) override;
+  [[nodiscard]] CalibrationFiles read(std::optional<std::uint64_t> number) override;
 
  private:
+  /// STATE/calibrations/NUMBER/NAME of an uploaded one, or the configured folder.
+  [[nodiscard]] std::filesystem::path folder_of(std::uint64_t number) const;
+  /// Nothing when there is none, or when the link leads elsewhere.
+  [[nodiscard]] std::optional<std::uint64_t> current_number() const;
+
   std::filesystem::path state_;
-  std::filesystem::path in_use_;
+  std::filesystem::path configured_;
 };
 
 }  // namespace dtact::net

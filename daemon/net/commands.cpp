@@ -18,10 +18,12 @@ namespace {
 
 namespace asio = boost::asio;
 
-/// GetCalibration requests that may wait for the worker at the same time.
+/// Requests to read calibrations that may wait for the worker at the same time.
 constexpr int kMaxReading = 16;
 
 constexpr const char* kBusy = "too many commands wait: ask again in a moment";
+constexpr const char* kChanging =
+    "another calibration is being uploaded or activated: ask again in a moment";
 
 v1::ServerMessage reply_to(std::uint64_t id) {
   v1::ServerMessage message;
@@ -86,19 +88,24 @@ std::string change(const v1::SetLight& request, hal::Light& light) {
   return {};
 }
 
-/// What a step on the worker came to: a value, or the sentence that says why not.
+/// What a step on the worker came to: a value, or an error and the sentence that says why not.
 template <typename Value>
 struct Outcome {
   Value value{};
+  v1::ErrorCode code = v1::ERROR_NONE;
   std::string error;
+  [[nodiscard]] bool failed() const noexcept { return code != v1::ERROR_NONE; }
 };
 
+/// `failure`: the code when `step` throws something else than NoSuchCalibration.
 template <typename Value, typename Step>
-Outcome<Value> attempt(Step step) {
+Outcome<Value> attempt(v1::ErrorCode failure, const Step& step) {
   try {
-    return {step(), {}};
+    return {step(), v1::ERROR_NONE, {}};
+  } catch (const NoSuchCalibration& e) {
+    return {{}, v1::ERROR_INVALID, e.what()};
   } catch (const std::exception& e) {
-    return {{}, e.what()};
+    return {{}, failure, e.what()};
   }
 }
 
@@ -121,9 +128,13 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
     case v1::ClientMessage::kGetStatus:
       return get_status(who);
     case v1::ClientMessage::kGetCalibration:
-      return get_calibration(who);
+      return get_calibration(who, message.get_calibration());
     case v1::ClientMessage::kUploadCalibration:
       return upload_calibration(who, message.upload_calibration());
+    case v1::ClientMessage::kListCalibrations:
+      return list_calibrations(who);
+    case v1::ClientMessage::kActivateCalibration:
+      return activate_calibration(who, message.activate_calibration());
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::REQUEST_NOT_SET:
       return;  // The session's business.
@@ -187,9 +198,9 @@ void Commands::on_done(const pipeline::CommandDone& done) {
     --lights_pending_;
     if (!ok && lights_pending_ == 0) light_.reset();
   }
-  const auto* files = std::get_if<std::shared_ptr<const CalibrationFiles>>(&pending.what);
-  if (files != nullptr && ok) return keep_calibration(pending, *files);
-  if (files != nullptr) uploading_ = false;
+  const auto* change = std::get_if<CalibrationChange>(&pending.what);
+  if (change != nullptr && ok) return keep_calibration(pending, *change);
+  if (change != nullptr) changing_ = false;
 
   const auto session = pending.session.lock();
   if (session == nullptr) return;
@@ -236,28 +247,54 @@ void Commands::on_worker(Work work, Done done) {
   });
 }
 
-void Commands::get_calibration(const Who& who) {
-  if (port_.status().calibration == nullptr) {
+void Commands::get_calibration(const Who& who, const v1::GetCalibration& request) {
+  std::optional<std::uint64_t> number;
+  if (request.has_number()) number = request.number();
+  if (!number && port_.status().calibration == nullptr) {
     return who.first->reply_error(who.second, v1::ERROR_UNCALIBRATED,
                                   "there is no calibration: make one with dtactctl calibrate "
-                                  "depth and send it with dtactctl calibration upload");
+                                  "depth and send it with dtactctl calibration upload, or take one "
+                                  "that dtactctl calibration list shows");
   }
   if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
   ++reading_;
   on_worker(
-      [&store = store_] { return attempt<CalibrationFiles>([&store] { return store.read(); }); },
+      [&store = store_, number] {
+        return attempt<CalibrationFiles>(v1::ERROR_STORAGE, [&] { return store.read(number); });
+      },
       [who](Commands& self, Outcome<CalibrationFiles> read) {
         --self.reading_;
         const auto& [session, id] = who;
-        if (!read.error.empty()) {
-          return session->reply_error(id, v1::ERROR_STORAGE,
-                                      "the calibration's files could not be read: " + read.error);
+        if (read.failed()) {
+          return session->reply_error(id, read.code, read.error);
         }
         auto message = reply_to(id);
         auto& files = *message.mutable_reply()->mutable_calibration();
+        files.set_number(read.value.number);
         files.set_name(std::move(read.value.name));
         files.set_calibration_toml(std::move(read.value.toml));
         files.set_reference_png(std::move(read.value.png));
+        session->send(message);
+      });
+}
+
+void Commands::list_calibrations(const Who& who) {
+  if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+  ++reading_;
+  using List = std::vector<StoredCalibration>;
+  on_worker(
+      [&store = store_] {
+        return attempt<List>(v1::ERROR_STORAGE, [&store] { return store.list(); });
+      },
+      [who](Commands& self, const Outcome<List>& list) {
+        --self.reading_;
+        const auto& [session, id] = who;
+        if (list.failed()) {
+          return session->reply_error(id, list.code, list.error);
+        }
+        auto message = reply_to(id);
+        auto& calibrations = *message.mutable_reply()->mutable_calibrations();
+        for (const auto& stored : list.value) fill(stored, *calibrations.add_calibrations());
         session->send(message);
       });
 }
@@ -277,52 +314,70 @@ void Commands::upload_calibration(const Who& who, const v1::UploadCalibration& r
                                 "upload_calibration: calibration_toml or reference_png is empty: "
                                 "send both files of the calibration folder");
   }
-  if (uploading_) {
-    return session->reply_error(id, v1::ERROR_BUSY,
-                                "another calibration is being uploaded: ask again in a moment");
+  if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
+  auto files = std::make_shared<const CalibrationFiles>(CalibrationFiles{
+      .name = request.name(), .toml = request.calibration_toml(), .png = request.reference_png()});
+  change_calibration(who, {std::move(files), 0, {}});
+}
+
+void Commands::activate_calibration(const Who& who, const v1::ActivateCalibration& request) {
+  const auto& [session, id] = who;
+  if (!request.has_number()) {
+    return session->reply_error(id, v1::ERROR_INVALID,
+                                "activate_calibration.number is not set: dtactctl calibration list "
+                                "shows the numbers there are");
   }
-  uploading_ = true;
-  const auto files = std::make_shared<const CalibrationFiles>(
-      CalibrationFiles{request.name(), request.calibration_toml(), request.reference_png()});
-  using Parsed = std::shared_ptr<const calibration::Calibration>;
-  on_worker([&store = store_,
-             files] { return attempt<Parsed>([&store, &files] { return store.check(*files); }); },
-            [who, files](Commands& self, Outcome<Parsed> parsed) {
-              if (parsed.error.empty()) {
-                return self.use_calibration(who, files, std::move(parsed.value));
-              }
-              self.uploading_ = false;
-              who.first->reply_error(who.second, v1::ERROR_INVALID, parsed.error);
-            });
+  if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
+  change_calibration(who, {nullptr, request.number(), {}});
 }
 
-void Commands::use_calibration(const Who& who, const std::shared_ptr<const CalibrationFiles>& files,
-                               std::shared_ptr<const calibration::Calibration> calibration) {
-  uploading_ = submit(who, pipeline::UseCalibration{std::move(calibration)}, files);
+void Commands::change_calibration(const Who& who, CalibrationChange change) {
+  changing_ = true;
+  using Loaded = std::shared_ptr<const calibration::Calibration>;
+  on_worker(
+      [&store = store_, change] {
+        return attempt<Loaded>(v1::ERROR_INVALID, [&] {
+          return change.upload != nullptr ? store.check(*change.upload) : store.load(change.number);
+        });
+      },
+      [who, change](Commands& self, Outcome<Loaded> loaded) mutable {
+        if (loaded.failed()) {
+          self.changing_ = false;
+          return who.first->reply_error(who.second, loaded.code, loaded.error);
+        }
+        change.name = loaded.value->name;
+        self.changing_ =
+            self.submit(who, pipeline::UseCalibration{std::move(loaded.value)}, std::move(change));
+      });
 }
 
-void Commands::keep_calibration(const Pending& pending,
-                                std::shared_ptr<const CalibrationFiles> files) {
+void Commands::keep_calibration(const Pending& pending, const CalibrationChange& change) {
   v1::ServerMessage event;
-  event.mutable_event()->mutable_calibration()->set_name(files->name);
+  event.mutable_event()->mutable_calibration()->set_name(change.name);
   hub_.broadcast(event);
+  config_.log(LogLevel::info, fmt::format("calibration {} is in use", change.name));
   // It is kept only now that the pipeline has taken it, so that a calibration that does not fit
   // this camera never replaces one that does.
   on_worker(
-      [&store = store_, files = std::move(files)] {
-        return attempt<bool>([&store, &files] {
-          store.keep(*files);
+      [&store = store_, change] {
+        return attempt<bool>(v1::ERROR_STORAGE, [&] {
+          if (change.upload != nullptr) {
+            store.keep(*change.upload);
+          } else {
+            store.make_current(change.number);
+          }
           return true;
         });
       },
       [weak = pending.session, id = pending.id](Commands& self, const Outcome<bool>& kept) {
-        self.uploading_ = false;
+        self.changing_ = false;
         const auto session = weak.lock();
         if (session == nullptr) return;
-        if (!kept.error.empty()) {
+        if (kept.failed()) {
+          // Whatever failed: it was checked and is in use, so the request itself was a valid one.
           return session->reply_error(id, v1::ERROR_STORAGE,
-                                      "the calibration is in use, but will be lost when the "
-                                      "daemon ends, since it could not be written: " +
+                                      "the calibration is in use, but the daemon will start with "
+                                      "the one before, since the change could not be written: " +
                                           kept.error);
         }
         auto message = reply_to(id);

@@ -16,6 +16,8 @@
 #include "daemon/pipeline/port.hpp"
 
 namespace dtact::v1 {
+class ActivateCalibration;
+class GetCalibration;
 class SetLight;
 class Subscribe;
 class UploadCalibration;
@@ -41,12 +43,18 @@ class Commands : public std::enable_shared_from_this<Commands> {
   void on_light(const hal::Light& light);
 
  private:
+  /// An upload, or without one the activation of a number.
+  struct CalibrationChange {
+    std::shared_ptr<const CalibrationFiles> upload;
+    std::uint64_t number = 0;
+    std::string name;  ///< Once it was read.
+  };
   /// A request that the pipeline is working on.
   struct Pending {
     std::weak_ptr<Session> session;
     std::uint64_t id = 0;
     struct Rezero {};
-    std::variant<Rezero, hal::Light, std::shared_ptr<const CalibrationFiles>> what;
+    std::variant<Rezero, hal::Light, CalibrationChange> what;
   };
   using Who = std::pair<std::shared_ptr<Session>, std::uint64_t>;
 
@@ -54,11 +62,13 @@ class Commands : public std::enable_shared_from_this<Commands> {
   void set_light(const Who& who, const v1::SetLight& request);
   void rezero(const Who& who, bool force);
   void get_status(const Who& who);
-  void get_calibration(const Who& who);
+  void get_calibration(const Who& who, const v1::GetCalibration& request);
+  void list_calibrations(const Who& who);
   void upload_calibration(const Who& who, const v1::UploadCalibration& request);
-  void use_calibration(const Who& who, const std::shared_ptr<const CalibrationFiles>& files,
-                       std::shared_ptr<const calibration::Calibration> calibration);
-  void keep_calibration(const Pending& pending, std::shared_ptr<const CalibrationFiles> files);
+  void activate_calibration(const Who& who, const v1::ActivateCalibration& request);
+  /// Reads and checks on the worker; then the pipeline uses it, then keep_calibration().
+  void change_calibration(const Who& who, CalibrationChange change);
+  void keep_calibration(const Pending& pending, const CalibrationChange& change);
   /// False, with the answer sent, when the pipeline cannot take another command.
   [[nodiscard]] bool submit(const Who& who, decltype(pipeline::Command::what) command,
                             decltype(Pending::what) what);
@@ -77,7 +87,7 @@ class Commands : public std::enable_shared_from_this<Commands> {
   std::uint64_t next_ticket_ = 1;
   std::optional<hal::Light> light_;  ///< Asked for last; empty: whatever the ring shows.
   int lights_pending_ = 0;
-  bool uploading_ = false;  ///< One at a time: each may be as large as a message.
+  bool changing_ = false;  ///< One at a time: an upload may be as large as a message.
   int reading_ = 0;
 };
 

@@ -69,10 +69,6 @@ const char* name_of(hal::CameraState state) {
   return "";
 }
 
-const char* name_of(recon::Method method) {
-  return method == recon::Method::published ? "published" : "list";
-}
-
 std::uint32_t clamp_ns(std::int64_t ns) {
   return static_cast<std::uint32_t>(
       std::clamp<std::int64_t>(ns, 0, std::numeric_limits<std::uint32_t>::max()));
@@ -113,24 +109,6 @@ void fill_camera(const hal::CameraInfo& info, const hal::CameraReport& report,
     to.set_locked(control.locked);
     to.set_note(control.note);
   }
-}
-
-void fill_calibration(const calibration::Calibration& calibration, v1::CalibrationSummary& out) {
-  out.set_name(calibration.name);
-  out.set_created(calibration.origin.created);
-  if (calibration.model == nullptr) return;
-  const auto& model = *calibration.model;
-  out.set_method(name_of(model.method));
-  out.set_mm_per_px(model.mm_per_px);
-  out.set_width(static_cast<std::uint32_t>(model.rectify.width));
-  out.set_height(static_cast<std::uint32_t>(model.rectify.height));
-  const auto depth_at = [&list = model.list](int q6) {
-    if (list.um.empty()) return 0.0;
-    const int last = static_cast<int>(list.um.size()) - 1;
-    return list.um[static_cast<std::size_t>(std::clamp(q6 - list.first_q6, 0, last))] / 1000.0;
-  };
-  out.set_covered_from_mm(depth_at(model.list.covered_from_q6));
-  out.set_covered_to_mm(depth_at(model.list.covered_to_q6));
 }
 
 }  // namespace
@@ -186,7 +164,7 @@ void fill(const pipeline::Status& status, v1::Status& out) {
   out.mutable_ring()->set_message(status.ring_message);
   fill(status.light, *out.mutable_light());
   if (status.calibration != nullptr) {
-    fill_calibration(*status.calibration, *out.mutable_calibration());
+    fill(summarise(*status.calibration), *out.mutable_calibration());
   }
   out.set_frames(status.frames);
   out.set_skipped(status.skipped);
@@ -199,6 +177,31 @@ void fill(const pipeline::Status& status, v1::Status& out) {
   usage.set_major_faults(status.capture_thread.major_faults);
   usage.set_waits(status.capture_thread.waits);
   usage.set_preemptions(status.capture_thread.preemptions);
+}
+
+void fill(const CalibrationSummary& summary, v1::CalibrationSummary& out) {
+  out.set_name(summary.name);
+  out.set_method(summary.method);
+  out.set_mm_per_px(summary.mm_per_px);
+  out.set_width(static_cast<std::uint32_t>(summary.width));
+  out.set_height(static_cast<std::uint32_t>(summary.height));
+  out.set_covered_from_mm(summary.covered_from_mm);
+  out.set_covered_to_mm(summary.covered_to_mm);
+  out.set_created(summary.created);
+  out.set_frame_width(static_cast<std::uint32_t>(summary.frame_width));
+  out.set_frame_height(static_cast<std::uint32_t>(summary.frame_height));
+}
+
+void fill(const StoredCalibration& stored, v1::StoredCalibration& out) {
+  out.set_number(stored.number);
+  out.set_name(stored.name);
+  out.set_uploaded(stored.uploaded);
+  out.set_current(stored.current);
+  if (stored.summary.has_value()) {
+    fill(*stored.summary, *out.mutable_summary());
+  } else {
+    out.set_damage(stored.damage);
+  }
 }
 
 void fill(const pipeline::StageStatistics& stage, v1::StagePercentiles& out) {

@@ -1,14 +1,17 @@
 #pragma once
 
+#include "daemon/net/calibration_store.hpp"
 #include "daemon/pipeline/port.hpp"
 
 namespace dtact::v1 {
+class CalibrationSummary;
 class Contact;
 class Event;
 class Frame;
 class LightState;
 class StagePercentiles;
 class Status;
+class StoredCalibration;
 }  // namespace dtact::v1
 
 // The pipeline's types as messages. Each function fills a message that is empty.
@@ -20,6 +23,8 @@ void fill(const pipeline::ContactSummary& contact, v1::Contact& out);
 void fill(const pipeline::DepthFrame& frame, v1::Frame& out);
 /// With the advice; without what the network part itself knows: its stages, clients, version, …
 void fill(const pipeline::Status& status, v1::Status& out);
+void fill(const CalibrationSummary& summary, v1::CalibrationSummary& out);
+void fill(const StoredCalibration& stored, v1::StoredCalibration& out);
 void fill(const pipeline::StageStatistics& stage, v1::StagePercentiles& out);
 /// False for CommandDone, which is an answer to one client and not an event.
 [[nodiscard]] bool fill(const pipeline::Event& event, v1::Event& out);

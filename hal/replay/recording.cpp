@@ -21,6 +21,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kTimestamps = "timestamps.csv";
+constexpr int kMostPixels = 16384;  // of a side: what luma buffers and the decoder take
+/// Between the first and the last frame: a year. Longer ones are another unit, and would overflow.
+constexpr std::int64_t kLongestNs = std::int64_t{366} * 24 * 3600 * 1'000'000'000;
 
 [[noreturn]] void fail(const fs::path& where, const std::string& what) {
   throw std::runtime_error(fmt::format("{}: {}", where.string(), what));
@@ -62,6 +65,10 @@ std::vector<fs::path> frames_in(const fs::path& folder) {
 }
 
 void check_size(Recording& recording, int width, int height, const fs::path& file) {
+  if (width > kMostPixels || height > kMostPixels) {
+    fail(file, fmt::format("is {}x{} pixels, a side has at most {}: remove the file", width, height,
+                           kMostPixels));
+  }
   if (recording.count() == 0) {
     recording.width = width;
     recording.height = height;
@@ -125,7 +132,11 @@ std::vector<std::int64_t> offsets_of(const std::vector<fs::path>& files, const f
     const auto found = times.find(name);
     if (found == times.end()) fail(csv, fmt::format("has no line for {}: add it", name));
     if (offsets.empty()) first = found->second;
-    const std::int64_t offset = found->second - first;
+    std::int64_t offset = 0;
+    if (__builtin_sub_overflow(found->second, first, &offset) || offset > kLongestNs) {
+      fail(csv, fmt::format("{} is more than a year after the first frame: times are nanoseconds",
+                            name));
+    }
     if (!offsets.empty() && offset <= offsets.back()) {
       fail(csv, fmt::format("{} is not later than the frame before it: frames play in the order of "
                             "their names",

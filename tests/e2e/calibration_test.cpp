@@ -10,6 +10,7 @@
 namespace dtact::e2e {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 
 bool depth_flows(client::Client& client) {
@@ -75,6 +76,114 @@ TEST(Calibration, BadUploadIsRefusedAndChangesNothing) {
   EXPECT_THROW(client.upload_calibration(bad), client::Refused);
   EXPECT_TRUE(depth_flows(client));
   EXPECT_EQ(client.calibration().toml, good.toml);
+}
+
+/// The next frames with depth have pixels of this size, which tells the calibrations apart.
+bool depth_flows_at(client::Client& client, double mm_per_px) {
+  return read_until(client, [mm_per_px](const Item& item) {
+    const auto* frame = std::get_if<client::Frame>(&item);
+    return frame != nullptr && frame->depth.has_value() && frame->depth->mm_per_px == mm_per_px;
+  });
+}
+
+bool is_told(client::Client& client, const std::string& name) {
+  return read_until(client, [&name](const Item& item) {
+    const auto* event = std::get_if<client::Event>(&item);
+    const auto* changed =
+        event == nullptr ? nullptr : std::get_if<client::CalibrationChanged>(event);
+    return changed != nullptr && changed->name == name;
+  });
+}
+
+/// A sensor with a configured calibration and, in use, an uploaded one, "other", number 1, that is
+/// like it but for the size of its pixels.
+class TwoCalibrations : public testing::Test {
+ protected:
+  static constexpr double kConfigured = 0.0413793;  // tests/e2e/sensor.cpp
+  static constexpr double kOther = 0.05;
+
+  TwoCalibrations() {
+    client::Client client = sensor_.connect();
+    client::CalibrationFiles files = client.calibration();
+    const std::string key = "mm_per_px = 0.0413793";
+    const std::size_t at = files.toml.find(key);
+    if (at == std::string::npos) throw std::runtime_error("no " + key);
+    files.toml.replace(at, key.size(), "mm_per_px = 0.05");
+    files.name = "other";
+    client.upload_calibration(files);
+  }
+
+  /// The list as dtactctl prints it.
+  [[nodiscard]] std::string list() const {
+    std::string output;
+    EXPECT_EQ(ctl(sensor_, {"calibration", "list"}, &output), 0) << output;
+    return output;
+  }
+  [[nodiscard]] int activate(const std::string& id, std::string* output = nullptr) const {
+    return ctl(sensor_, {"calibration", "activate", id}, output);
+  }
+  [[nodiscard]] bool depth_flows_again_at(double mm_per_px) const {
+    client::Client client = sensor_.connect();
+    client.subscribe({});
+    return depth_flows_at(client, mm_per_px);
+  }
+
+  Sensor sensor_;
+};
+
+TEST_F(TwoCalibrations, SwitchAtOnceAndStaySoAfterARestart) {
+  EXPECT_THAT(list(), AllOf(HasSubstr("  configured"), HasSubstr("*          1  20")));
+  client::Client watcher = sensor_.connect();
+  watcher.subscribe({});
+  ASSERT_TRUE(depth_flows_at(watcher, kOther));
+  std::string output;
+  ASSERT_EQ(activate("configured", &output), 0) << output;
+  EXPECT_TRUE(is_told(watcher, "calibration"));
+  EXPECT_TRUE(depth_flows_at(watcher, kConfigured));
+  sensor_.restart();
+  EXPECT_TRUE(depth_flows_again_at(kConfigured));
+  EXPECT_THAT(list(), HasSubstr("* configured"));
+  ASSERT_EQ(activate("1", &output), 0) << output;
+  sensor_.restart();
+  EXPECT_TRUE(depth_flows_again_at(kOther));
+}
+
+TEST_F(TwoCalibrations, ADamagedOneIsRefusedAndChangesNothing) {
+  std::string output;
+  ASSERT_EQ(activate("configured", &output), 0) << output;
+  base::write_file_atomically(sensor_.folder.path() / "state/calibrations/1/other/reference.png",
+                              "no PNG");
+  EXPECT_EQ(activate("1", &output), 1);
+  EXPECT_THAT(output, HasSubstr("reference"));
+  EXPECT_EQ(activate("2", &output), 1);
+  EXPECT_THAT(output, HasSubstr("there is no calibration 2"));
+  EXPECT_TRUE(depth_flows_again_at(kConfigured));
+  EXPECT_THAT(list(), AllOf(HasSubstr("* configured"), HasSubstr("cannot be read: ")));
+}
+
+TEST_F(TwoCalibrations, ADaemonWhoseUploadedOneIsDamagedStartsAndCanBeMended) {
+  const auto file = sensor_.folder.path() / "state/calibrations/1/other/calibration.toml";
+  base::write_file_atomically(file, "version = 1\n");
+  sensor_.restart();
+  EXPECT_EQ(sensor_.connect().status().state, "uncalibrated");
+  EXPECT_THAT(sensor_.daemon->log(), HasSubstr("dtactctl calibration activate"));
+  EXPECT_THAT(list(), HasSubstr("*          1  20"));
+  std::string output;
+  ASSERT_EQ(activate("configured", &output), 0) << output;
+  EXPECT_TRUE(depth_flows_again_at(kConfigured));
+}
+
+TEST_F(TwoCalibrations, AreExportedAsTheyWereUploaded) {
+  const auto folder = sensor_.folder.path() / "copy";
+  std::string output;
+  ASSERT_EQ(ctl(sensor_, {"calibration", "export", "configured", "-o", folder.string()}, &output),
+            0)
+      << output;
+  for (const char* file : {"calibration.toml", "reference.png"}) {
+    EXPECT_EQ(base::read_file(folder / file), base::read_file(calibration_folder() / file));
+  }
+  ASSERT_EQ(ctl(sensor_, {"calibration", "upload", folder.string()}, &output), 0) << output;
+  EXPECT_TRUE(depth_flows_again_at(kConfigured));
 }
 
 TEST(Ctl, StatusSnapshotAndLight) {

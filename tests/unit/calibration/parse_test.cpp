@@ -73,6 +73,15 @@ TEST(ParseCalibration, RefusesImpossibleValues) {
   expect_refused(with("  0, 1, 7, 2, 29, 1,", "  0, 1, 7,"), "untrusted.runs", "pairs");
 }
 
+TEST(ParseCalibration, RefusesAreasThatAskForGigabytes) {
+  expect_refused(with("width = 12\nheight = 9", "width = 16384\nheight = 16384"), "frame.width",
+                 "16384x16384 pixels are more than 67108864");
+  std::string toml = with("width = 12\nheight = 9", "width = 8192\nheight = 8192");
+  const std::string map = "width = 6\nheight = 5";
+  toml.replace(toml.find(map), map.size(), "width = 4096\nheight = 2049");
+  expect_refused(toml, "crop.width", "4096x2049 pixels are more than 8388608");
+}
+
 TEST(ParseCalibration, RefusesMissingAndUnknownKeys) {
   expect_refused(with("mm_per_px = 0.051", "mm_per_pixel = 0.051"), "mm_per_px", "missing");
   expect_refused(with("version = 1", "version = 1\nextra = 2"), "extra", "unknown key");

@@ -60,7 +60,8 @@ std::set<std::string> options_of(std::vector<std::string> command) {
 TEST(Completion, OffersCommands) {
   EXPECT_THAT(complete("re"), UnorderedElementsAre("rezero", "reconstruct"));
   EXPECT_THAT(complete("--port 7 s"), UnorderedElementsAre("status", "snapshot"));
-  EXPECT_THAT(complete("calibration \"\""), UnorderedElementsAre("upload", "show", "--help"));
+  EXPECT_THAT(complete("calibration \"\""),
+              UnorderedElementsAre("upload", "list", "show", "activate", "export", "--help"));
 }
 
 TEST(Completion, OffersValues) {
@@ -79,7 +80,10 @@ TEST(Completion, KnowsEveryOptionOfEveryCommand) {
                                                           {"rezero"},
                                                           {"snapshot"},
                                                           {"calibration", "upload"},
+                                                          {"calibration", "list"},
                                                           {"calibration", "show"},
+                                                          {"calibration", "activate"},
+                                                          {"calibration", "export"},
                                                           {"calibrate"},
                                                           {"calibrate", "depth"},
                                                           {"reconstruct"},

@@ -168,16 +168,93 @@ TEST(Calibration, GoesUpAndComesBack) {
   auto result = ctl(rig, {"calibration", "upload", folder.string() + "/"});
   EXPECT_EQ(result.code, 0) << result.error;
   EXPECT_EQ(result.out, "the daemon uses calibration ball from now on\n");
-  const fs::path copy = temporary / "copy";
-  result = ctl(rig, {"calibration", "show", "-o", copy.string()});
-  EXPECT_EQ(result.out, "# calibration ball\nversion = 1\n");
-  EXPECT_EQ(base::read_file(copy / "reference.png"), "png");
+  EXPECT_EQ(ctl(rig, {"calibration", "show"}).out, "# calibration ball (4)\nversion = 1\n");
+  const std::string copy = (temporary / "copy").string();
+  result = ctl(rig, {"calibration", "export", "-o", copy});
+  EXPECT_EQ(result.out, copy + ": calibration ball (4)\n");
+  EXPECT_EQ(base::read_file(copy + "/reference.png"), "png");
+  EXPECT_EQ(base::read_file(copy + "/calibration.toml"), "version = 1\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "other", "--json"});
   EXPECT_EQ(result.out, "{\"name\":\"other\"}\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "no good"});
   EXPECT_EQ(result.code, 1);
   EXPECT_EQ(ctl(rig, {"calibration", "upload", temporary.string()}).code, 1);
   fs::remove_all(temporary);
+}
+
+TEST(Calibration, IsExportedOnceUnlessForced) {
+  const Rig rig({}, answer_done);
+  std::string name = (fs::temp_directory_path() / "dtact-ctl-XXXXXX").string();
+  const fs::path temporary = ::mkdtemp(name.data());
+  const std::string folder = (temporary / "factory").string();
+  auto result = ctl(rig, {"calibration", "export", "configured", "-o", folder, "--json"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_EQ(result.out, R"({"id":"configured","name":"factory","folder":")" + folder + "\"}\n");
+  result = ctl(rig, {"calibration", "export", "2", "-o", folder});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.error, AllOf(HasSubstr(folder + " exists"), HasSubstr("--force")));
+  EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "toml of factory");
+  EXPECT_EQ(ctl(rig, {"calibration", "export", "2", "-o", folder, "--force"}).code, 0);
+  EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "bad");
+  // What is no part of a calibration is not lost, forced or not.
+  base::write_file_atomically(folder + "/notes.txt", "mine");
+  EXPECT_EQ(ctl(rig, {"calibration", "export", "1", "-o", folder, "--force"}).code, 1);
+  EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "bad");
+  EXPECT_EQ(ctl(rig, {"calibration", "export", "9", "-o", (temporary / "x").string()}).code, 1);
+  EXPECT_FALSE(fs::exists(temporary / "x"));
+  fs::remove_all(temporary);
+}
+
+TEST(Calibration, IsListed) {
+  const Rig rig;
+  EXPECT_EQ(
+      ctl(rig, {"calibration", "list"}).out,
+      "          id  uploaded              name         image        map    mm/px  method     "
+      "range\n"
+      "  configured  -                     factory    800x600    580x580   0.0414  list       "
+      "-0.02 "
+      "to 1.40 mm\n"
+      "*          1  2026-01-31T12:00:00Z  first      800x600    580x580   0.0414  list       "
+      "-0.02 "
+      "to 1.40 mm\n"
+      "           2  2026-01-31T12:00:00Z  broken   cannot be read: calibration.toml:3: scale "
+      "missing\n"
+      "           3  2026-01-31T12:00:00Z  stuck      800x600    580x580   0.0414  list       "
+      "-0.02 "
+      "to 1.40 mm\n");
+  const std::string json = ctl(rig, {"calibration", "list", "--json"}).out;
+  EXPECT_THAT(
+      json,
+      StartsWith(R"({"id":"configured","name":"factory","uploaded":"","current":false,"summary":{)"
+                 R"("name":"factory","method":"list","mm_per_px":0.0414,"width":580,"height":580,)"
+                 R"("covered_from_mm":-0.02,"covered_to_mm":1.4,"created":"","frame_width":800,)"
+                 R"("frame_height":600},"damage":""})"
+                 "\n"));
+  EXPECT_THAT(json, HasSubstr("\"name\":\"broken\",\"uploaded\":\"2026-01-31T12:00:00Z\","
+                              "\"current\":false,\"summary\":null,\"damage\":\"calibration.toml"));
+  EXPECT_EQ(std::count(json.begin(), json.end(), '\n'), 4);
+}
+
+TEST(Calibration, IsShownAndActivatedByItsId) {
+  const Rig rig({}, answer_done);
+  EXPECT_EQ(ctl(rig, {"calibration", "show", "configured"}).out,
+            "# calibration factory (configured)\ntoml of factory");
+  EXPECT_EQ(ctl(rig, {"calibration", "show", "1", "--json"}).out,
+            R"({"id":"1","name":"first","calibration_toml":"toml of first",)"
+            R"("reference_png_bytes":12})"
+            "\n");
+  EXPECT_EQ(ctl(rig, {"calibration", "activate", "configured"}).out,
+            "the daemon uses calibration configured from now on\n");
+  EXPECT_EQ(ctl(rig, {"calibration", "activate", "1", "--json"}).out, "{\"id\":\"1\"}\n");
+  const auto refused = ctl(rig, {"calibration", "activate", "2"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.error, HasSubstr("scale missing"));
+  const auto wrong = ctl(rig, {"calibration", "show", "newest"});
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_THAT(wrong.error, HasSubstr("a number that dtactctl calibration list shows"));
+  EXPECT_EQ(ctl(rig, {"calibration", "show", "0"}).code, 2);
+  EXPECT_EQ(ctl(rig, {"calibration", "activate"}).code, 2);
+  EXPECT_EQ(ctl(rig, {"calibration", "export"}).code, 2);
 }
 
 /// Publishes frames until it is told to end.

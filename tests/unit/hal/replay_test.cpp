@@ -214,6 +214,18 @@ TEST_F(ReplayTest, NamesUnreadableFiles) {
   EXPECT_NE(failure().find("a.png"), std::string::npos) << failure();
 }
 
+TEST_F(ReplayTest, RefusesAJpegThatIsTooWide) {
+  std::string bytes = jpeg_bytes(10);
+  // The frame header: its marker, length (2), precision (1), height (2), width (2).
+  const std::size_t header = bytes.find("\xff\xc0");
+  ASSERT_NE(header, std::string::npos);
+  bytes[header + 7] = '\x80';  // 100 pixels become 32,868
+  write("a.jpg", bytes);
+  EXPECT_NE(failure().find("a.jpg: is 32868x50 pixels, a side has at most 16384"),
+            std::string::npos)
+      << failure();
+}
+
 TEST_F(ReplayTest, RefusesTimestampsThatCannotBe) {
   png("a.png", 10);
   png("b.png", 20);
@@ -224,6 +236,12 @@ TEST_F(ReplayTest, RefusesTimestampsThatCannotBe) {
   EXPECT_NE(failure().find("no line for b.png"), std::string::npos) << failure();
   write("timestamps.csv", "a.png,5\nb.png,5\n");
   EXPECT_NE(failure().find("b.png is not later"), std::string::npos) << failure();
+  // A year is 3.2e16 ns.
+  for (const char* far : {"a.png,0\nb.png,40000000000000000\n",
+                          "a.png,-9000000000000000000\nb.png,9000000000000000000\n"}) {
+    write("timestamps.csv", far);
+    EXPECT_NE(failure().find("b.png is more than a year after"), std::string::npos) << failure();
+  }
   write("timestamps.csv", "a.png,5\na.png,6\n");
   EXPECT_NE(failure().find("line 2: a.png stands there twice"), std::string::npos) << failure();
 }

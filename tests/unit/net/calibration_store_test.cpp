@@ -1,86 +1,227 @@
 #include "daemon/net/calibration_store.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstdlib>
+#include <chrono>
 #include <filesystem>
 #include <string>
 
+#include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "tests/unit/calibration/sample.hpp"
 
 namespace dtact::net {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// A calibration that can be read.
+CalibrationFiles whole(const std::string& name) {
+  const calibration::Files files = calibration::format(calibration::sample());
+  return {name, files.toml, files.reference_png};
+}
+
+std::vector<std::uint64_t> numbers(const std::vector<StoredCalibration>& all) {
+  std::vector<std::uint64_t> found;
+  for (const auto& stored : all) found.push_back(stored.number);
+  return found;
+}
+
+std::uint64_t current_of(const std::vector<StoredCalibration>& all) {
+  std::uint64_t found = UINT64_MAX;
+  for (const auto& stored : all) {
+    if (!stored.current) continue;
+    EXPECT_EQ(found, UINT64_MAX) << "two are current";
+    found = stored.number;
+  }
+  return found;
+}
 
 class Store : public testing::Test {
  protected:
-  Store() {
-    std::string name = (fs::temp_directory_path() / "dtact-store-XXXXXX").string();
-    state_ = ::mkdtemp(name.data());
+  /// A folder of the configuration's.
+  fs::path make_configured() {
+    calibration::save(calibration::sample(), folder_.path() / "factory");
+    return folder_.path() / "factory";
   }
-  ~Store() override { fs::remove_all(state_); }
+  [[nodiscard]] fs::path numbered(int number) const {
+    return state_ / "calibrations" / std::to_string(number);
+  }
 
-  fs::path state_;
+  calibration::TempFolder folder_;
+  fs::path state_ = folder_.path() / "state";
+  bool made_ = fs::create_directory(state_);
 };
 
 TEST_F(Store, IsEmptyAtFirst) {
-  EXPECT_EQ(FolderCalibrationStore::current(state_), fs::path());
   FolderCalibrationStore store(state_, {});
-  EXPECT_THROW((void)store.read(), std::runtime_error);
+  EXPECT_EQ(store.current(), fs::path());
+  EXPECT_THAT(store.list(), IsEmpty());
+  EXPECT_THROW((void)store.read({}), std::runtime_error);
+  EXPECT_THROW((void)store.read(0), NoSuchCalibration);
+  EXPECT_THROW((void)store.read(1), NoSuchCalibration);
+  EXPECT_THROW((void)store.load(1), NoSuchCalibration);
+  EXPECT_THROW(store.make_current(0), NoSuchCalibration);
+  EXPECT_THROW(store.make_current(1), NoSuchCalibration);
 }
 
 TEST_F(Store, KeepsFilesUnderTheirName) {
   FolderCalibrationStore store(state_, {});
   store.keep({"ball", "a toml", "a png"});
-  const auto folder = FolderCalibrationStore::current(state_);
-  EXPECT_EQ(folder.filename(), "ball");
+  const auto folder = store.current();
+  EXPECT_EQ(folder, numbered(1) / "ball");
   EXPECT_EQ(base::read_file(folder / "calibration.toml"), "a toml");
   EXPECT_EQ(base::read_file(folder / "reference.png"), "a png");
   EXPECT_EQ(fs::canonical(state_ / "calibration"), fs::canonical(folder));
-  const auto files = store.read();
+  const auto files = store.read({});
+  EXPECT_EQ(files.number, 1U);
   EXPECT_EQ(files.name, "ball");
   EXPECT_EQ(files.toml, "a toml");
   EXPECT_EQ(files.png, "a png");
 }
 
-TEST_F(Store, ReadsTheFolderInUse) {
-  const fs::path folder = state_ / "elsewhere";
-  fs::create_directory(folder);
-  base::write_file_atomically(folder / "calibration.toml", "t");
-  base::write_file_atomically(folder / "reference.png", "p");
-  FolderCalibrationStore store(state_, folder);
-  EXPECT_EQ(store.read().name, "elsewhere");
-  EXPECT_EQ(store.read().png, "p");
+TEST_F(Store, ListsWhatEachIs) {
+  // A trailing slash is the user's habit.
+  FolderCalibrationStore store(state_, make_configured() / "");
+  store.keep(whole("ball"));
+  // date -u -d 2026-01-31T12:00:00Z +%s
+  const std::chrono::sys_time<std::chrono::seconds> noon(std::chrono::seconds(1769860800));
+  fs::last_write_time(numbered(1), fs::file_time_type::clock::from_sys(noon));
+  const auto all = store.list();
+  ASSERT_THAT(numbers(all), ElementsAre(0, 1));
+  EXPECT_EQ(all[0].name, "factory");
+  EXPECT_EQ(all[0].uploaded, "");
+  EXPECT_FALSE(all[0].current);
+  EXPECT_TRUE(all[0].summary.has_value()) << all[0].damage;
+  EXPECT_EQ(all[1].name, "ball");
+  EXPECT_EQ(all[1].uploaded, "2026-01-31T12:00:00Z");
+  EXPECT_TRUE(all[1].current);
+  ASSERT_TRUE(all[1].summary.has_value()) << all[1].damage;
+  // From tests/unit/calibration/sample.hpp: 6x5 pixels of 12x9, entries -1 … 2 of the list.
+  EXPECT_EQ(*all[1].summary, (CalibrationSummary{"ball", "list", 0.051, 6, 5, -0.01, 0.02,
+                                                 "2026-01-31T12:00:00Z", 12, 9}));
 }
 
-TEST_F(Store, KeepsTheOneBeforeAlsoUnderTheSameName) {
+TEST_F(Store, GoesBackToAnEarlierOne) {
   FolderCalibrationStore store(state_, {});
-  store.keep({"ball", "1", "p"});
-  const auto first = FolderCalibrationStore::current(state_);
-  store.keep({"ball", "2", "p"});
-  const auto second = FolderCalibrationStore::current(state_);
-  EXPECT_NE(first, second);
-  EXPECT_EQ(base::read_file(first / "calibration.toml"), "1");
-  EXPECT_EQ(base::read_file(second / "calibration.toml"), "2");
-  store.keep({"pins", "3", "p"});
-  EXPECT_FALSE(fs::exists(first));
-  EXPECT_TRUE(fs::exists(second));
-  EXPECT_EQ(FolderCalibrationStore::current(state_).filename(), "pins");
+  store.keep(whole("ball"));
+  store.keep(whole("pins"));
+  EXPECT_EQ(current_of(store.list()), 2U);
+  EXPECT_EQ(store.load(1)->name, "ball");
+  store.make_current(1);
+  EXPECT_EQ(current_of(store.list()), 1U);
+  EXPECT_EQ(store.current(), numbered(1) / "ball");
+  EXPECT_EQ(store.read({}).name, "ball");
+  EXPECT_EQ(store.read(2).name, "pins");
+  EXPECT_EQ(FolderCalibrationStore(state_, {}).current(), store.current());  // after a restart
 }
 
-TEST_F(Store, GoesOnAfterARestart) {
-  FolderCalibrationStore(state_, {}).keep({"ball", "1", "p"});
-  const auto first = FolderCalibrationStore::current(state_);
-  FolderCalibrationStore again(state_, first);
-  again.keep({"ball", "2", "p"});
-  EXPECT_TRUE(fs::exists(first));
-  EXPECT_EQ(again.read().toml, "2");
+TEST_F(Store, GoesBackToTheConfiguredOne) {
+  const fs::path configured = make_configured();
+  FolderCalibrationStore store(state_, configured);
+  EXPECT_EQ(store.current(), configured);
+  EXPECT_EQ(current_of(store.list()), 0U);
+  store.keep(whole("ball"));
+  EXPECT_EQ(current_of(store.list()), 1U);
+  EXPECT_EQ(store.load(0)->name, "factory");
+  store.make_current(0);
+  EXPECT_EQ(current_of(store.list()), 0U);
+  EXPECT_EQ(store.read({}).name, "factory");
+  EXPECT_EQ(FolderCalibrationStore(state_, configured).current(), configured);
+  EXPECT_TRUE(fs::exists(numbered(1) / "ball"));
+  store.make_current(0);  // again changes nothing
+  store.make_current(1);
+  EXPECT_EQ(store.current(), numbered(1) / "ball");
+}
+
+TEST_F(Store, KeepsTheNewestTwentyAndTheCurrentAndTheOneBeforeIt) {
+  FolderCalibrationStore store(state_, {});
+  for (int i = 1; i <= 20; ++i) store.keep({"ball", std::to_string(i), "p"});
+  EXPECT_EQ(numbers(store.list()).size(), 20U);
+  store.make_current(1);
+  store.keep({"ball", "21", "p"});  // 1 was current before: it stays
+  EXPECT_TRUE(fs::exists(numbered(1)));
+  EXPECT_EQ(numbers(store.list()).size(), 21U);
+  store.make_current(2);
+  store.keep({"ball", "22", "p"});  // … until something else was
+  const auto all = numbers(store.list());
+  EXPECT_EQ(all.size(), 21U);
+  EXPECT_EQ(all.front(), 2U);
+  EXPECT_EQ(all.back(), 22U);
+  store.keep({"ball", "23", "p"});
+  EXPECT_EQ(numbers(store.list()).front(), 4U);
+  EXPECT_EQ(numbers(store.list()).size(), 20U);
+}
+
+TEST_F(Store, GivesNoNumberTwice) {
+  FolderCalibrationStore store(state_, make_configured());
+  for (int i = 1; i <= 25; ++i) store.keep({"ball", "t", "p"});
+  store.make_current(6);
+  FolderCalibrationStore again(state_, {});
+  again.keep({"ball", "t", "p"});
+  EXPECT_EQ(again.read({}).number, 26U);
+  again.make_current(7);
+  again.keep({"ball", "t", "p"});
+  EXPECT_EQ(again.read({}).number, 27U);
+}
+
+TEST_F(Store, ListsADamagedOneWithTheReason) {
+  FolderCalibrationStore store(state_, {});
+  store.keep(whole("ball"));
+  store.keep(whole("pins"));
+  store.keep(whole("left"));
+  store.keep(whole("right"));
+  fs::remove(numbered(1) / "ball/reference.png");
+  base::write_file_atomically(numbered(2) / "pins/calibration.toml", "version = 1\n");
+  fs::remove_all(numbered(4) / "right");
+  const auto all = store.list();
+  ASSERT_THAT(numbers(all), ElementsAre(1, 2, 3, 4));
+  EXPECT_EQ(all[0].name, "ball");
+  EXPECT_FALSE(all[0].summary.has_value());
+  EXPECT_THAT(all[0].damage, HasSubstr("1/ball/reference.png"));
+  EXPECT_THAT(all[1].damage, HasSubstr("2/pins/calibration.toml:1: method: missing"));
+  EXPECT_TRUE(all[2].summary.has_value());
+  EXPECT_EQ(all[2].damage, "");
+  EXPECT_TRUE(all[3].current);
+  EXPECT_THAT(all[3].damage, HasSubstr("calibrations/4: holds 0 folders"));
+}
+
+TEST_F(Store, RefusesToLoadADamagedOne) {
+  FolderCalibrationStore store(state_, {});
+  store.keep(whole("ball"));
+  store.keep(whole("pins"));
+  base::write_file_atomically(numbered(1) / "ball/calibration.toml", "version = 1\n");
+  EXPECT_THROW((void)store.load(1), std::runtime_error);
+  EXPECT_EQ(current_of(store.list()), 2U);
+  EXPECT_EQ(store.read(1).toml, "version = 1\n");  // its files can be looked at
+}
+
+TEST_F(Store, PassesOverWhatIsNotItsOwn) {
+  FolderCalibrationStore store(state_, {});
+  store.keep(whole("ball"));
+  for (const char* name : {"0", "02", "-3", "4 ", "notes", "99999999999999999999"}) {
+    fs::create_directory(state_ / "calibrations" / name);
+  }
+  EXPECT_THAT(numbers(store.list()), ElementsAre(1));
+  store.keep(whole("pins"));
+  EXPECT_THAT(numbers(store.list()), ElementsAre(1, 2));
+  EXPECT_TRUE(fs::exists(state_ / "calibrations/notes"));
+}
+
+TEST_F(Store, SaysThatTheLinkLeadsElsewhere) {
+  FolderCalibrationStore store(state_, {});
+  fs::create_directory_symlink(make_configured(), state_ / "calibration");
+  EXPECT_EQ(store.current(), folder_.path() / "factory");  // an administrator's own doing
+  EXPECT_THROW((void)store.read({}), std::runtime_error);
 }
 
 TEST_F(Store, FailsWhereItCannotWrite) {
-  FolderCalibrationStore store(state_ / "no", {});
   base::write_file_atomically(state_ / "no", "a file");
+  FolderCalibrationStore store(state_ / "no", {});
   EXPECT_THROW(store.keep({"ball", "1", "p"}), std::exception);
 }
 
@@ -88,7 +229,8 @@ TEST_F(Store, RefusesWhatIsNoCalibration) {
   FolderCalibrationStore store(state_, {});
   EXPECT_THROW((void)store.check({"ball", "this is no toml", "this is no png"}),
                std::runtime_error);
-  EXPECT_EQ(FolderCalibrationStore::current(state_), fs::path());
+  EXPECT_EQ(store.check(whole("ball"))->name, "ball");
+  EXPECT_EQ(store.current(), fs::path());
 }
 
 }  // namespace

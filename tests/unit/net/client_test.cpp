@@ -148,6 +148,35 @@ TEST(ClientLibrary, CommandsAndRefusals) {
   EXPECT_EQ(client.status().clients.size(), 1U);
 }
 
+TEST(ClientLibrary, ListsReadsAndActivatesCalibrations) {
+  Rig rig({}, answer_done);
+  Client client(options(rig));
+  const auto all = client.calibrations();
+  ASSERT_EQ(all.size(), 4U);
+  EXPECT_EQ(all[0].number, client::kConfiguredCalibration);
+  EXPECT_EQ(all[1].name, "first");
+  EXPECT_EQ(all[1].uploaded, "2026-01-31T12:00:00Z");
+  EXPECT_TRUE(all[1].current);
+  ASSERT_TRUE(all[1].summary.has_value());
+  EXPECT_EQ(all[1].summary->mm_per_px, 0.0414);
+  EXPECT_EQ(all[1].summary->frame_width, 800U);
+  EXPECT_FALSE(all[2].summary.has_value());
+  EXPECT_EQ(all[2].damage, "calibration.toml:3: scale missing");
+  const auto files = client.calibration(0);
+  EXPECT_EQ(files.name, "factory");
+  EXPECT_EQ(files.number, client::kConfiguredCalibration);
+  client.activate_calibration(0);
+  EXPECT_EQ(std::get<client::CalibrationChanged>(next<client::Event>(client)).name, "factory");
+  EXPECT_TRUE(client.calibrations()[0].current);
+  try {
+    client.activate_calibration(2);
+    FAIL() << "not refused";
+  } catch (const client::Refused& e) {
+    EXPECT_EQ(e.code(), client::Code::invalid);
+  }
+  EXPECT_THROW((void)client.calibration(9), client::Refused);
+}
+
 TEST(ClientLibrary, RefusesToSendWhatIsTooLarge) {
   Rig rig;
   Client client(options(rig));

@@ -32,21 +32,6 @@ v1::ClientMessage rezero(bool force) {
   return message;
 }
 
-v1::ClientMessage upload(const std::string& name, const std::string& toml,
-                         const std::string& png = "png") {
-  v1::ClientMessage message;
-  message.mutable_upload_calibration()->set_name(name);
-  message.mutable_upload_calibration()->set_calibration_toml(toml);
-  message.mutable_upload_calibration()->set_reference_png(png);
-  return message;
-}
-
-v1::ClientMessage get_calibration() {
-  v1::ClientMessage message;
-  message.mutable_get_calibration();
-  return message;
-}
-
 /// Expects the request to be refused as invalid with a sentence that has `part` in it.
 void expect_invalid(RawClient& client, const v1::ClientMessage& message, const std::string& part) {
   const auto reply = client.request(message);
@@ -209,7 +194,6 @@ TEST(Commands, AreRefusedAsBusyWhenThePipelineIsFull) {
   client.hello();
   EXPECT_EQ(client.request(rezero(false)).error().code(), v1::ERROR_BUSY);
   EXPECT_EQ(client.request(brightness(1)).error().code(), v1::ERROR_BUSY);
-  EXPECT_EQ(client.request(upload("x", "good")).error().code(), v1::ERROR_BUSY);
 }
 
 TEST(Commands, OutliveTheClientThatSentThem) {
@@ -227,73 +211,6 @@ TEST(Commands, OutliveTheClientThatSentThem) {
   rig.port.emit(CommandDone{999, Outcome::done, ""});  // a ticket nobody has
   RawClient other(rig.tcp_port());
   EXPECT_NO_THROW(other.hello());
-}
-
-TEST(Upload, IsCheckedUsedKeptAndTold) {
-  Rig rig({}, answer_done);
-  RawClient client(rig.tcp_port());
-  RawClient watcher(rig.tcp_port());
-  client.hello();
-  watcher.hello();
-  EXPECT_TRUE(client.request(upload("ball-4_mm", "good")).has_done());
-  EXPECT_EQ(watcher.event().calibration().name(), "ball-4_mm");
-  const auto command = rig.port.wait_command(0);
-  ASSERT_TRUE(command.has_value());
-  EXPECT_EQ(std::get<pipeline::UseCalibration>(command->what).calibration->name, "ball-4_mm");
-
-  pipeline::Status status;
-  status.calibration = std::make_shared<calibration::Calibration>();
-  rig.port.set_status(status);
-  const auto files = client.request(get_calibration()).calibration();
-  EXPECT_EQ(files.name(), "ball-4_mm");
-  EXPECT_EQ(files.calibration_toml(), "good");
-  EXPECT_EQ(files.reference_png(), "png");
-}
-
-TEST(Upload, NamesWhatIsWrong) {
-  Rig rig({}, answer_done);
-  RawClient client(rig.tcp_port());
-  client.hello();
-  expect_invalid(client, upload("../etc", "good"), "\"../etc\"; allowed are 1 to 64 letters");
-  expect_invalid(client, upload("", "good"), "upload_calibration.name");
-  expect_invalid(client, upload(std::string(65, 'x'), "good"), "upload_calibration.name");
-  expect_invalid(client, upload("x", ""), "calibration_toml or reference_png is empty");
-  expect_invalid(client, upload("x", "bad"), "calibration.toml:3: scale missing");
-  EXPECT_TRUE(client.request(upload("x", "good")).has_done());  // none of them is in the way
-}
-
-TEST(Upload, IsNotKeptWhenThePipelineRefusesIt) {
-  Rig rig({}, [](FakePort& port) {
-    port.answer([](const pipeline::Command& command) {
-      return CommandDone{command.ticket, Outcome::invalid, "the camera gives 640x480"};
-    });
-  });
-  RawClient client(rig.tcp_port());
-  client.hello();
-  expect_invalid(client, upload("x", "good"), "640x480");
-  pipeline::Status status;
-  status.calibration = std::make_shared<calibration::Calibration>();
-  rig.port.set_status(status);
-  EXPECT_EQ(client.request(get_calibration()).calibration().name(), "first");
-  expect_invalid(client, upload("x", "good"), "640x480");  // and not busy
-}
-
-TEST(Upload, SaysWhenItCouldNotBeStored) {
-  Rig rig({}, answer_done);
-  RawClient client(rig.tcp_port());
-  client.hello();
-  const auto reply = client.request(upload("x", "unwritable"));
-  EXPECT_EQ(reply.error().code(), v1::ERROR_STORAGE);
-  EXPECT_THAT(reply.error().message(), HasSubstr("disk full"));
-}
-
-TEST(GetCalibration, NeedsOne) {
-  Rig rig;
-  RawClient client(rig.tcp_port());
-  client.hello();
-  const auto reply = client.request(get_calibration());
-  EXPECT_EQ(reply.error().code(), v1::ERROR_UNCALIBRATED);
-  EXPECT_THAT(reply.error().message(), HasSubstr("dtactctl calibration upload"));
 }
 
 TEST(GetStatus, TellsEverything) {
@@ -318,6 +235,10 @@ TEST(GetStatus, TellsEverything) {
   auto model = std::make_shared<recon::Model>();
   model->mm_per_px = 0.051;
   model->list = {-64, {-10, 0, 20, 40}, -64, -62};
+  model->rectify.width = 580;
+  model->rectify.height = 570;
+  model->rectify.frame_width = 800;
+  model->rectify.frame_height = 600;
   calibration->model = model;
   status.calibration = calibration;
   rig.port.set_status(status);
@@ -350,6 +271,10 @@ TEST(GetStatus, TellsEverything) {
   EXPECT_EQ(reply.calibration().name(), "ball");
   EXPECT_EQ(reply.calibration().covered_from_mm(), -0.01);
   EXPECT_EQ(reply.calibration().covered_to_mm(), 0.02);
+  EXPECT_EQ(reply.calibration().width(), 580U);
+  EXPECT_EQ(reply.calibration().height(), 570U);
+  EXPECT_EQ(reply.calibration().frame_width(), 800U);
+  EXPECT_EQ(reply.calibration().frame_height(), 600U);
   EXPECT_EQ(reply.clients_size(), 1);
   EXPECT_EQ(reply.clients(0).program(), "raw");
   EXPECT_EQ(reply.version(), "9.8.7");

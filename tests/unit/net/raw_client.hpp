@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -53,7 +54,9 @@ class RawClient {
   std::optional<v1::ServerMessage> receive() {
     while (decoder_.feed(unread_) != wire::MessageDecoder::Result::message) {
       pollfd readable{fd_.get(), POLLIN, 0};
-      if (::poll(&readable, 1, 60'000) <= 0) throw std::runtime_error("silence");
+      const int ready = ::poll(&readable, 1, 60'000);
+      if (ready < 0 && errno == EINTR) continue;  // libFuzzer's alarm
+      if (ready <= 0) throw std::runtime_error("silence");
       const ssize_t n = ::recv(fd_.get(), buffer_, sizeof buffer_, 0);
       if (n <= 0) return std::nullopt;
       unread_ = {buffer_, static_cast<std::size_t>(n)};
@@ -111,6 +114,8 @@ class RawClient {
     message.mutable_subscribe()->set_summary(summary);
     if (!request(message).has_done()) throw std::runtime_error("not subscribed");
   }
+  /// Sends nothing more; the other side sees the end after all that was sent.
+  void finish() { ::shutdown(fd_.get(), SHUT_WR); }
   /// Dies without a word: the other side gets a reset.
   void die() {
     const linger now{1, 0};

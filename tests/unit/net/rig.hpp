@@ -16,7 +16,8 @@
 
 namespace dtact::net::test {
 
-/// A store that takes everything but the text "bad", and can be told to fail.
+/// A store in memory with a configured calibration, "factory", and three others of which "first" is
+/// current. The text "bad" is no calibration, and one of "unwritable" cannot be made current.
 class FakeStore : public CalibrationStore {
  public:
   std::shared_ptr<const calibration::Calibration> check(const CalibrationFiles& files) override {
@@ -27,12 +28,48 @@ class FakeStore : public CalibrationStore {
   }
   void keep(const CalibrationFiles& files) override {
     if (files.toml == "unwritable") throw std::runtime_error("cannot write /state/x: disk full");
-    kept_ = files;
+    files_.push_back(files);
+    files_.back().number = files_.size() - 1;
+    current_ = files_.back().number;
   }
-  CalibrationFiles read() override { return kept_; }
+  std::vector<StoredCalibration> list() override {
+    std::vector<StoredCalibration> all;
+    for (const auto& files : files_) {
+      auto& stored = all.emplace_back();
+      stored.number = files.number;
+      stored.name = files.name;
+      stored.current = files.number == current_;
+      if (files.number > 0) stored.uploaded = "2026-01-31T12:00:00Z";
+      if (files.toml == "bad") {
+        stored.damage = "calibration.toml:3: scale missing";
+      } else {
+        stored.summary = {files.name, "list", 0.0414, 580, 580, -0.02, 1.4, "", 800, 600};
+      }
+    }
+    return all;
+  }
+  std::shared_ptr<const calibration::Calibration> load(std::uint64_t number) override {
+    return check(at(number));
+  }
+  void make_current(std::uint64_t number) override {
+    if (at(number).toml == "unwritable") throw std::runtime_error("cannot write /state: disk full");
+    current_ = number;
+  }
+  CalibrationFiles read(std::optional<std::uint64_t> number) override {
+    return at(number.value_or(current_));
+  }
 
  private:
-  CalibrationFiles kept_{"first", "toml of first", "png of first"};
+  [[nodiscard]] const CalibrationFiles& at(std::uint64_t number) const {
+    if (number < files_.size()) return files_[number];
+    throw NoSuchCalibration("there is no calibration " + std::to_string(number));
+  }
+
+  std::vector<CalibrationFiles> files_ = {{"factory", "toml of factory", "png of factory", 0},
+                                          {"first", "toml of first", "png of first", 1},
+                                          {"broken", "bad", "png", 2},
+                                          {"stuck", "unwritable", "png", 3}};
+  std::uint64_t current_ = 1;
 };
 
 /// A server on a free loopback port with a fake pipeline, running on a thread of its own.

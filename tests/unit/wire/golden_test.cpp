@@ -59,6 +59,12 @@ TEST(Golden, OtherRequests) {
   EXPECT_EQ(m.SerializeAsString(), bytes("08 04 32 00"));
   m.mutable_get_calibration();
   EXPECT_EQ(m.SerializeAsString(), bytes("08 04 3a 00"));
+  m.mutable_get_calibration()->set_number(0);  // the configured one is not the current one
+  EXPECT_EQ(m.SerializeAsString(), bytes("08 04 3a 02 08 00"));
+  m.mutable_list_calibrations();
+  EXPECT_EQ(m.SerializeAsString(), bytes("08 04 4a 00"));
+  m.mutable_activate_calibration()->set_number(3);
+  EXPECT_EQ(m.SerializeAsString(), bytes("08 04 52 02 08 03"));
   m.mutable_upload_calibration()->set_name("n");
   m.mutable_upload_calibration()->set_calibration_toml("t");
   m.mutable_upload_calibration()->set_reference_png("p");
@@ -83,6 +89,39 @@ TEST(Golden, Replies) {
   m.mutable_reply()->mutable_calibration()->set_calibration_toml("t");
   m.mutable_reply()->mutable_calibration()->set_reference_png("p");
   EXPECT_EQ(m.SerializeAsString(), bytes("0a 0d 08 09 3a 09 0a 01 6e 12 01 74 1a 01 70"));
+}
+
+TEST(Golden, Calibrations) {
+  ServerMessage m;
+  m.mutable_reply()->set_id(9);
+  m.mutable_reply()->mutable_calibration()->set_name("n");
+  m.mutable_reply()->mutable_calibration()->set_number(0);
+  EXPECT_EQ(m.SerializeAsString(), bytes("0a 09 08 09 3a 05 0a 01 6e 20 00"));
+  auto& list = *m.mutable_reply()->mutable_calibrations();
+  EXPECT_EQ(m.SerializeAsString(), bytes("0a 04 08 09 42 00"));
+  auto& stored = *list.add_calibrations();
+  stored.set_number(3);
+  stored.set_name("n");
+  stored.set_uploaded("t");
+  stored.set_current(true);
+  stored.set_damage("d");
+  EXPECT_EQ(m.SerializeAsString(),
+            bytes("0a 13 08 09 42 0f 0a 0d 08 03 12 01 6e 1a 01 74 20 01 32 01 64"));
+  auto& summary = *stored.mutable_summary();  // in the place of the damage
+  summary.set_name("n");
+  summary.set_method("l");
+  summary.set_mm_per_px(0.5);
+  summary.set_width(1);
+  summary.set_height(2);
+  summary.set_covered_from_mm(1);
+  summary.set_covered_to_mm(2);
+  summary.set_created("c");
+  summary.set_frame_width(3);
+  summary.set_frame_height(4);
+  EXPECT_EQ(m.SerializeAsString(),
+            bytes("0a 3e 08 09 42 3a 0a 38 08 03 12 01 6e 1a 01 74 20 01 2a 2c"  // … summary
+                  "0a 01 6e 12 01 6c 19 00 00 00 00 00 00 e0 3f 20 01 28 02"
+                  "31 00 00 00 00 00 00 f0 3f 39 00 00 00 00 00 00 00 40 42 01 63 48 03 50 04"));
 }
 
 TEST(Golden, HelloReply) {

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/types.hpp"
+
+namespace dtact::ctl {
+
+class Json;
+
+/// "ball, method list, 580x580 of 800x600 at 0.0414 mm/px, covers -0.02 to 1.40 mm, 2026-…"
+[[nodiscard]] std::string text_of(const client::CalibrationSummary& summary);
+/// As an object.
+void add_summary(const client::CalibrationSummary& summary, Json& json);
+
+/// What a calibration goes by on the command line: "17", or "configured".
+[[nodiscard]] std::string id_of(std::uint64_t number);
+/// The reverse. Throws std::invalid_argument saying what is allowed.
+[[nodiscard]] std::uint64_t parse_id(const std::string& text);
+
+/// A table with a line for each; those that cannot be read with the reason, a `*` before the
+/// current one.
+[[nodiscard]] std::string text_of(const std::vector<client::StoredCalibration>& calibrations);
+/// As an object.
+void add_stored(const client::StoredCalibration& stored, Json& json);
+
+}  // namespace dtact::ctl

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+
+#include "daemon/calibration/calibration.hpp"
+
+namespace dtact::net {
+
+/// What a calibration is, in a few words: dtact.v1.CalibrationSummary, where units stand.
+struct CalibrationSummary {
+  std::string name;
+  std::string method;  ///< "list" or "published".
+  double mm_per_px = 0;
+  int width = 0;  ///< Of the depth map at full resolution, pixels.
+  int height = 0;
+  double covered_from_mm = 0;
+  double covered_to_mm = 0;
+  std::string created;  ///< ISO 8601, or empty.
+  int frame_width = 0;  ///< Of the camera's image, pixels.
+  int frame_height = 0;
+  bool operator==(const CalibrationSummary&) const = default;
+};
+
+/// Without a model only name and time.
+[[nodiscard]] CalibrationSummary summarise(const calibration::Calibration& calibration);
+
+}  // namespace dtact::net

@@ -1,0 +1,71 @@
+// A camera's JPEG payload, four bytes of crop before it. A bad frame leaves nothing behind in the
+// decoder, and a crop gives the pixels that the whole picture has there.
+#include <algorithm>
+#include <array>
+
+#include "hal/mjpeg/grey_decoder.hpp"
+#include "tests/fakes/jpeg_maker.hpp"
+#include "tests/fuzz/fuzz.hpp"
+
+namespace dtact::fuzz {
+namespace {
+
+using hal::mjpeg::Status;
+
+constexpr int kWidth = 32;
+constexpr int kHeight = 24;
+using Picture = std::array<std::uint8_t, std::size_t{kWidth} * kHeight>;
+
+class Decoder {
+ public:
+  Decoder() { require(decode(good_, expected_) == Status::ok, "the test's own picture decodes"); }
+
+  void try_one(const hal::Area& crop, std::span<const std::uint8_t> payload) {
+    Picture whole{};
+    Picture part{};
+    const Status status = decode(payload, whole);
+    decoder_.set_crop(crop);
+    require(decode(payload, part) == status, "a crop does not change what is wrong with a frame");
+    decoder_.set_crop({});
+    if (status == Status::ok) {
+      for (int y = crop.y; y < crop.y + crop.height; ++y) {
+        const std::ptrdiff_t begin = std::ptrdiff_t{y} * kWidth + crop.x;
+        require(std::equal(whole.begin() + begin, whole.begin() + begin + crop.width,
+                           part.begin() + begin),
+                "a crop gives what the whole picture has there");
+      }
+    }
+    require_sentence(hal::mjpeg::describe(status));
+    hal::mjpeg::Size size;
+    if (decoder_.read_size(payload, size) == Status::ok && status == Status::ok) {
+      require(size == hal::mjpeg::Size{kWidth, kHeight}, "a frame has the size it says");
+    }
+    Picture after{};
+    require(decode(good_, after) == Status::ok && after == expected_,
+            "a frame leaves nothing behind");
+  }
+
+ private:
+  Status decode(std::span<const std::uint8_t> payload, Picture& out) {
+    return decoder_.decode(payload, out.data(), kWidth);
+  }
+
+  hal::mjpeg::GreyDecoder decoder_{kWidth, kHeight};
+  std::vector<std::uint8_t> good_ = fakes::make_jpeg({.width = kWidth, .height = kHeight},
+                                                     [](int x, int y) { return 4 * x + 3 * y; });
+  Picture expected_{};
+};
+
+}  // namespace
+}  // namespace dtact::fuzz
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace dtact::fuzz;
+  static Decoder decoder;
+  if (size < 4) return 0;
+  dtact::hal::Area crop{data[0] % kWidth, data[1] % kHeight, 0, 0};
+  crop.width = 1 + data[2] % (kWidth - crop.x);
+  crop.height = 1 + data[3] % (kHeight - crop.y);
+  decoder.try_one(crop, {data + 4, size - 4});
+  return 0;
+}

@@ -1,0 +1,123 @@
+// The store stopped before each of its system calls in turn, as a power cut would stop it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/ptrace.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "daemon/calibration/text.hpp"
+#include "daemon/net/calibration_store.hpp"
+#include "tests/unit/calibration/sample.hpp"
+
+namespace dtact::net {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Runs `work` in a process of its own and kills it before its n-th system call (from 1). True when
+/// it ended before that; nothing when processes cannot be traced here.
+std::optional<bool> run_until(int n, const std::function<void()>& work) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::ptrace(PTRACE_TRACEME, 0, nullptr, nullptr) != 0) ::_exit(2);
+    ::raise(SIGSTOP);
+    work();
+    ::_exit(0);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  if (!WIFSTOPPED(status)) return std::nullopt;
+  // The child stops when it enters a call and when it leaves it; the first is raise()'s return.
+  for (int stop = 0; stop < 2 * n; ++stop) {
+    ::ptrace(PTRACE_SYSCALL, child, nullptr, nullptr);
+    ::waitpid(child, &status, 0);
+    if (WIFEXITED(status)) return true;
+  }
+  ::kill(child, SIGKILL);
+  ::waitpid(child, &status, 0);
+  return false;
+}
+
+CalibrationFiles whole(const std::string& name) {
+  const calibration::Files files = calibration::format(calibration::sample());
+  return {name, files.toml, files.reference_png};
+}
+
+class Crash : public testing::Test {
+ protected:
+  Crash() {
+    fs::create_directory(start_);
+    FolderCalibrationStore store(start_, {});
+    // One more, and the oldest has to go.
+    for (std::size_t i = 0; i < FolderCalibrationStore::kKept; ++i) store.keep(whole("old"));
+    store.make_current(3);
+  }
+
+  /// Stops `work` everywhere, each time on the same state, and checks what is left.
+  void stop_everywhere(const std::function<void(FolderCalibrationStore&)>& work,
+                       std::uint64_t before, std::uint64_t after) {
+    bool was_before = false;
+    for (int n = 1;; ++n) {
+      fs::remove_all(state_);
+      fs::copy(start_, state_, fs::copy_options::recursive | fs::copy_options::copy_symlinks);
+      const auto ended = run_until(n, [&] {
+        FolderCalibrationStore store(state_, {});
+        work(store);
+      });
+      if (!ended) GTEST_SKIP() << "processes cannot be traced here";
+      const std::uint64_t current = check(n);
+      EXPECT_TRUE(current == before || current == after) << current;
+      was_before = was_before || current == before;
+      if (!*ended) continue;
+      EXPECT_EQ(current, after);
+      EXPECT_TRUE(was_before);
+      EXPECT_GT(n, 5);
+      return;
+    }
+  }
+
+  // In memory, where syncing costs nothing.
+  calibration::TempFolder folder_{fs::is_directory("/dev/shm") ? "/dev/shm"
+                                                               : fs::temp_directory_path()};
+  fs::path start_ = folder_.path() / "start";
+  fs::path state_ = folder_.path() / "state";
+
+ private:
+  /// The current one, after all that a store has to hold was checked.
+  std::uint64_t check(int n) {
+    FolderCalibrationStore store(state_, {});
+    std::uint64_t current = 0;
+    const auto all = store.list();
+    for (const auto& stored : all) {
+      EXPECT_EQ(stored.damage, "") << "stopped before call " << n;
+      if (stored.current) current = stored.number;
+    }
+    EXPECT_EQ(store.read({}).number, current);
+    // The next upload finds its way, under a number that none has.
+    store.keep(whole("next"));
+    EXPECT_EQ(store.read({}).number, all.back().number + 1) << "stopped before call " << n;
+    const auto entries = std::distance(fs::directory_iterator(state_ / "calibrations"), {});
+    EXPECT_LE(entries, static_cast<std::ptrdiff_t>(FolderCalibrationStore::kKept) + 1)
+        << "stopped before call " << n;
+    return current;
+  }
+};
+
+TEST_F(Crash, LeavesAWholeCalibrationDuringAnUpload) {
+  const CalibrationFiles fresh = whole("new");
+  stop_everywhere([&](FolderCalibrationStore& store) { store.keep(fresh); }, 3, 21);
+}
+
+TEST_F(Crash, LeavesAWholeCalibrationDuringAnActivation) {
+  stop_everywhere([](FolderCalibrationStore& store) { store.make_current(7); }, 3, 7);
+}
+
+}  // namespace
+}  // namespace dtact::net

@@ -1,0 +1,253 @@
+// What clients may ask of the daemon's calibrations.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+
+#include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::net::test {
+namespace {
+
+using pipeline::CommandDone;
+using pipeline::Outcome;
+using testing::HasSubstr;
+
+v1::ClientMessage upload(const std::string& name, const std::string& toml,
+                         const std::string& png = "png") {
+  v1::ClientMessage message;
+  message.mutable_upload_calibration()->set_name(name);
+  message.mutable_upload_calibration()->set_calibration_toml(toml);
+  message.mutable_upload_calibration()->set_reference_png(png);
+  return message;
+}
+
+v1::ClientMessage get_calibration() {
+  v1::ClientMessage message;
+  message.mutable_get_calibration();
+  return message;
+}
+
+v1::ClientMessage get_calibration(std::uint64_t number) {
+  auto message = get_calibration();
+  message.mutable_get_calibration()->set_number(number);
+  return message;
+}
+
+v1::ClientMessage list() {
+  v1::ClientMessage message;
+  message.mutable_list_calibrations();
+  return message;
+}
+
+v1::ClientMessage activate(std::uint64_t number) {
+  v1::ClientMessage message;
+  message.mutable_activate_calibration()->set_number(number);
+  return message;
+}
+
+/// Expects the request to be refused as invalid with a sentence that has `part` in it.
+void expect_invalid(RawClient& client, const v1::ClientMessage& message, const std::string& part) {
+  const auto reply = client.request(message);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_INVALID);
+  EXPECT_THAT(reply.error().message(), HasSubstr(part));
+}
+
+/// The pipeline says that it uses a calibration.
+void be_calibrated(Rig& rig) {
+  pipeline::Status status;
+  status.calibration = std::make_shared<calibration::Calibration>();
+  rig.port.set_status(status);
+}
+
+/// The one marked current; 999 when none is.
+std::uint64_t current_of(RawClient& client) {
+  const auto reply = client.request(list());
+  for (const auto& stored : reply.calibrations().calibrations()) {
+    if (stored.current()) return stored.number();
+  }
+  return 999;
+}
+
+void refuse_as_invalid(FakePort& port) {
+  port.answer([](const pipeline::Command& command) {
+    return CommandDone{command.ticket, Outcome::invalid, "the camera gives 640x480"};
+  });
+}
+
+TEST(Upload, IsCheckedUsedKeptAndTold) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  RawClient watcher(rig.tcp_port());
+  client.hello();
+  watcher.hello();
+  EXPECT_TRUE(client.request(upload("ball-4_mm", "good")).has_done());
+  EXPECT_EQ(watcher.event().calibration().name(), "ball-4_mm");
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  EXPECT_EQ(std::get<pipeline::UseCalibration>(command->what).calibration->name, "ball-4_mm");
+
+  be_calibrated(rig);
+  const auto files = client.request(get_calibration()).calibration();
+  EXPECT_EQ(files.name(), "ball-4_mm");
+  EXPECT_EQ(files.calibration_toml(), "good");
+  EXPECT_EQ(files.reference_png(), "png");
+}
+
+TEST(Upload, NamesWhatIsWrong) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  expect_invalid(client, upload("../etc", "good"), "\"../etc\"; allowed are 1 to 64 letters");
+  expect_invalid(client, upload("", "good"), "upload_calibration.name");
+  expect_invalid(client, upload(std::string(65, 'x'), "good"), "upload_calibration.name");
+  expect_invalid(client, upload("x", ""), "calibration_toml or reference_png is empty");
+  expect_invalid(client, upload("x", "bad"), "calibration.toml:3: scale missing");
+  EXPECT_TRUE(client.request(upload("x", "good")).has_done());  // none of them is in the way
+}
+
+TEST(Upload, IsNotKeptWhenThePipelineRefusesIt) {
+  Rig rig({}, refuse_as_invalid);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  expect_invalid(client, upload("x", "good"), "640x480");
+  be_calibrated(rig);
+  EXPECT_EQ(client.request(get_calibration()).calibration().name(), "first");
+  expect_invalid(client, upload("x", "good"), "640x480");  // and not busy
+}
+
+TEST(Upload, SaysWhenItCouldNotBeStored) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto reply = client.request(upload("x", "unwritable"));
+  EXPECT_EQ(reply.error().code(), v1::ERROR_STORAGE);
+  EXPECT_THAT(reply.error().message(), HasSubstr("disk full"));
+}
+
+TEST(GetCalibration, NeedsOne) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto reply = client.request(get_calibration());
+  EXPECT_EQ(reply.error().code(), v1::ERROR_UNCALIBRATED);
+  EXPECT_THAT(reply.error().message(), HasSubstr("dtactctl calibration upload"));
+}
+
+TEST(GetCalibration, TakesANumber) {
+  Rig rig;  // works on a daemon that uses none
+  RawClient client(rig.tcp_port());
+  client.hello();
+  auto files = client.request(get_calibration(0)).calibration();
+  EXPECT_EQ(files.name(), "factory");
+  EXPECT_TRUE(files.has_number());
+  EXPECT_EQ(files.number(), 0U);
+  files = client.request(get_calibration(2)).calibration();
+  EXPECT_EQ(files.calibration_toml(), "bad");  // damaged or not
+  EXPECT_EQ(files.number(), 2U);
+  expect_invalid(client, get_calibration(7), "there is no calibration 7");
+  be_calibrated(rig);
+  EXPECT_EQ(client.request(get_calibration()).calibration().number(), 1U);
+}
+
+TEST(ListCalibrations, TellsEverything) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto all = client.request(list()).calibrations();
+  ASSERT_EQ(all.calibrations_size(), 4);
+  EXPECT_EQ(all.calibrations(0).number(), 0U);
+  EXPECT_EQ(all.calibrations(0).uploaded(), "");
+  EXPECT_FALSE(all.calibrations(0).current());
+  const auto& first = all.calibrations(1);
+  EXPECT_EQ(first.number(), 1U);
+  EXPECT_EQ(first.name(), "first");
+  EXPECT_EQ(first.uploaded(), "2026-01-31T12:00:00Z");
+  EXPECT_TRUE(first.current());
+  EXPECT_EQ(first.summary().method(), "list");
+  EXPECT_EQ(first.summary().mm_per_px(), 0.0414);
+  EXPECT_EQ(first.summary().width(), 580U);
+  EXPECT_EQ(first.summary().frame_height(), 600U);
+  EXPECT_EQ(first.summary().covered_to_mm(), 1.4);
+  EXPECT_FALSE(all.calibrations(2).has_summary());
+  EXPECT_EQ(all.calibrations(2).damage(), "calibration.toml:3: scale missing");
+  EXPECT_TRUE(client.request(upload("ball", "good")).has_done());
+  EXPECT_EQ(current_of(client), 4U);
+}
+
+TEST(ActivateCalibration, IsCheckedUsedKeptAndTold) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  RawClient watcher(rig.tcp_port());
+  client.hello();
+  watcher.hello();
+  EXPECT_TRUE(client.request(activate(0)).has_done());
+  EXPECT_EQ(watcher.event().calibration().name(), "factory");
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  EXPECT_EQ(std::get<pipeline::UseCalibration>(command->what).calibration->name, "factory");
+  EXPECT_EQ(current_of(client), 0U);
+  EXPECT_TRUE(client.request(activate(1)).has_done());
+  EXPECT_EQ(watcher.event().calibration().name(), "first");
+  EXPECT_EQ(current_of(client), 1U);
+}
+
+TEST(ActivateCalibration, ChangesNothingWhenItCannotBeUsed) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  expect_invalid(client, activate(2), "calibration.toml:3: scale missing");
+  expect_invalid(client, activate(7), "there is no calibration 7");
+  auto without = activate(0);
+  without.mutable_activate_calibration()->clear_number();
+  expect_invalid(client, without, "activate_calibration.number is not set");
+  EXPECT_EQ(current_of(client), 1U);
+  EXPECT_TRUE(client.request(activate(0)).has_done());  // none of them is in the way
+}
+
+TEST(ActivateCalibration, IsNotKeptWhenThePipelineRefusesIt) {
+  Rig rig({}, refuse_as_invalid);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  expect_invalid(client, activate(0), "640x480");
+  EXPECT_EQ(current_of(client), 1U);
+  expect_invalid(client, activate(0), "640x480");  // and not busy
+}
+
+TEST(ActivateCalibration, SaysWhenItCouldNotBeStored) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto reply = client.request(activate(3));
+  EXPECT_EQ(reply.error().code(), v1::ERROR_STORAGE);
+  EXPECT_THAT(reply.error().message(), HasSubstr("disk full"));
+}
+
+TEST(ActivateCalibration, WaitsForAnotherChange) {
+  Rig rig;  // a pipeline that does not answer
+  RawClient client(rig.tcp_port());
+  client.hello();
+  auto message = upload("ball", "good");
+  message.set_id(50);
+  client.send(message);
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  EXPECT_EQ(client.request(activate(0)).error().code(), v1::ERROR_BUSY);
+  EXPECT_EQ(client.request(upload("other", "good")).error().code(), v1::ERROR_BUSY);
+  rig.port.emit(CommandDone{command->ticket, Outcome::done, ""});
+  EXPECT_EQ(client.reply().id(), 50U);
+}
+
+TEST(ActivateCalibration, IsRefusedAsBusyWhenThePipelineIsFull) {
+  Rig rig;
+  rig.port.set_full(true);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(client.request(upload("x", "good")).error().code(), v1::ERROR_BUSY);
+  EXPECT_EQ(client.request(activate(0)).error().code(), v1::ERROR_BUSY);
+}
+
+}  // namespace
+}  // namespace dtact::net::test
