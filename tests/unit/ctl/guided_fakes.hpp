@@ -85,7 +85,7 @@ class FakeSensor : public Sensor {
   }
   void upload(const client::CalibrationFiles& files) override {
     uploaded = files;
-    client::Status::Calibration calibration;
+    client::CalibrationSummary calibration;
     calibration.name = files.name;
     const std::size_t at = files.toml.find("created = \"") + 11;
     calibration.created = files.toml.substr(at, 20);
