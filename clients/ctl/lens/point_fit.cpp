@@ -155,6 +155,20 @@ void minimise(Parameters& p, const Units& u, std::span<const Mark> marks, LensMo
   }
 }
 
+/// The best parameters for all marks, in `u`.
+Parameters fit(std::span<const Mark> marks, const Units& u, LensModel model) {
+  if (marks.size() < static_cast<std::size_t>(parameters(model))) {
+    throw std::runtime_error("lens: too few points");
+  }
+  Parameters p = affine_start(marks, u, radial_terms(model));
+  // The larger model starts from the smaller one's end: a lens's terms trade against each other.
+  for (const LensModel stage : kModels) {
+    if (stage > model) break;
+    if (stage != LensModel::affine) minimise(p, u, marks, stage);
+  }
+  return p;
+}
+
 double square(Point p) { return p.x * p.x + p.y * p.y; }
 
 }  // namespace
@@ -165,17 +179,8 @@ int parameters(LensModel model) {
 }
 
 Lens fit_lens(std::span<const Mark> marks, LensModel model) {
-  if (marks.size() < static_cast<std::size_t>(parameters(model))) {
-    throw std::runtime_error("lens: too few points");
-  }
   const Units u = units_of(marks);
-  Parameters p = affine_start(marks, u, radial_terms(model));
-  // The larger model starts from the smaller one's end: a lens's terms trade against each other.
-  for (const LensModel stage : kModels) {
-    if (stage > model) break;
-    if (stage != LensModel::affine) minimise(p, u, marks, stage);
-  }
-  return lens_of(p, u);
+  return lens_of(fit(marks, u, model), u);
 }
 
 std::vector<Point> residuals_mm(const Lens& lens, std::span<const Mark> marks) {
@@ -200,11 +205,15 @@ double rms(std::span<const Point> residuals) {
 }
 
 std::vector<Point> leave_one_out(std::span<const Mark> marks, LensModel model) {
+  const Units u = units_of(marks);
+  const Parameters all = fit(marks, u, model);
   std::vector<Point> residuals;
   for (std::size_t out = 0; out < marks.size(); ++out) {
     std::vector<Mark> others(marks.begin(), marks.end());
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(out));
-    residuals.push_back(residuals_mm(fit_lens(others, model), marks.subspan(out, 1)).front());
+    Parameters p = all;  // One mark moves the minimum a little: a few steps from here.
+    minimise(p, u, others, model);
+    residuals.push_back(residuals_mm(lens_of(p, u), marks.subspan(out, 1)).front());
   }
   return residuals;
 }

@@ -23,8 +23,8 @@ class RobustPins : public testing::TestWithParam<const char*> {
   }
   /// The pins are found, but for `faint` at the edge, and lie where the grid says, each judged by
   /// the lens of the others.
-  static void expect_found(const PressImages& board, const char* what, double bound_mm = 0.06,
-                           std::size_t faint = 0) {
+  static PinPress expect_found(const PressImages& board, const char* what, double bound_mm = 0.06,
+                               std::size_t faint = 0) {
     const PinPress press = find_pins(board.reference, board.frame, {});
     const double error = rms(press.lens.left_out);
     fmt::print("{} {}: left-out RMS {:.4f} mm, {} parameters\n", GetParam(), what, error,
@@ -32,6 +32,7 @@ class RobustPins : public testing::TestWithParam<const char*> {
     EXPECT_LE(error, bound_mm) << what;
     EXPECT_EQ(press.marks.size() + press.missing.size(), 63U) << what;
     EXPECT_LE(press.missing.size(), faint) << what;
+    return press;
   }
   /// The pins darken the image by 8 levels only; some of those at the edge drown in a leak of 30,
   /// and it is said which.
@@ -41,8 +42,7 @@ class RobustPins : public testing::TestWithParam<const char*> {
 
 TEST_P(RobustPins, AsTheyAre) { expect_found(board_, "as it is"); }
 TEST_P(RobustPins, Portrait) {
-  expect_found(turned(board_), "portrait");
-  const PinPress press = find_pins(turned(board_).reference, turned(board_).frame, {});
+  const PinPress press = expect_found(turned(board_), "portrait");
   EXPECT_EQ(press.rows, 9);
   EXPECT_EQ(press.cols, 7);
 }
