@@ -29,17 +29,17 @@ std::string load_pair(const fs::path& folder, const char* object, ImageSet& refe
   return {};
 }
 
-void evaluate_ball(FolderEvaluation& e, double radius_mm) {
+void evaluate_ball(FolderEvaluation& e, const recon::Lens& lens, double radius_mm) {
   calibration::BallPress press;
   press.reference_q8 = e.ball_reference.mean_q8();
   press.frames = e.ball_images.frames();
   press.ball_radius_mm = radius_mm;
-  press.lens = e.pins->lens.lens;
-  press.gain = e.gain->gain;
-  press.mm_per_px = recon::central_mm_per_px(*press.lens);
-  e.calibration = calibration::build(press);
-  e.ball =
-      calibration::evaluate(*e.calibration, press.reference_q8.pixels, press.frames, radius_mm);
+  press.lens = lens;
+  press.gain = e.gain.gain;
+  press.mm_per_px = recon::central_mm_per_px(lens);
+  const calibration::Calibration made = calibration::build(press);
+  e.ball = calibration::evaluate(made, press.reference_q8.pixels, press.frames, radius_mm);
+  e.calibration = made;
 }
 
 /// Takes the plane through the pins' depths off and fills in what is left.
@@ -88,30 +88,31 @@ double peak_um(const std::vector<float>& um, int width, int height, double col, 
   return fit(0);
 }
 
-PinDepths read_pins(const FolderEvaluation& e, const Board& board) {
-  const recon::Model& model = *e.calibration->model;
+PinDepths read_pins(const FolderEvaluation& e, const PinPress& pins,
+                    const calibration::Calibration& calibration, const Board& board) {
+  const recon::Model& model = *calibration.model;
   const int width = model.rectify.width;
   const std::vector<float> um =
       calibration::mean_depth_um(model, e.board_reference.mean_q8().pixels, e.board.frames());
-  const recon::Point corner = surface_point(e.pins->lens.lens,
-                                            {e.calibration->crop_col, e.calibration->crop_row,
-                                             width, model.rectify.height, model.mm_per_px},
-                                            0, 0);
+  const recon::Point corner = surface_point(
+      pins.lens.lens,
+      {calibration.crop_col, calibration.crop_row, width, model.rectify.height, model.mm_per_px}, 0,
+      0);
   const double reach = board.pitch_mm / 5 / model.mm_per_px;
   PinDepths depths;
   std::vector<Mark> read;  // Those inside the trusted map.
-  for (std::size_t i = 0; i < e.pins->marks.size(); ++i) {
-    const Mark& mark = e.pins->marks[i];
+  for (std::size_t i = 0; i < pins.marks.size(); ++i) {
+    const Mark& mark = pins.marks[i];
     const double col = (mark.mm.x - corner.x) / model.mm_per_px;
     const double row = (mark.mm.y - corner.y) / model.mm_per_px;
     const double peak = peak_um(um, width, model.rectify.height, col, row, reach);
     if (std::isnan(peak)) continue;
-    depths.mm.push_back(0.001 * peak * e.gain->left_out_ratio[i]);
+    depths.mm.push_back(0.001 * peak * e.gain.left_out_ratio[i]);
     read.push_back(mark);
   }
-  if (4 * read.size() < 3 * e.pins->marks.size()) {
+  if (4 * read.size() < 3 * pins.marks.size()) {
     throw std::runtime_error(fmt::format("only {} of {} pins lie inside the trusted map",
-                                         read.size(), e.pins->marks.size()));
+                                         read.size(), pins.marks.size()));
   }
   judge(depths, read);
   if (!(depths.mean_mm > 0)) throw std::runtime_error("the pins read no depth");
@@ -139,20 +140,20 @@ FolderEvaluation evaluate_folder(const fs::path& folder, const Board& board,
   }
   e.no_ball = load_pair(folder, "ball", e.ball_reference, e.ball_images);
   if (e.no_ball.empty() && !e.pins) e.no_ball = "without a lens there is no scale";
-  if (e.no_ball.empty()) {
+  if (e.pins && e.no_ball.empty()) {
     try {
       require_same_size(e.board, "board.png", e.ball_images, "ball.png");
-      evaluate_ball(e, ball_radius_mm);
+      evaluate_ball(e, e.pins->lens.lens, ball_radius_mm);
     } catch (const std::runtime_error& error) {
       e.no_ball = error.what();
     }
   }
-  if (!e.pins || !e.ball) {
+  if (!e.pins || !e.calibration) {
     e.no_pin_depths = e.pins ? "without a ball there is no list" : "without the pins' places";
     return e;
   }
   try {
-    e.pin_depths = read_pins(e, board);
+    e.pin_depths = read_pins(e, *e.pins, *e.calibration, board);
   } catch (const std::runtime_error& error) {
     e.no_pin_depths = error.what();
   }
@@ -172,7 +173,7 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
     if (!e.pins->missing.empty()) {
       lines.push_back(fmt::format("lens: pins not found: {}", fmt::join(e.pins->missing, "; ")));
     }
-    lines.push_back(e.gain->describe());
+    lines.push_back(e.gain.describe());
   } else {
     lines.push_back("lens: skipped: " + e.no_pins);
   }

@@ -28,7 +28,7 @@ struct PinDepths {
 /// `ball_reference.png` and `ball.png`. What could not be done is empty and has its reason.
 struct FolderEvaluation {
   std::optional<PinPress> pins;
-  std::optional<PinGain> gain;                          ///< That the pins ask for.
+  PinGain gain;                                         ///< That the pins ask for.
   std::string no_pins;                                  ///< Why there is no lens.
   std::optional<calibration::Calibration> calibration;  ///< On the rectified image, of the ball.
   std::optional<calibration::Evaluation> ball;
