@@ -86,7 +86,7 @@ TEST(ReconstructorList, LightThatChangedByAFactorReadsTheSameDepth) {
   bench.reconstructor.set_light(0.8);
   EXPECT_THAT(bench.run(128), Each(0));
   EXPECT_THAT(bench.run(104), Each(960));  // 24 levels of the dimmed light are 30
-  bench.reconstructor.set_light(0.975);  // 156; replaces the other factor
+  bench.reconstructor.set_light(0.975);    // 156; replaces the other factor
   EXPECT_THAT(bench.run(156), Each(0));
   // 30 levels × 160/156 = 1969.2 Q6; half of 1969 is 984 µm.
   EXPECT_THAT(bench.run(126), Each(984));
