@@ -63,6 +63,7 @@ Outcome Session::run() {
 
 Outcome Session::guide() {
   greet();
+  folder_.require_ball(plan_.ball_radius_mm);
   if (folder_.has_reference()) {
     resume();
   } else {

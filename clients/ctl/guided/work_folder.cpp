@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
+#include "daemon/calibration/key_reader.hpp"
 #include "daemon/calibration/sensor_file.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/base/atomic_folder.hpp"
@@ -66,6 +68,23 @@ void WorkFolder::save_reference(const std::vector<image::Grey8>& frames,
 
 void WorkFolder::save_press(const std::string& name, const std::vector<image::Grey8>& frames) {
   save(path_ / name, frames, {});
+}
+
+void WorkFolder::require_ball(double radius_mm) const {
+  constexpr const char* kRadius = "radius_mm";
+  const fs::path file = path_ / "ball.toml";
+  if (fs::exists(file) && !presses().empty()) {
+    const toml::table document = calibration::parse_toml(base::read_file(file), file.string());
+    calibration::KeyReader reader(document, file.string());
+    const double there = reader.number(kRadius, 0.1, 100);
+    reader.finish();
+    if (there == radius_mm) return;
+    throw std::runtime_error(fmt::format(
+        "the presses in {} are of a ball of {:g} mm radius, not {:g} mm: give --radius-mm {:g}, or "
+        "begin again in another --folder",
+        path_.string(), there, radius_mm, there));
+  }
+  base::write_file_atomically(file, fmt::format("{} = {}\n", kRadius, radius_mm));
 }
 
 void WorkFolder::save_preview(const image::Rgb8& picture) {

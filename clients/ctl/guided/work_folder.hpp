@@ -14,6 +14,7 @@ namespace dtact::ctl::guided {
 ///
 ///     FOLDER/reference/00.png … sensor.toml     the untouched surface, camera and light
 ///     FOLDER/press-01/00.png …                  each press
+///     FOLDER/ball.toml                          the radius of the ball that made them
 ///     FOLDER/calibration/                       what was made of them
 ///     FOLDER/preview.png                        the last picture
 ///
@@ -34,6 +35,9 @@ class WorkFolder {
   void save_reference(const std::vector<image::Grey8>& frames, const calibration::Origin& origin);
   /// `name`: next_press(), or one that is there and is replaced.
   void save_press(const std::string& name, const std::vector<image::Grey8>& frames);
+  /// Notes the radius of the presses' ball; one already noted must be the same as long as there are
+  /// presses. Throws std::runtime_error naming both and the remedy.
+  void require_ball(double radius_mm) const;
   void save_preview(const image::Rgb8& picture);
 
   /// The folder's name as the daemon takes it for a calibration: letters, digits, '-' and '_', at

@@ -251,6 +251,21 @@ TEST_F(GuidedSession, AnotherLightIsRefused) {
       ThrowsMessage<std::runtime_error>(HasSubstr("the control exposure is 50 but was 100")));
 }
 
+TEST_F(GuidedSession, AnotherBallIsRefused) {
+  {
+    FakeSensor sensor(kEnough);
+    FakeConsole console({"", "", "q"});
+    EXPECT_EQ(run(sensor, console), Outcome::unfinished);
+  }
+  plan_.ball_radius_mm = 5;
+  FakeSensor sensor(kEnough);
+  FakeConsole console({"", ""});
+  EXPECT_THAT([&] { (void)run(sensor, console); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("of a ball of 4 mm radius, not 5 mm"), HasSubstr("--radius-mm 4"),
+                        HasSubstr("another --folder"))));
+}
+
 TEST_F(GuidedSession, TheFoldersNameSuitsTheDaemon) {
   EXPECT_EQ(WorkFolder(plan_.folder / "left hand.2/").calibration_name(), "left-hand-2");
 }
