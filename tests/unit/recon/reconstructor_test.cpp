@@ -155,7 +155,7 @@ TEST(ReconstructorList, RowsMayBePaddedAndTheLastPixelIsReached) {
   model.smoothing_px = 0;
   Reconstructor reconstructor(std::make_shared<Model>(std::move(model)));
   constexpr int kStride = 48;
-  std::vector<std::uint8_t> luma(std::size_t{kStride} * kFrameHeight, 160);
+  std::vector<std::uint8_t> luma(std::size_t{kStride} * kFrameHeight + kLumaPadding, 160);
   luma[kStride * (kFrameHeight - 1) + kFrameWidth - 1] = 150;
   std::vector<std::int16_t> depth(static_cast<std::size_t>(kWidth) * kHeight);
   reconstructor.run(luma.data(), kStride, depth);
