@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "hal/sim/grid.hpp"
+#include "hal/sim/texture.hpp"
 
 namespace dtact::hal::sim {
 namespace {
@@ -60,6 +61,7 @@ LightField::LightField(const Scene& scene)
   const CameraModel& camera = scene.camera;
   const LightModel& light = scene.light;
   const auto leds = led_places(light);
+  const Texture texture(scene.layer.texture, scene.layer.texture_mm);
   double at_centre = 0;
   for (const Place& led : leds) at_centre += direct(led, {}, light.led_distance_mm);
 
@@ -73,7 +75,7 @@ LightField::LightField(const Scene& scene)
       const double w = camera.width;
       const double h = camera.height;
       const double radius2 = (dx * dx * w * w + dy * dy * h * h) / (w * w + h * h);
-      const double lens = 1 - light.vignetting * radius2;
+      const double kept = (1 - light.vignetting * radius2) * (1 + texture.at(at));
       const std::size_t pixel =
           static_cast<std::size_t>(row) * static_cast<std::size_t>(camera.width) +
           static_cast<std::size_t>(column);
@@ -82,7 +84,7 @@ LightField::LightField(const Scene& scene)
             light.fill / kLedCount +
             (1 - light.fill) * direct(leds[i], at, light.led_distance_mm) / at_centre;
         shares_[i * pixels_ + pixel] =
-            static_cast<std::uint16_t>(std::min(std::lround(full * share * lens), 65535L));
+            static_cast<std::uint16_t>(std::min(std::lround(full * share * kept), 65535L));
       }
     }
   }

@@ -20,7 +20,7 @@ using LedLevels = std::array<std::uint16_t, kLedCount>;
 /// The light on the untouched layer as the camera sees it. Every LED shines through the diffuser
 /// as a point source on a plane, (1 + ρ²/d²)^−2 at the distance ρ from its foot (inverse square,
 /// and Lambert's cosine at both ends), plus an even share; the lens vignettes with the square of
-/// the radius.
+/// the radius, and the layer has its faint texture.
 class LightField {
  public:
   explicit LightField(const Scene& scene);

@@ -190,6 +190,8 @@ void read_scene(std::string_view toml_text, const std::string& name,
   layer.number("solve_step_mm", scene.layer.solve_step_mm, 0.02, 5);
   layer.number("taper_x", scene.layer.taper_x, -0.02, 0.02);
   layer.number("taper_y", scene.layer.taper_y, -0.02, 0.02);
+  layer.number("texture", scene.layer.texture, 0, 0.02);
+  layer.number("texture_mm", scene.layer.texture_mm, 0.05, 5);
   layer.finish();
 
   read_optics(root.table("optics"), scene.optics, scene.layer.thickness_mm);

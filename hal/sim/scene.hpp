@@ -30,6 +30,8 @@ struct LayerModel {
   double solve_step_mm = 0;
   double taper_x = 0;
   double taper_y = 0;
+  double texture = 0;
+  double texture_mm = 0;
 };
 
 struct OpticsModel {
