@@ -25,6 +25,10 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::camera_mismatch,
      "Camera, mode or controls differ from the calibration's: restore them in the configuration "
      "or calibrate again."},
+    {Health::camera_moved,
+     "The layer's marks are not where they were at calibration: camera or layer has moved, and "
+     "depth "
+     "lies in the wrong place. Fix it in its mount and calibrate again."},
     {Health::light_mismatch,
      "The ring shows another light than at calibration: depth is scaled to it, with more noise; "
      "dtactctl led sets the light back."},
@@ -72,6 +76,7 @@ void add(std::string& text, std::string_view sentence) {
 std::string_view detail(const pipeline::Status& status, Health health) {
   if (health == Health::camera_trouble) return status.camera_report.remedy;
   if (health == Health::camera_mismatch) return status.camera_report.moved;
+  if (health == Health::camera_moved) return status.place_message;
   if (health == Health::ring_trouble) return status.ring_message;
   return {};
 }

@@ -35,6 +35,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
     : camera_(parts.camera),
       light_(parts.light),
       writer_(parts.writer),
+      place_(parts.place),
       exchange_(parts.exchange),
       clock_(parts.clock),
       config_(config),
@@ -64,6 +65,7 @@ void CaptureLoop::run() noexcept {
   if (active_) {
     keeper_.use_calibration(active_->calibration->model->reference_q8, active_->grid,
                             active_->region);
+    place_.use_calibration(active_->calibration, active_->region);
     light_mismatch_ = light_differs(*active_->calibration, shown_);
   }
   const auto timeout =
@@ -143,6 +145,7 @@ void CaptureLoop::execute(CalibrationOrder& order) noexcept {
   unusable_ = false;
   const recon::Model& model = *active_->calibration->model;
   keeper_.use_calibration(model.reference_q8, active_->grid, active_->region);
+  place_.use_calibration(active_->calibration, active_->region);
   if (keeper_.ready()) use_reference();
   light_mismatch_ = light_differs(*active_->calibration, shown_);
   keep_due_ = keeper_.ready() && keeper_.worth_keeping();
@@ -182,8 +185,11 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
   // The health of this frame, before its image changes the reference for the next.
   out.health = health(settled, now_ns);
   teller_.contact(out);
+  const bool untouched = out.has_depth && keeper_.footing() == Footing::fresh &&
+                         !contact_.touching() && !light_mismatch_;
   publish(out);
   mind_reference(settled);
+  place_.look(frame_.luma(), untouched, now_ns);
   tell(health(timeline_.settled_at(exposure_ns), now_ns), now_ns);
   frame_.reset();
 }
@@ -228,6 +234,7 @@ void CaptureLoop::use_reference() noexcept {
   const recon::Model& model = *active_->calibration->model;
   follower_.restart(model.method == recon::Method::list);
   follow_due_.reset();
+  place_.hurry();
   exchange_.light_followed.store(0, std::memory_order_relaxed);
   const recon::RectifyTable& table = model.rectify;
   image_watch_.set_reference(keeper_.reference(), table.frame_width, table.frame_height,
@@ -361,6 +368,7 @@ HealthSet CaptureLoop::health(bool settled, std::int64_t now_ns) const noexcept 
   set.set(Health::light_mismatch, light_mismatch_ || other_level_);
   const bool differs = active_ && exchange_.camera_mismatch.load(std::memory_order_relaxed);
   set.set(Health::camera_mismatch, unusable_ || controls_moved_ || differs);
+  set.set(Health::camera_moved, place_.moved());
   set.set(Health::beyond_calibration, beyond_);
   set.set(Health::frames_lost, watch_.lost_lately(now_ns));
   set.set(Health::camera_trouble, watch_.trouble());

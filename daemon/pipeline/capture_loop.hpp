@@ -12,6 +12,7 @@
 #include "daemon/pipeline/light_follower.hpp"
 #include "daemon/pipeline/light_timeline.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/pipeline/place_watch.hpp"
 #include "daemon/pipeline/reference_keeper.hpp"
 #include "daemon/pipeline/reference_writer.hpp"
 #include "daemon/pipeline/teller.hpp"
@@ -26,6 +27,7 @@ struct CaptureParts {
   hal::Camera& camera;
   LightDriver& light;
   ReferenceWriter& writer;
+  PlaceWatch& place;
   Exchange& exchange;
   base::Clock& clock;
 };
@@ -71,6 +73,7 @@ class CaptureLoop {
   hal::Camera& camera_;
   LightDriver& light_;
   ReferenceWriter& writer_;
+  PlaceWatch& place_;
   Exchange& exchange_;
   base::Clock& clock_;
   const PipelineConfig& config_;

@@ -27,9 +27,10 @@ enum class Health : std::uint8_t {
   image_saturated = 14,  ///< Too much of the picture is white.
   image_dark = 15,       ///< The picture is too dark to measure in.
   image_noisy = 16,      ///< Pixels are noisier than smoothing makes up for, or many are dead.
-  image_repeated = 17    ///< All or part of the picture is the one before: frozen or torn.
+  image_repeated = 17,   ///< All or part of the picture is the one before: frozen or torn.
+  camera_moved = 18      ///< The layer's marks lie elsewhere than at calibration (place_watch.hpp).
 };
-inline constexpr int kHealthCount = 18;
+inline constexpr int kHealthCount = 19;
 
 class HealthSet {
  public:

@@ -50,6 +50,7 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
       exchange_(prototype(calibration.get())),
       light_(std::move(ring), config_.light, clock, exchange_.wake),
       writer_(info_.width, info_.height, config_.state_folder),
+      place_(info_.width, info_.height, config_.reference.frames),
       depth_capacity_(exchange_.slot.back().depth_um.capacity()) {
   std::unique_ptr<ActiveCalibration> active;
   bool unusable = false;
@@ -64,8 +65,9 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
       restore_failure_ = e.what();
     }
   }
-  loop_ = std::make_unique<CaptureLoop>(CaptureParts{*camera_, light_, writer_, exchange_, clock_},
-                                        config_, std::move(active), unusable);
+  loop_ = std::make_unique<CaptureLoop>(
+      CaptureParts{*camera_, light_, writer_, place_, exchange_, clock_}, config_,
+      std::move(active), unusable);
   if (!calibrations_.empty() && !config_.state_folder.empty()) {
     try {
       const auto stored =
@@ -101,6 +103,7 @@ void Pipeline::start() {
   camera_->start();
   compare_camera();
   writer_.start();
+  place_.start();
   capture_ = base::RtThread(
       {.name = "dtact-capture", .cpu = config_.cpu, .fifo_priority = config_.fifo_priority},
       [this] { loop_->run(); });
@@ -115,6 +118,7 @@ void Pipeline::stop() noexcept {
   capture_.join();
   light_.stop();
   writer_.stop();
+  place_.stop();
 }
 
 std::optional<Event> Pipeline::next_event() {
@@ -212,6 +216,7 @@ Status Pipeline::status() const {
   status.stages = exchange_.statistics.stages();
   status.capture_thread = exchange_.statistics.usage();
   status.light_followed = exchange_.light_followed.load(std::memory_order_relaxed);
+  status.place_message = place_.message();
   status.storage_message = writer_.message();
   if (status.storage_message.empty()) status.storage_message = restore_failure_;
   return status;

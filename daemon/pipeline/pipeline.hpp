@@ -10,6 +10,7 @@
 #include "daemon/pipeline/exchange.hpp"
 #include "daemon/pipeline/light_driver.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/pipeline/place_watch.hpp"
 #include "daemon/pipeline/port.hpp"
 #include "daemon/pipeline/reference_writer.hpp"
 #include "hal/base/rt_thread.hpp"
@@ -59,6 +60,7 @@ class Pipeline final : public Port {
   Exchange exchange_;
   LightDriver light_;
   ReferenceWriter writer_;
+  PlaceWatch place_;
   std::unique_ptr<CaptureLoop> loop_;
   std::size_t depth_capacity_;  // pixels that every frame of the pool has room for
   std::string restore_failure_;

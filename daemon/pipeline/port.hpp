@@ -98,6 +98,8 @@ struct Status {
   /// How far the reference follows the light since it was taken: a share, negative = dimmer.
   double light_followed = 0;
   ThreadUsage capture_thread;  ///< Renewed once a second.
+  /// How far the layer's marks lay from where they belong; meant while Health::camera_moved is set.
+  std::string place_message;
   /// Why the calibration or the last good reference could not be used or kept, and what to do;
   /// empty when all is well.
   std::string storage_message;

@@ -45,6 +45,27 @@ std::function<Script(double)> on_ball(const Spoil& spoil, bool rezero = false) {
   };
 }
 
+/// On the ball, after the camera has moved and time enough has passed to see it.
+std::function<Script(double)> after_move(const Spoil& move, bool rezero) {
+  return [move, rezero](double value) {
+    if (rezero) return on_ball(move, true)(value);
+    Script script = press(ball_truth(), value, move);
+    constexpr int kSeconds = 60;  // a look at the marks and the pause before it
+    script.fps = 1;
+    script.frames += kSeconds;
+    script.shot = [value, move](int n) {
+      Shot shot;
+      if (n >= kPress + kSeconds) shot.moment = moment_of(0);
+      if (n >= kReady) move(shot, n, value);
+      return shot;
+    };
+    return script;
+  };
+}
+
+void shift(Shot& shot, int /*n*/, double px) { shot.shift_px = px; }
+void turn(Shot& shot, int /*n*/, double degrees) { shot.turn_deg = degrees; }
+
 /// The object at the depth or size that is swept, under a clean image.
 std::function<Script(double)> object(const std::function<Pose(double)>& pose) {
   return [pose](double value) { return press(solve({pose(value)}), value, {}); };
@@ -172,18 +193,32 @@ std::vector<Row> image_rows() {
        ""},
       {"image",
        "shift",
-       "camera shifted since calibration",
+       "camera shifted while running",
        "pixels right and down",
        {0, 0.5, 1, 2, 3, 5, 10},
-       on_ball([](Shot& shot, int, double px) { shot.shift_px = px; }),
-       "an untouched layer has no texture, and pressed it looks as if the object lay elsewhere"},
+       after_move(shift, false),
+       ""},
+      {"image",
+       "shift_rezero",
+       "camera shifted, then re-zeroed",
+       "pixels right and down",
+       {0, 0.5, 1, 2, 3, 5, 10},
+       after_move(shift, true),
+       ""},
       {"image",
        "turn",
-       "camera rotated since calibration",
+       "camera rotated while running",
        "degrees",
-       {0, 0.5, 1, 2, 3, 5},
-       on_ball([](Shot& shot, int, double turn) { shot.turn_deg = turn; }),
-       "as for the shift"},
+       {0, 0.25, 0.5, 1, 2, 3, 5},
+       after_move(turn, false),
+       ""},
+      {"image",
+       "turn_rezero",
+       "camera rotated, then re-zeroed",
+       "degrees",
+       {0, 0.25, 0.5, 1, 2, 3, 5},
+       after_move(turn, true),
+       ""},
       {"image",
        "defocus",
        "defocus",

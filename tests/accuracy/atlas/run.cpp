@@ -129,6 +129,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
       : script_(script), clock_(clock), spoiler_(script.truth, 5), judge_(script) {}
 
   void attach(pipeline::Exchange& exchange) { exchange_ = &exchange; }
+  void attach(const pipeline::PlaceWatch& place) { place_ = &place; }
   [[nodiscard]] Outcome outcome() { return judge_.outcome(); }
 
   [[nodiscard]] hal::CameraInfo info() const override {
@@ -145,6 +146,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
 
   [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
                                      std::chrono::nanoseconds /*timeout*/) noexcept override {
+    place_->settle();  // what it finds would else come a frame sooner or later
     harvest();
     const int n = next_++;
     if (n >= script_.frames) {
@@ -187,6 +189,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
   Spoiler spoiler_;
   Judge judge_;
   pipeline::Exchange* exchange_ = nullptr;
+  const pipeline::PlaceWatch* place_ = nullptr;
   int next_ = 0;
 };
 
@@ -216,7 +219,10 @@ Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
   pipeline::LightDriver light(std::make_unique<hal::null::NullRing>(), config.light, clock,
                               exchange.wake);
   pipeline::ReferenceWriter writer(table.frame_width, table.frame_height, {});
-  pipeline::CaptureLoop loop({camera, light, writer, exchange, clock}, config,
+  pipeline::PlaceWatch place(table.frame_width, table.frame_height, config.reference.frames);
+  place.start();
+  camera.attach(place);
+  pipeline::CaptureLoop loop({camera, light, writer, place, exchange, clock}, config,
                              pipeline::activate(calibration, camera.info(), config.reconstruction),
                              false);
   loop.run();

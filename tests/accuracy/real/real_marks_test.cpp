@@ -1,0 +1,84 @@
+// Whether a moved camera shows in the faint marks of real layers: two references of one sensor,
+// taken apart, are still; what belongs to the layer in one of them is then moved, its stripes and
+// noise's place in the frame are not.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "daemon/pipeline/layer_marks.hpp"
+#include "tests/accuracy/real/press_images.hpp"
+
+namespace dtact {
+namespace {
+
+using pipeline::LayerMarks;
+
+LayerMarks marks_of(const cv::Mat1f& image) {
+  std::vector<std::uint16_t> q8;
+  q8.reserve(image.total());
+  for (const float grey : image) q8.push_back(static_cast<std::uint16_t>(std::lround(256 * grey)));
+  return {q8, image.cols, {60, 40, image.cols - 120, image.rows - 80}};
+}
+
+/// The fine detail goes `x` to the right and `y` down; smooth light and vertical stripes stay.
+cv::Mat1f with_layer_moved(const cv::Mat1f& image, double x, double y) {
+  cv::Mat1f smooth;
+  cv::Mat1f layer;
+  cv::GaussianBlur(image, smooth, {}, 8);
+  cv::subtract(image, smooth, layer);
+  cv::Mat1f sorted;
+  cv::sort(layer, sorted, cv::SORT_EVERY_COLUMN + cv::SORT_ASCENDING);
+  const cv::Mat1f stripes = cv::repeat(sorted.row(layer.rows / 2), layer.rows, 1);
+  cv::subtract(layer, stripes, layer);
+  const cv::Mat1d move = (cv::Mat1d(2, 3) << 1, 0, x, 0, 1, y);
+  cv::Mat1f moved;
+  cv::warpAffine(layer, moved, move, layer.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  cv::add(moved, smooth, moved);
+  cv::add(moved, stripes, moved);
+  cv::max(moved, 0, moved);
+  return moved;
+}
+
+/// The sensor's folder, and which of its two references comes first.
+class RealMarks : public testing::TestWithParam<std::tuple<const char*, const char*, const char*>> {
+};
+
+TEST_P(RealMarks, AStillSensorsDoNotMoveAndAMovedOnesDo) {
+  const auto& [sensor, first, second] = GetParam();
+  const auto folder = sensor_folder(sensor);
+  if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
+  const cv::Mat1f image = load_pair(*folder, second).reference;
+  const LayerMarks then = marks_of(load_pair(*folder, first).reference);
+  if (const auto still = then.moved_to(marks_of(image))) {
+    ADD_FAILURE() << fmt::format("still, but moved by {}, {}: {:.1f}", still->x, still->y,
+                                 still->strength);
+  }
+  for (const auto& [x, y] : {std::pair{0.4, 0.3}, {2., 1.}, {3., -2.}, {-5., 4.}, {0., 12.}}) {
+    const auto shift = then.moved_to(marks_of(with_layer_moved(image, x, y)));
+    if (x == 0.4) {
+      EXPECT_FALSE(shift) << "half a pixel is what temperature does";
+      continue;
+    }
+    if (!shift) {
+      ADD_FAILURE() << fmt::format("moved by {}, {}: not seen", x, y);
+      continue;
+    }
+    EXPECT_NEAR(shift->x, x, 1.5);
+    EXPECT_NEAR(shift->y, y, 1.5);
+    RecordProperty(fmt::format("{},{}", x, y), fmt::format("{:.1f}", shift->strength));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, RealMarks,
+                         testing::Values(std::tuple{"sensor_a", "ball", "board"},
+                                         std::tuple{"sensor_a", "board", "ball"},
+                                         std::tuple{"sensor_b", "ball", "board"},
+                                         std::tuple{"sensor_b", "board", "ball"}));
+
+}  // namespace
+}  // namespace dtact
