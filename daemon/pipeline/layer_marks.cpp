@@ -1,22 +1,23 @@
 #include "daemon/pipeline/layer_marks.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
+#include <numbers>
+#include <utility>
 
 namespace dtact::pipeline {
 namespace {
 
-constexpr int kSide = 2 * LayerMarks::kReach + 1;
-/// Correlation at each displacement, row-major from (−kReach, −kReach).
-using Correlation = std::array<double, std::size_t{kSide} * kSide>;
-
-constexpr std::size_t at(int x, int y) {
-  return static_cast<std::size_t>(y + LayerMarks::kReach) * kSide +
-         static_cast<std::size_t>(x + LayerMarks::kReach);
-}
+constexpr int kReach = LayerMarks::kReach;
+constexpr int kSide = 2 * kReach + 1;
+/// Turns that are tried: out to five degrees, at the corner of a map of 580 pixels two pixels
+/// apart.
+constexpr double kTurnStepDeg = 0.25;
+constexpr int kTurns = 20;
+/// Within a patch a turn of some degrees is a shift.
+constexpr int kPatch = 64;  // pixels, about
 
 struct Plane {
   int width;
@@ -98,22 +99,65 @@ std::int64_t product(const std::int16_t* a, const std::int16_t* b, int n) {
   return sum;
 }
 
-/// Looks for what stands out in the difference between a displacement and its opposite.
-std::optional<LayerMarks::Shift> one_sided(const Correlation& correlation) {
-  constexpr int kReach = LayerMarks::kReach;
-  const auto excess = [&correlation](int x, int y) {
-    return correlation[at(x, y)] - correlation[at(-x, -y)];
-  };
+/// Correlation of a patch at each displacement, and where its middle lies from that of the part.
+struct Patch {
+  double x = 0;
+  double y = 0;
+  std::vector<double> correlation = std::vector<double>(std::size_t{kSide} * kSide);
+
+  [[nodiscard]] double at(int dx, int dy) const {
+    return correlation[static_cast<std::size_t>((dy + kReach) * kSide + dx + kReach)];
+  }
+};
+
+/// A movement of the whole part: by a vector, and about its middle.
+struct Movement {
+  int x = 0;
+  int y = 0;
+  double turn_rad = 0;
+};
+
+/// What the patches' correlations say for a movement and not for its opposite; 0 where it takes too
+/// many of them out of reach. `apart`: mean length of the patches' displacements.
+double excess(const std::vector<Patch>& patches, const Movement& movement, double& apart) {
+  const double turned = std::cos(movement.turn_rad) - 1;
+  const double sine = std::sin(movement.turn_rad);
+  double sum = 0;
+  int within = 0;
+  apart = 0;
+  for (const Patch& patch : patches) {
+    const auto dx = static_cast<int>(std::lround(movement.x + turned * patch.x - sine * patch.y));
+    const auto dy = static_cast<int>(std::lround(movement.y + turned * patch.y + sine * patch.x));
+    if (std::abs(dx) > kReach || std::abs(dy) > kReach) continue;
+    sum += patch.at(dx, dy) - patch.at(-dx, -dy);
+    apart += std::hypot(dx, dy);
+    ++within;
+  }
+  if (2 * within < static_cast<int>(patches.size())) return 0;
+  apart /= within;
+  // As uncertain as the sum over all of them is.
+  return sum * std::sqrt(static_cast<double>(patches.size()) / within);
+}
+
+/// The movement that stands out most against its opposite.
+std::optional<LayerMarks::Move> one_sided(const std::vector<Patch>& patches) {
   std::vector<double> all;
-  LayerMarks::Shift best;
+  LayerMarks::Move best;
   double most = 0;
-  for (int y = -kReach; y <= kReach; ++y) {
-    for (int x = -kReach; x <= kReach; ++x) {
-      if (x * x + y * y < LayerMarks::kLeast * LayerMarks::kLeast) continue;
-      all.push_back(excess(x, y));
-      if (all.back() > most) {
-        most = all.back();
-        best = {x, y, 0};
+  double best_apart = 0;
+  for (int step = 0; step <= 2 * kTurns; ++step) {  // 0, 1, −1, 2, …: of equals the least turn
+    const double turn_deg = (step % 2 == 0 ? -1 : 1) * ((step + 1) / 2) * kTurnStepDeg;
+    for (int y = -kReach; y <= kReach; ++y) {
+      for (int x = -kReach; x <= kReach; ++x) {
+        double apart = 0;
+        const double value = excess(patches, {x, y, turn_deg * std::numbers::pi / 180}, apart);
+        if (apart < LayerMarks::kLeast) continue;
+        all.push_back(value);
+        if (value > most) {
+          most = value;
+          best_apart = apart;
+          best = {x, y, turn_deg, 0};
+        }
       }
     }
   }
@@ -121,9 +165,10 @@ std::optional<LayerMarks::Shift> one_sided(const Correlation& correlation) {
   if (noise <= 0) return std::nullopt;
   best.strength = most / noise;
   // So near to the middle a fraction of a pixel stands out too, and nearly all has to have moved.
-  constexpr int kNear = 4;
-  const bool is_near = best.x * best.x + best.y * best.y < kNear * kNear;
-  if (is_near && most < 0.5 * correlation[at(0, 0)]) return std::nullopt;
+  constexpr double kNear = 4;
+  double still = 0;
+  for (const Patch& patch : patches) still += patch.at(0, 0);
+  if (best_apart < kNear && most < 0.5 * still) return std::nullopt;
   if (best.strength < LayerMarks::kSure) return std::nullopt;
   return best;
 }
@@ -156,41 +201,37 @@ LayerMarks::LayerMarks(std::span<const std::uint16_t> reference_q8, int frame_wi
   }
 }
 
-std::optional<LayerMarks::Shift> LayerMarks::moved_to(const LayerMarks& now) const {
+std::optional<LayerMarks::Move> LayerMarks::moved_to(const LayerMarks& now) const {
   if (now.width_ != width_ || now.height_ != height_) return std::nullopt;
   if (width_ < 4 * kReach || height_ < 4 * kReach) return std::nullopt;
-  std::array<Correlation, 4> quarters{};
-  const std::array<int, 3> columns = {0, width_ / 2, width_};
-  const std::array<int, 3> rows = {0, height_ / 2, height_};
-  for (std::size_t quarter = 0; quarter < 4; ++quarter) {
-    const int left = columns[quarter % 2];
-    const int right = columns[quarter % 2 + 1];
-    const int top = rows[quarter / 2];
-    const int bottom = rows[quarter / 2 + 1];
-    for (int dy = -kReach; dy <= kReach; ++dy) {
-      for (int dx = -kReach; dx <= kReach; ++dx) {
-        // Over all that both have of the quarter: then a still sensor is the same either way.
-        const int first = std::max(left, left - dx);
-        const int n = right - left - std::abs(dx);
-        std::int64_t sum = 0;
-        for (int y = std::max(top, top - dy); y < std::min(bottom, bottom - dy); ++y) {
-          sum += product(detail_.data() + std::ptrdiff_t{y} * width_ + first,
-                         now.detail_.data() + std::ptrdiff_t{y + dy} * width_ + first + dx, n);
+  const int columns = std::max(2, width_ / kPatch);
+  const int rows = std::max(2, height_ / kPatch);
+  std::vector<Patch> patches;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      const int left = column * width_ / columns;
+      const int right = (column + 1) * width_ / columns;
+      const int top = row * height_ / rows;
+      const int bottom = (row + 1) * height_ / rows;
+      Patch patch{0.5 * (left + right - width_), 0.5 * (top + bottom - height_)};
+      double* out = patch.correlation.data();
+      for (int dy = -kReach; dy <= kReach; ++dy) {
+        for (int dx = -kReach; dx <= kReach; ++dx) {
+          // Over all that both have of the patch: then a still sensor is the same either way.
+          const int first = std::max(left, left - dx);
+          const int n = right - left - std::abs(dx);
+          std::int64_t sum = 0;
+          for (int y = std::max(top, top - dy); y < std::min(bottom, bottom - dy); ++y) {
+            sum += product(detail_.data() + std::ptrdiff_t{y} * width_ + first,
+                           now.detail_.data() + std::ptrdiff_t{y + dy} * width_ + first + dx, n);
+          }
+          *out++ = static_cast<double>(sum);
         }
-        quarters[quarter][at(dx, dy)] = static_cast<double>(sum);
       }
+      patches.push_back(std::move(patch));
     }
   }
-  Correlation whole{};
-  for (const Correlation& quarter : quarters) {
-    for (std::size_t i = 0; i < whole.size(); ++i) whole[i] += quarter[i];
-  }
-  std::optional<Shift> surest = one_sided(whole);
-  for (const Correlation& quarter : quarters) {
-    const auto shift = one_sided(quarter);
-    if (shift && (!surest || shift->strength > surest->strength)) surest = shift;
-  }
-  return surest;
+  return one_sided(patches);
 }
 
 }  // namespace dtact::pipeline

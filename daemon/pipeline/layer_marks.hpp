@@ -19,26 +19,27 @@ class LayerMarks {
   LayerMarks(std::span<const std::uint16_t> reference_q8, int frame_width,
              const recon::FrameRegion& part);
 
-  /// How far the layer's marks went, whole pixels.
-  struct Shift {
-    int x = 0;  ///< To the right.
-    int y = 0;  ///< Down.
+  /// How the layer's marks went: about the middle of the part and by whole pixels.
+  struct Move {
+    int x = 0;            ///< To the right.
+    int y = 0;            ///< Down.
+    double turn_deg = 0;  ///< Clockwise, as the image is seen.
     /// By how many standard deviations it stands out.
     double strength = 0;
   };
 
   /// The correlation of two images of one still sensor is the same at a displacement and at its
   /// opposite, whatever belongs to whom. Where it is not, some of the marks have moved, even if
-  /// others, the camera's own, have not. Looked for on all of the part and on each quarter, for a
-  /// turn moves them apart, out to kReach pixels each way. Empty: nothing is sure to have moved by
+  /// others, the camera's own, have not. Looked for in patches, so that turns out to five degrees
+  /// are found as well, and out to kReach pixels each way. Empty: nothing is sure to have moved by
   /// kLeast pixels, or there are no marks to tell by. Two references of one real sensor stand out
-  /// by at most 4; with all but the stripes and rings of one moved by 1 to 6 pixels, by 6 to 17 in
-  /// every quarter (sensors a and b; layer_marks_test, real_marks_test).
-  [[nodiscard]] std::optional<Shift> moved_to(const LayerMarks& now) const;
+  /// by at most 5.6; with all but the stripes of one moved by 2 to 12 pixels, by 21 to 36
+  /// (sensors a and b; real_marks_test).
+  [[nodiscard]] std::optional<Move> moved_to(const LayerMarks& now) const;
 
   static constexpr int kReach = 16;
   static constexpr int kLeast = 2;
-  static constexpr double kSure = 7;
+  static constexpr double kSure = 8;
 
  private:
   int width_;

@@ -82,14 +82,19 @@ void PlaceWatch::judge() {
   const recon::FrameRegion part{x, y, cell_edge(job_.region.x1, kGridWidth, table.frame_width) - x,
                                 cell_edge(job_.region.y1, kGridHeight, table.frame_height) - y};
   const LayerMarks then(job_.calibration->model->reference_q8, width_, part);
-  const auto shift = then.moved_to(LayerMarks(job_.image_q8, width_, part));
-  if (shift) {
+  const auto move = then.moved_to(LayerMarks(job_.image_q8, width_, part));
+  if (move) {
     const std::scoped_lock lock(mutex_);
-    message_ = fmt::format("They are about {} px {} and {} px {} of there.", std::abs(shift->x),
-                           shift->x < 0 ? "left" : "right", std::abs(shift->y),
-                           shift->y < 0 ? "up" : "down");
+    message_ =
+        fmt::format("They are about {} px {} and {} px {} of there", std::abs(move->x),
+                    move->x < 0 ? "left" : "right", std::abs(move->y), move->y < 0 ? "up" : "down");
+    if (move->turn_deg != 0) {
+      message_ += fmt::format(", turned by {} degrees {}", std::abs(move->turn_deg),
+                              move->turn_deg < 0 ? "anticlockwise" : "clockwise");
+    }
+    message_ += '.';
   }
-  moved_.store(shift ? job_.epoch : 0, std::memory_order_release);
+  moved_.store(move ? job_.epoch : 0, std::memory_order_release);
 }
 
 }  // namespace dtact::pipeline

@@ -59,18 +59,18 @@ TEST_P(RealMarks, AStillSensorsDoNotMoveAndAMovedOnesDo) {
                                  still->strength);
   }
   for (const auto& [x, y] : {std::pair{0.4, 0.3}, {2., 1.}, {3., -2.}, {-5., 4.}, {0., 12.}}) {
-    const auto shift = then.moved_to(marks_of(with_layer_moved(image, x, y)));
+    const auto move = then.moved_to(marks_of(with_layer_moved(image, x, y)));
     if (x == 0.4) {
-      EXPECT_FALSE(shift) << "half a pixel is what temperature does";
+      EXPECT_FALSE(move) << "half a pixel is what temperature does";
       continue;
     }
-    if (!shift) {
+    if (!move) {
       ADD_FAILURE() << fmt::format("moved by {}, {}: not seen", x, y);
       continue;
     }
-    EXPECT_NEAR(shift->x, x, 1.5);
-    EXPECT_NEAR(shift->y, y, 1.5);
-    RecordProperty(fmt::format("{},{}", x, y), fmt::format("{:.1f}", shift->strength));
+    EXPECT_NEAR(move->x, x, 1.5);
+    EXPECT_NEAR(move->y, y, 1.5);
+    RecordProperty(fmt::format("{},{}", x, y), fmt::format("{:.1f}", move->strength));
   }
 }
 

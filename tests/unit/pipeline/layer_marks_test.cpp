@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -92,10 +93,10 @@ TEST(LayerMarks, AreFoundWhereTheyWent) {
     Picture moved = fresh();
     moved.dx = x;
     moved.dy = y;
-    const auto shift = then.moved_to(marks(moved));
-    ASSERT_TRUE(shift) << x << ", " << y;
-    EXPECT_NEAR(shift->x, x, 1);
-    EXPECT_NEAR(shift->y, y, 1);
+    const auto move = then.moved_to(marks(moved));
+    ASSERT_TRUE(move) << x << ", " << y;
+    EXPECT_NEAR(move->x, x, 1);
+    EXPECT_NEAR(move->y, y, 1);
   }
 }
 
@@ -106,16 +107,24 @@ TEST(LayerMarks, MoveBesideMarksOfTheCameraThatDoNot) {
   EXPECT_FALSE(then.moved_to(marks(picture)));
   picture.dx = 6;
   picture.dy = -3;
-  const auto shift = then.moved_to(marks(picture));
-  ASSERT_TRUE(shift);
-  EXPECT_NEAR(shift->x, 6, 1);
-  EXPECT_NEAR(shift->y, -3, 1);
+  const auto move = then.moved_to(marks(picture));
+  ASSERT_TRUE(move);
+  EXPECT_NEAR(move->x, 6, 1);
+  EXPECT_NEAR(move->y, -3, 1);
 }
 
-TEST(LayerMarks, TellATurnByTheQuarters) {
-  Picture turned = fresh();
-  turned.turn = 0.02;  // at the middle of a quarter 2 to 3 pixels
-  EXPECT_TRUE(marks({}).moved_to(marks(turned)));
+TEST(LayerMarks, AreFoundTurned) {
+  const LayerMarks then = marks({});
+  for (const double degrees : {1., -2., 4.}) {
+    Picture turned = fresh();
+    turned.turn = degrees * std::numbers::pi / 180;
+    turned.dx = 3;
+    const auto move = then.moved_to(marks(turned));
+    ASSERT_TRUE(move) << degrees;
+    EXPECT_NEAR(move->turn_deg, degrees, 0.5);
+    EXPECT_NEAR(move->x, 3, 1);
+    EXPECT_NEAR(move->y, 0, 1);
+  }
 }
 
 TEST(LayerMarks, ThatAreNotThereTellNothing) {
