@@ -51,10 +51,6 @@ class CaptureLoop {
 
  private:
   void choose_area() noexcept;
-  void take_notes() noexcept;
-  void take_orders() noexcept;
-  void execute(const RezeroOrder& order) noexcept;
-  void execute(CalibrationOrder& order) noexcept;
   void process(std::int64_t now_ns) noexcept;
   void without_frame(hal::GrabStatus status, std::int64_t asked_ns, std::int64_t now_ns) noexcept;
   void reconstruct(DepthFrame& out) noexcept;
@@ -64,11 +60,19 @@ class CaptureLoop {
   void use_reference() noexcept;
   void publish(DepthFrame& out) noexcept;
   void tell(HealthSet health, std::int64_t now_ns) noexcept;
+  [[nodiscard]] State state() const noexcept;
+  [[nodiscard]] HealthSet health(bool settled, std::int64_t now_ns) const noexcept;
+
+  // capture_orders.cpp
+  void take_notes() noexcept;
+  void take_orders() noexcept;
+  void execute(const RezeroOrder& order) noexcept;
+  void execute(CalibrationOrder& order) noexcept;
   /// Answers the re-zero under way, if there is one.
   void answer(RezeroResult result) noexcept;
   void answer(Outcome outcome, const char* sentence) noexcept;
-  [[nodiscard]] State state() const noexcept;
-  [[nodiscard]] HealthSet health(bool settled, std::int64_t now_ns) const noexcept;
+  /// The camera is away.
+  void give_up_rezero() noexcept;
 
   hal::Camera& camera_;
   LightDriver& light_;
