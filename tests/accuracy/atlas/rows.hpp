@@ -20,8 +20,12 @@ struct Row {
   std::string_view undecidable;
 };
 
-/// Every row of the atlas.
+/// Every row of the atlas: those of its groups, each in a file of its name.
 [[nodiscard]] std::vector<Row> rows();
+[[nodiscard]] std::vector<Row> light_rows();
+[[nodiscard]] std::vector<Row> image_rows();
+[[nodiscard]] std::vector<Row> scene_rows();
+[[nodiscard]] std::vector<Row> reference_rows();
 
 /// Scenes in which nothing is wrong: whatever is flagged there is flagged falsely.
 [[nodiscard]] std::vector<Script> clean_scripts();

@@ -28,7 +28,8 @@ TEST(LightField, LevelsAreLumaTimesBrightness) {
 }
 
 TEST(LightField, AllWhiteGivesTheSetLevelAtTheCentre) {
-  const Scene scene = small_scene("");
+  Scene scene = small_scene("");
+  scene.layer.texture = 0;
   EXPECT_NEAR(field(scene, {})[kCentre] / 64.0, scene.light.level, 0.1);
 }
 
@@ -86,7 +87,8 @@ TEST(LightField, IsAsUnevenAsThePapers) {
 }
 
 TEST(LightField, SidesLightFromLeftAndRight) {
-  const Scene scene = small_scene("[light]\narrangement = \"sides\"\n");
+  Scene scene = small_scene("[light]\narrangement = \"sides\"\n");
+  scene.layer.texture = 0;
   Light right;
   for (std::size_t i = 4; i < 8; ++i) right.leds[i] = {};
   const auto plane = field(scene, right);
