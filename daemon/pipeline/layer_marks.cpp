@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdlib>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 namespace dtact::pipeline {
@@ -19,78 +20,79 @@ constexpr int kTurns = 20;
 /// Within a patch a turn of some degrees is a shift.
 constexpr int kPatch = 64;  // pixels, about
 
-struct Plane {
-  int width;
-  int height;
-  std::vector<float> values;
-
-  float* row(int y) { return values.data() + std::ptrdiff_t{y} * width; }
-  [[nodiscard]] const float* row(int y) const { return values.data() + std::ptrdiff_t{y} * width; }
-};
-
-/// Gaussian; beyond the edge the outermost pixel stands.
-Plane blurred(const Plane& in, double sigma) {
+/// A Gaussian to either side of its middle, of sum one.
+std::vector<float> gaussian(double sigma) {
   const int reach = static_cast<int>(std::ceil(3 * sigma));
   std::vector<float> taps;
-  float sum = 0;
   for (int k = -reach; k <= reach; ++k) {
     taps.push_back(static_cast<float>(std::exp(-0.5 * k * k / (sigma * sigma))));
-    sum += taps.back();
   }
+  const float sum = std::accumulate(taps.begin(), taps.end(), 0.0F);
   for (float& tap : taps) tap /= sum;
-
-  Plane down{in.width, in.height, std::vector<float>(in.values.size())};
-  for (int y = 0; y < in.height; ++y) {
-    float* const out = down.row(y);
-    for (int k = -reach; k <= reach; ++k) {
-      const float* const from = in.row(std::clamp(y + k, 0, in.height - 1));
-      const float tap = taps[static_cast<std::size_t>(k + reach)];
-      for (int x = 0; x < in.width; ++x) out[x] += tap * from[x];
-    }
-  }
-  Plane across{in.width, in.height, std::vector<float>(in.values.size())};
-  std::vector<float> line(static_cast<std::size_t>(in.width + 2 * reach));
-  for (int y = 0; y < in.height; ++y) {
-    const float* const from = down.row(y);
-    for (int x = -reach; x < in.width + reach; ++x) {
-      line[static_cast<std::size_t>(x + reach)] = from[std::clamp(x, 0, in.width - 1)];
-    }
-    float* const out = across.row(y);
-    for (std::size_t k = 0; k < taps.size(); ++k) {
-      for (int x = 0; x < in.width; ++x) out[x] += taps[k] * line[static_cast<std::size_t>(x) + k];
-    }
-  }
-  return across;
+  return taps;
 }
 
-float median(std::vector<float>& values) {
+/// Blurs one row after another of a part of an image, so that no plane is needed in between. Beyond
+/// the part's edge its outermost pixel stands.
+class RowBlur {
+ public:
+  RowBlur(double sigma, int width)
+      : taps_(gaussian(sigma)),
+        reach_(static_cast<int>(taps_.size() / 2)),
+        line_(static_cast<std::size_t>(width) + taps_.size() - 1),
+        out_(static_cast<std::size_t>(width)) {}
+
+  /// Row y of a part, blurred; valid until the next call. `part`: its upper left pixel.
+  std::span<const float> row(const std::uint16_t* part, int stride, int width, int height, int y) {
+    float* const line = line_.data() + reach_;
+    std::fill(line, line + width, 0.0F);
+    for (int k = -reach_; k <= reach_; ++k) {
+      const std::uint16_t* const from =
+          part + std::ptrdiff_t{std::clamp(y + k, 0, height - 1)} * stride;
+      const float tap = taps_[static_cast<std::size_t>(k + reach_)];
+      for (int x = 0; x < width; ++x) line[x] += tap * static_cast<float>(from[x]);
+    }
+    std::fill(line - reach_, line, line[0]);
+    std::fill(line + width, line + width + reach_, line[width - 1]);
+    std::ranges::fill(out_, 0.0F);
+    for (int k = -reach_; k <= reach_; ++k) {
+      const float tap = taps_[static_cast<std::size_t>(k + reach_)];
+      for (int x = 0; x < width; ++x) out_[static_cast<std::size_t>(x)] += tap * line[x + k];
+    }
+    return out_;
+  }
+
+ private:
+  std::vector<float> taps_;
+  int reach_;
+  std::vector<float> line_;
+  std::vector<float> out_;
+};
+
+template <typename T>
+T median(std::vector<T>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
   return *middle;
 }
 
-/// What a row or a column has in common is a stripe of the camera's.
-void remove_stripes(Plane& plane) {
-  std::vector<float> line(static_cast<std::size_t>(plane.height));
-  for (int x = 0; x < plane.width; ++x) {
-    for (int y = 0; y < plane.height; ++y) line[static_cast<std::size_t>(y)] = plane.row(y)[x];
-    const float common = median(line);
-    for (int y = 0; y < plane.height; ++y) plane.row(y)[x] -= common;
-  }
-  for (int y = 0; y < plane.height; ++y) {
-    line.assign(plane.row(y), plane.row(y) + plane.width);
-    const float common = median(line);
-    for (int x = 0; x < plane.width; ++x) plane.row(y)[x] -= common;
-  }
+/// A standard deviation that odd values do not pull.
+template <typename T>
+double robust_deviation(std::vector<T>& sizes) {
+  for (T& size : sizes) size = static_cast<T>(std::abs(size));
+  return 1.4826 * static_cast<double>(median(sizes));
 }
 
-/// A standard deviation that odd values do not pull; sorts some of them.
-template <typename T>
-T robust_deviation(std::vector<T> values) {
-  for (T& value : values) value = std::abs(value);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return static_cast<T>(1.4826) * *middle;
+/// Takes off what a row or a column has in common, a stripe of the camera's: `count` values, `step`
+/// apart.
+void remove_stripe(std::int16_t* first, int count, std::ptrdiff_t step,
+                   std::vector<std::int16_t>& line) {
+  line.clear();
+  for (int i = 0; i < count; ++i) line.push_back(first[i * step]);
+  const std::int16_t common = median(line);
+  for (int i = 0; i < count; ++i) {
+    first[i * step] = static_cast<std::int16_t>(first[i * step] - common);
+  }
 }
 
 std::int64_t product(const std::int16_t* a, const std::int16_t* b, int n) {
@@ -103,9 +105,9 @@ std::int64_t product(const std::int16_t* a, const std::int16_t* b, int n) {
 struct Patch {
   double x = 0;
   double y = 0;
-  std::vector<double> correlation = std::vector<double>(std::size_t{kSide} * kSide);
+  std::vector<float> correlation = std::vector<float>(std::size_t{kSide} * kSide);
 
-  [[nodiscard]] double at(int dx, int dy) const {
+  [[nodiscard]] float at(int dx, int dy) const {
     return correlation[static_cast<std::size_t>((dy + kReach) * kSide + dx + kReach)];
   }
 };
@@ -129,7 +131,7 @@ double excess(const std::vector<Patch>& patches, const Movement& movement, doubl
     const auto dx = static_cast<int>(std::lround(movement.x + turned * patch.x - sine * patch.y));
     const auto dy = static_cast<int>(std::lround(movement.y + turned * patch.y + sine * patch.x));
     if (std::abs(dx) > kReach || std::abs(dy) > kReach) continue;
-    sum += patch.at(dx, dy) - patch.at(-dx, -dy);
+    sum += static_cast<double>(patch.at(dx, dy) - patch.at(-dx, -dy));
     apart += std::hypot(dx, dy);
     ++within;
   }
@@ -141,7 +143,7 @@ double excess(const std::vector<Patch>& patches, const Movement& movement, doubl
 
 /// The movement that stands out most against its opposite.
 std::optional<LayerMarks::Move> one_sided(const std::vector<Patch>& patches) {
-  std::vector<double> all;
+  std::vector<float> all;
   LayerMarks::Move best;
   double most = 0;
   double best_apart = 0;
@@ -152,7 +154,7 @@ std::optional<LayerMarks::Move> one_sided(const std::vector<Patch>& patches) {
         double apart = 0;
         const double value = excess(patches, {x, y, turn_deg * std::numbers::pi / 180}, apart);
         if (apart < LayerMarks::kLeast) continue;
-        all.push_back(value);
+        all.push_back(static_cast<float>(value));
         if (value > most) {
           most = value;
           best_apart = apart;
@@ -161,13 +163,13 @@ std::optional<LayerMarks::Move> one_sided(const std::vector<Patch>& patches) {
       }
     }
   }
-  const double noise = robust_deviation(std::move(all));
+  const double noise = robust_deviation(all);
   if (noise <= 0) return std::nullopt;
   best.strength = most / noise;
   // So near to the middle a fraction of a pixel stands out too, and nearly all has to have moved.
   constexpr double kNear = 4;
   double still = 0;
-  for (const Patch& patch : patches) still += patch.at(0, 0);
+  for (const Patch& patch : patches) still += static_cast<double>(patch.at(0, 0));
   if (best_apart < kNear && most < 0.5 * still) return std::nullopt;
   if (best.strength < LayerMarks::kSure) return std::nullopt;
   return best;
@@ -181,23 +183,31 @@ LayerMarks::LayerMarks(std::span<const std::uint16_t> reference_q8, int frame_wi
       height_(part.height),
       detail_(static_cast<std::size_t>(part.width) * static_cast<std::size_t>(part.height)) {
   if (detail_.empty()) return;
-  Plane grey{width_, height_, {}};
-  grey.values.reserve(detail_.size());
-  for (int y = 0; y < height_; ++y) {
-    const std::uint16_t* const row =
-        reference_q8.data() + std::ptrdiff_t{part.y + y} * frame_width + part.x;
-    grey.values.insert(grey.values.end(), row, row + width_);
-  }
+  const std::uint16_t* const from =
+      reference_q8.data() + std::ptrdiff_t{part.y} * frame_width + part.x;
   const double unit = std::max(1.0, frame_width / 640.0);
-  Plane fine = blurred(grey, unit);
-  const Plane wide = blurred(grey, 4 * unit);
-  for (std::size_t i = 0; i < detail_.size(); ++i) fine.values[i] -= wide.values[i];
-  remove_stripes(fine);
-  const float deviation = robust_deviation(fine.values);
-  const float scale = deviation > 0 ? 127 / (4 * deviation) : 0;
-  for (std::size_t i = 0; i < detail_.size(); ++i) {
-    detail_[i] =
-        static_cast<std::int16_t>(std::lround(std::clamp(scale * fine.values[i], -127.0F, 127.0F)));
+  RowBlur narrow(unit, width_);
+  RowBlur wide(4 * unit, width_);
+  for (int y = 0; y < height_; ++y) {
+    const auto sharp = narrow.row(from, frame_width, width_, height_, y);
+    const auto smooth = wide.row(from, frame_width, width_, height_, y);
+    std::int16_t* const out = detail_.data() + std::ptrdiff_t{y} * width_;
+    for (std::size_t x = 0; x < sharp.size(); ++x) {
+      out[x] = static_cast<std::int16_t>(
+          std::lround(std::clamp(sharp[x] - smooth[x], -10000.0F, 10000.0F)));
+    }
+  }
+  std::vector<std::int16_t> scratch;
+  for (int x = 0; x < width_; ++x) remove_stripe(detail_.data() + x, height_, width_, scratch);
+  for (int y = 0; y < height_; ++y) {
+    remove_stripe(detail_.data() + std::ptrdiff_t{y} * width_, width_, 1, scratch);
+  }
+  scratch.clear();  // every fifth is plenty to know the deviation by
+  for (std::size_t i = 0; i < detail_.size(); i += 5) scratch.push_back(detail_[i]);
+  const double deviation = robust_deviation(scratch);
+  const double scale = deviation > 0 ? 127 / (4 * deviation) : 0;
+  for (std::int16_t& value : detail_) {
+    value = static_cast<std::int16_t>(std::lround(std::clamp(scale * value, -127.0, 127.0)));
   }
 }
 
@@ -214,7 +224,7 @@ std::optional<LayerMarks::Move> LayerMarks::moved_to(const LayerMarks& now) cons
       const int top = row * height_ / rows;
       const int bottom = (row + 1) * height_ / rows;
       Patch patch{0.5 * (left + right - width_), 0.5 * (top + bottom - height_)};
-      double* out = patch.correlation.data();
+      float* out = patch.correlation.data();
       for (int dy = -kReach; dy <= kReach; ++dy) {
         for (int dx = -kReach; dx <= kReach; ++dx) {
           // Over all that both have of the patch: then a still sensor is the same either way.
@@ -225,7 +235,7 @@ std::optional<LayerMarks::Move> LayerMarks::moved_to(const LayerMarks& now) cons
             sum += product(detail_.data() + std::ptrdiff_t{y} * width_ + first,
                            now.detail_.data() + std::ptrdiff_t{y + dy} * width_ + first + dx, n);
           }
-          *out++ = static_cast<double>(sum);
+          *out++ = static_cast<float>(sum);
         }
       }
       patches.push_back(std::move(patch));
