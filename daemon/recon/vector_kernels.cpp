@@ -52,8 +52,9 @@ void SmoothAcross(const int16_t* row_a, const int16_t* row_b, const TapPairs& ta
     const int16_t* rows[2] = {row_a, row_b};
     for (int i = 0; i < 2; ++i) {
       const int16_t* from = rows[i] + x - taps.radius();
-      int32_t sum = 0;
-      for (int j = 0; j < taps.count(); ++j) {
+      // The last word's high half is no tap: what it would meet may lie beyond the row.
+      int32_t sum = LowTap(taps.words()[taps.radius()]) * from[2 * taps.radius()];
+      for (int j = 0; j < taps.radius(); ++j) {
         sum += LowTap(taps.words()[j]) * from[2 * j];
         sum += HighTap(taps.words()[j]) * from[2 * j + 1];
       }
