@@ -7,6 +7,7 @@ namespace dtact::net {
 namespace {
 
 using pipeline::Health;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -44,6 +45,15 @@ TEST(Advice, AddsTheDevicesOwnSentenceAndPutsItFirst) {
   status.health.set(Health::ring_trouble);
   status.ring_message = "the ring is gone.";
   EXPECT_THAT(advice(status), HasSubstr("LED ring failed. the ring is gone."));
+}
+
+TEST(Advice, SaysHowFarTheCameraHasMovedOnlyWhileItHas) {
+  pipeline::Status status;
+  status.state = pipeline::State::serving;
+  status.place_message = "They are about 4 px right and 2 px up of there.";
+  EXPECT_EQ(advice(status), "");
+  status.health.set(Health::camera_moved);
+  EXPECT_THAT(advice(status), EndsWith("calibrate again. " + status.place_message));
 }
 
 TEST(Advice, EndsWithWhatCouldNotBeKept) {
