@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
 #include <utility>
 
@@ -79,7 +80,7 @@ Outcome Session::guide() {
 }
 
 void Session::greet() {
-  const client::Status status = sensor_.status();
+  const client::Status status = steady_status();
   const auto lit = std::ranges::count_if(status.light.leds, [](const client::Rgb& led) {
     return led.r > 0 || led.g > 0 || led.b > 0;
   });
@@ -132,8 +133,18 @@ void Session::resume() {
   (void)ask("[Enter] go on   [q] quit");
 }
 
+client::Status Session::steady_status() {
+  constexpr int kPatience = 50;  // frames, or five seconds without one
+  client::Status status = sensor_.status();
+  for (int i = 0; i < kPatience && !unfit(status).empty(); ++i) {
+    (void)sensor_.next(std::chrono::milliseconds(100));
+    status = sensor_.status();
+  }
+  return status;
+}
+
 void Session::require_same_sensor() {
-  const client::Status status = sensor_.status();
+  const client::Status status = steady_status();
   const std::string wrong = unfit(status);
   if (!wrong.empty()) throw std::runtime_error(wrong);
   const image::Grey16& reference = images_.set.reference_q8;
@@ -178,7 +189,7 @@ void Session::reference_step() {
       const Still still = capture_->untouched(plan_.reference_frames);
       const std::string fault = fault_of(still, empty_.model->rectify);
       if (!fault.empty()) throw NotTaken("not taken: " + fault);
-      const client::Status status = sensor_.status();
+      const client::Status status = steady_status();
       const std::string wrong = unfit(status);
       if (!wrong.empty()) throw NotTaken("not taken: " + wrong);
       folder_.save_reference(still.frames, origin_of(status));

@@ -47,6 +47,9 @@ class Session {
   void greet();
   void prepare_map(const client::Status& status);
   void resume();
+  /// The daemon's state, after a while where it is unfit: a camera that stumbles comes back by
+  /// itself.
+  [[nodiscard]] client::Status steady_status();
   /// Throws unless camera and light are those of the reference.
   void require_same_sensor();
   void load();

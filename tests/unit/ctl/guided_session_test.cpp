@@ -222,6 +222,17 @@ TEST_F(GuidedSession, RefusesAnUnfitDaemon) {
               ThrowsMessage<std::runtime_error>(HasSubstr("Plug it in")));
 }
 
+TEST_F(GuidedSession, WaitsForACameraThatStumbles) {
+  FakeSensor sensor(kEnough);
+  int asked = 0;
+  sensor.on_status = [&](client::Status& now) {
+    now.health = {"uncalibrated"};
+    if (++asked % 6 != 0) now.health.emplace_back("camera_trouble");
+  };
+  FakeConsole console({"", "", "", "", "", "", "", ""});
+  EXPECT_EQ(run(sensor, console), Outcome::uploaded) << console.said;
+}
+
 TEST_F(GuidedSession, SaysWhyNothingComes) {
   FakeSensor sensor(kEnough);
   sensor.silent = true;
