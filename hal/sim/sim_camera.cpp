@@ -193,7 +193,7 @@ void SimCamera::start() {
 }
 
 void SimCamera::will_read(const Area& area) noexcept {
-  if (impl_->decoder) impl_->decoder->set_crop(area);
+  if (auto& decoder = impl_->decoder) decoder->set_crop(area);
 }
 
 GrabStatus SimCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexcept {
