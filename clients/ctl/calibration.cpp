@@ -55,11 +55,12 @@ void upload(const Context& context, const fs::path& folder, const std::string& n
   files.name = name.empty() ? name_of(folder) : name;
   files.toml = base::read_file(folder / kToml);
   files.png = base::read_file(folder / kPng);
-  client::Client(context.target).upload_calibration(files);
+  files.number = client::Client(context.target).upload_calibration(files);
   if (context.json) {
-    print(context, Json().open('{').member("name", files.name));
+    Json json = begin(files);
+    print(context, json);
   } else {
-    context.out << fmt::format("the daemon uses calibration {} from now on\n", files.name);
+    context.out << fmt::format("the daemon uses calibration {} from now on\n", title_of(files));
   }
 }
 

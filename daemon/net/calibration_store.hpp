@@ -54,8 +54,8 @@ class CalibrationStore {
   /// and remedy.
   [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files) = 0;
-  /// Stores checked files under a new number and makes them current.
-  virtual void keep(const CalibrationFiles& files) = 0;
+  /// Stores checked files under a new number, which it returns, and makes them current.
+  virtual std::uint64_t keep(const CalibrationFiles& files) = 0;
   /// All there are: the configured one, then by number. Reads and checks every one.
   [[nodiscard]] virtual std::vector<StoredCalibration> list() = 0;
   /// One, read and checked. Throws as check() does.
@@ -91,7 +91,7 @@ class FolderCalibrationStore : public CalibrationStore {
 
   [[nodiscard]] std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files) override;
-  void keep(const CalibrationFiles& files) override;
+  std::uint64_t keep(const CalibrationFiles& files) override;
   [[nodiscard]] std::vector<StoredCalibration> list() override;
   [[nodiscard]] std::shared_ptr<const calibration::Calibration> load(std::uint64_t number) override;
   void make_current(std::uint64_t number) override;

@@ -360,16 +360,14 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
   // this camera never replaces one that does.
   on_worker(
       [&store = store_, change] {
-        return attempt<bool>(v1::ERROR_STORAGE, [&] {
-          if (change.upload != nullptr) {
-            store.keep(*change.upload);
-          } else {
-            store.make_current(change.number);
-          }
-          return true;
+        return attempt<std::uint64_t>(v1::ERROR_STORAGE, [&] {
+          if (change.upload != nullptr) return store.keep(*change.upload);
+          store.make_current(change.number);
+          return change.number;
         });
       },
-      [weak = pending.session, id = pending.id](Commands& self, const Outcome<bool>& kept) {
+      [weak = pending.session, id = pending.id, uploaded = change.upload != nullptr](
+          Commands& self, const Outcome<std::uint64_t>& kept) {
         self.changing_ = false;
         const auto session = weak.lock();
         if (session == nullptr) return;
@@ -381,7 +379,8 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
                                           kept.error);
         }
         auto message = reply_to(id);
-        message.mutable_reply()->mutable_done();
+        auto& done = *message.mutable_reply()->mutable_done();
+        if (uploaded) done.set_calibration(kept.value);
         session->send(message);
       });
 }

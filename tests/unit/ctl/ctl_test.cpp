@@ -167,7 +167,7 @@ TEST(Calibration, GoesUpAndComesBack) {
 
   auto result = ctl(rig, {"calibration", "upload", folder.string() + "/"});
   EXPECT_EQ(result.code, 0) << result.error;
-  EXPECT_EQ(result.out, "the daemon uses calibration ball from now on\n");
+  EXPECT_EQ(result.out, "the daemon uses calibration ball (4) from now on\n");
   EXPECT_EQ(ctl(rig, {"calibration", "show"}).out, "# calibration ball (4)\nversion = 1\n");
   const std::string copy = (temporary / "copy").string();
   result = ctl(rig, {"calibration", "export", "-o", copy});
@@ -175,7 +175,7 @@ TEST(Calibration, GoesUpAndComesBack) {
   EXPECT_EQ(base::read_file(copy + "/reference.png"), "png");
   EXPECT_EQ(base::read_file(copy + "/calibration.toml"), "version = 1\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "other", "--json"});
-  EXPECT_EQ(result.out, "{\"name\":\"other\"}\n");
+  EXPECT_EQ(result.out, "{\"id\":\"5\",\"name\":\"other\"}\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "no good"});
   EXPECT_EQ(result.code, 1);
   EXPECT_EQ(ctl(rig, {"calibration", "upload", temporary.string()}).code, 1);

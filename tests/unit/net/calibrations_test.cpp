@@ -83,7 +83,8 @@ TEST(Upload, IsCheckedUsedKeptAndTold) {
   RawClient watcher(rig.tcp_port());
   client.hello();
   watcher.hello();
-  EXPECT_TRUE(client.request(upload("ball-4_mm", "good")).has_done());
+  const auto reply = client.request(upload("ball-4_mm", "good"));
+  EXPECT_EQ(reply.done().calibration(), 4U);
   EXPECT_EQ(watcher.event().calibration().name(), "ball-4_mm");
   const auto command = rig.port.wait_command(0);
   ASSERT_TRUE(command.has_value());
@@ -183,7 +184,9 @@ TEST(ActivateCalibration, IsCheckedUsedKeptAndTold) {
   RawClient watcher(rig.tcp_port());
   client.hello();
   watcher.hello();
-  EXPECT_TRUE(client.request(activate(0)).has_done());
+  const auto reply = client.request(activate(0));
+  EXPECT_TRUE(reply.has_done());
+  EXPECT_FALSE(reply.done().has_calibration());
   EXPECT_EQ(watcher.event().calibration().name(), "factory");
   const auto command = rig.port.wait_command(0);
   ASSERT_TRUE(command.has_value());

@@ -142,7 +142,7 @@ TEST(ClientLibrary, CommandsAndRefusals) {
     EXPECT_STREQ(e.what(), "free it");
   }
   EXPECT_THROW((void)client.set_light({-1, {}, {}}), client::Refused);
-  EXPECT_NO_THROW(client.upload_calibration({"ball", "good", "png"}));
+  EXPECT_EQ(client.upload_calibration({"ball", "good", "png"}), 4U);
   EXPECT_EQ(std::get<client::CalibrationChanged>(next<client::Event>(client)).name, "ball");
   EXPECT_THROW((void)client.calibration(), client::Refused);
   EXPECT_EQ(client.status().clients.size(), 1U);

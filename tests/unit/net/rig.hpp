@@ -26,11 +26,12 @@ class FakeStore : public CalibrationStore {
     calibration->name = files.name;
     return calibration;
   }
-  void keep(const CalibrationFiles& files) override {
+  std::uint64_t keep(const CalibrationFiles& files) override {
     if (files.toml == "unwritable") throw std::runtime_error("cannot write /state/x: disk full");
     files_.push_back(files);
     files_.back().number = files_.size() - 1;
     current_ = files_.back().number;
+    return current_;
   }
   std::vector<StoredCalibration> list() override {
     std::vector<StoredCalibration> all;

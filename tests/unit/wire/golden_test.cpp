@@ -79,6 +79,8 @@ TEST(Golden, Replies) {
   EXPECT_EQ(m.SerializeAsString(), bytes("0a 09 08 09 12 05 08 05 12 01 6d"));
   m.mutable_reply()->mutable_done();
   EXPECT_EQ(m.SerializeAsString(), bytes("0a 04 08 09 22 00"));
+  m.mutable_reply()->mutable_done()->set_calibration(3);
+  EXPECT_EQ(m.SerializeAsString(), bytes("0a 06 08 09 22 02 08 03"));
   m.mutable_reply()->mutable_light()->set_brightness(7);
   EXPECT_EQ(m.SerializeAsString(), bytes("0a 06 08 09 2a 02 08 07"));
   m.mutable_reply()->mutable_status()->set_state(STATE_SERVING);
