@@ -216,6 +216,7 @@ TEST_F(Store, SaysThatTheLinkLeadsElsewhere) {
   FolderCalibrationStore store(state_, {});
   fs::create_directory_symlink(make_configured(), state_ / "calibration");
   EXPECT_EQ(store.current(), folder_.path() / "factory");  // an administrator's own doing
+  EXPECT_EQ(store.current_number(), std::nullopt);
   EXPECT_THROW((void)store.read({}), std::runtime_error);
 }
 

@@ -71,6 +71,15 @@ std::uint64_t current_of(RawClient& client) {
   return 999;
 }
 
+/// The one marked in use; 999 when none is.
+std::uint64_t in_use(RawClient& client) {
+  const auto reply = client.request(list());
+  for (const auto& stored : reply.calibrations().calibrations()) {
+    if (stored.in_use()) return stored.number();
+  }
+  return 999;
+}
+
 void refuse_as_invalid(FakePort& port) {
   port.answer([](const pipeline::Command& command) {
     return CommandDone{command.ticket, Outcome::invalid, "the camera gives 640x480"};
@@ -128,6 +137,19 @@ TEST(Upload, SaysWhenItCouldNotBeStored) {
   EXPECT_THAT(reply.error().message(), HasSubstr("disk full"));
 }
 
+TEST(Upload, ThatCouldNotBeStoredIsInUseUnderNoNumber) {
+  Rig rig({}, answer_done);
+  be_calibrated(rig);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(client.request(upload("x", "unwritable")).error().code(), v1::ERROR_STORAGE);
+  EXPECT_EQ(in_use(client), 999U);
+  EXPECT_EQ(current_of(client), 1U);
+  EXPECT_TRUE(client.request(upload("x", "good")).has_done());
+  EXPECT_EQ(in_use(client), 4U);
+  EXPECT_EQ(current_of(client), 4U);
+}
+
 TEST(GetCalibration, NeedsOne) {
   Rig rig;
   RawClient client(rig.tcp_port());
@@ -178,6 +200,15 @@ TEST(ListCalibrations, TellsEverything) {
   EXPECT_EQ(current_of(client), 4U);
 }
 
+TEST(ListCalibrations, TellsTheOneInUse) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(in_use(client), 999U);  // the pipeline could not use the current one
+  be_calibrated(rig);
+  EXPECT_EQ(in_use(client), 1U);
+}
+
 TEST(ActivateCalibration, IsCheckedUsedKeptAndTold) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
@@ -223,9 +254,15 @@ TEST(ActivateCalibration, SaysWhenItCouldNotBeStored) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   client.hello();
+  be_calibrated(rig);
   const auto reply = client.request(activate(3));
   EXPECT_EQ(reply.error().code(), v1::ERROR_STORAGE);
   EXPECT_THAT(reply.error().message(), HasSubstr("disk full"));
+  EXPECT_EQ(in_use(client), 3U);
+  EXPECT_EQ(current_of(client), 1U);
+  EXPECT_TRUE(client.request(activate(0)).has_done());
+  EXPECT_EQ(in_use(client), 0U);
+  EXPECT_EQ(current_of(client), 0U);
 }
 
 TEST(ActivateCalibration, WaitsForAnotherChange) {

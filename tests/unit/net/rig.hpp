@@ -56,6 +56,7 @@ class FakeStore : public CalibrationStore {
     if (at(number).toml == "unwritable") throw std::runtime_error("cannot write /state: disk full");
     current_ = number;
   }
+  [[nodiscard]] std::optional<std::uint64_t> current_number() const override { return current_; }
   CalibrationFiles read(std::optional<std::uint64_t> number) override {
     return at(number.value_or(current_));
   }
