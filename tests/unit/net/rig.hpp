@@ -77,7 +77,7 @@ class FakeStore : public CalibrationStore {
 /// A server on a free loopback port with a fake pipeline, running on a thread of its own.
 class Rig {
  public:
-  explicit Rig(NetConfig config = {}, std::function<void(FakePort&)> prepare = {}) {
+  explicit Rig(NetConfig config = {}, const std::function<void(FakePort&)>& prepare = {}) {
     if (prepare) prepare(port);
     config.port = 0;
     config.program = "dtactd 9.8.7";
@@ -86,7 +86,7 @@ class Rig {
       const std::lock_guard lock(mutex_);
       log_ += text + "\n";
     };
-    server_.emplace(io_, config, port, store);
+    server_ = std::make_unique<Server>(io_, config, port, store);
     thread_ = std::thread([this] { io_.run(); });
   }
   ~Rig() { stop(); }
@@ -121,7 +121,7 @@ class Rig {
   std::mutex mutex_;
   std::string log_;
   boost::asio::io_context io_;
-  std::optional<Server> server_;
+  std::unique_ptr<Server> server_;
   std::thread thread_;
 };
 
