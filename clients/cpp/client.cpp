@@ -172,13 +172,15 @@ std::vector<StoredCalibration> Client::calibrations() {
   return calibrations;
 }
 
-void Client::upload_calibration(const CalibrationFiles& files) {
+std::optional<std::uint64_t> Client::upload_calibration(const CalibrationFiles& files) {
   v1::ClientMessage message;
   auto& request = *message.mutable_upload_calibration();
   request.set_name(files.name);
   request.set_calibration_toml(files.toml);
   request.set_reference_png(files.png);
-  (void)impl_->request(message, impl_->parse_timeout());
+  const auto reply = impl_->request(message, impl_->parse_timeout());
+  if (!reply.done().has_calibration()) return std::nullopt;
+  return reply.done().calibration();
 }
 
 void Client::activate_calibration(std::uint64_t number) {

@@ -68,8 +68,9 @@ class Client {
   /// All that the daemon has: the configured one, then the uploaded ones, oldest first. Each is
   /// read and checked for this; may take a few seconds.
   [[nodiscard]] std::vector<StoredCalibration> calibrations();
-  /// Returns once the daemon uses and has stored it. May take a few seconds.
-  void upload_calibration(const CalibrationFiles& files);
+  /// Returns once the daemon uses and has stored it, with its number; nothing from a daemon that is
+  /// too old to say it. May take a few seconds.
+  std::optional<std::uint64_t> upload_calibration(const CalibrationFiles& files);
   /// Makes one of calibrations() current. Returns once the daemon uses it and will start with it.
   void activate_calibration(std::uint64_t number);
 

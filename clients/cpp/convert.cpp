@@ -144,6 +144,7 @@ StoredCalibration to_stored(const v1::StoredCalibration& message) {
   stored.name = message.name();
   stored.uploaded = message.uploaded();
   stored.current = message.current();
+  stored.in_use = message.has_in_use() ? message.in_use() : message.current();
   if (message.has_summary()) stored.summary = to_summary(message.summary());
   stored.damage = message.damage();
   return stored;

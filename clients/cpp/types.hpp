@@ -150,7 +150,8 @@ struct StoredCalibration {
   std::uint64_t number = kConfiguredCalibration;
   std::string name;
   std::string uploaded;                       ///< ISO 8601, UTC; empty for the configured one.
-  bool current = false;                       ///< In use, and what the daemon starts with.
+  bool current = false;                       ///< What the daemon starts with.
+  bool in_use = false;                        ///< As far as an older daemon tells: the current one.
   std::optional<CalibrationSummary> summary;  ///< None when it cannot be read, …
   std::string damage;                         ///< … and why not.
 };

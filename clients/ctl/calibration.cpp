@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <ostream>
 #include <stdexcept>
+#include <vector>
 
 #include "clients/ctl/calibration_text.hpp"
 #include "clients/ctl/json/json.hpp"
@@ -55,16 +57,35 @@ void upload(const Context& context, const fs::path& folder, const std::string& n
   files.name = name.empty() ? name_of(folder) : name;
   files.toml = base::read_file(folder / kToml);
   files.png = base::read_file(folder / kPng);
-  client::Client(context.target).upload_calibration(files);
+  files.number = client::Client(context.target).upload_calibration(files);
   if (context.json) {
-    print(context, Json().open('{').member("name", files.name));
+    Json json = begin(files);
+    print(context, json);
   } else {
-    context.out << fmt::format("the daemon uses calibration {} from now on\n", files.name);
+    context.out << fmt::format("the daemon uses calibration {} from now on\n", title_of(files));
   }
 }
 
+/// What the table does not say when the calibration in use and the one to start with differ.
+std::string difference_of(const std::vector<client::StoredCalibration>& calibrations,
+                          client::Client& client) {
+  using client::StoredCalibration;
+  const auto current = std::ranges::find_if(calibrations, &StoredCalibration::current);
+  const bool starts = current != calibrations.end();
+  if (starts && current->in_use) return {};
+  std::string text;
+  if (std::ranges::none_of(calibrations, &StoredCalibration::in_use)) {
+    const auto used = client.status().calibration;
+    text = used ? fmt::format("in use is {}, under no number that the daemon knows\n", used->name)
+                : "none is in use\n";
+  }
+  if (starts) text += fmt::format("the daemon starts with {} (>)\n", id_of(current->number));
+  return text;
+}
+
 void list(const Context& context) {
-  const auto calibrations = client::Client(context.target).calibrations();
+  client::Client client(context.target);
+  const auto calibrations = client.calibrations();
   if (context.json) {
     for (const auto& stored : calibrations) {
       Json json;
@@ -72,9 +93,10 @@ void list(const Context& context) {
       context.out << json.text() << '\n';
     }
   } else if (calibrations.empty()) {
-    context.out << "the daemon has no calibration: dtactctl calibration upload sends one\n";
+    context.out << "the daemon keeps no calibration: dtactctl calibration upload sends one\n"
+                << difference_of(calibrations, client);
   } else {
-    context.out << text_of(calibrations);
+    context.out << text_of(calibrations) << difference_of(calibrations, client);
   }
 }
 
@@ -149,7 +171,7 @@ void add_calibration(CLI::App& app, Context& context) {
   command
       ->add_subcommand("list",
                        "List them: the one the configuration names and the uploaded ones; * marks "
-                       "the current one")
+                       "the one in use, > the one to start with where that is another one")
       ->callback([&context] { list(context); });
 
   const std::string which = "As in the list (default: the current one)";

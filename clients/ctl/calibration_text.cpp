@@ -18,6 +18,11 @@ std::string size_text(std::uint32_t width, std::uint32_t height) {
   return fmt::format("{}x{}", width, height);
 }
 
+char mark_of(const client::StoredCalibration& stored) {
+  if (stored.in_use) return '*';
+  return stored.current ? '>' : ' ';
+}
+
 }  // namespace
 
 std::string text_of(const client::CalibrationSummary& summary) {
@@ -65,9 +70,9 @@ std::string text_of(const std::vector<client::StoredCalibration>& calibrations) 
                   "uploaded", "name", name_width, "image", "map", "mm/px", "method");
   const auto out = std::back_inserter(text);
   for (const auto& stored : calibrations) {
-    fmt::format_to(out, "{} {:>{}}  {:<20}  {:<{}}  ", stored.current ? '*' : ' ',
-                   id_of(stored.number), id_width, stored.uploaded.empty() ? "-" : stored.uploaded,
-                   stored.name, name_width);
+    fmt::format_to(out, "{} {:>{}}  {:<20}  {:<{}}  ", mark_of(stored), id_of(stored.number),
+                   id_width, stored.uploaded.empty() ? "-" : stored.uploaded, stored.name,
+                   name_width);
     if (stored.summary.has_value()) {
       const auto& summary = *stored.summary;
       fmt::format_to(out, "{:>9}  {:>9}  {:>7.4f}  {:<9}  {:.2f} to {:.2f} mm\n",
@@ -84,6 +89,7 @@ std::string text_of(const std::vector<client::StoredCalibration>& calibrations) 
 void add_stored(const client::StoredCalibration& stored, Json& json) {
   json.open('{').member("id", id_of(stored.number)).member("name", stored.name);
   json.member("uploaded", stored.uploaded).member("current", stored.current);
+  json.member("in_use", stored.in_use);
   json.key("summary");
   if (stored.summary.has_value()) {
     add_summary(*stored.summary, json);

@@ -20,8 +20,8 @@ void add_summary(const client::CalibrationSummary& summary, Json& json);
 /// The reverse. Throws std::invalid_argument saying what is allowed.
 [[nodiscard]] std::uint64_t parse_id(const std::string& text);
 
-/// A table with a line for each; those that cannot be read with the reason, a `*` before the
-/// current one.
+/// A table with a line for each; those that cannot be read with the reason. `*` stands before the
+/// one in use, `>` before the one to start with where that is another one.
 [[nodiscard]] std::string text_of(const std::vector<client::StoredCalibration>& calibrations);
 /// As an object.
 void add_stored(const client::StoredCalibration& stored, Json& json);

@@ -101,7 +101,7 @@ class Watch {
   /// A new line, or on a terminal the same one again, cut to its width.
   void line(const std::string& text) {
     if (!terminal_) {
-      context_.out << text << std::endl;
+      context_.out << text << '\n' << std::flush;
       return;
     }
     winsize size{};

@@ -1,19 +1,12 @@
 #include "daemon/app/config_keys.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
-#include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <limits>
-#include <map>
-#include <optional>
-#include <sstream>
-#include <type_traits>
 #include <utility>
-#include <vector>
 
+#include "daemon/app/key_kinds.hpp"
 #include "daemon/net/light_schemes.hpp"
 #include "hal/registry.hpp"
 
@@ -21,171 +14,6 @@ namespace dtact::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string toml_string(const std::string& text) {
-  std::ostringstream out;
-  out << toml::toml_formatter(toml::array{text});  // toml++ prints no bare string
-  const std::string array = out.str();
-  const std::size_t first = array.find_first_of("\"'");
-  return array.substr(first, array.find_last_of("\"'") - first + 1);
-}
-
-template <typename Integer>
-Key integer(std::string path, Integer& field, std::int64_t least, std::int64_t most,
-            const std::string& unit) {
-  return {std::move(path), fmt::format("a whole number, {} … {} {}", least, most, unit),
-          [&field, least, most](const toml::node& node, const fs::path&) {
-            const auto value = node.value_exact<std::int64_t>();
-            if (!value || *value < least || *value > most) return false;
-            field = static_cast<Integer>(*value);
-            return true;
-          },
-          [&field] { return fmt::format("{}", field); }};
-}
-
-Key one_of(std::string path, int& field, std::vector<std::int64_t> allowed) {
-  const std::string words = fmt::format("one of {}", fmt::join(allowed, ", "));
-  return {std::move(path), words,
-          [&field, allowed = std::move(allowed)](const toml::node& node, const fs::path&) {
-            const auto value = node.value_exact<std::int64_t>();
-            if (!value || std::find(allowed.begin(), allowed.end(), *value) == allowed.end()) {
-              return false;
-            }
-            field = static_cast<int>(*value);
-            return true;
-          },
-          [&field] { return fmt::format("{}", field); }};
-}
-
-Key real(std::string path, double& field, double least, double most, const std::string& unit) {
-  return {std::move(path), fmt::format("a number, {} … {} {}", least, most, unit),
-          [&field, least, most](const toml::node& node, const fs::path&) {
-            if (!node.is_number()) return false;
-            const double value = node.value<double>().value_or(NAN);
-            if (!(value >= least && value <= most)) return false;
-            field = value;
-            return true;
-          },
-          [&field] { return fmt::format("{}", field); }};
-}
-
-Key boolean(std::string path, bool& field) {
-  return {std::move(path), "true or false",
-          [&field](const toml::node& node, const fs::path&) {
-            const auto value = node.value_exact<bool>();
-            if (value) field = *value;
-            return value.has_value();
-          },
-          [&field] { return field ? "true" : "false"; }};
-}
-
-Key text(std::string path, std::string& field, const std::string& allowed) {
-  return {std::move(path), allowed,
-          [&field](const toml::node& node, const fs::path&) {
-            const auto value = node.value_exact<std::string>();
-            if (value) field = *value;
-            return value.has_value();
-          },
-          [&field] { return toml_string(field); }};
-}
-
-Key choice(std::string path, std::string& field, std::vector<std::string> allowed) {
-  const std::string words = fmt::format("one of \"{}\"", fmt::join(allowed, "\", \""));
-  return {std::move(path), words,
-          [&field, allowed = std::move(allowed)](const toml::node& node, const fs::path&) {
-            const auto value = node.value_exact<std::string>();
-            if (!value || std::find(allowed.begin(), allowed.end(), *value) == allowed.end()) {
-              return false;
-            }
-            field = *value;
-            return true;
-          },
-          [&field] { return toml_string(field); }};
-}
-
-/// A number that goes by a name.
-Key named(std::string path, int& field, const std::vector<std::pair<std::string, int>>& names) {
-  std::vector<std::string> words;
-  words.reserve(names.size());
-  for (const auto& [name, value] : names) words.push_back(toml_string(name));
-  return {std::move(path), fmt::format("one of {}", fmt::join(words, ", ")),
-          [&field, names](const toml::node& node, const fs::path&) {
-            const auto text = node.value_exact<std::string>();
-            const auto it =
-                std::ranges::find_if(names, [&](const auto& entry) { return text == entry.first; });
-            if (it == names.end()) return false;
-            field = it->second;
-            return true;
-          },
-          [&field, names] {
-            return toml_string(std::ranges::find_if(names, [&](const auto& entry) {
-                                 return entry.second == field;
-                               })->first);
-          }};
-}
-
-Key path(std::string key, fs::path& field, const std::string& allowed) {
-  return {std::move(key), allowed,
-          [&field](const toml::node& node, const fs::path& folder) {
-            const auto value = node.value_exact<std::string>();
-            if (!value) return false;
-            field = value->empty() ? fs::path() : (folder / *value).lexically_normal();
-            return true;
-          },
-          [&field] { return toml_string(field.string()); }};
-}
-
-/// A number, or false for "none".
-Key optional_integer(std::string path, std::optional<int>& field, int least, int most,
-                     const std::string& unit) {
-  return {std::move(path), fmt::format("a whole number, {} … {} {}, or false", least, most, unit),
-          [&field, least, most](const toml::node& node, const fs::path&) {
-            if (node.value_exact<bool>() == false) {
-              field.reset();
-              return true;
-            }
-            const auto value = node.value_exact<std::int64_t>();
-            if (!value || *value < least || *value > most) return false;
-            field = static_cast<int>(*value);
-            return true;
-          },
-          [&field] { return field ? fmt::format("{}", *field) : std::string("false"); }};
-}
-
-}  // namespace
-
-namespace {
-
-Key milliseconds(std::string path, std::chrono::milliseconds& field, std::int64_t least,
-                 std::int64_t most) {
-  return {std::move(path), fmt::format("a whole number, {} … {} (milliseconds)", least, most),
-          [&field, least, most](const toml::node& node, const fs::path&) {
-            const auto value = node.value_exact<std::int64_t>();
-            if (!value || *value < least || *value > most) return false;
-            field = std::chrono::milliseconds(*value);
-            return true;
-          },
-          [&field] { return fmt::format("{}", field.count()); }};
-}
-
-/// An entry of a table of controls: a number, or "default" for none.
-template <typename Number>
-Key control(const std::string& table, const char* name, std::map<std::string, Number>& controls) {
-  return {fmt::format("{}.{}", table, name), "a number in the camera's own units, or \"default\"",
-          [&controls, name](const toml::node& node, const fs::path&) {
-            if (node.value_exact<std::string>() == "default") {
-              controls.erase(name);
-              return true;
-            }
-            const bool fits = std::is_integral_v<Number> ? node.is_integer() : node.is_number();
-            if (fits) controls[name] = *node.value<Number>();
-            return fits;
-          },
-          [&controls, name] {
-            const auto it = controls.find(name);
-            return it == controls.end() ? "\"default\"" : fmt::format("{}", it->second);
-          }};
-}
 
 constexpr const char* kPwmUnit = "(Hz, 0 = not known)";
 constexpr const char* kExposureUnit = "(microseconds, 0 = the camera's default)";

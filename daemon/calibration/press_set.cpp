@@ -22,6 +22,11 @@ constexpr double kDepthBinMm = 0.2;
 /// of 1.5 to 3 mm (simulator). The share that covers them.
 constexpr double kOtherShape = 0.05;
 
+/// What a refusal ends with, so that nobody looks in vain for a press that was made but not used.
+std::string name_left_out(const std::vector<std::string>& left_out) {
+  return left_out.empty() ? "" : fmt::format("; left out: {}", fmt::join(left_out, "; "));
+}
+
 /// The presses in which a contact is found; the others' reasons go to `left_out`.
 std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set,
                                      std::vector<std::string>& left_out) {
@@ -39,8 +44,8 @@ std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set
   if (presses.size() < 2) {
     throw std::runtime_error(
         fmt::format("a chain of presses needs at least two in which a contact is found: press "
-                    "lighter and deeper{}{}",
-                    left_out.empty() ? "" : "; left out: ", fmt::join(left_out, "; ")));
+                    "lighter and deeper{}",
+                    name_left_out(left_out)));
   }
   return presses;
 }
@@ -201,15 +206,17 @@ std::vector<recon::Model::Uncertainty> uncertainty_of(const LeftOut& left_out) {
   return rows;
 }
 
-void refuse_gaps(const ChainFit& chain, const BallPresses& set) {
+void refuse_gaps(const ChainFit& chain, const BallPresses& set,
+                 const std::vector<std::string>& left_out) {
   const bool tied = std::ranges::any_of(set.presses, [](const auto& p) { return !!p.depth_mm; });
   if (chain.gaps.empty() || tied) return;
   const ChainFit::Gap& gap = chain.gaps.front();
   const double g = std::min(gap.to_mm, set.ball_radius_mm);
   throw std::runtime_error(fmt::format(
       "no press shows indentations from {:.2f} to {:.2f} mm, so the list cannot be chained there: "
-      "press the ball about {:.2f} mm deep (a contact {:.1f} mm wide) and add that press",
-      gap.from_mm, gap.to_mm, g, 2 * kContactOfCut * std::sqrt(g * (2 * set.ball_radius_mm - g))));
+      "press the ball about {:.2f} mm deep (a contact {:.1f} mm wide) and add that press{}",
+      gap.from_mm, gap.to_mm, g, 2 * kContactOfCut * std::sqrt(g * (2 * set.ball_radius_mm - g)),
+      name_left_out(left_out)));
 }
 
 }  // namespace
@@ -238,7 +245,7 @@ Calibration build(const BallPresses& presses, PressReport* report) {
   const std::size_t choice = simplest(trials, found.gains);
   const Trial& chosen = trials[choice];
   const ChainFit& fit = chosen.fit;
-  refuse_gaps(fit, set);
+  refuse_gaps(fit, set, found.left_out);
 
   auto model =
       std::make_shared<recon::Model>(chosen.shape == recon::GainShape::none ? plain : uniform);

@@ -56,7 +56,8 @@ struct PressReport {
 ///
 /// A press without a contact that can be used (too light, beyond the map) is left out. Throws
 /// std::runtime_error when fewer than two remain, naming those left out, and when the presses leave
-/// a gap that no press of known depth closes, saying which press is missing. At least two presses.
+/// a gap that no press of known depth closes, saying which press is missing and which were left
+/// out. At least two presses.
 [[nodiscard]] Calibration build(const BallPresses& set, PressReport* report = nullptr);
 
 /// The paper's linear regression, to compare with: depth = (k·distance + b) · darkening, the

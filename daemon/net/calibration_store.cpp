@@ -154,7 +154,7 @@ std::shared_ptr<const calibration::Calibration> FolderCalibrationStore::check(
   return std::make_shared<const calibration::Calibration>(std::move(parsed));
 }
 
-void FolderCalibrationStore::keep(const CalibrationFiles& files) {
+std::uint64_t FolderCalibrationStore::keep(const CalibrationFiles& files) {
   const fs::path folders = state_ / kFolders;
   fs::create_directories(folders);
   const auto numbers = numbers_in(folders);
@@ -164,6 +164,7 @@ void FolderCalibrationStore::keep(const CalibrationFiles& files) {
   const auto previous = current_number();
   move_link(state_, fs::path(kFolders) / std::to_string(number) / files.name);
   remove_old(folders, {number, previous.value_or(number)});
+  return number;
 }
 
 std::vector<StoredCalibration> FolderCalibrationStore::list() {

@@ -40,9 +40,9 @@ class NoSuchCalibration : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Where calibrations are checked and kept. Only the network part's worker thread calls it, one
-/// call at a time. Everything throws std::exception naming the path; what takes a number throws
-/// NoSuchCalibration, too.
+/// Where calibrations are checked and kept. Only the network part calls it, one call at a time, and
+/// on its worker thread once that runs. Everything throws std::exception naming the path; what
+/// takes a number throws NoSuchCalibration, too.
 class CalibrationStore {
  public:
   CalibrationStore() = default;
@@ -54,8 +54,8 @@ class CalibrationStore {
   /// and remedy.
   [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files) = 0;
-  /// Stores checked files under a new number and makes them current.
-  virtual void keep(const CalibrationFiles& files) = 0;
+  /// Stores checked files under a new number, which it returns, and makes them current.
+  virtual std::uint64_t keep(const CalibrationFiles& files) = 0;
   /// All there are: the configured one, then by number. Reads and checks every one.
   [[nodiscard]] virtual std::vector<StoredCalibration> list() = 0;
   /// One, read and checked. Throws as check() does.
@@ -63,6 +63,8 @@ class CalibrationStore {
       std::uint64_t number) = 0;
   /// Makes one current.
   virtual void make_current(std::uint64_t number) = 0;
+  /// Nothing when there is none, or when the current one has no number. Throws nothing.
+  [[nodiscard]] virtual std::optional<std::uint64_t> current_number() const = 0;
   /// The files of one, unchecked; without a number, of the current one.
   [[nodiscard]] virtual CalibrationFiles read(std::optional<std::uint64_t> number) = 0;
 };
@@ -91,17 +93,17 @@ class FolderCalibrationStore : public CalibrationStore {
 
   [[nodiscard]] std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files) override;
-  void keep(const CalibrationFiles& files) override;
+  std::uint64_t keep(const CalibrationFiles& files) override;
   [[nodiscard]] std::vector<StoredCalibration> list() override;
   [[nodiscard]] std::shared_ptr<const calibration::Calibration> load(std::uint64_t number) override;
   void make_current(std::uint64_t number) override;
+  /// Nothing also when the link leads elsewhere.
+  [[nodiscard]] std::optional<std::uint64_t> current_number() const override;
   [[nodiscard]] CalibrationFiles read(std::optional<std::uint64_t> number) override;
 
  private:
   /// STATE/calibrations/NUMBER/NAME of an uploaded one, or the configured folder.
   [[nodiscard]] std::filesystem::path folder_of(std::uint64_t number) const;
-  /// Nothing when there is none, or when the link leads elsewhere.
-  [[nodiscard]] std::optional<std::uint64_t> current_number() const;
 
   std::filesystem::path state_;
   std::filesystem::path configured_;

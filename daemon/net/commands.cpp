@@ -113,7 +113,13 @@ Outcome<Value> attempt(v1::ErrorCode failure, const Step& step) {
 
 Commands::Commands(asio::io_context& io, asio::thread_pool& worker, const NetConfig& config,
                    Hub& hub, pipeline::Port& port, CalibrationStore& store)
-    : io_(io), worker_(worker), config_(config), hub_(hub), port_(port), store_(store) {}
+    : io_(io),
+      worker_(worker),
+      config_(config),
+      hub_(hub),
+      port_(port),
+      store_(store),
+      in_use_(store.current_number()) {}
 
 void Commands::on_request(const std::shared_ptr<Session>& session,
                           const v1::ClientMessage& message) {
@@ -294,7 +300,12 @@ void Commands::list_calibrations(const Who& who) {
         }
         auto message = reply_to(id);
         auto& calibrations = *message.mutable_reply()->mutable_calibrations();
-        for (const auto& stored : list.value) fill(stored, *calibrations.add_calibrations());
+        const bool calibrated = self.port_.status().calibration != nullptr;
+        for (const auto& stored : list.value) {
+          auto& out = *calibrations.add_calibrations();
+          fill(stored, out);
+          out.set_in_use(calibrated && stored.number == self.in_use_);
+        }
         session->send(message);
       });
 }
@@ -356,21 +367,22 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
   event.mutable_event()->mutable_calibration()->set_name(change.name);
   hub_.broadcast(event);
   config_.log(LogLevel::info, fmt::format("calibration {} is in use", change.name));
+  in_use_.reset();
+  if (change.upload == nullptr) in_use_ = change.number;
   // It is kept only now that the pipeline has taken it, so that a calibration that does not fit
   // this camera never replaces one that does.
   on_worker(
       [&store = store_, change] {
-        return attempt<bool>(v1::ERROR_STORAGE, [&] {
-          if (change.upload != nullptr) {
-            store.keep(*change.upload);
-          } else {
-            store.make_current(change.number);
-          }
-          return true;
+        return attempt<std::uint64_t>(v1::ERROR_STORAGE, [&] {
+          if (change.upload != nullptr) return store.keep(*change.upload);
+          store.make_current(change.number);
+          return change.number;
         });
       },
-      [weak = pending.session, id = pending.id](Commands& self, const Outcome<bool>& kept) {
+      [weak = pending.session, id = pending.id, uploaded = change.upload != nullptr](
+          Commands& self, const Outcome<std::uint64_t>& kept) {
         self.changing_ = false;
+        if (!kept.failed()) self.in_use_ = kept.value;
         const auto session = weak.lock();
         if (session == nullptr) return;
         if (kept.failed()) {
@@ -381,7 +393,8 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
                                           kept.error);
         }
         auto message = reply_to(id);
-        message.mutable_reply()->mutable_done();
+        auto& done = *message.mutable_reply()->mutable_done();
+        if (uploaded) done.set_calibration(kept.value);
         session->send(message);
       });
 }

@@ -87,6 +87,9 @@ class Commands : public std::enable_shared_from_this<Commands> {
   std::uint64_t next_ticket_ = 1;
   std::optional<hal::Light> light_;  ///< Asked for last; empty: whatever the ring shows.
   int lights_pending_ = 0;
+  /// Of the calibration that the pipeline uses, if it uses one; nothing when that has no number or
+  /// the store failed to keep it.
+  std::optional<std::uint64_t> in_use_;
   bool changing_ = false;  ///< One at a time: an upload may be as large as a message.
   int reading_ = 0;
 };

@@ -92,6 +92,10 @@ class Activity {
   [[nodiscard]] FrameRegion region() const noexcept;
 
  private:
+  static constexpr double kQ16 = 65536;
+  [[nodiscard]] static std::int32_t q16(double levels) noexcept;
+  /// Standard deviation over mean magnitude of a Gaussian's difference of two draws: √(π/2)/√2.
+  static constexpr double kFromDifference = 0.8862;
   /// Tiles that read a cell, widened by the reach: columns and rows [first, last).
   struct Readers {
     std::int32_t first_column = INT32_MAX;

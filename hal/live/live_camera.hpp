@@ -102,6 +102,9 @@ class LiveCamera : public Camera, private FrameOwner {
     std::atomic<std::uint64_t> delivered, lost, skipped, disconnects;
     std::atomic<std::uint64_t> flagged, markers, too_short, undecodable;
   };
+  static void add(std::atomic<std::uint64_t>& counter, std::uint64_t n = 1) noexcept {
+    counter.fetch_add(n, std::memory_order_relaxed);
+  }
   Counters counters_{};
   std::thread watcher_;  // last: it uses all of the above
 };

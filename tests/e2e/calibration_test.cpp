@@ -167,7 +167,7 @@ TEST_F(TwoCalibrations, ADaemonWhoseUploadedOneIsDamagedStartsAndCanBeMended) {
   sensor_.restart();
   EXPECT_EQ(sensor_.connect().status().state, "uncalibrated");
   EXPECT_THAT(sensor_.daemon->log(), HasSubstr("dtactctl calibration activate"));
-  EXPECT_THAT(list(), HasSubstr("*          1  20"));
+  EXPECT_THAT(list(), AllOf(HasSubstr(">          1  20"), HasSubstr("none is in use")));
   std::string output;
   ASSERT_EQ(activate("configured", &output), 0) << output;
   EXPECT_TRUE(depth_flows_again_at(kConfigured));

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include "clients/cpp/types.hpp"
@@ -19,6 +20,7 @@ struct DepthError {
 };
 
 inline DepthError depth_error(const client::Frame& frame, const hal::sim::Truth& truth) {
+  if (!frame.depth) throw std::invalid_argument("a frame without depth");
   std::vector<float> indentation;
   std::vector<std::uint8_t> contact;
   truth.indentation_mm(frame.sequence, indentation);

@@ -195,6 +195,24 @@ TEST(BuildFromPresses, SaysWhatToPressNext) {
               ThrowsMessage<std::runtime_error>(HasSubstr("press 2")));
 }
 
+TEST(BuildFromPresses, ARefusalForAGapNamesThePressThatWasLeftOut) {
+  // The first would close the gap, but its 7 grey levels are no contact.
+  EXPECT_THAT(
+      [] {
+        (void)build(set_of({Ball{.depth_mm = 0.23}, Ball{.depth_mm = 0.8}, Ball{.depth_mm = 0.8}}));
+      },
+      ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("no press shows indentations from 0.00 to"),
+                                              HasSubstr("; left out: press 1: no contact found"))));
+}
+
+TEST(BuildFromPresses, TwoLightPressesAreEnough) {
+  PressReport report;
+  (void)build(set_of({Ball{.depth_mm = 0.45}, Ball{.col = 130, .depth_mm = 0.8}}), &report);
+  ASSERT_EQ(report.presses.size(), 2U);
+  EXPECT_NEAR(report.presses[0].depth_mm, 0.45, 0.02);
+  EXPECT_NEAR(report.presses[1].depth_mm, 0.8, 0.02);
+}
+
 TEST(BuildRegression, FindsOneSlopeWhereThereIsOne) {
   const Calibration made =
       build_regression(set_of({Ball{.depth_mm = 1.0}, Ball{.col = 90, .row = 90, .depth_mm = 1.2},

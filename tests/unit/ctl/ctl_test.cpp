@@ -10,6 +10,7 @@
 #include <sstream>
 #include <thread>
 
+#include "clients/cpp/client.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
 #include "tests/unit/net/rig.hpp"
@@ -23,7 +24,9 @@ using net::test::FakePort;
 using net::test::make_frame;
 using net::test::Rig;
 using testing::AllOf;
+using testing::EndsWith;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 struct Result {
@@ -153,11 +156,18 @@ TEST(Rezero, IsRefusedUnlessForced) {
   EXPECT_EQ(ctl(rig, {"rezero", "--force"}).code, 0);
 }
 
+/// The pipeline says that it uses a calibration.
+void be_calibrated(Rig& rig, const std::string& name) {
+  auto calibration = std::make_shared<calibration::Calibration>();
+  calibration->name = name;
+  pipeline::Status status;
+  status.calibration = std::move(calibration);
+  rig.port.set_status(status);
+}
+
 TEST(Calibration, GoesUpAndComesBack) {
   Rig rig({}, answer_done);
-  pipeline::Status status;
-  status.calibration = std::make_shared<calibration::Calibration>();
-  rig.port.set_status(status);
+  be_calibrated(rig, "first");
   std::string name = (fs::temp_directory_path() / "dtact-ctl-XXXXXX").string();
   const fs::path temporary = ::mkdtemp(name.data());
   const fs::path folder = temporary / "ball";
@@ -167,7 +177,7 @@ TEST(Calibration, GoesUpAndComesBack) {
 
   auto result = ctl(rig, {"calibration", "upload", folder.string() + "/"});
   EXPECT_EQ(result.code, 0) << result.error;
-  EXPECT_EQ(result.out, "the daemon uses calibration ball from now on\n");
+  EXPECT_EQ(result.out, "the daemon uses calibration ball (4) from now on\n");
   EXPECT_EQ(ctl(rig, {"calibration", "show"}).out, "# calibration ball (4)\nversion = 1\n");
   const std::string copy = (temporary / "copy").string();
   result = ctl(rig, {"calibration", "export", "-o", copy});
@@ -175,7 +185,7 @@ TEST(Calibration, GoesUpAndComesBack) {
   EXPECT_EQ(base::read_file(copy + "/reference.png"), "png");
   EXPECT_EQ(base::read_file(copy + "/calibration.toml"), "version = 1\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "other", "--json"});
-  EXPECT_EQ(result.out, "{\"name\":\"other\"}\n");
+  EXPECT_EQ(result.out, "{\"id\":\"5\",\"name\":\"other\"}\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "no good"});
   EXPECT_EQ(result.code, 1);
   EXPECT_EQ(ctl(rig, {"calibration", "upload", temporary.string()}).code, 1);
@@ -206,7 +216,8 @@ TEST(Calibration, IsExportedOnceUnlessForced) {
 }
 
 TEST(Calibration, IsListed) {
-  const Rig rig;
+  Rig rig;
+  be_calibrated(rig, "first");
   EXPECT_EQ(
       ctl(rig, {"calibration", "list"}).out,
       "          id  uploaded              name         image        map    mm/px  method     "
@@ -225,14 +236,40 @@ TEST(Calibration, IsListed) {
   const std::string json = ctl(rig, {"calibration", "list", "--json"}).out;
   EXPECT_THAT(
       json,
-      StartsWith(R"({"id":"configured","name":"factory","uploaded":"","current":false,"summary":{)"
-                 R"("name":"factory","method":"list","mm_per_px":0.0414,"width":580,"height":580,)"
-                 R"("covered_from_mm":-0.02,"covered_to_mm":1.4,"created":"","frame_width":800,)"
-                 R"("frame_height":600},"damage":""})"
-                 "\n"));
-  EXPECT_THAT(json, HasSubstr("\"name\":\"broken\",\"uploaded\":\"2026-01-31T12:00:00Z\","
-                              "\"current\":false,\"summary\":null,\"damage\":\"calibration.toml"));
+      StartsWith(
+          R"({"id":"configured","name":"factory","uploaded":"","current":false,"in_use":false,)"
+          R"("summary":{)"
+          R"("name":"factory","method":"list","mm_per_px":0.0414,"width":580,"height":580,)"
+          R"("covered_from_mm":-0.02,"covered_to_mm":1.4,"created":"","frame_width":800,)"
+          R"("frame_height":600},"damage":""})"
+          "\n"));
+  EXPECT_THAT(
+      json,
+      HasSubstr(
+          "\"name\":\"broken\",\"uploaded\":\"2026-01-31T12:00:00Z\","
+          "\"current\":false,\"in_use\":false,\"summary\":null,\"damage\":\"calibration.toml"));
   EXPECT_EQ(std::count(json.begin(), json.end(), '\n'), 4);
+}
+
+TEST(Calibration, InUseAndToStartWithAreToldApart) {
+  Rig rig({}, answer_done);
+  EXPECT_THAT(ctl(rig, {"calibration", "list"}).out,
+              AllOf(HasSubstr("\n>          1"), EndsWith("none is in use\n"
+                                                          "the daemon starts with 1 (>)\n")));
+  be_calibrated(rig, "stuck");
+  EXPECT_EQ(ctl(rig, {"calibration", "activate", "3"}).code, 1);  // disk full
+  EXPECT_THAT(ctl(rig, {"calibration", "list"}).out,
+              AllOf(HasSubstr("\n>          1"), HasSubstr("\n*          3"),
+                    EndsWith("mm\nthe daemon starts with 1 (>)\n")));
+  be_calibrated(rig, "ball");
+  client::Options target;
+  target.port = rig.tcp_port();
+  EXPECT_THROW(client::Client(target).upload_calibration({"ball", "unwritable", "png"}),
+               client::Refused);
+  EXPECT_THAT(ctl(rig, {"calibration", "list"}).out,
+              AllOf(HasSubstr("\n>          1"), Not(HasSubstr("\n*")),
+                    EndsWith("in use is ball, under no number that the daemon knows\n"
+                             "the daemon starts with 1 (>)\n")));
 }
 
 TEST(Calibration, IsShownAndActivatedByItsId) {

@@ -71,7 +71,7 @@ TEST_F(Store, IsEmptyAtFirst) {
 
 TEST_F(Store, KeepsFilesUnderTheirName) {
   FolderCalibrationStore store(state_, {});
-  store.keep({"ball", "a toml", "a png"});
+  EXPECT_EQ(store.keep({"ball", "a toml", "a png"}), 1U);
   const auto folder = store.current();
   EXPECT_EQ(folder, numbered(1) / "ball");
   EXPECT_EQ(base::read_file(folder / "calibration.toml"), "a toml");
@@ -109,7 +109,7 @@ TEST_F(Store, ListsWhatEachIs) {
 TEST_F(Store, GoesBackToAnEarlierOne) {
   FolderCalibrationStore store(state_, {});
   store.keep(whole("ball"));
-  store.keep(whole("pins"));
+  EXPECT_EQ(store.keep(whole("pins")), 2U);
   EXPECT_EQ(current_of(store.list()), 2U);
   EXPECT_EQ(store.load(1)->name, "ball");
   store.make_current(1);
@@ -216,6 +216,7 @@ TEST_F(Store, SaysThatTheLinkLeadsElsewhere) {
   FolderCalibrationStore store(state_, {});
   fs::create_directory_symlink(make_configured(), state_ / "calibration");
   EXPECT_EQ(store.current(), folder_.path() / "factory");  // an administrator's own doing
+  EXPECT_EQ(store.current_number(), std::nullopt);
   EXPECT_THROW((void)store.read({}), std::runtime_error);
 }
 

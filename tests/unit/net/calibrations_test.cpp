@@ -71,6 +71,15 @@ std::uint64_t current_of(RawClient& client) {
   return 999;
 }
 
+/// The one marked in use; 999 when none is.
+std::uint64_t in_use(RawClient& client) {
+  const auto reply = client.request(list());
+  for (const auto& stored : reply.calibrations().calibrations()) {
+    if (stored.in_use()) return stored.number();
+  }
+  return 999;
+}
+
 void refuse_as_invalid(FakePort& port) {
   port.answer([](const pipeline::Command& command) {
     return CommandDone{command.ticket, Outcome::invalid, "the camera gives 640x480"};
@@ -83,7 +92,8 @@ TEST(Upload, IsCheckedUsedKeptAndTold) {
   RawClient watcher(rig.tcp_port());
   client.hello();
   watcher.hello();
-  EXPECT_TRUE(client.request(upload("ball-4_mm", "good")).has_done());
+  const auto reply = client.request(upload("ball-4_mm", "good"));
+  EXPECT_EQ(reply.done().calibration(), 4U);
   EXPECT_EQ(watcher.event().calibration().name(), "ball-4_mm");
   const auto command = rig.port.wait_command(0);
   ASSERT_TRUE(command.has_value());
@@ -125,6 +135,19 @@ TEST(Upload, SaysWhenItCouldNotBeStored) {
   const auto reply = client.request(upload("x", "unwritable"));
   EXPECT_EQ(reply.error().code(), v1::ERROR_STORAGE);
   EXPECT_THAT(reply.error().message(), HasSubstr("disk full"));
+}
+
+TEST(Upload, ThatCouldNotBeStoredIsInUseUnderNoNumber) {
+  Rig rig({}, answer_done);
+  be_calibrated(rig);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(client.request(upload("x", "unwritable")).error().code(), v1::ERROR_STORAGE);
+  EXPECT_EQ(in_use(client), 999U);
+  EXPECT_EQ(current_of(client), 1U);
+  EXPECT_TRUE(client.request(upload("x", "good")).has_done());
+  EXPECT_EQ(in_use(client), 4U);
+  EXPECT_EQ(current_of(client), 4U);
 }
 
 TEST(GetCalibration, NeedsOne) {
@@ -177,13 +200,24 @@ TEST(ListCalibrations, TellsEverything) {
   EXPECT_EQ(current_of(client), 4U);
 }
 
+TEST(ListCalibrations, TellsTheOneInUse) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(in_use(client), 999U);  // the pipeline could not use the current one
+  be_calibrated(rig);
+  EXPECT_EQ(in_use(client), 1U);
+}
+
 TEST(ActivateCalibration, IsCheckedUsedKeptAndTold) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   RawClient watcher(rig.tcp_port());
   client.hello();
   watcher.hello();
-  EXPECT_TRUE(client.request(activate(0)).has_done());
+  const auto reply = client.request(activate(0));
+  EXPECT_TRUE(reply.has_done());
+  EXPECT_FALSE(reply.done().has_calibration());
   EXPECT_EQ(watcher.event().calibration().name(), "factory");
   const auto command = rig.port.wait_command(0);
   ASSERT_TRUE(command.has_value());
@@ -220,9 +254,15 @@ TEST(ActivateCalibration, SaysWhenItCouldNotBeStored) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   client.hello();
+  be_calibrated(rig);
   const auto reply = client.request(activate(3));
   EXPECT_EQ(reply.error().code(), v1::ERROR_STORAGE);
   EXPECT_THAT(reply.error().message(), HasSubstr("disk full"));
+  EXPECT_EQ(in_use(client), 3U);
+  EXPECT_EQ(current_of(client), 1U);
+  EXPECT_TRUE(client.request(activate(0)).has_done());
+  EXPECT_EQ(in_use(client), 0U);
+  EXPECT_EQ(current_of(client), 0U);
 }
 
 TEST(ActivateCalibration, WaitsForAnotherChange) {

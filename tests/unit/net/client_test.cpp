@@ -142,7 +142,7 @@ TEST(ClientLibrary, CommandsAndRefusals) {
     EXPECT_STREQ(e.what(), "free it");
   }
   EXPECT_THROW((void)client.set_light({-1, {}, {}}), client::Refused);
-  EXPECT_NO_THROW(client.upload_calibration({"ball", "good", "png"}));
+  EXPECT_EQ(client.upload_calibration({"ball", "good", "png"}), 4U);
   EXPECT_EQ(std::get<client::CalibrationChanged>(next<client::Event>(client)).name, "ball");
   EXPECT_THROW((void)client.calibration(), client::Refused);
   EXPECT_EQ(client.status().clients.size(), 1U);
@@ -157,6 +157,7 @@ TEST(ClientLibrary, ListsReadsAndActivatesCalibrations) {
   EXPECT_EQ(all[1].name, "first");
   EXPECT_EQ(all[1].uploaded, "2026-01-31T12:00:00Z");
   EXPECT_TRUE(all[1].current);
+  EXPECT_FALSE(all[1].in_use);  // the pipeline has none
   ASSERT_TRUE(all[1].summary.has_value());
   EXPECT_EQ(all[1].summary->mm_per_px, 0.0414);
   EXPECT_EQ(all[1].summary->frame_width, 800U);

@@ -28,7 +28,8 @@ class FakePort : public pipeline::Port {
   [[nodiscard]] const pipeline::DepthFrame* latest() noexcept override {
     const std::lock_guard lock(mutex_);
     if (!fresh_.has_value()) return nullptr;
-    current_ = *std::exchange(fresh_, std::nullopt);
+    current_ = *std::move(fresh_);
+    fresh_.reset();
     changed_.notify_all();
     return &current_;
   }

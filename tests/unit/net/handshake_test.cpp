@@ -17,10 +17,12 @@ v1::ClientMessage hello(std::uint32_t major) {
   return message;
 }
 
+// NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send and messages that are
+// filled for constants
 TEST(Handshake, TellsVersionProgramAndSurfaceFrame) {
   NetConfig config;
   config.frame_id = "finger_3";
-  Rig rig(config);
+  const Rig rig(config);
   RawClient client(rig.tcp_port());
   const auto reply = client.request(hello(1));
   EXPECT_EQ(reply.id(), 1U);
@@ -33,7 +35,7 @@ TEST(Handshake, TellsVersionProgramAndSurfaceFrame) {
 }
 
 TEST(Handshake, RefusesAnotherMajorVersionAndEnds) {
-  Rig rig;
+  const Rig rig;
   RawClient client(rig.tcp_port());
   const auto reply = client.request(hello(2));
   EXPECT_EQ(reply.id(), 1U);
@@ -43,7 +45,7 @@ TEST(Handshake, RefusesAnotherMajorVersionAndEnds) {
 }
 
 TEST(Handshake, WantsHelloFirst) {
-  Rig rig;
+  const Rig rig;
   RawClient client(rig.tcp_port());
   v1::ClientMessage message;
   message.mutable_get_status();
@@ -53,7 +55,7 @@ TEST(Handshake, WantsHelloFirst) {
 }
 
 TEST(Handshake, WantsHelloOnlyOnce) {
-  Rig rig;
+  const Rig rig;
   RawClient client(rig.tcp_port());
   client.hello();
   EXPECT_EQ(client.request(hello(1)).error().code(), v1::ERROR_INVALID);
@@ -67,7 +69,7 @@ TEST(Handshake, WantsHelloOnlyOnce) {
 }
 
 TEST(Handshake, RefusesALongProgramName) {
-  Rig rig;
+  const Rig rig;
   RawClient client(rig.tcp_port());
   auto message = hello(1);
   message.mutable_hello()->set_program(std::string(65, 'x'));
@@ -79,7 +81,7 @@ TEST(Handshake, RefusesALongProgramName) {
 TEST(Handshake, EndsAfterSilence) {
   NetConfig config;
   config.hello_timeout = std::chrono::milliseconds(50);
-  Rig rig(config);
+  const Rig rig(config);
   RawClient client(rig.tcp_port());
   EXPECT_TRUE(client.ends());
 }
@@ -87,7 +89,7 @@ TEST(Handshake, EndsAfterSilence) {
 TEST(Handshake, KeepsSilentClientsAfterHello) {
   NetConfig config;
   config.hello_timeout = std::chrono::milliseconds(100);
-  Rig rig(config);
+  const Rig rig(config);
   RawClient client(rig.tcp_port());
   client.hello();
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
@@ -116,7 +118,7 @@ TEST(Handshake, RefusesMoreThanMaxClients) {
 }
 
 TEST(Malformed, IsAnsweredAndEnds) {
-  Rig rig;
+  const Rig rig;
   RawClient client(rig.tcp_port());
   client.hello();
   client.send_bytes("\0\0\0\3\xff\xff\xff"s);
@@ -127,7 +129,7 @@ TEST(Malformed, IsAnsweredAndEnds) {
 }
 
 TEST(Malformed, EmptyMessagesAreNoRequests) {
-  Rig rig;
+  const Rig rig;
   RawClient client(rig.tcp_port());
   client.send_bytes("\0\0\0\0"s);
   EXPECT_EQ(client.reply().error().code(), v1::ERROR_BAD_MESSAGE);
@@ -135,7 +137,7 @@ TEST(Malformed, EmptyMessagesAreNoRequests) {
 }
 
 TEST(Malformed, IdZeroIsNotAllowed) {
-  Rig rig;
+  const Rig rig;
   RawClient client(rig.tcp_port());
   client.hello();
   v1::ClientMessage message;
@@ -148,7 +150,7 @@ TEST(Malformed, IdZeroIsNotAllowed) {
 }
 
 TEST(Malformed, AnUnknownRequestIsAnsweredByItsId) {
-  Rig rig;
+  const Rig rig;
   RawClient client(rig.tcp_port());
   client.hello();
   client.send_bytes("\0\0\0\5\x08\x07\xfa\x01\x00"s);  // id 7, field 31 of a later version, empty
@@ -159,7 +161,7 @@ TEST(Malformed, AnUnknownRequestIsAnsweredByItsId) {
 }
 
 TEST(Oversized, IsAnsweredAndEndsEvenWhileTheClientStillSends) {
-  Rig rig;
+  const Rig rig;
   RawClient client(rig.tcp_port());
   client.hello();
   client.send_bytes("\x01\x00\x00\x01"s);  // 16 MiB + 1
@@ -171,7 +173,7 @@ TEST(Oversized, IsAnsweredAndEndsEvenWhileTheClientStillSends) {
 }
 
 TEST(Server, SaysWhoMayHaveThePort) {
-  Rig rig;
+  const Rig rig;
   boost::asio::io_context io;
   FakePort port;
   FakeStore store;
@@ -219,6 +221,8 @@ TEST(Server, EndsItsConnectionsAndItsWork) {
   EXPECT_TRUE(client.ends());
   EXPECT_TRUE(rig.port.wait_wanted(false, false));
 }
+
+// NOLINTEND(misc-const-correctness)
 
 }  // namespace
 }  // namespace dtact::net::test

@@ -26,11 +26,12 @@ class FakeStore : public CalibrationStore {
     calibration->name = files.name;
     return calibration;
   }
-  void keep(const CalibrationFiles& files) override {
+  std::uint64_t keep(const CalibrationFiles& files) override {
     if (files.toml == "unwritable") throw std::runtime_error("cannot write /state/x: disk full");
     files_.push_back(files);
     files_.back().number = files_.size() - 1;
     current_ = files_.back().number;
+    return current_;
   }
   std::vector<StoredCalibration> list() override {
     std::vector<StoredCalibration> all;
@@ -55,6 +56,7 @@ class FakeStore : public CalibrationStore {
     if (at(number).toml == "unwritable") throw std::runtime_error("cannot write /state: disk full");
     current_ = number;
   }
+  [[nodiscard]] std::optional<std::uint64_t> current_number() const override { return current_; }
   CalibrationFiles read(std::optional<std::uint64_t> number) override {
     return at(number.value_or(current_));
   }
@@ -75,7 +77,7 @@ class FakeStore : public CalibrationStore {
 /// A server on a free loopback port with a fake pipeline, running on a thread of its own.
 class Rig {
  public:
-  explicit Rig(NetConfig config = {}, std::function<void(FakePort&)> prepare = {}) {
+  explicit Rig(NetConfig config = {}, const std::function<void(FakePort&)>& prepare = {}) {
     if (prepare) prepare(port);
     config.port = 0;
     config.program = "dtactd 9.8.7";
@@ -84,7 +86,7 @@ class Rig {
       const std::lock_guard lock(mutex_);
       log_ += text + "\n";
     };
-    server_.emplace(io_, config, port, store);
+    server_ = std::make_unique<Server>(io_, config, port, store);
     thread_ = std::thread([this] { io_.run(); });
   }
   ~Rig() { stop(); }
@@ -119,7 +121,7 @@ class Rig {
   std::mutex mutex_;
   std::string log_;
   boost::asio::io_context io_;
-  std::optional<Server> server_;
+  std::unique_ptr<Server> server_;
   std::thread thread_;
 };
 

@@ -79,6 +79,8 @@ TEST(Golden, Replies) {
   EXPECT_EQ(m.SerializeAsString(), bytes("0a 09 08 09 12 05 08 05 12 01 6d"));
   m.mutable_reply()->mutable_done();
   EXPECT_EQ(m.SerializeAsString(), bytes("0a 04 08 09 22 00"));
+  m.mutable_reply()->mutable_done()->set_calibration(3);
+  EXPECT_EQ(m.SerializeAsString(), bytes("0a 06 08 09 22 02 08 03"));
   m.mutable_reply()->mutable_light()->set_brightness(7);
   EXPECT_EQ(m.SerializeAsString(), bytes("0a 06 08 09 2a 02 08 07"));
   m.mutable_reply()->mutable_status()->set_state(STATE_SERVING);
@@ -107,6 +109,10 @@ TEST(Golden, Calibrations) {
   stored.set_damage("d");
   EXPECT_EQ(m.SerializeAsString(),
             bytes("0a 13 08 09 42 0f 0a 0d 08 03 12 01 6e 1a 01 74 20 01 32 01 64"));
+  stored.set_in_use(false);  // set to false is not the same as unset
+  EXPECT_EQ(m.SerializeAsString(),
+            bytes("0a 15 08 09 42 11 0a 0f 08 03 12 01 6e 1a 01 74 20 01 32 01 64 38 00"));
+  stored.clear_in_use();
   auto& summary = *stored.mutable_summary();  // in the place of the damage
   summary.set_name("n");
   summary.set_method("l");
