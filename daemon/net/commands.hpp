@@ -58,10 +58,17 @@ class Commands : public std::enable_shared_from_this<Commands> {
   };
   using Who = std::pair<std::shared_ptr<Session>, std::uint64_t>;
 
+  static constexpr const char* kBusy = "too many commands wait: ask again in a moment";
+
   void subscribe(const Who& who, const v1::Subscribe& request);
   void set_light(const Who& who, const v1::SetLight& request);
   void rezero(const Who& who, bool force);
   void get_status(const Who& who);
+  /// False, with the answer sent, when the pipeline cannot take another command.
+  [[nodiscard]] bool submit(const Who& who, decltype(pipeline::Command::what) command,
+                            decltype(Pending::what) what);
+
+  // calibration_commands.cpp
   void get_calibration(const Who& who, const v1::GetCalibration& request);
   void list_calibrations(const Who& who);
   void upload_calibration(const Who& who, const v1::UploadCalibration& request);
@@ -69,9 +76,6 @@ class Commands : public std::enable_shared_from_this<Commands> {
   /// Reads and checks on the worker; then the pipeline uses it, then keep_calibration().
   void change_calibration(const Who& who, CalibrationChange change);
   void keep_calibration(const Pending& pending, const CalibrationChange& change);
-  /// False, with the answer sent, when the pipeline cannot take another command.
-  [[nodiscard]] bool submit(const Who& who, decltype(pipeline::Command::what) command,
-                            decltype(Pending::what) what);
   /// Runs `work` on the worker and then `done`(its result) here.
   template <typename Work, typename Done>
   void on_worker(Work work, Done done);

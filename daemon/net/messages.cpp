@@ -232,4 +232,10 @@ bool fill(const pipeline::Event& event, v1::Event& out) {
   return true;
 }
 
+v1::ServerMessage reply_to(std::uint64_t id) {
+  v1::ServerMessage message;
+  message.mutable_reply()->set_id(id);
+  return message;
+}
+
 }  // namespace dtact::net

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "daemon/net/calibration_store.hpp"
 #include "daemon/pipeline/port.hpp"
 
@@ -9,6 +11,7 @@ class Contact;
 class Event;
 class Frame;
 class LightState;
+class ServerMessage;
 class StagePercentiles;
 class Status;
 class StoredCalibration;
@@ -28,5 +31,8 @@ void fill(const StoredCalibration& stored, v1::StoredCalibration& out);
 void fill(const pipeline::StageStatistics& stage, v1::StagePercentiles& out);
 /// False for CommandDone, which is an answer to one client and not an event.
 [[nodiscard]] bool fill(const pipeline::Event& event, v1::Event& out);
+
+/// An answer to the request `id`, to be filled.
+[[nodiscard]] v1::ServerMessage reply_to(std::uint64_t id);
 
 }  // namespace dtact::net

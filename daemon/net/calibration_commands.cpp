@@ -1,0 +1,216 @@
+// The commands that read, list and change calibrations: their files take longer than a frame, so
+// the worker reads and writes them.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/post.hpp>
+#include <exception>
+#include <utility>
+
+#include "daemon/net/commands.hpp"
+#include "daemon/net/hub.hpp"
+#include "daemon/net/messages.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::net {
+namespace {
+
+namespace asio = boost::asio;
+
+/// Requests to read calibrations that may wait for the worker at the same time.
+constexpr int kMaxReading = 16;
+
+constexpr const char* kChanging =
+    "another calibration is being uploaded or activated: ask again in a moment";
+
+bool valid_name(const std::string& name) {
+  return !name.empty() && name.size() <= wire::kMaxCalibrationName &&
+         std::all_of(name.begin(), name.end(), [](char c) {
+           return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+                  c == '-' || c == '_';
+         });
+}
+
+/// What a step on the worker came to: a value, or an error and the sentence that says why not.
+template <typename Value>
+struct Outcome {
+  Value value{};
+  v1::ErrorCode code = v1::ERROR_NONE;
+  std::string error;
+  [[nodiscard]] bool failed() const noexcept { return code != v1::ERROR_NONE; }
+};
+
+/// `failure`: the code when `step` throws something else than NoSuchCalibration.
+template <typename Value, typename Step>
+Outcome<Value> attempt(v1::ErrorCode failure, const Step& step) {
+  try {
+    return {step(), v1::ERROR_NONE, {}};
+  } catch (const NoSuchCalibration& e) {
+    return {{}, v1::ERROR_INVALID, e.what()};
+  } catch (const std::exception& e) {
+    return {{}, failure, e.what()};
+  }
+}
+
+}  // namespace
+
+template <typename Work, typename Done>
+void Commands::on_worker(Work work, Done done) {
+  // The guard keeps the network thread's loop alive until the result has come back.
+  asio::post(worker_, [guard = asio::make_work_guard(io_), weak = weak_from_this(),
+                       work = std::move(work), done = std::move(done)]() mutable {
+    asio::post(guard.get_executor(),
+               [weak = std::move(weak), done = std::move(done), result = work()]() mutable {
+                 if (const auto self = weak.lock()) done(*self, std::move(result));
+               });
+  });
+}
+
+void Commands::get_calibration(const Who& who, const v1::GetCalibration& request) {
+  std::optional<std::uint64_t> number;
+  if (request.has_number()) number = request.number();
+  if (!number && port_.status().calibration == nullptr) {
+    return who.first->reply_error(who.second, v1::ERROR_UNCALIBRATED,
+                                  "there is no calibration: make one with dtactctl calibrate "
+                                  "depth and send it with dtactctl calibration upload, or take one "
+                                  "that dtactctl calibration list shows");
+  }
+  if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+  ++reading_;
+  on_worker(
+      [&store = store_, number] {
+        return attempt<CalibrationFiles>(v1::ERROR_STORAGE, [&] { return store.read(number); });
+      },
+      [who](Commands& self, Outcome<CalibrationFiles> read) {
+        --self.reading_;
+        const auto& [session, id] = who;
+        if (read.failed()) {
+          return session->reply_error(id, read.code, read.error);
+        }
+        auto message = reply_to(id);
+        auto& files = *message.mutable_reply()->mutable_calibration();
+        files.set_number(read.value.number);
+        files.set_name(std::move(read.value.name));
+        files.set_calibration_toml(std::move(read.value.toml));
+        files.set_reference_png(std::move(read.value.png));
+        session->send(message);
+      });
+}
+
+void Commands::list_calibrations(const Who& who) {
+  if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+  ++reading_;
+  using List = std::vector<StoredCalibration>;
+  on_worker(
+      [&store = store_] {
+        return attempt<List>(v1::ERROR_STORAGE, [&store] { return store.list(); });
+      },
+      [who](Commands& self, const Outcome<List>& list) {
+        --self.reading_;
+        const auto& [session, id] = who;
+        if (list.failed()) {
+          return session->reply_error(id, list.code, list.error);
+        }
+        auto message = reply_to(id);
+        auto& calibrations = *message.mutable_reply()->mutable_calibrations();
+        const bool calibrated = self.port_.status().calibration != nullptr;
+        for (const auto& stored : list.value) {
+          auto& out = *calibrations.add_calibrations();
+          fill(stored, out);
+          out.set_in_use(calibrated && stored.number == self.in_use_);
+        }
+        session->send(message);
+      });
+}
+
+void Commands::upload_calibration(const Who& who, const v1::UploadCalibration& request) {
+  const auto& [session, id] = who;
+  if (!valid_name(request.name())) {
+    return session->reply_error(
+        id, v1::ERROR_INVALID,
+        fmt::format("upload_calibration.name: \"{}\"; allowed are 1 to {} letters, digits, '-' "
+                    "and '_'",
+                    request.name().substr(0, wire::kMaxCalibrationName),
+                    wire::kMaxCalibrationName));
+  }
+  if (request.calibration_toml().empty() || request.reference_png().empty()) {
+    return session->reply_error(id, v1::ERROR_INVALID,
+                                "upload_calibration: calibration_toml or reference_png is empty: "
+                                "send both files of the calibration folder");
+  }
+  if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
+  auto files = std::make_shared<const CalibrationFiles>(CalibrationFiles{
+      .name = request.name(), .toml = request.calibration_toml(), .png = request.reference_png()});
+  change_calibration(who, {std::move(files), 0, {}});
+}
+
+void Commands::activate_calibration(const Who& who, const v1::ActivateCalibration& request) {
+  const auto& [session, id] = who;
+  if (!request.has_number()) {
+    return session->reply_error(id, v1::ERROR_INVALID,
+                                "activate_calibration.number is not set: dtactctl calibration list "
+                                "shows the numbers there are");
+  }
+  if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
+  change_calibration(who, {nullptr, request.number(), {}});
+}
+
+void Commands::change_calibration(const Who& who, CalibrationChange change) {
+  changing_ = true;
+  using Loaded = std::shared_ptr<const calibration::Calibration>;
+  on_worker(
+      [&store = store_, change] {
+        return attempt<Loaded>(v1::ERROR_INVALID, [&] {
+          return change.upload != nullptr ? store.check(*change.upload) : store.load(change.number);
+        });
+      },
+      [who, change](Commands& self, Outcome<Loaded> loaded) mutable {
+        if (loaded.failed()) {
+          self.changing_ = false;
+          return who.first->reply_error(who.second, loaded.code, loaded.error);
+        }
+        change.name = loaded.value->name;
+        self.changing_ =
+            self.submit(who, pipeline::UseCalibration{std::move(loaded.value)}, std::move(change));
+      });
+}
+
+void Commands::keep_calibration(const Pending& pending, const CalibrationChange& change) {
+  v1::ServerMessage event;
+  event.mutable_event()->mutable_calibration()->set_name(change.name);
+  hub_.broadcast(event);
+  config_.log(LogLevel::info, fmt::format("calibration {} is in use", change.name));
+  in_use_.reset();
+  if (change.upload == nullptr) in_use_ = change.number;
+  // It is kept only now that the pipeline has taken it, so that a calibration that does not fit
+  // this camera never replaces one that does.
+  on_worker(
+      [&store = store_, change] {
+        return attempt<std::uint64_t>(v1::ERROR_STORAGE, [&] {
+          if (change.upload != nullptr) return store.keep(*change.upload);
+          store.make_current(change.number);
+          return change.number;
+        });
+      },
+      [weak = pending.session, id = pending.id, uploaded = change.upload != nullptr](
+          Commands& self, const Outcome<std::uint64_t>& kept) {
+        self.changing_ = false;
+        if (!kept.failed()) self.in_use_ = kept.value;
+        const auto session = weak.lock();
+        if (session == nullptr) return;
+        if (kept.failed()) {
+          // Whatever failed: it was checked and is in use, so the request itself was a valid one.
+          return session->reply_error(id, v1::ERROR_STORAGE,
+                                      "the calibration is in use, but the daemon will start with "
+                                      "the one before, since the change could not be written: " +
+                                          kept.error);
+        }
+        auto message = reply_to(id);
+        auto& done = *message.mutable_reply()->mutable_done();
+        if (uploaded) done.set_calibration(kept.value);
+        session->send(message);
+      });
+}
+
+}  // namespace dtact::net
