@@ -46,4 +46,7 @@ struct Model {
   std::vector<std::uint8_t> untrusted;
 };
 
+/// Throws std::invalid_argument, naming the part, where the parts do not fit each other.
+void check(const Model& model);
+
 }  // namespace dtact::recon

@@ -1,0 +1,104 @@
+#pragma once
+
+// Inside of the reconstructor: reconstructor.cpp and reconstructor_rows.cpp only.
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "daemon/recon/kernels.hpp"
+#include "daemon/recon/reconstructor.hpp"
+#include "daemon/recon/smoother.hpp"
+#include "daemon/recon/tiles.hpp"
+#include "daemon/recon/vector_kernels.hpp"
+
+namespace dtact::recon {
+
+/// Pairs of rows that a step works on before the next step: one row of tiles.
+inline constexpr int kStrip = Smoother::kStrip;
+static_assert(2 * kStrip == TileGrid::kRows);
+inline constexpr int kMaxDecimation = 4;
+
+/// Splits the time of a run into steps. Reads no clock when nobody asks.
+class Stopwatch {
+ public:
+  explicit Stopwatch(bool on) : on_(on), last_(on ? Clock::now() : Clock::time_point{}) {}
+  /// The time since the last call.
+  std::int64_t lap() noexcept {
+    if (!on_) return 0;
+    const auto now = Clock::now();
+    return std::chrono::nanoseconds(now - std::exchange(last_, now)).count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  bool on_;
+  Clock::time_point last_;
+};
+
+struct Reconstructor::Impl {
+  Impl(std::shared_ptr<const Model> the_model, const ActivitySettings& settings);
+
+  /// Where row y begins in the planes below, whose rows are whole blocks.
+  [[nodiscard]] std::size_t at(int y) const noexcept {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(vec::padded(grid.width));
+  }
+  /// Where row y begins in a depth map.
+  [[nodiscard]] std::ptrdiff_t packed(int y) const noexcept {
+    return std::ptrdiff_t{y} * grid.width;
+  }
+  void rectify_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+  void smooth_reference(std::span<std::int16_t> smoothed) noexcept;
+  void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+  void set_light(double factor) noexcept;
+  void run_list(const std::uint8_t* luma, const TileRows& tiles, std::int16_t* depth,
+                StepTimes& times, Stopwatch& watch) noexcept;
+  void clear_rest(const TileRows& tiles, DrawnTiles& drawn, std::int16_t* depth) const noexcept;
+  void run_published(const std::uint8_t* luma, std::int16_t* depth, StepTimes& times,
+                     Stopwatch& watch) noexcept;
+
+  std::shared_ptr<const Model> model;
+  TileGrid grid;
+  TileRows all_tiles;
+  RectifyPlan plan;
+  Smoother smoother;
+  Smoother second;  ///< The second filter of the published method.
+  Activity activity;
+  RowBuffer in;                    ///< A strip before smoothing.
+  RowBuffer fine;                  ///< The rows of one row of a coarse map.
+  std::vector<std::int16_t> zero;  ///< As long as one of them.
+  RowBuffer between;
+  RowBuffer out;                     ///< A strip after smoothing.
+  std::vector<std::int16_t> lookup;  ///< The list as the kernel reads it.
+  kernels::LookUp list;
+  std::vector<std::int16_t> calibration_q6;  ///< Smoothed reference of the calibration.
+  // The reference as it was taken and its gain, 0 where untrusted; and both in the present light.
+  std::vector<std::int16_t> taken_q6;
+  std::vector<std::int16_t> taken_gain_q12;
+  std::vector<std::int16_t> reference_q6;
+  std::vector<std::int16_t> gain_q12;
+  std::vector<std::uint8_t> untrusted;
+  std::uint64_t rest = 0;  ///< Counts the references: each has its own untouched map.
+  int beyond = 0;
+
+ private:
+  /// The table's row `y` of fine pixels.
+  [[nodiscard]] const RectifyTable::Entry* entries(int y) const noexcept {
+    return model->rectify.entries.data() + std::ptrdiff_t{y} * model->rectify.fine_width();
+  }
+  /// The map's pixels [x0, x1) of row `y` before smoothing.
+  void rectify(const std::uint8_t* luma, int y, int x0, int x1, std::int16_t* row) noexcept;
+  /// Fetches what the last step on a row of tiles reads and writes. Whole maps are fetched by the
+  /// processor itself; the short rows of a few tiles are not (5 % of a small press's time).
+  void prefetch(const TileRows& tiles, int row, const std::int16_t* depth) const noexcept;
+  /// The tiles whose depth needs any row of the pairs [begin, end).
+  [[nodiscard]] std::uint64_t readers(const TileRows& tiles, int begin, int end) const noexcept;
+  void rectify_pair(const std::uint8_t* luma, int pair, std::uint64_t tiles, int slot) noexcept;
+  void push_pair(int pair, std::uint64_t tiles, int slot) noexcept;
+  void clear(std::uint64_t tiles, int row, std::int16_t* depth) const noexcept;
+};
+
+}  // namespace dtact::recon

@@ -1,0 +1,176 @@
+// What is done to the rows of a frame: rectified, smoothed and looked up, strip by strip.
+#include <algorithm>
+#include <array>
+
+#include "daemon/recon/reconstructor_impl.hpp"
+
+namespace dtact::recon {
+
+void Reconstructor::Impl::prefetch(const TileRows& tiles, int row,
+                                   const std::int16_t* depth) const noexcept {
+  constexpr int kForWriting = 1;
+  constexpr int kToL2 = 2;
+  const int end = std::min((row + 1) * TileGrid::kRows, grid.height);
+  for_each_run(tiles[static_cast<std::size_t>(row)], [&](int first, int last) {
+    last = std::min(last * grid.blocks_per_tile, grid.blocks());
+    for (int y = row * TileGrid::kRows; y < end; ++y) {
+      for (int block = first * grid.blocks_per_tile; block < last; ++block) {
+        const std::size_t x = static_cast<std::size_t>(block) * vec::kBlock;
+        __builtin_prefetch(gain_q12.data() + at(y) + x, 0, kToL2);
+        __builtin_prefetch(depth + packed(y) + x, kForWriting, kToL2);
+      }
+    }
+  });
+}
+
+std::uint64_t Reconstructor::Impl::readers(const TileRows& tiles, int begin,
+                                           int end) const noexcept {
+  const int first = std::max(0, begin - smoother.reach()) / kStrip;
+  const int last = std::min(smoother.pairs() - 1, end - 1 + smoother.reach()) / kStrip;
+  std::uint64_t any = 0;
+  for (int row = first; row <= last; ++row) any |= tiles[static_cast<std::size_t>(row)];
+  return any;
+}
+
+void Reconstructor::Impl::rectify(const std::uint8_t* luma, int y, int x0, int x1,
+                                  std::int16_t* row) noexcept {
+  const RectifyTable& table = model->rectify;
+  const int decimation = table.decimation;
+  const int first = x0 * decimation / RectifyPlan::kGroup;
+  const int last = std::min((x1 * decimation + RectifyPlan::kGroup - 1) / RectifyPlan::kGroup,
+                            plan.blocks() * RectifyPlan::kGroups);
+  if (decimation == 1) {
+    vec::rectify_difference(plan, y, first, last, luma, entries(y), table.fine_width(),
+                            reference_q6.data() + at(y), row);
+    return;
+  }
+  std::array<const std::int16_t*, kMaxDecimation> rows{};
+  for (int k = 0; k < decimation; ++k) {
+    const int fine_y = y * decimation + k;
+    vec::rectify_difference(plan, fine_y, first, last, luma, entries(fine_y), table.fine_width(),
+                            zero.data(), fine.row(k));
+    rows[static_cast<std::size_t>(k)] = fine.row(k) + std::ptrdiff_t{x0} * decimation;
+  }
+  kernels::average_difference_row(rows.data(), decimation, reference_q6.data() + at(y) + x0,
+                                  std::min(x1, grid.width) - x0, row + x0);
+}
+
+void Reconstructor::Impl::rectify_pair(const std::uint8_t* luma, int pair, std::uint64_t tiles,
+                                       int slot) noexcept {
+  for (int i = 0; i < std::min(2, grid.height - 2 * pair); ++i) {
+    for_each_run(tiles, [&](int first, int last) {
+      rectify(luma, 2 * pair + i, std::max(0, first * grid.tile_width() - smoother.radius()),
+              last * grid.tile_width() + smoother.radius(), in.row(2 * slot + i));
+    });
+  }
+}
+
+void Reconstructor::Impl::push_pair(int pair, std::uint64_t tiles, int slot) noexcept {
+  for_each_run(tiles, [&](int first, int last) {
+    smoother.push(pair, in.row(2 * slot), in.row(2 * slot + 1), first * grid.blocks_per_tile,
+                  std::min(last * grid.blocks_per_tile, grid.blocks()));
+  });
+}
+
+void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& tiles,
+                                   std::int16_t* depth, StepTimes& times,
+                                   Stopwatch& watch) noexcept {
+  int pushed = 0;
+  for (int row = 0; row < grid.rows(); ++row) {
+    const int begin = row * kStrip;
+    const int end = std::min(begin + kStrip, smoother.pairs());
+    const int needed = std::min(end + smoother.reach(), smoother.pairs());
+    prefetch(tiles, row, depth);
+    while (pushed < needed) {
+      const int strip = pushed;
+      const int strip_end = std::min(strip + kStrip, needed);
+      pushed = strip_end;
+      if (readers(tiles, strip, strip_end) == 0) continue;
+      for (int pair = strip; pair < strip_end; ++pair) {
+        rectify_pair(luma, pair, readers(tiles, pair, pair + 1), pair - strip);
+      }
+      times.rectify_ns += watch.lap();
+      for (int pair = strip; pair < strip_end; ++pair) {
+        push_pair(pair, readers(tiles, pair, pair + 1), pair - strip);
+      }
+      times.smooth_ns += watch.lap();
+    }
+    for_each_run(tiles[static_cast<std::size_t>(row)], [&](int first, int last) {
+      first *= grid.blocks_per_tile;
+      last = std::min(last * grid.blocks_per_tile, grid.blocks());
+      for (int pair = begin; pair < end; ++pair) {
+        const int slot = 2 * (pair - begin);
+        smoother.take(pair, out.row(slot), out.row(slot + 1), first, last);
+      }
+      times.smooth_ns += watch.lap();
+      const int x = first * vec::kBlock;
+      const int columns = std::min(last * vec::kBlock, grid.width) - x;
+      const int y = 2 * begin;
+      const std::size_t here = at(y) + static_cast<std::size_t>(x);
+      beyond += vec::gain_list_mask(
+          {out.row(0) + x, out.stride(), gain_q12.data() + here, vec::padded(grid.width),
+           depth + packed(y) + x, grid.width, columns, std::min(2 * end, grid.height) - y},
+          list);
+      times.list_ns += watch.lap();
+    });
+  }
+}
+
+void Reconstructor::Impl::run_published(const std::uint8_t* luma, std::int16_t* depth,
+                                        StepTimes& times, Stopwatch& watch) noexcept {
+  const int blocks = grid.blocks();
+  const int pairs = smoother.pairs();
+  const int reach = smoother.reach();
+  int pushed = 0;
+  int passed_on = 0;
+  for (int pair = 0; pair < pairs; ++pair) {
+    for (; pushed < std::min(pairs, pair + 2 * reach + 1); ++pushed) {
+      rectify_pair(luma, pushed, grid.all(), 0);
+      times.rectify_ns += watch.lap();
+      beyond += vec::gain_list_mask({in.row(0), in.stride(), nullptr, 0, in.row(0), in.stride(),
+                                     grid.width, std::min(2, grid.height - 2 * pushed)},
+                                    list);
+      times.list_ns += watch.lap();
+      smoother.push(pushed, in.row(0), in.row(1), 0, blocks);
+    }
+    for (; passed_on < std::min(pairs, pair + reach + 1); ++passed_on) {
+      smoother.take(passed_on, between.row(0), between.row(1), 0, blocks);
+      second.push(passed_on, between.row(0), between.row(1), 0, blocks);
+    }
+    second.take(pair, out.row(0), out.row(1), 0, blocks);
+    for (int y = 2 * pair; y < std::min(2 * pair + 2, grid.height); ++y) {
+      std::copy_n(out.row(y - 2 * pair), grid.width, depth + packed(y));
+      kernels::mask_row(untrusted.data() + at(y), grid.width, depth + packed(y));
+    }
+    times.smooth_ns += watch.lap();
+  }
+}
+
+void Reconstructor::Impl::clear(std::uint64_t tiles, int row, std::int16_t* depth) const noexcept {
+  for_each_run(tiles, [&](int first, int last) {
+    const int x0 = first * grid.tile_width();
+    const int x1 = std::min(last * grid.tile_width(), grid.width);
+    for (int y = row * TileGrid::kRows; y < std::min((row + 1) * TileGrid::kRows, grid.height);
+         ++y) {
+      std::fill_n(depth + packed(y) + x0, x1 - x0, std::int16_t{0});
+      kernels::mask_row(untrusted.data() + at(y) + static_cast<std::size_t>(x0), x1 - x0,
+                        depth + packed(y) + x0);
+    }
+  });
+}
+
+void Reconstructor::Impl::clear_rest(const TileRows& tiles, DrawnTiles& drawn,
+                                     std::int16_t* depth) const noexcept {
+  if (drawn.rest != rest || drawn.tiles.size() != tiles.size()) {
+    drawn.tiles = all_tiles;
+    drawn.rest = rest;
+  }
+  for (int row = 0; row < grid.rows(); ++row) {
+    std::uint64_t& was = drawn.tiles[static_cast<std::size_t>(row)];
+    const std::uint64_t now = tiles[static_cast<std::size_t>(row)];
+    clear(was & ~now, row, depth);
+    was = now;
+  }
+}
+
+}  // namespace dtact::recon
