@@ -46,18 +46,20 @@ class RowBlur {
   std::span<const float> row(const std::uint16_t* part, int stride, int width, int height, int y) {
     float* const line = line_.data() + reach_;
     std::fill(line, line + width, 0.0F);
-    for (int k = -reach_; k <= reach_; ++k) {
+    int k = -reach_;
+    for (const float tap : taps_) {
       const std::uint16_t* const from =
           part + std::ptrdiff_t{std::clamp(y + k, 0, height - 1)} * stride;
-      const float tap = taps_[static_cast<std::size_t>(k + reach_)];
       for (int x = 0; x < width; ++x) line[x] += tap * static_cast<float>(from[x]);
+      ++k;
     }
     std::fill(line - reach_, line, line[0]);
     std::fill(line + width, line + width + reach_, line[width - 1]);
     std::ranges::fill(out_, 0.0F);
-    for (int k = -reach_; k <= reach_; ++k) {
-      const float tap = taps_[static_cast<std::size_t>(k + reach_)];
-      for (int x = 0; x < width; ++x) out_[static_cast<std::size_t>(x)] += tap * line[x + k];
+    const float* from = line_.data();
+    for (const float tap : taps_) {
+      for (std::size_t x = 0; x < out_.size(); ++x) out_[x] += tap * from[x];
+      ++from;
     }
     return out_;
   }
@@ -108,7 +110,8 @@ struct Patch {
   std::vector<float> correlation = std::vector<float>(std::size_t{kSide} * kSide);
 
   [[nodiscard]] float at(int dx, int dy) const {
-    return correlation[static_cast<std::size_t>((dy + kReach) * kSide + dx + kReach)];
+    return correlation[static_cast<std::size_t>(dy + kReach) * kSide +
+                       static_cast<std::size_t>(dx + kReach)];
   }
 };
 
@@ -148,7 +151,8 @@ std::optional<LayerMarks::Move> one_sided(const std::vector<Patch>& patches) {
   double most = 0;
   double best_apart = 0;
   for (int step = 0; step <= 2 * kTurns; ++step) {  // 0, 1, −1, 2, …: of equals the least turn
-    const double turn_deg = (step % 2 == 0 ? -1 : 1) * ((step + 1) / 2) * kTurnStepDeg;
+    const int turns = (step + 1) / 2;
+    const double turn_deg = (step % 2 == 0 ? -turns : turns) * kTurnStepDeg;
     for (int y = -kReach; y <= kReach; ++y) {
       for (int x = -kReach; x <= kReach; ++x) {
         double apart = 0;

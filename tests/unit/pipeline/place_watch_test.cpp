@@ -15,6 +15,10 @@ namespace {
 constexpr int kFrames = 16;
 constexpr CellRegion kAll{};
 
+std::size_t at(int x, int y) {
+  return static_cast<std::size_t>(y) * fakes::kToyWidth + static_cast<std::size_t>(x);
+}
+
 /// Coarse enough marks that eight bits show them, two levels high.
 double toy_mark(int x, int y) {
   const auto hash = [](int u, int v) {
@@ -31,7 +35,7 @@ std::shared_ptr<const calibration::Calibration> calibrated() {
   auto model = std::make_shared<recon::Model>(*made->model);
   for (int y = 0; y < fakes::kToyHeight; ++y) {
     for (int x = 0; x < fakes::kToyWidth; ++x) {
-      auto& q8 = model->reference_q8[static_cast<std::size_t>(y * fakes::kToyWidth + x)];
+      auto& q8 = model->reference_q8[at(x, y)];
       q8 = static_cast<std::uint16_t>(std::lround(q8 + 256 * toy_mark(x, y)));
     }
   }
@@ -49,7 +53,7 @@ class PlaceWatchTest : public ::testing::Test {
       fakes::ToyFrame frame({}, sequence++);
       for (int y = 0; y < fakes::kToyHeight; ++y) {
         for (int x = 0; x < fakes::kToyWidth; ++x) {
-          auto& pixel = frame.pixels[static_cast<std::size_t>(y * fakes::kToyWidth + x)];
+          auto& pixel = frame.pixels[at(x, y)];
           pixel = static_cast<std::uint8_t>(std::lround(pixel + toy_mark(x - dx, y)));
         }
       }

@@ -10,8 +10,10 @@ namespace {
 double mean_product(const Texture& texture, double apart_mm) {
   double sum = 0;
   int count = 0;
-  for (double y = -10; y < 10; y += 0.131) {
-    for (double x = -10; x < 10; x += 0.131) {
+  for (int row = 0; row < 150; ++row) {
+    for (int column = 0; column < 150; ++column) {
+      const double x = 0.131 * column - 10;
+      const double y = 0.131 * row - 10;
       sum += texture.at({x, y}) * texture.at({x + apart_mm, y});
       ++count;
     }
@@ -29,7 +31,8 @@ TEST(Texture, IsAsStrongAndAsWideAsAsked) {
 TEST(Texture, BelongsToItsPlaceAndHasNoSteps) {
   const Texture texture(0.01, 0.2);
   EXPECT_EQ(texture.at({1.234, -3.21}), Texture(0.01, 0.2).at({1.234, -3.21}));
-  for (double x = -1; x < 1; x += 0.01) {
+  for (int i = 0; i < 200; ++i) {
+    const double x = 0.01 * i - 1;
     EXPECT_NEAR(texture.at({x, 0.5}), texture.at({x + 1e-6, 0.5}), 1e-6);
   }
 }
