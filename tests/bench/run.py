@@ -86,7 +86,7 @@ def machine():
                     break
     except OSError:
         pass
-    return f"one core of {model} ({platform.machine()}, Linux {platform.release()})"
+    return f"one core of {model} ({platform.machine()}, Linux {platform.release().split('-')[0]})"
 
 
 def count_instructions(server, case):

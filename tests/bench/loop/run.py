@@ -32,7 +32,7 @@ def machine():
             if text.startswith(("model name", "Model")):
                 model = text.split(":", 1)[1].strip()
                 break
-    return f"{os.cpu_count()} CPUs, {model}, Linux {os.uname().release}"
+    return f"{os.cpu_count()} CPUs, {model}, Linux {os.uname().release.split('-')[0]}"
 
 
 def surroundings(programs, seconds):
