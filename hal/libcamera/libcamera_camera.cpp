@@ -96,9 +96,11 @@ class Search {
 live::Opener opener(const CameraConfig& config) {
   check_pixel_format(config.libcamera.pixel_format);
   return [config, lock = PhotometricLock(config.libcamera, config.fps),
-          search = Search(config.libcamera.device)]() mutable -> live::Opened {
+          search = Search(config.libcamera.device),
+          session = std::shared_ptr<Session>()]() mutable -> live::Opened {
     const std::shared_ptr<lc::Camera> camera = search();
-    const auto session = std::make_shared<Session>(camera, config, lock);
+    session.reset();  // the one before, which see
+    session = std::make_shared<Session>(camera, config, lock);
     return {session, camera->id(), session->pixel_format(), session->controls()};
   };
 }

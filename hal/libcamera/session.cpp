@@ -142,8 +142,10 @@ void Session::stop() noexcept {
   camera_->stop();
   camera_->requestCompleted.disconnect(this);
   camera_->disconnected.disconnect(this);
-  for (Slot& slot : slots_) slot.request.reset();
-  allocator_.reset();
+  if (!gone()) {
+    for (Slot& slot : slots_) slot.request.reset();
+    allocator_.reset();
+  }
   camera_->release();
 }
 
@@ -160,6 +162,11 @@ void Session::on_disconnected() {
   const std::lock_guard guard(mutex_);
   gone_ = true;
   changed_.notify_one();
+}
+
+bool Session::gone() noexcept {
+  const std::lock_guard guard(mutex_);
+  return gone_;
 }
 
 void Session::wait(std::int64_t deadline_ns) noexcept {

@@ -18,6 +18,10 @@ namespace dtact::hal::libcamera_backend {
 
 /// A camera that libcamera has given to us and that streams. Requests go round: completed, lent or
 /// decoded, queued again, never made anew.
+///
+/// When the camera was unplugged, libcamera's stop() returns at once, and its thread may still have
+/// a request before it that was queued just then: requests live on until the session ends. Keep the
+/// session until libcamera shows a camera again, which its thread does after that.
 class Session final : public live::Source {
  public:
   /// Configures the camera and starts it. Throws live::ModeError when it lacks the mode asked for,
@@ -51,6 +55,7 @@ class Session final : public live::Source {
   void start(const PhotometricLock& lock);
   void on_completed(libcamera::Request* request);
   void on_disconnected();
+  [[nodiscard]] bool gone() noexcept;
 
   std::shared_ptr<libcamera::Camera> camera_;
   std::unique_ptr<libcamera::CameraConfiguration> configuration_;
