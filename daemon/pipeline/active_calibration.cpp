@@ -16,23 +16,14 @@ namespace dtact::pipeline {
 namespace {
 
 CellRegion cells_within(const recon::RectifyTable& table) {
-  int left = table.frame_width;
-  int right = 0;
-  int top = table.frame_height;
-  int bottom = 0;
-  for (const auto& entry : table.entries) {
-    left = std::min<int>(left, entry.x);
-    right = std::max<int>(right, entry.x + 1);
-    top = std::min<int>(top, entry.y);
-    bottom = std::max<int>(bottom, entry.y + 1);
-  }
+  const recon::FrameRegion read = recon::region_read(table);
   const auto first = [](int pixel, int cells, int pixels) {
     return std::min(cells, (pixel * cells + pixels - 1) / pixels);
   };
-  CellRegion region{.x0 = first(left, kGridWidth, table.frame_width),
-                    .y0 = first(top, kGridHeight, table.frame_height),
-                    .x1 = (right + 1) * kGridWidth / table.frame_width,
-                    .y1 = (bottom + 1) * kGridHeight / table.frame_height};
+  CellRegion region{.x0 = first(read.x, kGridWidth, table.frame_width),
+                    .y0 = first(read.y, kGridHeight, table.frame_height),
+                    .x1 = (read.x + read.width) * kGridWidth / table.frame_width,
+                    .y1 = (read.y + read.height) * kGridHeight / table.frame_height};
   region.x1 = std::min(region.x1, kGridWidth);
   region.y1 = std::min(region.y1, kGridHeight);
   return region;

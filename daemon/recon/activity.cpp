@@ -28,21 +28,12 @@ Activity::Activity(const RectifyTable& table, int radius, const ActivitySettings
       frame_height_(table.frame_height),
       tiles_(static_cast<std::size_t>(grid_.rows()), grid_.all()) {
   if (frame_width_ < kCell || frame_height_ < kCell) return;
-  int right = 0;
-  int bottom = 0;
-  x_ = frame_width_;
-  y_ = frame_height_;
-  for (const RectifyTable::Entry& e : table.entries) {
-    x_ = std::min<int>(x_, e.x);
-    y_ = std::min<int>(y_, e.y);
-    right = std::max(right, e.x + 2);
-    bottom = std::max(bottom, e.y + 2);
-  }
-  columns_ = (right - x_ + kCell - 1) / kCell;
-  rows_ = (bottom - y_ + kCell - 1) / kCell;
+  const FrameRegion read = region_read(table);
+  columns_ = (read.width + kCell - 1) / kCell;
+  rows_ = (read.height + kCell - 1) / kCell;
   // Whole cells inside the frame if they fit; else the last ones overlap those before (x_of).
-  x_ = std::clamp(x_, 0, std::max(0, frame_width_ - columns_ * kCell));
-  y_ = std::clamp(y_, 0, std::max(0, frame_height_ - rows_ * kCell));
+  x_ = std::clamp(read.x, 0, std::max(0, frame_width_ - columns_ * kCell));
+  y_ = std::clamp(read.y, 0, std::max(0, frame_height_ - rows_ * kCell));
   stride_ = vec::padded_cells(columns_);
   const std::size_t cells = at(0, rows_);
   margin_ = static_cast<std::size_t>(stride_) + vec::kCellBlock;

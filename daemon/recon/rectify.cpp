@@ -33,4 +33,18 @@ RectifyTable make_crop_table(int frame_width, int frame_height, int crop_col, in
   return table;
 }
 
+FrameRegion region_read(const RectifyTable& table) noexcept {
+  int left = table.frame_width;
+  int right = 0;
+  int top = table.frame_height;
+  int bottom = 0;
+  for (const RectifyTable::Entry& entry : table.entries) {
+    left = std::min<int>(left, entry.x);
+    right = std::max(right, entry.x + 2);
+    top = std::min<int>(top, entry.y);
+    bottom = std::max(bottom, entry.y + 2);
+  }
+  return {left, top, right - left, bottom - top};
+}
+
 }  // namespace dtact::recon

@@ -42,4 +42,7 @@ struct FrameRegion {
 [[nodiscard]] RectifyTable make_crop_table(int frame_width, int frame_height, int crop_col,
                                            int crop_row, int width, int height);
 
+/// The smallest rectangle with every pixel that the table reads. The table has entries.
+[[nodiscard]] FrameRegion region_read(const RectifyTable& table) noexcept;
+
 }  // namespace dtact::recon

@@ -19,21 +19,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kCalibration = "calibration";
 
-/// The part of the frame that the map is read from.
-recon::FrameRegion region_of(const recon::RectifyTable& table) {
-  int left = table.frame_width;
-  int right = 0;
-  int top = table.frame_height;
-  int bottom = 0;
-  for (const auto& entry : table.entries) {
-    left = std::min<int>(left, entry.x);
-    right = std::max<int>(right, entry.x + 2);
-    top = std::min<int>(top, entry.y);
-    bottom = std::max<int>(bottom, entry.y + 2);
-  }
-  return {left, top, right - left, bottom - top};
-}
-
 }  // namespace
 
 Session::Session(Sensor& sensor, Console& console, Plan plan)
@@ -105,7 +90,7 @@ void Session::prepare_map(const client::Status& status) {
   image::Grey16 black{width, height, {}};
   black.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   empty_ = calibration::empty_calibration(black, map.crop, map.mm_per_px, map.lens);
-  grid_ = CellGrid(region_of(empty_.model->rectify));
+  grid_ = CellGrid(recon::region_read(empty_.model->rectify));
   cell_mm_ = grid_.cell_px() * (map.lens ? recon::central_mm_per_px(*map.lens) : map.mm_per_px);
   view_.use(empty_, {}, cell_mm_);
   capture_ = std::make_unique<Capture>(
