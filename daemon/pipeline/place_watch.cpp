@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cstdlib>
+#include <new>
 #include <utility>
 
 #include "daemon/pipeline/layer_marks.hpp"
@@ -10,19 +11,8 @@
 namespace dtact::pipeline {
 
 PlaceWatch::PlaceWatch(int width, int height, int frames)
-    : width_(width), average_(width, height, frames) {
+    : width_(width), average_(width, height, frames), thread_("dtact-place", [this] { judge(); }) {
   job_.image_q8.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-}
-
-void PlaceWatch::start() {
-  stop_ = false;
-  thread_ = base::RtThread({.name = "dtact-place", .cpu = {}}, [this] { run(); });
-}
-
-void PlaceWatch::stop() noexcept {
-  stop_ = true;
-  work_.ring();
-  thread_.join();
 }
 
 void PlaceWatch::use_calibration(std::shared_ptr<const calibration::Calibration> calibration,
@@ -39,7 +29,7 @@ void PlaceWatch::hurry() noexcept {
 }
 
 void PlaceWatch::look(const hal::LumaView& luma, bool untouched, std::int64_t now_ns) noexcept {
-  if (!calibration_ || now_ns < due_ns_ || full_.load(std::memory_order_acquire)) return;
+  if (!calibration_ || now_ns < due_ns_ || thread_.busy()) return;
   if (!untouched) {
     if (average_.added() > 0) average_.reset();
     return;
@@ -51,8 +41,7 @@ void PlaceWatch::look(const hal::LumaView& luma, bool untouched, std::int64_t no
   job_.region = region_;
   job_.epoch = epoch_;
   due_ns_ = now_ns + kPauseNs;
-  full_.store(true, std::memory_order_release);
-  work_.ring();
+  thread_.hand_over();
 }
 
 std::string PlaceWatch::message() const {
@@ -60,22 +49,16 @@ std::string PlaceWatch::message() const {
   return message_;
 }
 
-void PlaceWatch::settle() const noexcept { full_.wait(true, std::memory_order_acquire); }
-
-void PlaceWatch::run() {
-  for (;;) {
-    work_.wait();
-    if (full_.load(std::memory_order_acquire)) {
-      judge();
-      job_.calibration.reset();
-      full_.store(false, std::memory_order_release);
-      full_.notify_all();
-    }
-    if (stop_) return;
+void PlaceWatch::judge() {
+  try {
+    compare();
+  } catch (const std::bad_alloc&) {
+    moved_.store(0, std::memory_order_release);  // nothing is known; it looks again after the pause
   }
+  job_.calibration.reset();
 }
 
-void PlaceWatch::judge() {
+void PlaceWatch::compare() {
   const recon::RectifyTable& table = job_.calibration->model->rectify;
   const int x = cell_edge(job_.region.x0, kGridWidth, table.frame_width);
   const int y = cell_edge(job_.region.y0, kGridHeight, table.frame_height);

@@ -8,10 +8,9 @@
 #include <vector>
 
 #include "daemon/calibration/calibration.hpp"
-#include "daemon/pipeline/doorbell.hpp"
 #include "daemon/pipeline/luma_grid.hpp"
 #include "daemon/pipeline/reference_average.hpp"
-#include "hal/base/rt_thread.hpp"
+#include "daemon/pipeline/side_thread.hpp"
 #include "hal/frame.hpp"
 
 namespace dtact::pipeline {
@@ -24,12 +23,9 @@ class PlaceWatch {
  public:
   /// `frames`: so many are averaged, as for a reference.
   PlaceWatch(int width, int height, int frames);
-  PlaceWatch(const PlaceWatch&) = delete;
-  PlaceWatch& operator=(const PlaceWatch&) = delete;
-  ~PlaceWatch() { stop(); }
 
-  void start();
-  void stop() noexcept;
+  void start() { thread_.start(); }
+  void stop() noexcept { thread_.stop(); }
 
   // On the capture thread; neither waits nor allocates.
 
@@ -49,13 +45,13 @@ class PlaceWatch {
   /// How far the marks have moved; empty before anything was found to have moved.
   [[nodiscard]] std::string message() const;
   /// Waits until what was averaged so far has been judged.
-  void settle() const noexcept;
+  void settle() const noexcept { thread_.settle(); }
 
   static constexpr std::int64_t kPauseNs = 20'000'000'000;
 
  private:
-  void run();
   void judge();
+  void compare();
 
   int width_;
   ReferenceAverage average_;
@@ -70,14 +66,11 @@ class PlaceWatch {
     std::uint64_t epoch = 0;
     std::vector<std::uint16_t> image_q8;
   };
-  Job job_;  // belongs to the thread while full_, else to look()
-  std::atomic<bool> full_{false};
+  Job job_;                              // the thread's while it is busy, else look()'s
   std::atomic<std::uint64_t> moved_{0};  // epoch in which the camera was last found to have moved
-  std::atomic<bool> stop_{false};
-  Doorbell work_;
-  mutable std::mutex mutex_;  // of message_; never taken on the capture thread
+  mutable std::mutex mutex_;             // of message_; never taken on the capture thread
   std::string message_;
-  base::RtThread thread_;
+  SideThread thread_;  // last: it uses the others
 };
 
 }  // namespace dtact::pipeline

@@ -1,15 +1,13 @@
 #pragma once
 
-#include <atomic>
 #include <filesystem>
 #include <memory>
 #include <mutex>
 #include <span>
 #include <string>
 
-#include "daemon/pipeline/doorbell.hpp"
 #include "daemon/pipeline/reference_store.hpp"
-#include "hal/base/rt_thread.hpp"
+#include "daemon/pipeline/side_thread.hpp"
 
 namespace dtact::pipeline {
 
@@ -19,13 +17,10 @@ class ReferenceWriter {
  public:
   /// An empty folder keeps nothing.
   ReferenceWriter(int width, int height, std::filesystem::path folder);
-  ReferenceWriter(const ReferenceWriter&) = delete;
-  ReferenceWriter& operator=(const ReferenceWriter&) = delete;
-  ~ReferenceWriter() { stop(); }
 
-  void start();
+  void start() { thread_.start(); }
   /// Ends the thread after what it has been offered is written.
-  void stop() noexcept;
+  void stop() noexcept { thread_.stop(); }
 
   /// Capture thread: copies the reference (Q8, frame sized) for writing. False while busy. Neither
   /// waits nor allocates.
@@ -36,17 +31,15 @@ class ReferenceWriter {
   [[nodiscard]] std::string message() const;
 
  private:
-  void run();
+  void write();
 
   std::filesystem::path folder_;
+  // The thread's while it is busy, else offer()'s.
   StoredReference pending_;
   std::shared_ptr<const calibration::Calibration> calibration_;
-  std::atomic<bool> full_{false};  // pending_ belongs to the writer while true, else to offer()
-  std::atomic<bool> stop_{false};
-  Doorbell work_;
   mutable std::mutex mutex_;  // of message_; never taken on the capture thread
   std::string message_;
-  base::RtThread thread_;
+  SideThread thread_;  // last: it uses the others
 };
 
 }  // namespace dtact::pipeline
