@@ -122,8 +122,8 @@ struct Movement {
   double turn_rad = 0;
 };
 
-/// What the patches' correlations say for a movement and not for its opposite; 0 where it takes too
-/// many of them out of reach. `apart`: mean length of the patches' displacements.
+/// What the patches' correlations say for a movement and not for its opposite. `apart`: mean length
+/// of the patches' displacements; 0 where too many of them are out of reach.
 double excess(const std::vector<Patch>& patches, const Movement& movement, double& apart) {
   const double turned = std::cos(movement.turn_rad) - 1;
   const double sine = std::sin(movement.turn_rad);
@@ -138,7 +138,10 @@ double excess(const std::vector<Patch>& patches, const Movement& movement, doubl
     apart += std::hypot(dx, dy);
     ++within;
   }
-  if (2 * within < static_cast<int>(patches.size())) return 0;
+  if (2 * within < static_cast<int>(patches.size())) {
+    apart = 0;
+    return 0;
+  }
   apart /= within;
   // As uncertain as the sum over all of them is.
   return sum * std::sqrt(static_cast<double>(patches.size()) / within);
