@@ -151,15 +151,8 @@ TEST(Uncertainty, IsHonestOnEveryObject) {
 // The same with what a list from several presses states of itself.
 TEST(Uncertainty, IsHonestWithAListFromSeveralPresses) {
   const image::Grey16 reference = make_reference();
-  calibration::BallPresses set;
-  set.reference_q8 = reference;
-  for (const Shot& shot : make_calibration_presses()) {
-    set.presses.push_back({.name = shot.name, .frames = shot.frames, .depth_mm = {}});
-  }
-  set.ball_radius_mm = 4.0;
-  set.mm_per_px = kMmPerPx;
-  set.crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide};
-  const Ratios ratios = ratios_of(scripted_run(60, reference, calibration::build(set)));
+  const Ratios ratios =
+      ratios_of(scripted_run(60, reference, calibration::build(several_presses(reference))));
   EXPECT_GT(ratios.median, 0.5);
   EXPECT_LT(ratios.median, 1.3);
   EXPECT_LT(ratios.most_of_all, 1.7);

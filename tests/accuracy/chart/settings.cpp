@@ -11,7 +11,6 @@
 #include "daemon/calibration/contact.hpp"
 #include "daemon/calibration/difference.hpp"
 #include "daemon/calibration/list_fit.hpp"
-#include "daemon/calibration/press_set.hpp"
 #include "daemon/recon/decimate.hpp"
 
 namespace dtact::chart {
@@ -27,18 +26,6 @@ std::shared_ptr<const recon::Model> calibrate(const image::Grey16& reference, co
                              .crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide},
                              .method = method})
       .model;
-}
-
-calibration::BallPresses several(const image::Grey16& reference) {
-  calibration::BallPresses set;
-  set.reference_q8 = reference;
-  for (const Shot& shot : make_calibration_presses()) {
-    set.presses.push_back({.name = shot.name, .frames = shot.frames, .depth_mm = {}});
-  }
-  set.ball_radius_mm = 4.0;
-  set.mm_per_px = kMmPerPx;
-  set.crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide};
-  return set;
 }
 
 /// A map's value at a place between its pixels; none where one of the four is untrusted.
@@ -96,12 +83,24 @@ Setting sharpened(const recon::Model& model, const image::Grey16& reference, con
 
 }  // namespace
 
+calibration::BallPresses several_presses(const image::Grey16& reference) {
+  calibration::BallPresses set;
+  set.reference_q8 = reference;
+  for (const Shot& shot : make_calibration_presses()) {
+    set.presses.push_back({.name = shot.name, .frames = shot.frames, .depth_mm = {}});
+  }
+  set.ball_radius_mm = 4.0;
+  set.mm_per_px = kMmPerPx;
+  set.crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide};
+  return set;
+}
+
 std::vector<Setting> make_settings(const image::Grey16& reference) {
   const Shot calibration_press = make_calibration_press();
   std::vector<Setting> settings;
   settings.push_back({"published full", "published", 1, false, 0,
                       calibrate(reference, calibration_press, recon::Method::published)});
-  const calibration::BallPresses presses = several(reference);
+  const calibration::BallPresses presses = several_presses(reference);
   settings.push_back(
       {"regression full", "regression", 1, false, 0, calibration::build_regression(presses).model});
   const auto list = calibrate(reference, calibration_press, recon::Method::list);

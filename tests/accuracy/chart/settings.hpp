@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/calibration/press_set.hpp"
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "tests/accuracy/chart/scenes.hpp"
@@ -33,6 +34,9 @@ struct Error {
   double mean_absolute_mm = 0;  ///< Over judged, trusted pixels.
   double untrusted_share = 0;   ///< Of the judged pixels.
 };
+
+/// What a list of several presses is made from: the calibration presses of a 4 mm ball.
+[[nodiscard]] calibration::BallPresses several_presses(const image::Grey16& reference);
 
 /// Of one map at 1/decimation of the crop's resolution, against the truth at every pixel of the
 /// crop: a coarser map is read bilinearly.
