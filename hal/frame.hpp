@@ -42,7 +42,10 @@ enum FrameFlag : std::uint32_t {
   kFrameNormal = 0,
   kFrameAfterGap = 1U << 0U,  ///< Frames between this one and the one before were lost.
   /// A locked control of the camera has moved by itself: the brightness may have, too.
-  kFrameControlsMoved = 1U << 1U
+  kFrameControlsMoved = 1U << 1U,
+  /// The device was opened and its controls were set anew since the frame before: the brightness
+  /// may be another, however short it was away.
+  kFrameReopened = 1U << 2U
 };
 
 struct FrameInfo {

@@ -5,7 +5,8 @@
 namespace dtact::pipeline {
 
 bool CameraWatch::arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexcept {
-  const bool returned = std::exchange(away_, false);
+  const bool was_away = std::exchange(away_, false);
+  const bool returned = was_away || (info.flags & hal::kFrameReopened) != 0;
   // A camera that comes back may count from anywhere.
   const bool gap = have_sequence_ && !returned && info.sequence > sequence_ + 1;
   if (gap || (info.flags & hal::kFrameAfterGap) != 0) lose(now_ns);

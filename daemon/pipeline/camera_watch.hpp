@@ -13,7 +13,8 @@ class CameraWatch {
 
   /// Silence is counted from here.
   void started(std::int64_t now_ns) noexcept { last_ns_ = now_ns; }
-  /// A frame came. True when the camera had been away: what was known of its image is in doubt.
+  /// A frame came. True when the camera had been away or was opened anew (a stalled one is, without
+  /// ever having been away): what was known of its image is in doubt.
   bool arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexcept;
   /// grab() came back without one.
   void missed(hal::GrabStatus status, std::int64_t now_ns) noexcept;

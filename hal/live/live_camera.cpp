@@ -99,6 +99,7 @@ void LiveCamera::connect() {
   last_buffer_ns_ = 0;
   last_counted_.reset();
   after_gap_ = get(counters_.delivered) > 0;
+  reopened_ = after_gap_;
   const std::lock_guard guard(mutex_);
   info_.identity = std::move(opened.identity);
   info_.pixel_format = std::move(opened.pixel_format);

@@ -87,6 +87,7 @@ class LiveCamera : public Camera, private FrameOwner {
   std::uint64_t sequence_ = 0;                 // of the last buffer, never going back
   std::optional<std::uint32_t> last_counted_;  // the driver's count of the last buffer
   bool after_gap_ = false;
+  bool reopened_ = false;
 
   // Shared. The mutex is held for copies only, never during a system call.
   mutable std::mutex mutex_;

@@ -101,6 +101,7 @@ PayloadStatus LiveCamera::deliver(const Filled& filled, std::uint64_t sequence, 
 
 std::uint32_t LiveCamera::take_flags() noexcept {
   std::uint32_t flags = std::exchange(after_gap_, false) ? kFrameAfterGap : kFrameNormal;
+  if (std::exchange(reopened_, false)) flags |= kFrameReopened;
   if (controls_moved_.load(std::memory_order_relaxed)) flags |= kFrameControlsMoved;
   return flags;
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <deque>
 #include <memory>
+#include <utility>
 
 #include "hal/base/clock.hpp"
 #include "hal/live/device_error.hpp"
@@ -146,6 +147,29 @@ TEST(LiveCamera, SilenceIsAStallAndIsRestarted) {
   }
   EXPECT_TRUE(rig.source->stopped);
   EXPECT_NE(status, GrabStatus::ok);
+}
+
+TEST(LiveCamera, TheFirstFrameAfterARestartSaysSo) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().flags, kFrameNormal);
+  const std::shared_ptr<LendingSource> stalled =
+      std::exchange(rig.source, std::make_shared<LendingSource>());
+  rig.source->fill(1, 60);
+  rig.source->fill(2, 70);
+  GrabStatus status = GrabStatus::timeout;
+  for (int i = 0; i < 1000 && status == GrabStatus::timeout; ++i) {
+    status = rig.camera.grab(frame, milliseconds(20));
+  }
+  ASSERT_EQ(status, GrabStatus::ok) << "it was never unplugged";
+  EXPECT_TRUE(stalled->stopped);
+  EXPECT_EQ(frame.info().flags, kFrameAfterGap | kFrameReopened);
+  rig.source->fill(1, 60);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().flags, kFrameNormal);
 }
 
 TEST(LiveCamera, RefusesImpossibleRates) {

@@ -277,7 +277,7 @@ TEST_P(StreamFails, CountsAsUnplugAndComesBack) {
   device.deliver_grey(2, 0);
   ASSERT_EQ(grab_soon(camera, frame), GrabStatus::ok);
   EXPECT_GT(frame.info().sequence, before);
-  EXPECT_EQ(frame.info().flags, kFrameAfterGap);
+  EXPECT_EQ(frame.info().flags, kFrameAfterGap | kFrameReopened);
   EXPECT_EQ(camera.report().state, CameraState::streaming);
 }
 
