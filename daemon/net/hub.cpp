@@ -55,7 +55,7 @@ void Hub::stop() {
     const auto sessions = std::exchange(*list, {});
     for (const auto& session : sessions) session->close("the daemon ends");
   }
-  port_.want(false, false);
+  port_.want({});
 }
 
 void Hub::wait() {
@@ -133,16 +133,17 @@ void Hub::broadcast(const v1::ServerMessage& message) {
 }
 
 void Hub::update_want() {
-  bool depth = false;
-  bool luma = false;
+  pipeline::Wanted wanted;
   for (const auto& session : sessions_) {
+    if (!session->greeted()) continue;
+    wanted.contact = true;
     const auto& subscription = session->subscription();
-    if (!session->greeted() || !subscription.active) continue;
+    if (!subscription.active) continue;
     // A summary tells of the contact, which comes from the depth.
-    depth = depth || subscription.kind.depth != 0 || subscription.kind == FrameKind{};
-    luma = luma || subscription.kind.luma != 0;
+    wanted.depth = wanted.depth || subscription.kind.depth != 0 || subscription.kind == FrameKind{};
+    wanted.luma = wanted.luma || subscription.kind.luma != 0;
   }
-  port_.want(depth, luma);
+  port_.want(wanted);
 }
 
 std::vector<pipeline::StageStatistics> Hub::stages() const {

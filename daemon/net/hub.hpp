@@ -49,6 +49,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
 
   void on_request(const std::shared_ptr<Session>& session,
                   const v1::ClientMessage& message) override;
+  void on_greeted() override { update_want(); }
   void on_closed(const Session& session) override;
 
  private:

@@ -170,6 +170,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   frame.set_origin("centre");
   frame.set_axes("x right, y down, z towards the object, as the camera sees it");
   send(message);
+  if (const auto host = host_.lock()) host->on_greeted();
 }
 
 void Session::reply_error(std::uint64_t id, int error_code_, const std::string& sentence) {

@@ -30,6 +30,8 @@ class SessionHost {
   SessionHost& operator=(const SessionHost&) = delete;
   virtual ~SessionHost() = default;
 
+  /// The handshake is over: events and, once subscribed, frames flow.
+  virtual void on_greeted() = 0;
   /// A request after the handshake, its id checked. Every one is owed exactly one reply.
   virtual void on_request(const std::shared_ptr<Session>& session,
                           const v1::ClientMessage& message) = 0;

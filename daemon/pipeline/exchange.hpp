@@ -46,6 +46,8 @@ struct Exchange {
   EventFd wake;  ///< Readable when a frame or an event waits.
   Statistics statistics;
 
+  // Port::want().
+  std::atomic<bool> want_contact{false};
   std::atomic<bool> want_depth{false};
   std::atomic<bool> want_luma{false};
   std::atomic<bool> stop{false};

@@ -5,6 +5,15 @@
 
 namespace dtact::pipeline {
 
+/// Where the pipeline is between power-on and shutdown.
+enum class State : std::uint8_t {
+  settling,      ///< Ring and camera on; waiting for the mean grey to stop moving.
+  referencing,   ///< Averaging the untouched image.
+  serving,       ///< Depth flows.
+  uncalibrated,  ///< Luma flows; there is no calibration.
+  camera_lost    ///< The camera is away; the report says why.
+};
+
 /// Named conditions under which depth deserves less trust. The values are those of the wire
 /// (dtact.proto, Health); a set is carried by every frame.
 enum class Health : std::uint8_t {

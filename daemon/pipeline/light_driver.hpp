@@ -6,11 +6,11 @@
 #include <mutex>
 #include <string>
 
-#include "daemon/pipeline/doorbell.hpp"
 #include "daemon/pipeline/event_fd.hpp"
 #include "daemon/pipeline/port.hpp"
 #include "daemon/pipeline/spsc_queue.hpp"
 #include "hal/base/clock.hpp"
+#include "hal/base/doorbell.hpp"
 #include "hal/base/rt_thread.hpp"
 
 namespace dtact::pipeline {
@@ -69,7 +69,7 @@ class LightDriver {
   SpscQueue<Request, 16> requests_;
   SpscQueue<Event, 64> events_;
   SpscQueue<LightNote, 16> notes_;
-  Doorbell work_;
+  base::Doorbell work_;
   std::atomic<bool> stop_{false};
   std::atomic<bool> trouble_{false};
   mutable std::mutex mutex_;  // between this thread and the network thread, held for a copy

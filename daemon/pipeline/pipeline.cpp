@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "daemon/pipeline/reference_store.hpp"
+#include "daemon/pipeline/untouched/reference_store.hpp"
 
 namespace dtact::pipeline {
 namespace {
@@ -191,9 +191,10 @@ void Pipeline::free_retired() {
   }
 }
 
-void Pipeline::want(bool depth, bool luma) noexcept {
-  exchange_.want_depth.store(depth, std::memory_order_relaxed);
-  exchange_.want_luma.store(luma, std::memory_order_relaxed);
+void Pipeline::want(Wanted wanted) noexcept {
+  exchange_.want_contact.store(wanted.contact || wanted.depth, std::memory_order_relaxed);
+  exchange_.want_depth.store(wanted.depth, std::memory_order_relaxed);
+  exchange_.want_luma.store(wanted.luma, std::memory_order_relaxed);
 }
 
 Status Pipeline::status() const {

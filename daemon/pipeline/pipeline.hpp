@@ -10,9 +10,9 @@
 #include "daemon/pipeline/exchange.hpp"
 #include "daemon/pipeline/light_driver.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
-#include "daemon/pipeline/place_watch.hpp"
 #include "daemon/pipeline/port.hpp"
-#include "daemon/pipeline/reference_writer.hpp"
+#include "daemon/pipeline/untouched/place_watch.hpp"
+#include "daemon/pipeline/untouched/reference_writer.hpp"
 #include "hal/base/rt_thread.hpp"
 
 namespace dtact::pipeline {
@@ -40,7 +40,7 @@ class Pipeline final : public Port {
   [[nodiscard]] const DepthFrame* latest() noexcept override { return exchange_.slot.fetch(); }
   [[nodiscard]] std::optional<Event> next_event() override;
   [[nodiscard]] bool submit(Command command) override;
-  void want(bool depth, bool luma) noexcept override;
+  void want(Wanted wanted) noexcept override;
   [[nodiscard]] Status status() const override;
 
  private:

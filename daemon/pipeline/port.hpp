@@ -14,15 +14,6 @@
 
 namespace dtact::pipeline {
 
-/// Where the pipeline is between power-on and shutdown.
-enum class State : std::uint8_t {
-  settling,      ///< Ring and camera on; waiting for the mean grey to stop moving.
-  referencing,   ///< Averaging the untouched image.
-  serving,       ///< Depth flows.
-  uncalibrated,  ///< Luma flows; there is no calibration.
-  camera_lost    ///< The camera is away; the report says why.
-};
-
 // Commands: what the network may ask of the pipeline. Each is answered by one CommandDone.
 struct SetLight {
   hal::Light light;
@@ -105,6 +96,15 @@ struct Status {
   std::string storage_message;
 };
 
+/// What the network has use for. With nothing, frames are looked at for what reference, light and
+/// health need, no depth is made and nothing is published.
+struct Wanted {
+  bool contact = false;  ///< Contact events, and the refusal to re-zero under contact.
+  bool depth = false;    ///< Frames with depth or its summary; needs contact.
+  bool luma = false;     ///< Frames with the camera's image.
+  bool operator==(const Wanted&) const = default;
+};
+
 /// The one seam between the network thread (the only caller) and the pipeline's threads. No call
 /// blocks.
 class Port {
@@ -122,8 +122,7 @@ class Port {
   [[nodiscard]] virtual std::optional<Event> next_event() = 0;
   /// False: too many commands wait; ask again later.
   [[nodiscard]] virtual bool submit(Command command) = 0;
-  /// What subscribers want. With neither, frames are inspected but not published.
-  virtual void want(bool depth, bool luma) noexcept = 0;
+  virtual void want(Wanted wanted) noexcept = 0;
   [[nodiscard]] virtual Status status() const = 0;
 };
 

@@ -1,6 +1,11 @@
 #include "daemon/pipeline/teller.hpp"
 
 namespace dtact::pipeline {
+namespace {
+
+constexpr std::int64_t kLastsNs = 1'000'000'000;
+
+}  // namespace
 
 bool Teller::push(const Report& report) noexcept {
   if (!exchange_.reports.push(Report(report))) return false;
@@ -17,10 +22,13 @@ void Teller::contact(const DepthFrame& frame) noexcept {
   }
 }
 
-void Teller::state(State state, HealthSet health) noexcept {
-  if (state_ && state_->state == state && state_->health == health) return;
+HealthSet Teller::state(State state, HealthSet health, std::int64_t now_ns) noexcept {
+  if (health.has(Health::beyond_calibration)) beyond_until_ns_ = now_ns + kLastsNs;
+  health.set(Health::beyond_calibration, now_ns < beyond_until_ns_);
+  if (state_ && state_->state == state && state_->health == health) return health;
   const StateChanged changed{state, health};
   if (push(changed)) state_ = changed;
+  return health;
 }
 
 void Teller::flush() noexcept {

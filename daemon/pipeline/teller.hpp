@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "daemon/pipeline/exchange.hpp"
@@ -19,7 +20,9 @@ class Teller {
   [[nodiscard]] bool answer_due() const noexcept { return answer_.has_value(); }
 
   void contact(const DepthFrame& frame) noexcept;
-  void state(State state, HealthSet health) noexcept;
+  /// A press at the list's end would send an event with every frame: Health::beyond_calibration is
+  /// told to last a second longer than it does. Returns what is told.
+  HealthSet state(State state, HealthSet health, std::int64_t now_ns) noexcept;
   /// Tries what is due.
   void flush() noexcept;
 
@@ -29,6 +32,7 @@ class Teller {
   Exchange& exchange_;
   bool touching_ = false;              // as told
   std::optional<StateChanged> state_;  // as told
+  std::int64_t beyond_until_ns_ = INT64_MIN;
   std::optional<ReferenceTaken> reference_;
   std::optional<Answer> answer_;
 };

@@ -17,7 +17,7 @@ std::vector<std::int16_t> published_taps() { return {4608, 3584, 1792, 512}; }
 
 }  // namespace
 
-Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, const ActivitySettings& settings)
+Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model)
     : model(std::move(the_model)),
       grid(model->rectify.width, model->rectify.height),
       all_tiles(static_cast<std::size_t>(grid.rows()), grid.all()),
@@ -26,7 +26,6 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, const Activity
           model->method == Method::list ? gaussian_taps(model->smoothing_px) : published_taps(),
           grid.width, grid.height),
       second(published_taps(), grid.width, grid.height),
-      activity(model->rectify, smoother.radius(), settings),
       in(2 * kStrip, grid.width),
       fine(model->rectify.decimation, model->rectify.fine_width()),
       zero(static_cast<std::size_t>(vec::padded(model->rectify.fine_width()))),
@@ -92,7 +91,6 @@ void Reconstructor::Impl::smooth_reference(std::span<std::int16_t> smoothed) noe
 }
 
 void Reconstructor::Impl::set_reference(std::span<const std::uint16_t> reference_q8) noexcept {
-  activity.set_reference(reference_q8);
   ++rest;
   rectify_reference(reference_q8);
   // The gain's plane holds the smoothed reference until each of its rows is divided.
@@ -126,13 +124,12 @@ void Reconstructor::Impl::set_light(double factor) noexcept {
   const auto count = static_cast<int>(taken_q6.size());
   kernels::scale_row(taken_q6.data(), q15(factor), count, reference_q6.data());
   kernels::scale_row(taken_gain_q12.data(), q15(1 / factor), count, gain_q12.data());
-  activity.set_light(factor);
 }
 
-Reconstructor::Reconstructor(std::shared_ptr<const Model> model, const ActivitySettings& activity) {
+Reconstructor::Reconstructor(std::shared_ptr<const Model> model) {
   if (!model) throw std::invalid_argument("model: missing");
   check(*model);
-  impl_ = std::make_unique<Impl>(std::move(model), activity);
+  impl_ = std::make_unique<Impl>(std::move(model));
 }
 
 Reconstructor::~Reconstructor() = default;
@@ -149,10 +146,6 @@ void Reconstructor::set_reference(std::span<const std::uint16_t> reference_q8) n
 
 void Reconstructor::set_light(double factor) noexcept { impl_->set_light(factor); }
 
-void Reconstructor::follow(const Reconstructor& other) noexcept {
-  impl_->activity.follow(other.impl_->activity);
-}
-
 void Reconstructor::run(const std::uint8_t* luma, std::ptrdiff_t stride,
                         std::span<std::int16_t> depth_um, StepTimes* times) noexcept {
   StepTimes spent;
@@ -168,19 +161,16 @@ void Reconstructor::run(const std::uint8_t* luma, std::ptrdiff_t stride,
 }
 
 void Reconstructor::run_active(const std::uint8_t* luma, std::ptrdiff_t stride,
-                               std::span<std::int16_t> depth_um, DrawnTiles& drawn,
-                               ActivityReport& report, StepTimes* times) noexcept {
+                               const TileRows& tiles, std::span<std::int16_t> depth_um,
+                               DrawnTiles& drawn, StepTimes* times) noexcept {
   StepTimes spent;
   Stopwatch watch(times != nullptr);
   impl_->beyond = 0;
   impl_->plan.set_stride(stride);
-  const TileRows& tiles = impl_->activity.look(luma, stride, report);
-  spent.activity_ns = watch.lap();
   if (impl_->model->method == Method::list) {
     impl_->clear_rest(tiles, drawn, depth_um.data());
-    if (report.active_tiles > 0) impl_->run_list(luma, tiles, depth_um.data(), spent, watch);
+    if (count_tiles(tiles) > 0) impl_->run_list(luma, tiles, depth_um.data(), spent, watch);
   } else {
-    report.active_tiles = report.tiles;
     impl_->clear_rest(impl_->all_tiles, drawn, depth_um.data());
     impl_->run_published(luma, depth_um.data(), spent, watch);
   }
@@ -189,6 +179,6 @@ void Reconstructor::run_active(const std::uint8_t* luma, std::ptrdiff_t stride,
 
 const TileGrid& Reconstructor::grid() const noexcept { return impl_->grid; }
 
-FrameRegion Reconstructor::region() const noexcept { return impl_->activity.region(); }
+int Reconstructor::radius() const noexcept { return impl_->smoother.radius(); }
 
 }  // namespace dtact::recon

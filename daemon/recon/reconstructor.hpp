@@ -5,7 +5,6 @@
 #include <memory>
 #include <span>
 
-#include "daemon/recon/activity.hpp"
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/tiles.hpp"
 
@@ -15,8 +14,7 @@ namespace dtact::recon {
 struct StepTimes {
   std::int64_t rectify_ns = 0;  ///< Rectify and difference.
   std::int64_t smooth_ns = 0;
-  std::int64_t list_ns = 0;      ///< Gain, list, untrusted mark.
-  std::int64_t activity_ns = 0;  ///< Which tiles changed; run_active() only.
+  std::int64_t list_ns = 0;  ///< Gain, list, untrusted mark.
 };
 
 /// What a depth buffer holds besides the untouched map: kept beside each buffer that run_active()
@@ -35,7 +33,7 @@ inline constexpr std::size_t kLumaPadding = 64;
 class Reconstructor {
  public:
   /// Throws std::invalid_argument when the model's parts disagree in size.
-  explicit Reconstructor(std::shared_ptr<const Model> model, const ActivitySettings& activity = {});
+  explicit Reconstructor(std::shared_ptr<const Model> model);
   ~Reconstructor();
   Reconstructor(Reconstructor&&) noexcept;
   Reconstructor& operator=(Reconstructor&&) noexcept;
@@ -53,11 +51,6 @@ class Reconstructor {
   /// and goes on as it is. Does not allocate, and takes about as long as a frame.
   void set_light(double factor) noexcept;
 
-  /// Takes over how far the untouched image was followed, and what is active, from one that worked
-  /// on the frames until now: same reference, another resolution. Does nothing where the two look
-  /// at different parts of the frame. Does not allocate.
-  void follow(const Reconstructor& other) noexcept;
-
   /// `luma`: frame sized, rows `stride` bytes apart, kLumaPadding bytes readable after the last
   /// pixel. `depth_um`: width × height of the model's table, row-major. Borders are replicated when
   /// smoothing. Beyond the list's covered range on the deep side Method::list writes kUntrusted; so
@@ -66,17 +59,17 @@ class Reconstructor {
   void run(const std::uint8_t* luma, std::ptrdiff_t stride, std::span<std::int16_t> depth_um,
            StepTimes* times = nullptr) noexcept;
 
-  /// The same where the image changed against the untouched one, in whole tiles widened by the
-  /// smoothing's reach: those hold what run() gives, bit for bit. Everywhere else `depth_um` is 0,
-  /// or kUntrusted where the mask or the light say so. ActivitySettings says what that can hide.
-  /// `drawn` belongs to this buffer. Method::published is computed in full. Allocates when `drawn`
-  /// is of another map, i.e. the first time.
-  void run_active(const std::uint8_t* luma, std::ptrdiff_t stride, std::span<std::int16_t> depth_um,
-                  DrawnTiles& drawn, ActivityReport& report, StepTimes* times = nullptr) noexcept;
+  /// The same in some tiles of grid() only (TileReaders says which depend on what has changed):
+  /// those hold what run() gives, bit for bit. Everywhere else `depth_um` is 0, or kUntrusted where
+  /// the mask or the light say so. `drawn` belongs to this buffer. Method::published is computed in
+  /// full. Allocates when `drawn` is of another map, i.e. the first time.
+  void run_active(const std::uint8_t* luma, std::ptrdiff_t stride, const TileRows& tiles,
+                  std::span<std::int16_t> depth_um, DrawnTiles& drawn,
+                  StepTimes* times = nullptr) noexcept;
 
   [[nodiscard]] const TileGrid& grid() const noexcept;
-  /// The part of the frame that is read; the rest need not be decoded.
-  [[nodiscard]] FrameRegion region() const noexcept;
+  /// How many pixels of the map a result depends on, on every side.
+  [[nodiscard]] int radius() const noexcept;
 
   /// Pixels of the last run() or run_active() that were darker than the list covers, masked ones
   /// not counted.

@@ -40,7 +40,7 @@ class Stopwatch {
 };
 
 struct Reconstructor::Impl {
-  Impl(std::shared_ptr<const Model> the_model, const ActivitySettings& settings);
+  explicit Impl(std::shared_ptr<const Model> the_model);
 
   /// Where row y begins in the planes below, whose rows are whole blocks.
   [[nodiscard]] std::size_t at(int y) const noexcept {
@@ -65,8 +65,7 @@ struct Reconstructor::Impl {
   TileRows all_tiles;
   RectifyPlan plan;
   Smoother smoother;
-  Smoother second;  ///< The second filter of the published method.
-  Activity activity;
+  Smoother second;                 ///< The second filter of the published method.
   RowBuffer in;                    ///< A strip before smoothing.
   RowBuffer fine;                  ///< The rows of one row of a coarse map.
   std::vector<std::int16_t> zero;  ///< As long as one of them.

@@ -7,9 +7,12 @@
 #include <fstream>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
+#include "daemon/pipeline/untouched/cells.hpp"
 #include "daemon/recon/decimate.hpp"
 #include "daemon/recon/reconstructor.hpp"
+#include "daemon/recon/tile_readers.hpp"
 #include "hal/luma/luma_buffer.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "tests/bench/opencv_pipeline.hpp"
@@ -165,18 +168,29 @@ Case active(const Inputs& in, const std::string& name, double radius_px) {
   struct State {
     Image frame;
     recon::Reconstructor reconstructor;
+    pipeline::Cells cells;
+    recon::TileReaders readers;
+    recon::TileRows tiles;
     Depth depth;
     recon::DrawnTiles drawn;
-    recon::ActivityReport report;
   };
+  recon::Reconstructor reconstructor(in.model);
+  pipeline::Cells cells{recon::CellLattice(in.model->rectify)};
+  cells.set_reference(in.model->reference_q8);
+  recon::TileReaders readers(cells.lattice(), in.model->rectify, reconstructor.radius());
+  recon::TileRows tiles(static_cast<std::size_t>(reconstructor.grid().rows()));
   auto state = std::make_shared<State>(State{Inputs::with_padding(make_frame(radius_px, 2)),
-                                             recon::Reconstructor(in.model),
+                                             std::move(reconstructor),
+                                             std::move(cells),
+                                             std::move(readers),
+                                             std::move(tiles),
                                              Depth(in.specified.size()),
-                                             {},
                                              {}});
   const auto once = [state] {
-    state->reconstructor.run_active(state->frame.data(), kFrameWidth, state->depth, state->drawn,
-                                    state->report);
+    (void)state->cells.look({state->frame.data(), kFrameWidth, kFrameHeight, kFrameWidth});
+    state->readers.mark(state->cells.active(), state->tiles);
+    state->reconstructor.run_active(state->frame.data(), kFrameWidth, state->tiles, state->depth,
+                                    state->drawn);
   };
   once();
   return {name, once,

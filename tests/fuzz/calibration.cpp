@@ -11,6 +11,7 @@
 #include "daemon/calibration/text.hpp"
 #include "daemon/recon/decimate.hpp"
 #include "daemon/recon/reconstructor.hpp"
+#include "daemon/recon/tile_readers.hpp"
 #include "tests/fuzz/fuzz.hpp"
 #include "tests/fuzz/png_checksums.hpp"
 
@@ -27,9 +28,14 @@ void reconstruct(const std::shared_ptr<const recon::Model>& model) {
   std::vector<std::int16_t> depth(static_cast<std::size_t>(table.width) *
                                   static_cast<std::size_t>(table.height));
   reconstructor.run(luma.data(), table.frame_width, depth);
+  const recon::CellLattice lattice(table);
+  const recon::TileReaders readers(lattice, table, reconstructor.radius());
+  recon::TileRows tiles(static_cast<std::size_t>(readers.grid().rows()));
+  std::vector<std::int32_t> active(lattice.at(0, lattice.rows()));
+  for (std::size_t i = 0; i < active.size(); i += 5) active[i] = -1;
+  readers.mark(active, tiles);
   recon::DrawnTiles drawn;
-  recon::ActivityReport report;
-  reconstructor.run_active(luma.data(), table.frame_width, depth, drawn, report);
+  reconstructor.run_active(luma.data(), table.frame_width, tiles, depth, drawn);
 }
 
 void use(const calibration::Calibration& calibration) {

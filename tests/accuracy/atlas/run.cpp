@@ -210,6 +210,7 @@ Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
   prototype.depth_um.resize(static_cast<std::size_t>(table.width) *
                             static_cast<std::size_t>(table.height));
   pipeline::Exchange exchange(prototype);
+  exchange.want_contact = true;
   exchange.want_depth = true;
   camera.attach(exchange);
   pipeline::PipelineConfig config;
@@ -225,7 +226,7 @@ Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
   pipeline::CaptureLoop loop({camera, light, writer, place, exchange, clock}, config,
                              pipeline::activate(calibration, camera.info(), config.reconstruction),
                              false);
-  loop.run();
+  while (!exchange.stop) loop.step();
   return camera.outcome();
 }
 

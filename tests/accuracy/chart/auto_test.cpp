@@ -8,7 +8,7 @@
 #include "daemon/calibration/build.hpp"
 #include "daemon/calibration/press_set.hpp"
 #include "daemon/pipeline/active_calibration.hpp"
-#include "daemon/pipeline/uncertainty.hpp"
+#include "daemon/pipeline/depth/uncertainty.hpp"
 #include "hal/sim/renderer.hpp"
 #include "tests/accuracy/chart/scenes.hpp"
 #include "tests/accuracy/chart/settings.hpp"
@@ -44,8 +44,11 @@ std::vector<Judged> scripted_run(double max_error_um, const image::Grey16& refer
   camera.fps = 60;
   const auto active =
       pipeline::activate(calibration, camera, {.decimation = 0, .max_error_um = max_error_um});
-  active->set_reference(reference.pixels);
-  active->use_decimation(4);
+  pipeline::Cells& cells = active->image.cells;
+  cells.set_reference(reference.pixels);
+  pipeline::Resolutions& maps = active->maps;
+  maps.set_reference(reference.pixels);
+  maps.use_decimation(4);
   recon::Reconstructor full(calibration->model);
   full.set_reference(reference.pixels);
   pipeline::ResolutionChooser chooser(max_error_um);
@@ -60,23 +63,25 @@ std::vector<Judged> scripted_run(double max_error_um, const image::Grey16& refer
   std::vector<Judged> run;
   for (std::uint64_t sequence = 0; sequence < 1920; sequence += 6) {
     renderer.render(sequence, hal::sim::led_levels(hal::Light{}), luma.data(), kWidth, kHeight);
-    recon::Reconstructor& reconstructor = active->reconstructor();
-    const int decimation = reconstructor.model().rectify.decimation;
+    pipeline::Resolution& resolution = maps.in_use();
+    recon::Reconstructor& reconstructor = resolution.reconstructor;
+    const int decimation = resolution.decimation();
     recon::DrawnTiles& marks = drawn[static_cast<std::size_t>(decimation)];
     marks.rest = 0;  // one buffer for all resolutions
-    recon::ActivityReport report;
     const recon::TileGrid& grid = reconstructor.grid();
     depth.resize(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height));
-    reconstructor.run_active(luma.data(), kWidth, depth, marks, report);
+    (void)cells.look({luma.data(), kWidth, kHeight, kWidth});
+    resolution.readers.mark(cells.active(), resolution.tiles);
+    reconstructor.run_active(luma.data(), kWidth, resolution.tiles, depth, marks);
     const double bend =
         pipeline::bend_um(depth, grid, marks.tiles, reconstructor.model().mm_per_px, 100);
     // As the capture loop has it: half of the deepest is about the mean over a contact.
-    const double list_um = active->list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)));
+    const double list_um = maps.list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)));
     Judged judged{.chosen = decimation,
                   .error_um = 0,
                   .full_error_um = 0,
                   .uncertainty_um = pipeline::uncertainty_at_um(list_um, bend, decimation)};
-    active->use_decimation(chooser.next(list_um, bend));
+    maps.use_decimation(chooser.next(list_um, bend));
 
     const Shot shot = truth_of(renderer, sequence);
     if (std::ranges::count_if(shot.judged, [](std::uint8_t c) { return c != 0; }) < 300) continue;

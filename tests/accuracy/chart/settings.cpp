@@ -133,8 +133,14 @@ std::vector<Setting> make_settings(const image::Grey16& reference) {
 }
 
 Worker::Worker(const Setting& setting, const image::Grey16& reference, const Shot& shot)
-    : setting_(setting), shot_(shot), reconstructor_(setting.model) {
+    : setting_(setting),
+      shot_(shot),
+      reconstructor_(setting.model),
+      cells_(recon::CellLattice(setting.model->rectify)),
+      readers_(cells_.lattice(), setting.model->rectify, reconstructor_.radius()),
+      tiles_(static_cast<std::size_t>(readers_.grid().rows())) {
   reconstructor_.set_reference(reference.pixels);
+  cells_.set_reference(reference.pixels);
   for (const image::Grey8& frame : shot.frames) {
     frames_.push_back(frame.pixels);
     frames_.back().resize(frame.pixels.size() + recon::kLumaPadding);
@@ -154,7 +160,9 @@ void Worker::once() {
     reconstructor_.run(luma, kWidth, level_q6_);
     sharpener_->look_up(level_q6_, setting_.sharpened_list, depth_um_);
   } else if (setting_.tiles) {
-    reconstructor_.run_active(luma, kWidth, depth_um_, drawn_, report_);
+    (void)cells_.look({luma, kWidth, kHeight, kWidth});
+    readers_.mark(cells_.active(), tiles_);
+    reconstructor_.run_active(luma, kWidth, tiles_, depth_um_, drawn_);
   } else {
     reconstructor_.run(luma, kWidth, depth_um_);
   }

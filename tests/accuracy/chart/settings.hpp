@@ -6,8 +6,10 @@
 #include <vector>
 
 #include "daemon/calibration/press_set.hpp"
+#include "daemon/pipeline/untouched/cells.hpp"
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
+#include "daemon/recon/tile_readers.hpp"
 #include "tests/accuracy/chart/scenes.hpp"
 #include "tests/accuracy/chart/sharpen.hpp"
 
@@ -57,12 +59,14 @@ class Worker {
   const Setting& setting_;
   const Shot& shot_;
   recon::Reconstructor reconstructor_;
+  pipeline::Cells cells_;
+  recon::TileReaders readers_;
+  recon::TileRows tiles_;
   std::vector<std::vector<std::uint8_t>> frames_;  // padded for vector loads
   std::vector<std::int16_t> depth_um_;
   std::optional<Sharpener> sharpener_;
   std::vector<std::int16_t> level_q6_;  // what it sharpens
   recon::DrawnTiles drawn_;
-  recon::ActivityReport report_;
   std::size_t next_ = 0;
 };
 

@@ -10,7 +10,7 @@
 #include <tuple>
 #include <vector>
 
-#include "daemon/pipeline/layer_marks.hpp"
+#include "daemon/pipeline/untouched/layer_marks.hpp"
 #include "tests/accuracy/real/press_images.hpp"
 
 namespace dtact {

@@ -52,9 +52,9 @@ class FakePort : public pipeline::Port {
     }
     return true;
   }
-  void want(bool depth, bool luma) noexcept override {
+  void want(pipeline::Wanted wanted) noexcept override {
     const std::lock_guard lock(mutex_);
-    wanted_ = {depth, luma};
+    wanted_ = wanted;
     changed_.notify_all();
   }
   [[nodiscard]] pipeline::Status status() const override {
@@ -95,8 +95,8 @@ class FakePort : public pipeline::Port {
   [[nodiscard]] bool wait_fetched() {
     return wait([this] { return !fresh_.has_value(); });
   }
-  [[nodiscard]] bool wait_wanted(bool depth, bool luma) {
-    return wait([=, this] { return wanted_ == std::pair(depth, luma); });
+  [[nodiscard]] bool wait_wanted(pipeline::Wanted wanted) {
+    return wait([=, this] { return wanted_ == wanted; });
   }
   [[nodiscard]] bool wait_status_calls(int calls) {
     return wait([=, this] { return status_calls_ >= calls; });
@@ -128,7 +128,7 @@ class FakePort : public pipeline::Port {
   std::vector<pipeline::Command> commands_;
   std::function<std::optional<pipeline::CommandDone>(const pipeline::Command&)> answer_;
   bool full_ = false;
-  std::pair<bool, bool> wanted_{false, false};
+  pipeline::Wanted wanted_;
   mutable int status_calls_ = 0;
   pipeline::Status status_;
 };

@@ -219,7 +219,7 @@ TEST(Server, EndsItsConnectionsAndItsWork) {
   client.subscribe(v1::DEPTH_INT16);
   rig.stop();  // returns only when the loop has nothing left to do
   EXPECT_TRUE(client.ends());
-  EXPECT_TRUE(rig.port.wait_wanted(false, false));
+  EXPECT_TRUE(rig.port.wait_wanted({}));
 }
 
 // NOLINTEND(misc-const-correctness)

@@ -112,21 +112,22 @@ TEST(Stream, LeavesDepthOutWhenThereIsNone) {
 
 TEST(Stream, TellsThePipelineTheUnionOfWhatIsWanted) {
   Rig rig;
-  ASSERT_TRUE(rig.port.wait_wanted(false, false));
+  ASSERT_TRUE(rig.port.wait_wanted({}));
   auto depth = std::make_unique<RawClient>(rig.tcp_port());
   RawClient luma(rig.tcp_port());
   depth->hello();
+  EXPECT_TRUE(rig.port.wait_wanted({.contact = true}));
   luma.hello();
   depth->subscribe(v1::DEPTH_DELTA_ZSTD);
-  EXPECT_TRUE(rig.port.wait_wanted(true, false));
+  EXPECT_TRUE(rig.port.wait_wanted({.contact = true, .depth = true}));
   luma.subscribe(v1::DEPTH_NONE, v1::LUMA_GREY8);
-  EXPECT_TRUE(rig.port.wait_wanted(true, true));
+  EXPECT_TRUE(rig.port.wait_wanted({.contact = true, .depth = true, .luma = true}));
   depth.reset();
-  EXPECT_TRUE(rig.port.wait_wanted(false, true));
+  EXPECT_TRUE(rig.port.wait_wanted({.contact = true, .luma = true}));
   luma.subscribe(v1::DEPTH_NONE, v1::LUMA_NONE, 1, true);
-  EXPECT_TRUE(rig.port.wait_wanted(true, false));
+  EXPECT_TRUE(rig.port.wait_wanted({.contact = true, .depth = true}));
   luma.subscribe(v1::DEPTH_NONE);
-  EXPECT_TRUE(rig.port.wait_wanted(false, false));
+  EXPECT_TRUE(rig.port.wait_wanted({.contact = true}));
 }
 
 TEST(Stream, GivesEveryNthFrame) {

@@ -1,4 +1,4 @@
-#include "daemon/pipeline/contact.hpp"
+#include "daemon/pipeline/depth/contact.hpp"
 
 #include <gtest/gtest.h>
 

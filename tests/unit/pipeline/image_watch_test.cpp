@@ -1,4 +1,4 @@
-#include "daemon/pipeline/image_watch.hpp"
+#include "daemon/pipeline/untouched/image_watch.hpp"
 
 #include <gtest/gtest.h>
 
@@ -19,16 +19,16 @@ class ImageWatchTest : public ::testing::Test {
     const std::vector<std::uint16_t> reference(pixels_.size(), 100 * 256);
     watch_.set_reference(reference, kWidth, kHeight, {});
     report_.cells = 80;
-    report_.pixels = 10240;
+    report_.frame.pixels = 10240;
     report_.mean_grey = 100;
-    report_.rough_noise = 1;
+    report_.frame.rough_noise = 1;
   }
 
   void look() { watch_.look(report_, {pixels_.data(), kWidth, kHeight, kWidth}, light_); }
   [[nodiscard]] bool has(Health health) const { return watch_.conditions().has(health); }
 
   std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(std::size_t{kWidth} * kHeight, 100);
-  recon::ActivityReport report_;
+  CellReport report_;
   double light_ = 1;
   ImageWatch watch_;
 };
@@ -78,7 +78,7 @@ TEST_F(ImageWatchTest, LightIsLookedAtEverySixteenFrames) {
 }
 
 TEST_F(ImageWatchTest, BandsMustLastSixFrames) {
-  report_.ripple = 0.6;
+  report_.frame.ripple = 0.6;
   for (int i = 0; i < 5; ++i) look();
   EXPECT_FALSE(has(Health::light_banded));
   look();
@@ -88,28 +88,28 @@ TEST_F(ImageWatchTest, BandsMustLastSixFrames) {
 }
 
 TEST_F(ImageWatchTest, FineBandsCountAsBands) {
-  report_.fine_ripple = 3.9;
+  report_.frame.fine_ripple = 3.9;
   for (int i = 0; i < 12; ++i) look();
   EXPECT_FALSE(has(Health::light_banded));
-  report_.fine_ripple = 4.1;
+  report_.frame.fine_ripple = 4.1;
   for (int i = 0; i < 6; ++i) look();
   EXPECT_TRUE(has(Health::light_banded));
 }
 
 TEST_F(ImageWatchTest, StatisticsHaveTheirLimits) {
-  report_.saturated = 103;
+  report_.frame.saturated = 103;
   report_.mean_grey = 19;
-  report_.rough_noise = 2.6;
-  report_.unchanged_rows = 2;
+  report_.frame.rough_noise = 2.6;
+  report_.frame.unchanged_rows = 2;
   look();
   EXPECT_TRUE(has(Health::image_saturated));
   EXPECT_TRUE(has(Health::image_dark));
   EXPECT_TRUE(has(Health::image_noisy));
   EXPECT_TRUE(has(Health::image_repeated));
-  report_.saturated = 102;
+  report_.frame.saturated = 102;
   report_.mean_grey = 20;
-  report_.rough_noise = 2.5;
-  report_.unchanged_rows = 1;
+  report_.frame.rough_noise = 2.5;
+  report_.frame.unchanged_rows = 1;
   look();
   EXPECT_TRUE(watch_.conditions().empty());
 }

@@ -6,7 +6,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "daemon/pipeline/reference_keeper.hpp"
+#include "daemon/pipeline/untouched/reference_keeper.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
 namespace dtact::pipeline {

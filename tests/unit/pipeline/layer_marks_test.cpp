@@ -1,4 +1,4 @@
-#include "daemon/pipeline/layer_marks.hpp"
+#include "daemon/pipeline/untouched/layer_marks.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "daemon/pipeline/light_follower.hpp"
+#include "daemon/pipeline/untouched/light_follower.hpp"
 
 #include <gtest/gtest.h>
 
@@ -14,28 +14,27 @@ constexpr int kMinute = 600;
 /// Light as a share of the reference's, seen by a follower that is applied at once.
 class LightFollowerTest : public ::testing::Test {
  protected:
-  void untouched(double light, int frames = 1) { see(light, true, frames); }
-  void touched(double light, int frames) { see(light, false, frames); }
+  void untouched(double light, int frames = 1) { see(light, LightSeen::From::all, frames); }
+  void touched(double light, int frames) { see(light, LightSeen::From::nothing, frames); }
   /// From the light of now, evenly.
-  void drift(double to, int frames, bool alone = true) {
+  void drift(double to, int frames, LightSeen::From how = LightSeen::From::all) {
     const double from = light_;
-    for (int i = 1; i <= frames; ++i) see(from + (to - from) * i / frames, alone, 1);
+    for (int i = 1; i <= frames; ++i) see(from + (to - from) * i / frames, how, 1);
   }
 
   LightFollower follower_{DriftRules{.limit_percent = 2, .percent_per_minute = 2}};
 
- private:
-  void see(double light, bool alone, int frames) {
+  void see(double light, LightSeen::From from, int frames) {
     for (int i = 0; i < frames; ++i) {
-      recon::ActivityReport report;
-      report.light_alone = alone;
-      if (alone) report.light_change = light / follower_.factor() - 1;
+      LightSeen seen;
+      if (from != LightSeen::From::nothing) seen = {from, light / follower_.factor() - 1};
       now_ns_ += kFrameNs;
-      (void)follower_.look(report, now_ns_);
+      (void)follower_.look(seen, now_ns_);
     }
     light_ = light;
   }
 
+ private:
   double light_ = 1;
   std::int64_t now_ns_ = 0;
 };
@@ -86,12 +85,35 @@ TEST_F(LightFollowerTest, DriftFasterThanTheRateIsTold) {
 
 TEST_F(LightFollowerTest, CatchesUpAfterALongPress) {
   untouched(1, kMinute);
-  drift(0.99, kMinute, false);
+  drift(0.99, kMinute, LightSeen::From::nothing);
   EXPECT_EQ(follower_.factor(), 1);
   untouched(0.99, kSecond - 1);
   EXPECT_EQ(follower_.factor(), 1) << "waits a second";
   untouched(0.99, 2);
   EXPECT_NEAR(follower_.factor(), 0.99, 0.0001);
+}
+
+TEST_F(LightFollowerTest, FollowsBesideAPressWhatTheRestShows) {
+  untouched(1, kMinute);
+  drift(0.994, 2 * kMinute, LightSeen::From::quiet);
+  EXPECT_NEAR(follower_.factor(), 0.994, 0.0005);
+  EXPECT_FALSE(follower_.drifted());
+}
+
+TEST_F(LightFollowerTest, WaitsASecondWhenTheLightIsSeenAnotherWay) {
+  untouched(1, kMinute);
+  see(0.999, LightSeen::From::quiet, kSecond);
+  EXPECT_EQ(follower_.factor(), 1);
+  see(0.999, LightSeen::From::quiet, 3);  // 1.3 s at 2 % a minute
+  EXPECT_NEAR(follower_.factor(), 0.99957, 0.00001);
+}
+
+TEST_F(LightFollowerTest, AStepThatComesWithAPressIsToldAndNotFollowed) {
+  untouched(1, kMinute);
+  see(0.99, LightSeen::From::quiet, kMinute);
+  EXPECT_EQ(follower_.factor(), 1);
+  EXPECT_NEAR(follower_.left(), -0.01, 1e-9);
+  EXPECT_TRUE(follower_.drifted());
 }
 
 TEST_F(LightFollowerTest, AShortPressAllowsNoStep) {

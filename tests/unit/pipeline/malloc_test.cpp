@@ -67,7 +67,7 @@ class CaptureThread : public ::testing::Test {
     fakes::FakeRing::Handle ring;
     Pipeline pipeline(std::move(camera), std::make_unique<fakes::FakeRing>(ring),
                       fakes::toy_calibration(), config);
-    pipeline.want(true, true);
+    pipeline.want({.contact = true, .depth = true, .luma = true});
     pipeline.start();
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (grabbed < frames && std::chrono::steady_clock::now() < deadline) {
@@ -76,7 +76,9 @@ class CaptureThread : public ::testing::Test {
         contacts_ += std::holds_alternative<ContactChanged>(*event) ? 1 : 0;
         answers_ += std::holds_alternative<CommandDone>(*event) ? 1U : 0U;
       }
-      pipeline.want(true, commands_ % 2 == 0);  // whole frames and parts of them
+      pipeline.want({.contact = true,
+                     .depth = true,
+                     .luma = commands_ % 2 == 0});  // whole frames and parts of them
       if (grabbed > kEvery * (commands_ + 1)) commands_ += pipeline.submit(next()) ? 1U : 0U;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }

@@ -91,7 +91,7 @@ TEST_F(PipelineTest, TheNewestFrameWinsAndTheOthersAreCounted) {
 
 TEST_F(PipelineTest, WithoutSubscribersNothingIsPublishedButContactIsTold) {
   build(fakes::toy_calibration());
-  pipeline->want(false, false);
+  pipeline->want({.contact = true});
   pipeline->start();
   ASSERT_TRUE(until([&] { return !all<ReferenceTaken>().empty(); }));
   camera.press(1);

@@ -1,4 +1,4 @@
-#include "daemon/pipeline/place_watch.hpp"
+#include "daemon/pipeline/untouched/place_watch.hpp"
 
 #include <gtest/gtest.h>
 

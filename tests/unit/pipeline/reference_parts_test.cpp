@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "daemon/pipeline/luma_grid.hpp"
-#include "daemon/pipeline/reference_average.hpp"
-#include "daemon/pipeline/settle.hpp"
-#include "daemon/pipeline/touch_check.hpp"
+#include "daemon/pipeline/untouched/luma_grid.hpp"
+#include "daemon/pipeline/untouched/reference_average.hpp"
+#include "daemon/pipeline/untouched/settle.hpp"
+#include "daemon/pipeline/untouched/touch_check.hpp"
 #include "hal/image/png.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 

@@ -6,8 +6,8 @@
 #include <string>
 #include <thread>
 
-#include "daemon/pipeline/reference_store.hpp"
-#include "daemon/pipeline/reference_writer.hpp"
+#include "daemon/pipeline/untouched/reference_store.hpp"
+#include "daemon/pipeline/untouched/reference_writer.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 

@@ -50,20 +50,33 @@ TEST_F(TellerTest, TellsChangesOnly) {
 }
 
 TEST_F(TellerTest, TheFirstStateIsAlwaysTold) {
-  teller.state(State::settling, {});
-  teller.state(State::settling, {});
+  (void)teller.state(State::settling, {}, 0);
+  (void)teller.state(State::settling, {}, 0);
   ASSERT_TRUE(next());
   EXPECT_FALSE(next());
   HealthSet health;
   health.set(Health::frames_lost);
-  teller.state(State::settling, health);
+  (void)teller.state(State::settling, health, 0);
   EXPECT_TRUE(std::get<StateChanged>(next().value()).health.has(Health::frames_lost));
+}
+
+TEST_F(TellerTest, BeyondTheListIsToldASecondLonger) {
+  HealthSet beyond;
+  beyond.set(Health::beyond_calibration);
+  EXPECT_EQ(teller.state(State::serving, beyond, 0), beyond);
+  EXPECT_EQ(std::get<StateChanged>(next().value()).health, beyond);
+  EXPECT_EQ(teller.state(State::serving, {}, 500'000'000), beyond);
+  EXPECT_EQ(teller.state(State::serving, beyond, 700'000'000), beyond);
+  EXPECT_EQ(teller.state(State::serving, {}, 1'699'999'999), beyond);
+  EXPECT_FALSE(next()) << "flicker is one event";
+  EXPECT_TRUE(teller.state(State::serving, {}, 1'700'000'000).empty());
+  EXPECT_TRUE(std::get<StateChanged>(next().value()).health.empty());
 }
 
 TEST_F(TellerTest, WhatDoesNotFitIsToldLater) {
   fill();
   teller.contact(frame(true, 7));
-  teller.state(State::serving, {});
+  (void)teller.state(State::serving, {}, 0);
   teller.reference({.sequence = 8, .restored = true});
   teller.answer({.ticket = 9});
   teller.flush();
@@ -75,7 +88,7 @@ TEST_F(TellerTest, WhatDoesNotFitIsToldLater) {
   EXPECT_EQ(std::get<ReferenceTaken>(next().value()).sequence, 8U);
   EXPECT_FALSE(next());
   teller.contact(frame(true, 10));  // the next frames carry the rest
-  teller.state(State::serving, {});
+  (void)teller.state(State::serving, {}, 0);
   EXPECT_EQ(std::get<ContactChanged>(next().value()).sequence, 10U);
   EXPECT_EQ(std::get<StateChanged>(next().value()).state, State::serving);
 }

@@ -1,4 +1,4 @@
-#include "daemon/pipeline/uncertainty.hpp"
+#include "daemon/pipeline/depth/uncertainty.hpp"
 
 #include <gtest/gtest.h>
 

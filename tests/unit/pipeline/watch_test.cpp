@@ -42,6 +42,14 @@ TEST(CameraWatch, FlagsAndDamageCountAsLossToo) {
   EXPECT_TRUE(watch.lost_lately(2000 * kMs));
 }
 
+TEST(CameraWatch, ADeviceOpenedAnewHasReturnedThoughItWasNeverAway) {
+  CameraWatch watch(kPeriod);
+  EXPECT_FALSE(watch.arrived(numbered(0), 0));
+  watch.missed(hal::GrabStatus::timeout, 400 * kPeriod);
+  EXPECT_TRUE(watch.arrived(numbered(1, hal::kFrameReopened), 401 * kPeriod));
+  EXPECT_FALSE(watch.arrived(numbered(2), 402 * kPeriod));
+}
+
 TEST(CameraWatch, ARepeatedNumberIsNoLoss) {
   CameraWatch watch(kPeriod);
   (void)watch.arrived(numbered(3), 0);
@@ -143,7 +151,7 @@ TEST(Activate, KnowsTheCellsOfTheCalibratedPart) {
   camera.width = 160;
   camera.height = 120;
   const auto active = activate(fakes::toy_calibration(), camera, {});
-  EXPECT_EQ(active->region, (CellRegion{.x0 = 2, .y0 = 2, .x1 = 38, .y1 = 28}));
+  EXPECT_EQ(active->image.region, (CellRegion{.x0 = 2, .y0 = 2, .x1 = 38, .y1 = 28}));
   EXPECT_FALSE(active->camera_mismatch);
   auto other = fakes::toy_calibration();
   other->origin.camera = "another";

@@ -44,7 +44,7 @@ class PipelineTest : public ::testing::Test {
     pipeline =
         std::make_unique<Pipeline>(std::make_unique<fakes::FakeCamera>(camera),
                                    std::make_unique<fakes::FakeRing>(ring), calibration, config);
-    pipeline->want(true, false);
+    pipeline->want({.contact = true, .depth = true});
   }
   void start(const std::shared_ptr<const calibration::Calibration>& calibration) {
     build(calibration);

@@ -25,7 +25,10 @@ ROOMS = {
     "hal": ["hal/base", "hal/null", "hal/replay", "hal/sim", "hal/v4l2", "hal/libcamera", "hal/ws2812"],
     "daemon/recon": [],
     "daemon/calibration": ["hal/base", "hal/image", "daemon/recon"],
-    "daemon/pipeline": ["hal", "hal/base", "hal/image", "daemon/recon", "daemon/calibration"],
+    # The two rooms inside know of the pipeline its settings, conditions and the frame it fills.
+    "daemon/pipeline/untouched": ["hal", "hal/base", "hal/image", "daemon/recon", "daemon/calibration", "daemon/pipeline"],
+    "daemon/pipeline/depth": ["hal", "hal/base", "daemon/recon", "daemon/pipeline", "daemon/pipeline/untouched"],
+    "daemon/pipeline": ["hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth"],
     "daemon/net": ["hal", "hal/base", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/ws2812"],
     "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net"],

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "daemon/pipeline/depth/contact.hpp"
+#include "daemon/pipeline/depth/resolutions.hpp"
+#include "daemon/pipeline/depth/uncertainty.hpp"
+#include "daemon/pipeline/depth_frame.hpp"
+#include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/pipeline/untouched/untouched_image.hpp"
+#include "hal/base/clock.hpp"
+#include "hal/frame.hpp"
+
+namespace dtact::pipeline {
+
+/// Makes a frame's depth where it differs from the untouched image, says what touches and what the
+/// map is worth, and chooses the next map's resolution. Capture thread only; does not allocate
+/// after construction.
+class DepthMaker {
+ public:
+  DepthMaker(const PipelineConfig& config, base::Clock& clock);
+
+  /// From now on this calibration's; null: none. `generation` tells calibrations apart.
+  void use(Resolutions* maps, std::uint64_t generation) noexcept;
+  /// The untouched image is another: follows it. Takes about six frames' time.
+  void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
+  /// The light on it is. Takes about a frame's time.
+  void set_light(double factor) noexcept;
+
+  /// Depth, contact and uncertainty of a frame that `untouched` has just looked at, into buffers
+  /// that hold a map of this calibration.
+  void make(const hal::LumaView& luma, const UntouchedImage& untouched, DepthFrame& out) noexcept;
+  /// The same of a frame of which no depth is made: what was known of contact stands.
+  void skip(DepthFrame& out) noexcept;
+
+  [[nodiscard]] bool touching() const noexcept { return contact_.touching(); }
+  /// Somewhere in the last frame the image was darker than the list reaches.
+  [[nodiscard]] bool beyond() const noexcept { return beyond_; }
+
+ private:
+  void judge(const Trust& trust, DepthFrame& out) noexcept;
+
+  const PipelineConfig& config_;
+  base::Clock& clock_;
+  Resolutions* maps_ = nullptr;
+  std::uint64_t generation_ = 0;
+  ContactDetector contact_;
+  ResolutionChooser chooser_;
+  bool beyond_ = false;
+};
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "daemon/recon/cells.hpp"
+#include "daemon/recon/tile_readers.hpp"
+
+namespace dtact::pipeline {
+
+/// What a frame tells by itself and beside the frame before, over the part that the map reads.
+/// Levels of grey.
+struct FrameStatistics {
+  std::int64_t pixels = 0;
+  std::int64_t saturated = 0;  ///< Pixels at least as bright as CellLimits::saturated.
+  std::int64_t dark = 0;       ///< Pixels at most as bright as CellLimits::dark.
+  /// Standard deviation of a pixel's noise, from all cells: steep depth adds a little.
+  double rough_noise = 0;
+  /// Rows of cells, at the frame's edge or inside, none of which changed by a bit since the frame
+  /// before. Noise changes every row: such a row was not exposed anew. Clipped cells do not count.
+  int unchanged_rows = 0;
+  /// How unevenly the rows of cells changed since the frame before: root mean square of the second
+  /// difference, along the columns, of each row's mean change. Bands that wander, not a press.
+  double ripple = 0;
+  /// The same of half rows of cells: bands too fine for whole ones, down to about twelve pixels.
+  double fine_ripple = 0;
+};
+
+/// The newest frame and the one before as sums over cells. Never allocates after construction.
+class CellSums {
+ public:
+  CellSums(const recon::CellLattice& lattice, const recon::vec::CellLimits& limits);
+
+  /// Sums the next frame; a lattice without cells sums nothing.
+  void add(const std::uint8_t* luma, std::ptrdiff_t stride) noexcept;
+  /// What compares with the frame before is 0 for the first frame.
+  [[nodiscard]] FrameStatistics statistics() const noexcept;
+
+  // Planes of the lattice's cells (recon::vec::sum_cells).
+  [[nodiscard]] const std::int32_t* now() const noexcept { return sum_.data(); }
+  [[nodiscard]] const std::int32_t* before() const noexcept { return sum_before_.data(); }
+  [[nodiscard]] const std::int32_t* rough() const noexcept { return rough_.data(); }
+  /// Frames added.
+  [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
+  /// The next frame has none before.
+  void restart() noexcept { frames_ = 0; }
+
+ private:
+  recon::CellLattice lattice_;
+  recon::vec::CellLimits limits_;
+  std::vector<std::int32_t> sum_;
+  std::vector<std::int32_t> sum_before_;
+  std::vector<std::int32_t> upper_;  // sums over the upper halves
+  std::vector<std::int32_t> upper_before_;
+  std::vector<std::int32_t> rough_;
+  recon::vec::CellCounts counts_;
+  std::uint64_t frames_ = 0;
+};
+
+}  // namespace dtact::pipeline

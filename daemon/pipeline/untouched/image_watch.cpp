@@ -1,0 +1,86 @@
+#include "daemon/pipeline/untouched/image_watch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dtact::pipeline {
+namespace {
+
+/// Mean change of the light, as a share. 1 % is 1.6 grey levels or 0.05 mm on the sensors known. A
+/// plane is fitted, with weights that leave out what a press changes: a ball, a nut, a bar and a
+/// disc of 8 mm move it by up to 0.55 % (simulated sensor).
+constexpr double kDriftShare = 0.01;
+constexpr int kDriftDegree = 1;
+/// A light change makes most cells active; below this share nothing is compared.
+constexpr int kActiveShare = 4;
+constexpr int kCheckEvery = 16;
+/// Grey levels. Noise makes 0.05, a press in motion up to 0.3 for as long as it moves.
+constexpr double kRipple = 0.5;
+/// The same of fine bands, of which smoothing leaves less: noise makes 0.07, 4 are bands of 0.7 %.
+constexpr double kFineRipple = 4;
+/// A press that comes down at once ripples in one or two frames.
+constexpr int kBandedFrames = 6;
+constexpr int kBandedMost = 12;
+/// Share of the pixels; the LEDs' own reflections are smaller.
+constexpr int kSaturatedShare = 100;
+/// Mean grey: an eighth of what the sensors known show; the reconstruction marks pixels below 8.
+constexpr double kDarkGrey = 20;
+/// Grey levels; the sensors known have 1.0.
+constexpr double kNoise = 2.5;
+/// Rows of cells; one alone may be a static test picture's border.
+constexpr int kUnchangedRows = 2;
+
+}  // namespace
+
+void ImageWatch::set_reference(std::span<const std::uint16_t> reference_q8, int width, int height,
+                               const CellRegion& region) noexcept {
+  measure(reference_q8, width, height, reference_);
+  region_ = region;
+  have_reference_ = true;
+  forget();
+}
+
+void ImageWatch::forget() noexcept {
+  drifted_ = false;
+  until_check_ = 0;
+  banded_ = 0;
+  conditions_ = {};
+}
+
+void ImageWatch::look(const CellReport& report, const hal::LumaView& luma, double light) noexcept {
+  if (report.cells == 0) return;
+  compare_light(report, luma, light);
+  const bool bands = report.frame.ripple > kRipple || report.frame.fine_ripple > kFineRipple;
+  banded_ = std::clamp(banded_ + (bands ? 1 : -1), 0, kBandedMost);
+  conditions_.set(Health::light_drifted, drifted_);
+  conditions_.set(Health::light_banded, banded_ >= kBandedFrames);
+  conditions_.set(Health::image_saturated,
+                  report.frame.saturated * kSaturatedShare > report.frame.pixels);
+  conditions_.set(Health::image_dark, report.mean_grey < kDarkGrey);
+  conditions_.set(Health::image_noisy, report.frame.rough_noise > kNoise);
+  conditions_.set(Health::image_repeated, report.frame.unchanged_rows >= kUnchangedRows);
+}
+
+void ImageWatch::compare_light(const CellReport& report, const hal::LumaView& luma,
+                               double light) noexcept {
+  if (!have_reference_ || report.active_cells * kActiveShare < report.cells) {
+    drifted_ = false;
+    until_check_ = 0;
+    return;
+  }
+  if (until_check_-- > 0) return;
+  until_check_ = kCheckEvery - 1;
+  measure(luma, now_);
+  (void)check_.compare(reference_, now_, region_, kDriftDegree, field_);
+  double change = 0;
+  int cells = 0;
+  for (int y = region_.y0; y < region_.y1; ++y) {
+    for (int x = region_.x0; x < region_.x1; ++x) {
+      change += std::abs(field_[cell_at(x, y)] / light - 1);
+      ++cells;
+    }
+  }
+  drifted_ = change > kDriftShare * std::max(1, cells);
+}
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,83 @@
+#include "daemon/pipeline/untouched/place_watch.hpp"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <new>
+#include <utility>
+
+#include "daemon/pipeline/untouched/layer_marks.hpp"
+
+namespace dtact::pipeline {
+
+PlaceWatch::PlaceWatch(int width, int height, int frames)
+    : width_(width), average_(width, height, frames), thread_("dtact-place", [this] { judge(); }) {
+  job_.image_q8.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+}
+
+void PlaceWatch::use_calibration(std::shared_ptr<const calibration::Calibration> calibration,
+                                 const CellRegion& region) noexcept {
+  calibration_ = std::move(calibration);
+  region_ = region;
+  ++epoch_;
+  hurry();
+}
+
+void PlaceWatch::hurry() noexcept {
+  due_ns_ = INT64_MIN;
+  average_.reset();
+}
+
+void PlaceWatch::look(const hal::LumaView& luma, bool untouched, std::int64_t now_ns) noexcept {
+  if (!calibration_ || now_ns < due_ns_ || thread_.busy()) return;
+  if (!untouched) {
+    if (average_.added() > 0) average_.reset();
+    return;
+  }
+  if (!average_.add(luma)) return;
+  average_.write(job_.image_q8);
+  average_.reset();
+  job_.calibration = calibration_;
+  job_.region = region_;
+  job_.epoch = epoch_;
+  due_ns_ = now_ns + kPauseNs;
+  thread_.hand_over();
+}
+
+std::string PlaceWatch::message() const {
+  const std::scoped_lock lock(mutex_);
+  return message_;
+}
+
+void PlaceWatch::judge() {
+  try {
+    compare();
+  } catch (const std::bad_alloc&) {
+    moved_.store(0, std::memory_order_release);  // nothing is known; it looks again after the pause
+  }
+  job_.calibration.reset();
+}
+
+void PlaceWatch::compare() {
+  const recon::RectifyTable& table = job_.calibration->model->rectify;
+  const int x = cell_edge(job_.region.x0, kGridWidth, table.frame_width);
+  const int y = cell_edge(job_.region.y0, kGridHeight, table.frame_height);
+  const recon::FrameRegion part{x, y, cell_edge(job_.region.x1, kGridWidth, table.frame_width) - x,
+                                cell_edge(job_.region.y1, kGridHeight, table.frame_height) - y};
+  const LayerMarks then(job_.calibration->model->reference_q8, width_, part);
+  const auto move = then.moved_to(LayerMarks(job_.image_q8, width_, part));
+  if (move) {
+    const std::scoped_lock lock(mutex_);
+    message_ =
+        fmt::format("They are about {} px {} and {} px {} of there", std::abs(move->x),
+                    move->x < 0 ? "left" : "right", std::abs(move->y), move->y < 0 ? "up" : "down");
+    if (move->turn_deg != 0) {
+      message_ += fmt::format(", turned by {} degrees {}", std::abs(move->turn_deg),
+                              move->turn_deg < 0 ? "anticlockwise" : "clockwise");
+    }
+    message_ += '.';
+  }
+  moved_.store(move ? job_.epoch : 0, std::memory_order_release);
+}
+
+}  // namespace dtact::pipeline

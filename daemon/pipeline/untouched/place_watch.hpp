@@ -1,0 +1,76 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "daemon/calibration/calibration.hpp"
+#include "daemon/pipeline/untouched/luma_grid.hpp"
+#include "daemon/pipeline/untouched/reference_average.hpp"
+#include "hal/base/side_thread.hpp"
+#include "hal/frame.hpp"
+
+namespace dtact::pipeline {
+
+/// Tells when the camera has moved against the layer since calibration, by the layer's marks
+/// (layer_marks.hpp): then depth is right and lies in the wrong place. Averages untouched frames on
+/// the capture thread, once after a new reference and then every kPauseNs, and compares on a thread
+/// of its own, which takes a tenth of a second.
+class PlaceWatch {
+ public:
+  /// `frames`: so many are averaged, as for a reference.
+  PlaceWatch(int width, int height, int frames);
+
+  void start() { thread_.start(); }
+  void stop() noexcept { thread_.stop(); }
+
+  // On the capture thread; neither waits nor allocates.
+
+  /// Compares with this calibration from now on, within `region` (as for TouchCheck).
+  void use_calibration(std::shared_ptr<const calibration::Calibration> calibration,
+                       const CellRegion& region) noexcept;
+  /// There is a new reference: looks at once.
+  void hurry() noexcept;
+  /// The next frame. `untouched`: depth is measured and nothing touches.
+  void look(const hal::LumaView& luma, bool untouched, std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool moved() const noexcept {
+    return epoch_ != 0 && moved_.load(std::memory_order_acquire) == epoch_;
+  }
+
+  // On any thread.
+
+  /// How far the marks have moved; empty before anything was found to have moved.
+  [[nodiscard]] std::string message() const;
+  /// Waits until what was averaged so far has been judged.
+  void settle() const noexcept { thread_.settle(); }
+
+  static constexpr std::int64_t kPauseNs = 20'000'000'000;
+
+ private:
+  void judge();
+  void compare();
+
+  int width_;
+  ReferenceAverage average_;
+  std::shared_ptr<const calibration::Calibration> calibration_;
+  CellRegion region_;
+  std::uint64_t epoch_ = 0;  // counts calibrations
+  std::int64_t due_ns_ = INT64_MIN;
+
+  struct Job {
+    std::shared_ptr<const calibration::Calibration> calibration;
+    CellRegion region;
+    std::uint64_t epoch = 0;
+    std::vector<std::uint16_t> image_q8;
+  };
+  Job job_;                              // the thread's while it is busy, else look()'s
+  std::atomic<std::uint64_t> moved_{0};  // epoch in which the camera was last found to have moved
+  mutable std::mutex mutex_;             // of message_; never taken on the capture thread
+  std::string message_;
+  base::SideThread thread_;  // last: it uses the others
+};
+
+}  // namespace dtact::pipeline

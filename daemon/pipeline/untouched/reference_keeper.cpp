@@ -1,0 +1,245 @@
+#include "daemon/pipeline/untouched/reference_keeper.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace dtact::pipeline {
+namespace {
+
+/// Too dark to be a reference, grey levels; reconstruction trusts nothing below that either.
+constexpr float kDarkGrey = 8;
+/// While a reference is averaged no cell may move more than this, grey levels (0.03 mm).
+constexpr float kStillGrey = 1;
+/// Local darkening that is a touch. Between two references of one sensor: at most 0.006; the
+/// lightest press of the real images: 0.05 (TouchVerdict). 0.0125 is about 0.07 mm.
+constexpr float kTouchedDarkening = 0.0125F;
+/// The same between images under different light, of which the fit leaves a little: on the
+/// simulated sensor at most 0.002 after dimming by half, 0.019 with only the LEDs of one half lit.
+/// 0.13 mm.
+constexpr float kTouchedUnderOtherLight = 0.025F;
+/// The same where nothing touched right before the light changed: then only a plain press (0.2 mm)
+/// outweighs that, and what another set of LEDs leaves of the light's shape does not.
+constexpr float kTouchedAfterUntouched = 0.04F;
+/// A fit that explains less of the field has lost its way (most of it is pressed).
+constexpr float kEnoughExplained = 0.5F;
+constexpr int kFramesBetweenLooks = 8;
+constexpr int kClearLooks = 2;
+
+}  // namespace
+
+ReferenceKeeper::ReferenceKeeper(int width, int height, const ReferenceRules& rules)
+    : width_(width),
+      height_(height),
+      rules_(rules),
+      settle_(rules),
+      average_(width, height, rules.frames),
+      good_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
+      candidate_(good_.size()),
+      stand_in_(good_.size()) {
+  if (width < kLeastFrameWidth || height < kLeastFrameHeight) {
+    throw std::invalid_argument("camera: frames must have at least 80x60 pixels");
+  }
+}
+
+void ReferenceKeeper::restore(std::span<const std::uint16_t> reference_q8, bool same_light,
+                              bool same_shape) {
+  if (reference_q8.size() != good_.size()) {
+    throw std::invalid_argument("stored reference: not the size of the camera's frames");
+  }
+  std::ranges::copy(reference_q8, good_.begin());
+  measure(good_, width_, height_, good_grid_);
+  have_good_ = true;
+  good_same_light_ = same_light;
+  other_light_ = !same_light;
+  same_shape_ = same_shape;
+}
+
+void ReferenceKeeper::use_calibration(std::span<const std::uint16_t> reference_q8,
+                                      const LumaGrid& grid, const CellRegion& region) noexcept {
+  calibration_ = {reference_q8, &grid};
+  region_ = region;
+  if (ready() && footing_ == Footing::fresh) return;
+  if (footing_ != Footing::none) have_good_ = false;
+  begin();
+}
+
+void ReferenceKeeper::begin() noexcept {
+  phase_ = Phase::settling;
+  footing_ = Footing::none;
+  starting_ = true;
+  averaging_ = false;
+  untouched_before_ = false;
+  waited_ = 0;
+  settle_.reset();
+}
+
+void ReferenceKeeper::light_changed(bool touching, bool same_shape) noexcept {
+  same_shape_ = same_shape_ && same_shape;
+  // During an earlier change nothing new is known about touch; what was known then still holds.
+  if (ready()) untouched_before_ = footing_ == Footing::fresh && !touching;
+  if (ready()) starting_ = false;
+  phase_ = Phase::settling;
+  footing_ = Footing::none;
+  good_same_light_ = false;
+  other_light_ = true;
+  averaging_ = false;
+  waited_ = 0;
+  settle_.reset();
+}
+
+std::optional<RezeroResult> ReferenceKeeper::rezero(bool force, bool touching) noexcept {
+  if (!force && touching && ready() && footing_ != Footing::stale) return RezeroResult::touched;
+  request_ = Request{force};
+  averaging_ = false;
+  return std::nullopt;
+}
+
+bool ReferenceKeeper::looks() const noexcept {
+  return phase_ != Phase::holding || averaging_ || request_ || footing_ != Footing::fresh;
+}
+
+State ReferenceKeeper::state() const noexcept {
+  switch (phase_) {
+    case Phase::settling:
+      return State::settling;
+    case Phase::averaging:
+      return State::referencing;
+    case Phase::holding:
+      break;
+  }
+  return State::serving;
+}
+
+std::span<const std::uint16_t> ReferenceKeeper::reference() const noexcept {
+  return footing_ == Footing::fresh ? std::span(good_) : std::span(stand_in_);
+}
+
+KeeperStep ReferenceKeeper::step(const hal::LumaView& luma) noexcept {
+  if (phase_ == Phase::settling) return settle(luma);
+  if (phase_ == Phase::averaging || averaging_) return gather(luma);
+  if (request_) {
+    start_average();
+    averaging_ = true;
+    return gather(luma);
+  }
+  if (footing_ != Footing::fresh) watch(luma);
+  return {};
+}
+
+void ReferenceKeeper::start_average() noexcept {
+  average_.reset();
+  waited_ = 0;
+}
+
+KeeperStep ReferenceKeeper::settle(const hal::LumaView& luma) noexcept {
+  measure(luma, now_);
+  if (now_.mean < kDarkGrey) {
+    settle_.reset();
+    waited_ = 0;
+    if (!std::exchange(request_, std::nullopt)) return {};
+    return {.reference_changed = false, .answer = RezeroResult::dark};
+  }
+  if (settle_.add(now_.mean) || ++waited_ > rules_.patience_frames) {
+    start_average();
+    phase_ = Phase::averaging;
+  }
+  return {};
+}
+
+KeeperStep ReferenceKeeper::gather(const hal::LumaView& luma) noexcept {
+  measure(luma, now_);
+  if (++waited_ > rules_.patience_frames) return decide(RezeroResult::unsteady);
+  if (average_.added() > 0 && greatest_change(first_, now_, region_) > kStillGrey) average_.reset();
+  if (average_.added() == 0) first_ = now_;
+  if (!average_.add(luma)) return {};
+  average_.write(candidate_);
+  measure(candidate_, width_, height_, candidate_grid_);
+  if (candidate_grid_.mean < kDarkGrey) return decide(RezeroResult::dark);
+  if (request_ && request_->force) return take();
+  now_ = candidate_grid_;
+  return touched(candidate_grid_) ? decide(RezeroResult::touched) : take();
+}
+
+void ReferenceKeeper::watch(const hal::LumaView& luma) noexcept {
+  if (++watched_ < kFramesBetweenLooks) return;
+  watched_ = 0;
+  measure(luma, now_);
+  clear_ = now_.mean >= kDarkGrey && !touched(now_) ? clear_ + 1 : 0;
+  if (clear_ < kClearLooks) return;
+  clear_ = 0;
+  start_average();
+  averaging_ = true;
+}
+
+KeeperStep ReferenceKeeper::take() noexcept {
+  forced_ = request_ && request_->force && touched(candidate_grid_);
+  std::swap(good_, candidate_);
+  good_grid_ = candidate_grid_;
+  have_good_ = true;
+  good_same_light_ = true;
+  other_light_ = false;
+  same_shape_ = true;
+  footing_ = Footing::fresh;
+  phase_ = Phase::holding;
+  averaging_ = false;
+  untouched_before_ = false;
+  KeeperStep step{.reference_changed = true, .answer = std::nullopt};
+  if (std::exchange(request_, std::nullopt)) step.answer = RezeroResult::taken;
+  return step;
+}
+
+KeeperStep ReferenceKeeper::decide(RezeroResult obstacle) noexcept {
+  KeeperStep step;
+  averaging_ = false;
+  if (phase_ != Phase::holding) {
+    if (obstacle == RezeroResult::dark) {
+      phase_ = Phase::settling;
+      settle_.reset();
+      waited_ = 0;
+    } else {
+      step = stand_in();
+    }
+  }
+  if (std::exchange(request_, std::nullopt)) step.answer = obstacle;
+  return step;
+}
+
+KeeperStep ReferenceKeeper::stand_in() noexcept {
+  const Known known = best_known();
+  // One number is measured best where most of the image is far from the touch: on all of it (0.02
+  // mm of depth instead of 0.03 under a ball pressed 1 mm, simulated sensor).
+  const TouchVerdict verdict =
+      same_shape_ ? check_.compare(*known.grid, now_, {}, TouchCheck::kSameShape, field_)
+                  : check_.compare(*known.grid, now_, region_, TouchCheck::kAnyShape, field_);
+  const bool same_light = have_good_ && good_same_light_;
+  if (verdict.explained < kEnoughExplained) {
+    // Most of the field is pressed. Under the same light the reference holds as it is.
+    field_.fill(same_light ? 1.0F : std::clamp(now_.mean / known.grid->mean, 0.0625F, 16.0F));
+  }
+  relight(known.reference_q8, width_, height_, field_, stand_in_);
+  footing_ = same_light ? Footing::restored : Footing::stale;
+  phase_ = Phase::holding;
+  watched_ = 0;
+  clear_ = 0;
+  return {.reference_changed = true, .answer = std::nullopt};
+}
+
+bool ReferenceKeeper::touched(const LumaGrid& now) noexcept {
+  float limit = other_light_ ? kTouchedUnderOtherLight : kTouchedDarkening;
+  if (untouched_before_) limit = kTouchedAfterUntouched;
+  // One witness is enough: the last good reference may be from before a wear of the gel, the
+  // calibration's from before a change of the light's shape.
+  if (have_good_ &&
+      check_.compare(good_grid_, now, region_, TouchCheck::kAnyShape, field_).darkening < limit) {
+    return false;
+  }
+  return check_.compare(*calibration_.grid, now, region_, TouchCheck::kAnyShape, field_)
+             .darkening >= limit;
+}
+
+ReferenceKeeper::Known ReferenceKeeper::best_known() const noexcept {
+  return have_good_ ? Known{good_, &good_grid_} : calibration_;
+}
+
+}  // namespace dtact::pipeline

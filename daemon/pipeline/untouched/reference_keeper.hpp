@@ -1,0 +1,133 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "daemon/pipeline/health.hpp"
+#include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/pipeline/untouched/luma_grid.hpp"
+#include "daemon/pipeline/untouched/reference_average.hpp"
+#include "daemon/pipeline/untouched/settle.hpp"
+#include "daemon/pipeline/untouched/touch_check.hpp"
+
+namespace dtact::pipeline {
+
+/// What the reference in use stands on.
+enum class Footing : std::uint8_t {
+  none,      ///< There is none yet: no depth.
+  fresh,     ///< Averaged under the present light with nothing touching.
+  restored,  ///< Something touches: the last good one, made under the same light.
+  stale      ///< Something touches: an older one brought to the present light as well as it goes.
+};
+
+enum class RezeroResult : std::uint8_t { taken, touched, unsteady, dark };
+
+struct KeeperStep {
+  bool reference_changed = false;      ///< reference() is another from now on.
+  std::optional<RezeroResult> answer;  ///< To the re-zero that was asked for.
+};
+
+/// Decides when the untouched image may be taken and what stands in until then. The sequence: wait
+/// until the mean grey settles, average, compare with what is known to be untouched, and only then
+/// take it. While a stand-in is in use it looks every few frames whether nothing touches any more.
+/// All memory is taken at construction; one thread.
+class ReferenceKeeper {
+ public:
+  ReferenceKeeper(int width, int height, const ReferenceRules& rules);
+
+  /// The last good reference of an earlier run (Q8, frame sized). `same_light`: made under the
+  /// light of now; `same_shape`: under the same colours, whatever the brightness.
+  void restore(std::span<const std::uint16_t> reference_q8, bool same_light, bool same_shape);
+  /// What the calibration knows; the span and the grid must outlive their use here. A fresh
+  /// reference stays, whatever else is known is forgotten and the sequence begins again.
+  void use_calibration(std::span<const std::uint16_t> reference_q8, const LumaGrid& grid,
+                       const CellRegion& region) noexcept;
+  /// The camera has (re)started: begins the sequence.
+  void begin() noexcept;
+  /// The light is about to change or has just changed: no depth until the next reference.
+  /// `touching`: what the depth said last; `same_shape`: only the brightness changes.
+  void light_changed(bool touching, bool same_shape) noexcept;
+  /// Asks for the present image as reference. An answer means that it is refused at once, else it
+  /// comes out of step().
+  [[nodiscard]] std::optional<RezeroResult> rezero(bool force, bool touching) noexcept;
+  void cancel_rezero() noexcept {
+    request_.reset();
+    if (phase_ == Phase::holding) averaging_ = false;
+  }
+
+  /// The next frame under settled light. Mostly cheap; a decision takes about two frames' time.
+  [[nodiscard]] KeeperStep step(const hal::LumaView& luma) noexcept;
+
+  /// The next image counts for a reference, all of it. Else step() does not look.
+  [[nodiscard]] bool looks() const noexcept;
+  [[nodiscard]] State state() const noexcept;
+  [[nodiscard]] Footing footing() const noexcept { return footing_; }
+  /// False from a start or a light change until a reference or a stand-in is there.
+  [[nodiscard]] bool ready() const noexcept { return phase_ == Phase::holding; }
+  /// The sequence runs because the camera (re)started, not because of the light.
+  [[nodiscard]] bool starting() const noexcept { return !ready() && starting_; }
+  /// Q8 luma, frame sized. Only when ready().
+  [[nodiscard]] std::span<const std::uint16_t> reference() const noexcept;
+  /// The reference in use is worth keeping for the next start: taken with nothing touching.
+  [[nodiscard]] bool worth_keeping() const noexcept {
+    return footing_ == Footing::fresh && !forced_;
+  }
+
+ private:
+  enum class Phase : std::uint8_t { settling, averaging, holding };
+  struct Known {
+    std::span<const std::uint16_t> reference_q8;
+    const LumaGrid* grid = nullptr;
+  };
+
+  struct Request {
+    bool force = false;
+  };
+
+  void start_average() noexcept;
+  KeeperStep settle(const hal::LumaView& luma) noexcept;
+  KeeperStep gather(const hal::LumaView& luma) noexcept;
+  void watch(const hal::LumaView& luma) noexcept;
+  KeeperStep decide(RezeroResult obstacle) noexcept;
+  KeeperStep take() noexcept;
+  KeeperStep stand_in() noexcept;
+  [[nodiscard]] bool touched(const LumaGrid& now) noexcept;
+  [[nodiscard]] Known best_known() const noexcept;
+
+  int width_;
+  int height_;
+  ReferenceRules rules_;
+  SettleDetector settle_;
+  ReferenceAverage average_;
+  TouchCheck check_;
+  CellRegion region_;
+  Known calibration_;
+
+  Phase phase_ = Phase::settling;
+  Footing footing_ = Footing::none;
+  bool starting_ = true;
+  bool averaging_ = false;         // while holding: a new reference is being gathered
+  bool untouched_before_ = false;  // nothing touched right before the light changed
+  bool other_light_ = false;       // than what is known was made under
+  bool same_shape_ = true;         // the light differs from it by a factor only
+  bool forced_ = false;
+  std::optional<Request> request_;
+  int waited_ = 0;   // frames since the sequence or the average began
+  int watched_ = 0;  // frames since the last look
+  int clear_ = 0;    // looks in a row that saw nothing touch
+
+  std::vector<std::uint16_t> good_;  // the last good reference
+  LumaGrid good_grid_;
+  bool have_good_ = false;
+  bool good_same_light_ = false;
+  std::vector<std::uint16_t> candidate_;
+  LumaGrid candidate_grid_;
+  std::vector<std::uint16_t> stand_in_;
+  LumaGrid first_;  // of the average being gathered
+  LumaGrid now_;
+  LightField field_{};
+};
+
+}  // namespace dtact::pipeline

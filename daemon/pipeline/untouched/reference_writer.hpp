@@ -1,0 +1,45 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+
+#include "daemon/pipeline/untouched/reference_store.hpp"
+#include "hal/base/side_thread.hpp"
+
+namespace dtact::pipeline {
+
+/// Writes references to the state folder on a thread of its own, since a disk may take seconds. It
+/// has room for one; while that is being written offer() refuses and the caller offers again.
+class ReferenceWriter {
+ public:
+  /// An empty folder keeps nothing.
+  ReferenceWriter(int width, int height, std::filesystem::path folder);
+
+  void start() { thread_.start(); }
+  /// Ends the thread after what it has been offered is written.
+  void stop() noexcept { thread_.stop(); }
+
+  /// Capture thread: copies the reference (Q8, frame sized) for writing. False while busy. Neither
+  /// waits nor allocates.
+  [[nodiscard]] bool offer(std::span<const std::uint16_t> reference_q8, const hal::Light& light,
+                           std::shared_ptr<const calibration::Calibration> calibration) noexcept;
+
+  /// Why the last write failed and what to do; empty when it went well.
+  [[nodiscard]] std::string message() const;
+
+ private:
+  void write();
+
+  std::filesystem::path folder_;
+  // The thread's while it is busy, else offer()'s.
+  StoredReference pending_;
+  std::shared_ptr<const calibration::Calibration> calibration_;
+  mutable std::mutex mutex_;  // of message_; never taken on the capture thread
+  std::string message_;
+  base::SideThread thread_;  // last: it uses the others
+};
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,122 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "daemon/pipeline/health.hpp"
+#include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/pipeline/untouched/calibrated_image.hpp"
+#include "daemon/pipeline/untouched/image_watch.hpp"
+#include "daemon/pipeline/untouched/light_follower.hpp"
+#include "daemon/pipeline/untouched/place_watch.hpp"
+#include "daemon/pipeline/untouched/reference_keeper.hpp"
+#include "daemon/pipeline/untouched/reference_writer.hpp"
+#include "hal/frame.hpp"
+#include "hal/light_ring.hpp"
+
+namespace dtact::pipeline {
+
+/// When and how a frame was taken, as far as the untouched image is concerned.
+struct Moment {
+  std::int64_t timestamp_ns = 0;  ///< The frame's own, CLOCK_MONOTONIC.
+  std::int64_t now_ns = 0;        ///< CLOCK_MONOTONIC.
+  bool settled = false;           ///< It shows the present light and nothing of an earlier one.
+  bool whole = false;             ///< All of it was read, not only what the map reads.
+};
+
+/// What a look at a frame answers.
+struct Look {
+  bool measurable = false;     ///< Depth can be measured in this frame, against reference().
+  bool new_reference = false;  ///< reference() is another from this frame on, and light() is 1.
+  bool new_light = false;      ///< light() is another from this frame on.
+  std::optional<RezeroResult> rezeroed;  ///< The answer to the re-zero that was asked for.
+};
+
+/// How far the reference can be trusted.
+struct Trust {
+  bool stale = false;     ///< It was scaled from another light.
+  double light_left = 0;  ///< What of the light is not followed: a share, positive = brighter.
+};
+
+/// The untouched image in the present light, reference × light + drift, and all that is known of
+/// it: where a frame differs from it, what the light does, which conditions hold, how far it can be
+/// trusted. Nobody else knows any of this. Capture thread only; does not allocate after
+/// construction.
+class UntouchedImage {
+ public:
+  /// Frames of width × height pixels; `light`: what the ring shows at first. Throws
+  /// std::invalid_argument when the frames are too small or the rules impossible.
+  UntouchedImage(int width, int height, const hal::Light& light, const PipelineConfig& config,
+                 ReferenceWriter& writer, PlaceWatch& place);
+
+  // What happens to the image, or is asked of it.
+
+  /// The last good reference of an earlier run, taken under `light`.
+  void restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light);
+  /// From now on this calibration; null: none. A fresh reference stays.
+  void use(CalibratedImage* image) noexcept;
+  /// The camera has begun anew: what was known of its image is in doubt.
+  void camera_began() noexcept;
+  /// The ring is about to show this, or shows it since just now.
+  void light_changes(const hal::Light& light) noexcept;
+  /// Asks for the present image as reference. An answer means that it is refused at once, else it
+  /// comes with a look. Only while there is a calibration.
+  [[nodiscard]] std::optional<RezeroResult> rezero(bool force) noexcept {
+    return keeper_.rezero(force, touched_);
+  }
+  void cancel_rezero() noexcept { keeper_.cancel_rezero(); }
+  /// What depth says of the frame just looked at. Where no depth is made, whatever is active
+  /// counts.
+  void touched(bool touching) noexcept { touched_ = touching; }
+
+  // Each frame.
+
+  /// The next image counts for a reference, all of it; else what the map reads is enough.
+  [[nodiscard]] bool needs_whole_frame() const noexcept { return keeper_.looks(); }
+  /// Looks at a frame. Mostly cheap; a decision on the reference takes about two frames' time.
+  Look look(const hal::LumaView& luma, const Moment& moment) noexcept;
+
+  // Answers.
+
+  [[nodiscard]] State state() const noexcept;
+  /// Of the frame looked at.
+  [[nodiscard]] HealthSet conditions() const noexcept;
+  [[nodiscard]] Trust trust() const noexcept;
+  /// A plane of cells (CalibratedImage::cells): not 0 where the frame differs from it.
+  [[nodiscard]] std::span<const std::int32_t> active() const noexcept {
+    return image_->cells.active();
+  }
+  [[nodiscard]] bool anything_active() const noexcept { return report_.active_cells > 0; }
+  /// There is a reference to measure against.
+  [[nodiscard]] bool ready() const noexcept { return keeper_.ready(); }
+  [[nodiscard]] Footing footing() const noexcept { return keeper_.footing(); }
+  /// As it was taken: Q8 luma, frame sized. Only when ready().
+  [[nodiscard]] std::span<const std::uint16_t> reference() const noexcept {
+    return keeper_.reference();
+  }
+  /// The present light as a factor on it.
+  [[nodiscard]] double light() const noexcept { return follower_.factor(); }
+
+ private:
+  void use_reference() noexcept;
+  void keep_reference() noexcept;
+
+  int width_;
+  int height_;
+  ReferenceWriter& writer_;
+  PlaceWatch& place_;
+  CalibratedImage* image_ = nullptr;
+  ReferenceKeeper keeper_;
+  LightFollower follower_;
+  ImageWatch watch_;
+  CellReport report_;
+  hal::Light shown_;
+  bool settled_ = true;       // the frame looked at
+  bool touched_ = false;      // in the frame before
+  bool other_light_ = false;  // the ring shows another than at calibration
+  bool other_level_ = false;  // the reference's light is not the calibration's, and it matters
+  bool keep_due_ = false;     // the reference in use waits to be written
+};
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,146 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "daemon/pipeline/capture_loop.hpp"
+#include "tests/fakes/fake_clock.hpp"
+#include "tests/fakes/fake_ring.hpp"
+#include "tests/fakes/toy_sensor.hpp"
+
+namespace dtact::fakes {
+
+/// The capture loop before the toy sensor, one frame at a time on the test's own thread and clock.
+class SteppedLoop {
+ public:
+  explicit SteppedLoop(double fps = 60) : camera(*this, fps) {
+    config.reference.frames = 16;
+    exchange.want_contact = true;
+    exchange.want_depth = true;
+    place.start();
+  }
+
+  /// After this the configuration is the loop's.
+  void begin(const std::shared_ptr<const calibration::Calibration>& calibration,
+             bool unusable = false) {
+    light.emplace(std::make_unique<FakeRing>(ring), config.light, clock, exchange.wake);
+    std::unique_ptr<pipeline::ActiveCalibration> active;
+    if (calibration) active = activated(calibration);
+    loop.emplace(pipeline::CaptureParts{camera, *light, writer, place, exchange, clock}, config,
+                 std::move(active), unusable);
+  }
+  [[nodiscard]] std::unique_ptr<pipeline::ActiveCalibration> activated(
+      const std::shared_ptr<const calibration::Calibration>& calibration) {
+    auto active = pipeline::activate(calibration, camera.info(), config.reconstruction);
+    active->generation = ++generations;
+    return active;
+  }
+
+  /// One turn of the loop; true if it published a frame.
+  bool step() {
+    place.settle();  // what it finds would else come a frame sooner or later
+    loop->step();
+    pipeline::Report report;
+    while (exchange.reports.pop(report)) reports.push_back(report);
+    const pipeline::DepthFrame* const fetched = exchange.slot.fetch();
+    if (fetched != nullptr) frame = fetched;
+    return fetched != nullptr;
+  }
+  void step(int turns) {
+    for (int i = 0; i < turns; ++i) (void)step();
+  }
+  bool until(const std::function<bool()>& done, int most = 400) {
+    for (int i = 0; i < most; ++i) {
+      (void)step();
+      if (done()) return true;
+    }
+    return false;
+  }
+  bool until_fresh() {
+    return until([this] { return frame != nullptr && frame->has_depth && frame->health.empty(); });
+  }
+  [[nodiscard]] pipeline::HealthSet health() const {
+    pipeline::HealthSet set;
+    for (int i = 0; i < pipeline::kHealthCount; ++i) {
+      const auto each = static_cast<pipeline::Health>(i);
+      set.set(each, (exchange.health.load() >> static_cast<unsigned>(i) & 1U) != 0);
+    }
+    return set;
+  }
+  template <typename T>
+  [[nodiscard]] std::vector<T> all() const {
+    std::vector<T> found;
+    for (const pipeline::Report& report : reports) {
+      if (const auto* one = std::get_if<T>(&report)) found.push_back(*one);
+    }
+    return found;
+  }
+
+  struct Camera final : hal::Camera, private hal::FrameOwner {
+    Camera(SteppedLoop& loop, double rate) : owner(loop) {
+      description.backend = "toy";
+      description.identity = "toy";
+      description.width = kToyWidth;
+      description.height = kToyHeight;
+      description.fps = rate;
+    }
+    [[nodiscard]] hal::CameraInfo info() const override { return description; }
+    [[nodiscard]] hal::CameraReport report() const override { return {}; }
+    void start() override {}
+    [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
+                                       std::chrono::nanoseconds /*timeout*/) noexcept override {
+      owner.clock.now += static_cast<std::int64_t>(1e9 / description.fps);
+      if (status != hal::GrabStatus::ok) return status;
+      hal::FrameInfo frame;
+      frame.sequence = sequence++;
+      frame.timestamp_ns = owner.clock.now - delay_ns;
+      frame.ready_ns = owner.clock.now;
+      frame.meaning = hal::TimestampMeaning::start_of_exposure;
+      frame.flags = std::exchange(flags, hal::kFrameNormal);
+      toy_paint(scene, frame.sequence, pixels.data());
+      out = hal::Frame(*this, 0, {pixels.data(), kToyWidth, kToyHeight, kToyWidth}, frame);
+      return hal::GrabStatus::ok;
+    }
+    void give_back(int /*index*/) noexcept override {}
+
+    SteppedLoop& owner;
+    hal::CameraInfo description;
+    hal::GrabStatus status = hal::GrabStatus::ok;
+    ToyScene scene;
+    std::uint32_t flags = hal::kFrameNormal;  ///< Of the next frame.
+    std::int64_t delay_ns = 0;                ///< From a frame's timestamp to its arrival.
+    std::uint64_t sequence = 0;
+    std::vector<std::uint8_t> pixels =
+        std::vector<std::uint8_t>(std::size_t{kToyWidth} * kToyHeight + hal::kLumaPadding);
+  };
+
+  pipeline::PipelineConfig config;
+  FakeClock clock;
+  Camera camera;
+  FakeRing::Handle ring;
+  pipeline::Exchange exchange{prototype()};
+  pipeline::ReferenceWriter writer{kToyWidth, kToyHeight, {}};
+  pipeline::PlaceWatch place{kToyWidth, kToyHeight, 16};
+  std::optional<pipeline::LightDriver> light;
+  std::optional<pipeline::CaptureLoop> loop;
+  const pipeline::DepthFrame* frame = nullptr;  ///< The newest.
+  std::vector<pipeline::Report> reports;
+  std::uint64_t generations = 0;
+
+ private:
+  static pipeline::DepthFrame prototype() {
+    pipeline::DepthFrame frame;
+    frame.depth_um.resize(std::size_t{kToyWidth} * kToyHeight);
+    frame.luma.resize(frame.depth_um.size());
+    return frame;
+  }
+};
+
+}  // namespace dtact::fakes

@@ -1,0 +1,186 @@
+#include "daemon/pipeline/capture_loop.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <string>
+
+#include "tests/fakes/stepped_loop.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+using fakes::SteppedLoop;
+using fakes::toy_calibration;
+
+TEST(CaptureLoop, StampsAFrameWithTheWallTimeOfItsExposure) {
+  SteppedLoop loop;
+  loop.camera.delay_ns = 12'345'678;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  EXPECT_EQ(loop.frame->camera.timestamp_ns, loop.clock.now - 12'345'678);
+  EXPECT_EQ(loop.frame->wall_ns, loop.frame->camera.timestamp_ns + fakes::FakeClock::kWallOffset);
+}
+
+// 991 µm were served where 960 are true.
+TEST(CaptureLoop, FollowsTheLightBesideAPressThatLasts) {
+  SteppedLoop loop(10);
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.step(50);
+  loop.camera.scene.x_px = 32;
+  loop.camera.scene.y_px = 32;
+  loop.camera.scene.press_mm = 1;
+  loop.step(50);
+  const double before_mm = loop.frame->contact.deepest_mm;
+  EXPECT_NEAR(before_mm, 0.99, 0.02);
+  for (int i = 1; i <= 1200; ++i) {  // two minutes
+    loop.camera.scene.light = 1 - 0.006 * i / 1200;
+    loop.step(1);
+  }
+  EXPECT_NEAR(loop.frame->contact.deepest_mm, before_mm, 0.010);
+  EXPECT_NEAR(loop.exchange.light_followed, -0.006, 0.001);
+  EXPECT_TRUE(loop.frame->health.empty());
+}
+
+// The light that nobody can follow, since it came too fast, is in what the map states.
+TEST(CaptureLoop, StatesWhatOfTheLightItDoesNotFollow) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.step(120);
+  const double before_um = loop.frame->uncertainty_um;
+  loop.camera.scene.light = 0.99;
+  loop.step(120);
+  EXPECT_TRUE(loop.frame->health.has(Health::light_drifted));
+  // 1 % of 141 grey levels, 32 µm each.
+  EXPECT_NEAR(loop.frame->uncertainty_um, std::hypot(before_um, 45), 3);
+}
+
+TEST(CaptureLoop, AStaleReferenceIsInTheUncertainty) {
+  SteppedLoop loop;
+  loop.camera.scene.press_mm = 1;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until([&] { return loop.frame != nullptr && loop.frame->has_depth; }));
+  EXPECT_TRUE(loop.frame->health.has(Health::reference_stale));
+  // 30 µm for the reference and 20 for a list that says nothing of itself, without the bend.
+  EXPECT_GT(loop.frame->uncertainty_um, 36);
+}
+
+TEST(CaptureLoop, AReferenceFromAnotherBrightnessIsNotTheLastGoodOne) {
+  SteppedLoop loop;
+  loop.camera.scene.press_mm = 1;
+  loop.begin(toy_calibration());
+  hal::Light dim;
+  dim.brightness = 128;
+  loop.loop->restore(fakes::toy_reference_q8(), dim);
+  ASSERT_TRUE(loop.until([&] { return loop.frame != nullptr && loop.frame->has_depth; }));
+  EXPECT_TRUE(loop.frame->health.has(Health::reference_stale));
+  EXPECT_FALSE(loop.frame->health.has(Health::reference_restored));
+}
+
+TEST(CaptureLoop, AGoodCalibrationTakesThePlaceOfAnUnusableOne) {
+  SteppedLoop loop;
+  loop.begin(nullptr, true);
+  loop.step(2);
+  EXPECT_TRUE(loop.health().has(Health::camera_mismatch));
+  ASSERT_TRUE(loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration())}));
+  ASSERT_TRUE(loop.until_fresh());
+  EXPECT_FALSE(loop.health().has(Health::camera_mismatch));
+}
+
+TEST(CaptureLoop, ACalibrationOutOfUseIsHeldByNobody) {
+  SteppedLoop loop;
+  const auto first = toy_calibration();
+  loop.begin(first);
+  ASSERT_TRUE(loop.until_fresh());
+  ASSERT_TRUE(loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration())}));
+  loop.step(30);
+  std::unique_ptr<ActiveCalibration> retired;
+  ASSERT_TRUE(loop.exchange.retired.pop(retired));
+  retired.reset();
+  EXPECT_EQ(first.use_count(), 1) << "the watch on the camera's place, for one, has the new one";
+}
+
+TEST(CaptureLoop, ACameraOpenedAnewBeginsAnew) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  const std::size_t taken = loop.all<ReferenceTaken>().size();
+  // A stall: it was never away. The controls are set anew, and the image is another.
+  loop.camera.status = hal::GrabStatus::timeout;
+  loop.step(200);
+  loop.camera.status = hal::GrabStatus::ok;
+  loop.camera.flags = hal::kFrameReopened;
+  loop.camera.scene.light = 0.9;
+  loop.step(1);
+  EXPECT_TRUE(loop.frame == nullptr || !loop.frame->has_depth) << "no depth in the old light";
+  EXPECT_TRUE(loop.health().has(Health::starting));
+  ASSERT_TRUE(loop.until_fresh());
+  EXPECT_EQ(loop.all<ReferenceTaken>().size(), taken + 1);
+  loop.camera.scene.press_mm = 0.5;
+  loop.step(10);
+  EXPECT_NEAR(loop.frame->contact.deepest_mm, 0.5, 0.02);
+}
+
+TEST(CaptureLoop, ARezeroOfACameraThatWentAwayIsGivenUp) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.scene.press_mm = 1;
+  loop.step(10);
+  ASSERT_TRUE(loop.exchange.orders.push(RezeroOrder{7, true}));
+  loop.step(4);
+  loop.camera.status = hal::GrabStatus::unplugged;
+  loop.step(2);
+  const auto answers = loop.all<Answer>();
+  ASSERT_EQ(answers.size(), 1U);
+  EXPECT_EQ(answers[0].ticket, 7U);
+  EXPECT_EQ(answers[0].outcome, Outcome::camera_away);
+  loop.camera.status = hal::GrabStatus::ok;
+  ASSERT_TRUE(loop.until([&] { return loop.frame->has_depth; }));
+  EXPECT_NEAR(loop.frame->contact.deepest_mm, 1, 0.05) << "the touched image is no reference";
+}
+
+TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
+  SteppedLoop loop;
+  loop.exchange.want_contact = loop.exchange.want_depth = false;
+  loop.begin(toy_calibration());
+  loop.step(100);
+  EXPECT_EQ(loop.exchange.state, State::serving);
+  EXPECT_TRUE(loop.health().empty());
+  loop.camera.scene.press_mm = 1;
+  loop.step(20);
+  EXPECT_TRUE(loop.all<ContactChanged>().empty());
+  for (const StageStatistics& stage : loop.exchange.statistics.stages()) {
+    EXPECT_NE(stage.stage, std::string("list"));
+  }
+  // The light and what the picture shows are looked at all the same.
+  loop.camera.scene = {};
+  loop.step(20);
+  loop.camera.scene.light = 0.98;
+  loop.step(20);
+  EXPECT_TRUE(loop.health().has(Health::light_drifted));
+  loop.camera.scene = {};
+  loop.camera.scene.press_mm = 1;
+  loop.exchange.want_contact = true;
+  loop.step(5);
+  ASSERT_EQ(loop.all<ContactChanged>().size(), 1U);
+  EXPECT_NEAR(loop.all<ContactChanged>()[0].contact.deepest_mm, 1, 0.05);
+}
+
+TEST(CaptureLoop, LossesAreAConditionForASecond) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.status = hal::GrabStatus::damaged;
+  loop.step(1);
+  const std::int64_t lost_ns = loop.clock.now;
+  loop.camera.status = hal::GrabStatus::ok;
+  ASSERT_TRUE(loop.until([&] { return !loop.health().has(Health::frames_lost); }));
+  EXPECT_NEAR(static_cast<double>(loop.clock.now - lost_ns), 1e9, 17e6);
+}
+
+}  // namespace
+}  // namespace dtact::pipeline
