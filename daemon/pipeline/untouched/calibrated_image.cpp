@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 namespace dtact::pipeline {
 namespace {
@@ -36,7 +37,14 @@ CalibratedImage::CalibratedImage(std::shared_ptr<const calibration::Calibration>
                     "from touch: calibrate with a crop of at least a quarter of each side",
                     calibration->name, table.width, table.height));
   }
-  measure(calibration->model->reference_q8, table.frame_width, table.frame_height, grid);
+  const std::vector<std::uint16_t>& reference_q8 = calibration->model->reference_q8;
+  measure(reference_q8, table.frame_width, table.frame_height, grid);
+  const int x = cell_edge(region.x0, kGridWidth, table.frame_width);
+  const int y = cell_edge(region.y0, kGridHeight, table.frame_height);
+  marks = std::make_shared<const LayerMarks>(
+      reference_q8, table.frame_width,
+      recon::FrameRegion{x, y, cell_edge(region.x1, kGridWidth, table.frame_width) - x,
+                         cell_edge(region.y1, kGridHeight, table.frame_height) - y});
 }
 
 bool light_differs(const calibration::Calibration& calibration, const hal::Light& light) noexcept {

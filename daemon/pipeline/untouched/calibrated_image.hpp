@@ -4,6 +4,7 @@
 
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/pipeline/untouched/cells.hpp"
+#include "daemon/pipeline/untouched/layer_marks.hpp"
 #include "daemon/pipeline/untouched/luma_grid.hpp"
 #include "hal/light_ring.hpp"
 
@@ -20,6 +21,7 @@ struct CalibratedImage {
   LumaGrid grid;      ///< Of the calibration's reference.
   CellRegion region;  ///< Cells that lie wholly in the calibrated part of the frame.
   Cells cells;
+  std::shared_ptr<const LayerMarks> marks;  ///< Of the layer, within the region.
 };
 
 /// The ring shows another light than at calibration: any channel, after brightness, off by more

@@ -186,28 +186,28 @@ std::optional<LayerMarks::Move> one_sided(const std::vector<Patch>& patches) {
 
 LayerMarks::LayerMarks(std::span<const std::uint16_t> reference_q8, int frame_width,
                        const recon::FrameRegion& part)
-    : width_(part.width),
-      height_(part.height),
+    : part_(part),
       detail_(static_cast<std::size_t>(part.width) * static_cast<std::size_t>(part.height)) {
   if (detail_.empty()) return;
   const std::uint16_t* const from =
       reference_q8.data() + std::ptrdiff_t{part.y} * frame_width + part.x;
   const double unit = std::max(1.0, frame_width / 640.0);
-  RowBlur narrow(unit, width_);
-  RowBlur wide(4 * unit, width_);
-  for (int y = 0; y < height_; ++y) {
-    const auto sharp = narrow.row(from, frame_width, width_, height_, y);
-    const auto smooth = wide.row(from, frame_width, width_, height_, y);
-    std::int16_t* const out = detail_.data() + std::ptrdiff_t{y} * width_;
+  RowBlur narrow(unit, part_.width);
+  RowBlur wide(4 * unit, part_.width);
+  for (int y = 0; y < part_.height; ++y) {
+    const auto sharp = narrow.row(from, frame_width, part_.width, part_.height, y);
+    const auto smooth = wide.row(from, frame_width, part_.width, part_.height, y);
+    std::int16_t* const out = detail_.data() + std::ptrdiff_t{y} * part_.width;
     for (std::size_t x = 0; x < sharp.size(); ++x) {
       out[x] = static_cast<std::int16_t>(
           std::lround(std::clamp(sharp[x] - smooth[x], -10000.0F, 10000.0F)));
     }
   }
   std::vector<std::int16_t> scratch;
-  for (int x = 0; x < width_; ++x) remove_stripe(detail_.data() + x, height_, width_, scratch);
-  for (int y = 0; y < height_; ++y) {
-    remove_stripe(detail_.data() + std::ptrdiff_t{y} * width_, width_, 1, scratch);
+  for (int x = 0; x < part_.width; ++x)
+    remove_stripe(detail_.data() + x, part_.height, part_.width, scratch);
+  for (int y = 0; y < part_.height; ++y) {
+    remove_stripe(detail_.data() + std::ptrdiff_t{y} * part_.width, part_.width, 1, scratch);
   }
   scratch.clear();  // every fifth is plenty to know the deviation by
   for (std::size_t i = 0; i < detail_.size(); i += 5) scratch.push_back(detail_[i]);
@@ -219,18 +219,18 @@ LayerMarks::LayerMarks(std::span<const std::uint16_t> reference_q8, int frame_wi
 }
 
 std::optional<LayerMarks::Move> LayerMarks::moved_to(const LayerMarks& now) const {
-  if (now.width_ != width_ || now.height_ != height_) return std::nullopt;
-  if (width_ < 4 * kReach || height_ < 4 * kReach) return std::nullopt;
-  const int columns = std::max(2, width_ / kPatch);
-  const int rows = std::max(2, height_ / kPatch);
+  if (now.part_.width != part_.width || now.part_.height != part_.height) return std::nullopt;
+  if (part_.width < 4 * kReach || part_.height < 4 * kReach) return std::nullopt;
+  const int columns = std::max(2, part_.width / kPatch);
+  const int rows = std::max(2, part_.height / kPatch);
   std::vector<Patch> patches;
   for (int row = 0; row < rows; ++row) {
     for (int column = 0; column < columns; ++column) {
-      const int left = column * width_ / columns;
-      const int right = (column + 1) * width_ / columns;
-      const int top = row * height_ / rows;
-      const int bottom = (row + 1) * height_ / rows;
-      Patch patch{0.5 * (left + right - width_), 0.5 * (top + bottom - height_)};
+      const int left = column * part_.width / columns;
+      const int right = (column + 1) * part_.width / columns;
+      const int top = row * part_.height / rows;
+      const int bottom = (row + 1) * part_.height / rows;
+      Patch patch{0.5 * (left + right - part_.width), 0.5 * (top + bottom - part_.height)};
       float* out = patch.correlation.data();
       for (int dy = -kReach; dy <= kReach; ++dy) {
         for (int dx = -kReach; dx <= kReach; ++dx) {
@@ -239,8 +239,9 @@ std::optional<LayerMarks::Move> LayerMarks::moved_to(const LayerMarks& now) cons
           const int n = right - left - std::abs(dx);
           std::int64_t sum = 0;
           for (int y = std::max(top, top - dy); y < std::min(bottom, bottom - dy); ++y) {
-            sum += product(detail_.data() + std::ptrdiff_t{y} * width_ + first,
-                           now.detail_.data() + std::ptrdiff_t{y + dy} * width_ + first + dx, n);
+            sum +=
+                product(detail_.data() + std::ptrdiff_t{y} * part_.width + first,
+                        now.detail_.data() + std::ptrdiff_t{y + dy} * part_.width + first + dx, n);
           }
           *out++ = static_cast<float>(sum);
         }

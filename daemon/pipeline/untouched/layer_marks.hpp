@@ -37,13 +37,15 @@ class LayerMarks {
   /// (sensors a and b; real_marks_test).
   [[nodiscard]] std::optional<Move> moved_to(const LayerMarks& now) const;
 
+  /// Of the frame, as given.
+  [[nodiscard]] const recon::FrameRegion& part() const noexcept { return part_; }
+
   static constexpr int kReach = 16;
   static constexpr int kLeast = 2;
   static constexpr double kSure = 8;
 
  private:
-  int width_;
-  int height_;
+  recon::FrameRegion part_;
   std::vector<std::int16_t> detail_;
 };
 

@@ -6,8 +6,6 @@
 #include <new>
 #include <utility>
 
-#include "daemon/pipeline/untouched/layer_marks.hpp"
-
 namespace dtact::pipeline {
 
 PlaceWatch::PlaceWatch(int width, int height, int frames)
@@ -15,10 +13,8 @@ PlaceWatch::PlaceWatch(int width, int height, int frames)
   job_.image_q8.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
 }
 
-void PlaceWatch::use_calibration(std::shared_ptr<const calibration::Calibration> calibration,
-                                 const CellRegion& region) noexcept {
-  calibration_ = std::move(calibration);
-  region_ = region;
+void PlaceWatch::use_marks(std::shared_ptr<const LayerMarks> then) noexcept {
+  then_ = std::move(then);
   ++epoch_;
   hurry();
 }
@@ -29,7 +25,7 @@ void PlaceWatch::hurry() noexcept {
 }
 
 void PlaceWatch::look(const hal::LumaView& luma, bool untouched, std::int64_t now_ns) noexcept {
-  if (!calibration_ || now_ns < due_ns_ || thread_.busy()) return;
+  if (!then_ || now_ns < due_ns_ || thread_.busy()) return;
   if (!untouched) {
     if (average_.added() > 0) average_.reset();
     return;
@@ -37,8 +33,7 @@ void PlaceWatch::look(const hal::LumaView& luma, bool untouched, std::int64_t no
   if (!average_.add(luma)) return;
   average_.write(job_.image_q8);
   average_.reset();
-  job_.calibration = calibration_;
-  job_.region = region_;
+  job_.then = then_;
   job_.epoch = epoch_;
   due_ns_ = now_ns + kPauseNs;
   thread_.hand_over();
@@ -55,17 +50,11 @@ void PlaceWatch::judge() {
   } catch (const std::bad_alloc&) {
     moved_.store(0, std::memory_order_release);  // nothing is known; it looks again after the pause
   }
-  job_.calibration.reset();
+  job_.then.reset();
 }
 
 void PlaceWatch::compare() {
-  const recon::RectifyTable& table = job_.calibration->model->rectify;
-  const int x = cell_edge(job_.region.x0, kGridWidth, table.frame_width);
-  const int y = cell_edge(job_.region.y0, kGridHeight, table.frame_height);
-  const recon::FrameRegion part{x, y, cell_edge(job_.region.x1, kGridWidth, table.frame_width) - x,
-                                cell_edge(job_.region.y1, kGridHeight, table.frame_height) - y};
-  const LayerMarks then(job_.calibration->model->reference_q8, width_, part);
-  const auto move = then.moved_to(LayerMarks(job_.image_q8, width_, part));
+  const auto move = job_.then->moved_to(LayerMarks(job_.image_q8, width_, job_.then->part()));
   if (move) {
     const std::scoped_lock lock(mutex_);
     message_ =

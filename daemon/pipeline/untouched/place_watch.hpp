@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/calibration/calibration.hpp"
-#include "daemon/pipeline/untouched/luma_grid.hpp"
+#include "daemon/pipeline/untouched/layer_marks.hpp"
 #include "daemon/pipeline/untouched/reference_average.hpp"
 #include "hal/base/side_thread.hpp"
 #include "hal/frame.hpp"
@@ -29,9 +28,8 @@ class PlaceWatch {
 
   // On the capture thread; neither waits nor allocates.
 
-  /// Compares with this calibration from now on, within `region` (as for TouchCheck).
-  void use_calibration(std::shared_ptr<const calibration::Calibration> calibration,
-                       const CellRegion& region) noexcept;
+  /// Compares with the marks of another calibration from now on.
+  void use_marks(std::shared_ptr<const LayerMarks> then) noexcept;
   /// There is a new reference: looks at once.
   void hurry() noexcept;
   /// The next frame. `untouched`: depth is measured and nothing touches.
@@ -55,14 +53,12 @@ class PlaceWatch {
 
   int width_;
   ReferenceAverage average_;
-  std::shared_ptr<const calibration::Calibration> calibration_;
-  CellRegion region_;
+  std::shared_ptr<const LayerMarks> then_;
   std::uint64_t epoch_ = 0;  // counts calibrations
   std::int64_t due_ns_ = INT64_MIN;
 
   struct Job {
-    std::shared_ptr<const calibration::Calibration> calibration;
-    CellRegion region;
+    std::shared_ptr<const LayerMarks> then;
     std::uint64_t epoch = 0;
     std::vector<std::uint16_t> image_q8;
   };

@@ -30,7 +30,7 @@ void UntouchedImage::use(CalibratedImage* image) noexcept {
   image_ = image;
   if (image == nullptr) return;
   keeper_.use_calibration(image->calibration->model->reference_q8, image->grid, image->region);
-  place_.use_calibration(image->calibration, image->region);
+  place_.use_marks(image->marks);
   other_light_ = light_differs(*image->calibration, shown_);
   if (keeper_.ready()) use_reference();
 }

@@ -136,11 +136,57 @@ TEST_F(KeeperTest, RezeroUnderContactIsRefusedAtOnce) {
 TEST_F(KeeperTest, RezeroSeesATouchThatTheDepthMissed) {
   calibrate();
   ASSERT_TRUE(run(40));
-  scene.press_mm = 0.3;
+  scene.press_mm = 0.09;  // 1.8 % of the light; the limit is 1.25 %
   EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
   ASSERT_TRUE(run(40));
   EXPECT_EQ(last.answer, RezeroResult::touched);
   EXPECT_FALSE(last.reference_changed);
+  scene.press_mm = 0.05;
+  EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(last.answer, RezeroResult::taken);
+}
+
+TEST_F(KeeperTest, WhatMovesSlowlyIsNotAveraged) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
+  for (int i = 0; i < 50; ++i) {
+    scene.light -= 0.002;  // 0.3 grey levels a frame: less than what counts as movement
+    ASSERT_FALSE(run(1)) << i;
+  }
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(last.answer, RezeroResult::taken);
+  EXPECT_LT(worst_error(), 0.7);
+}
+
+TEST_F(KeeperTest, UntouchedTwiceInARowEndsAStandIn) {
+  calibrate();
+  scene.press_mm = 1;
+  ASSERT_TRUE(run(40));
+  ASSERT_EQ(keeper.footing(), Footing::stale);
+  // It looks every eighth frame.
+  ASSERT_FALSE(run(8));
+  scene.press_mm = 0;
+  ASSERT_FALSE(run(8));
+  scene.press_mm = 1;
+  ASSERT_FALSE(run(8));
+  scene.press_mm = 0;
+  EXPECT_FALSE(run(16 + 15)) << "two looks, and all but one frame of an average";
+  EXPECT_TRUE(run(1));
+  EXPECT_EQ(keeper.footing(), Footing::fresh);
+}
+
+TEST_F(KeeperTest, ANewCalibrationForgetsTheLastGoodOneThatOnlyStoodIn) {
+  keeper.restore(fakes::toy_reference_q8({.tilt = 0.4}), true, true);
+  calibrate();
+  scene.press_mm = 1;
+  ASSERT_TRUE(run(40));
+  ASSERT_EQ(keeper.footing(), Footing::restored);
+  calibrate();
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_LT(worst_error(), 1.0) << "the calibration's own, scaled";
 }
 
 TEST_F(KeeperTest, ForcedRezeroTakesTheTouchedImageButDoesNotKeepIt) {

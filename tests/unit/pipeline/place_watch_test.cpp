@@ -13,7 +13,6 @@ namespace dtact::pipeline {
 namespace {
 
 constexpr int kFrames = 16;
-constexpr CellRegion kAll{};
 
 std::size_t at(int x, int y) {
   return static_cast<std::size_t>(y) * fakes::kToyWidth + static_cast<std::size_t>(x);
@@ -30,17 +29,18 @@ double toy_mark(int x, int y) {
   return 2 * hash((x + 100) / 2, y / 2);  // never negative
 }
 
-std::shared_ptr<const calibration::Calibration> calibrated() {
-  auto made = fakes::toy_calibration();
-  auto model = std::make_shared<recon::Model>(*made->model);
+/// Of a toy sensor's layer with such marks.
+std::shared_ptr<const LayerMarks> calibrated() {
+  std::vector<std::uint16_t> reference_q8 = fakes::toy_reference_q8();
   for (int y = 0; y < fakes::kToyHeight; ++y) {
     for (int x = 0; x < fakes::kToyWidth; ++x) {
-      auto& q8 = model->reference_q8[at(x, y)];
+      auto& q8 = reference_q8[at(x, y)];
       q8 = static_cast<std::uint16_t>(std::lround(q8 + 256 * toy_mark(x, y)));
     }
   }
-  made->model = std::move(model);
-  return made;
+  return std::make_shared<const LayerMarks>(
+      reference_q8, fakes::kToyWidth,
+      recon::FrameRegion{0, 0, fakes::kToyWidth, fakes::kToyHeight});
 }
 
 class PlaceWatchTest : public ::testing::Test {
@@ -69,7 +69,7 @@ class PlaceWatchTest : public ::testing::Test {
 };
 
 TEST_F(PlaceWatchTest, TellsAMovedCameraAndHowFar) {
-  watch.use_calibration(calibrated(), kAll);
+  watch.use_marks(calibrated());
   show(kFrames, 0);
   EXPECT_FALSE(watch.moved());
   watch.hurry();  // a new reference
@@ -82,7 +82,7 @@ TEST_F(PlaceWatchTest, TellsAMovedCameraAndHowFar) {
 }
 
 TEST_F(PlaceWatchTest, LooksAgainAfterAPauseByItself) {
-  watch.use_calibration(calibrated(), kAll);
+  watch.use_marks(calibrated());
   show(kFrames, 0);
   show(kFrames, 4);
   EXPECT_FALSE(watch.moved());
@@ -94,7 +94,7 @@ TEST_F(PlaceWatchTest, LooksAgainAfterAPauseByItself) {
 }
 
 TEST_F(PlaceWatchTest, AveragesNothingThatTouches) {
-  watch.use_calibration(calibrated(), kAll);
+  watch.use_marks(calibrated());
   show(kFrames - 1, 4);
   show(1, 4, false);
   show(kFrames - 1, 4);
@@ -106,10 +106,10 @@ TEST_F(PlaceWatchTest, AveragesNothingThatTouches) {
 TEST_F(PlaceWatchTest, KnowsNothingOfANewCalibrationBeforeItHasLooked) {
   show(kFrames, 4);
   EXPECT_FALSE(watch.moved());  // without any calibration
-  watch.use_calibration(calibrated(), kAll);
+  watch.use_marks(calibrated());
   show(kFrames, 4);
   ASSERT_TRUE(watch.moved());
-  watch.use_calibration(calibrated(), kAll);
+  watch.use_marks(calibrated());
   EXPECT_FALSE(watch.moved());
 }
 

@@ -128,6 +128,26 @@ TEST_F(TouchTest, OneNumberSeesADimmedRingThroughALargePress) {
   EXPECT_EQ(field[cell_at(20, 15)], field[0]);
 }
 
+TEST_F(TouchTest, OneOddCellIsNoTouchAndTwoAre) {
+  LumaGrid now = grid_of({});
+  now.cells[cell_at(20, 15)] *= 0.5F;
+  EXPECT_LT(check.compare(grid_of({}), now, region, TouchCheck::kAnyShape, field).darkening,
+            0.001F);
+  now.cells[cell_at(21, 15)] *= 0.9F;
+  EXPECT_NEAR(check.compare(grid_of({}), now, region, TouchCheck::kAnyShape, field).darkening, 0.1F,
+              0.002F);
+}
+
+TEST(Relight, EndsAtWhite) {
+  LightField field;
+  field.fill(2);
+  const std::vector<std::uint16_t> then(std::size_t{80} * 60, 200 * 256);
+  std::vector<std::uint16_t> relit(then.size());
+  relight(then, 80, 60, field, relit);
+  EXPECT_EQ(relit.front(), 65280);
+  EXPECT_EQ(relit.back(), 65280);
+}
+
 TEST_F(TouchTest, RelightingBringsAReferenceToTheLightOfNow) {
   (void)darkening({.light = 0.7, .tilt = 0.2});
   const auto then = toy_reference_q8();
