@@ -71,8 +71,8 @@ struct ListRows {
 };
 
 /// kernels::gain_list_mask_row of each row: `width` pixels are written, inputs are read in whole
-/// blocks. After the list's last entry must stand kUntrusted once more: untrusted pixels look that
-/// up.
+/// blocks. The depth may be written over the difference. After the list's last entry must stand
+/// kUntrusted once more: untrusted pixels look that up.
 int gain_list_mask(const ListRows& rows, const kernels::LookUp& list) noexcept;
 
 /// Name of the instruction set the kernels run with.

@@ -51,9 +51,10 @@ HWY_NOINLINE int GainListMaskRows(const ListRows& rows, const kernels::LookUp& l
   const auto half = hn::Set(d32, 1 << 11);
   size_t beyond = 0;
   for (int y = 0; y < rows.height; ++y) {
-    const int16_t* HWY_RESTRICT difference = rows.difference_q6 + y * rows.difference_stride;
+    // The published method writes its depth over its difference: neither is restricted.
+    const int16_t* difference = rows.difference_q6 + y * rows.difference_stride;
     const int16_t* HWY_RESTRICT gains = kGain ? rows.gain_q12 + y * rows.gain_stride : nullptr;
-    int16_t* HWY_RESTRICT depth = rows.depth_um + y * rows.depth_stride;
+    int16_t* depth = rows.depth_um + y * rows.depth_stride;
     for (int begin = 0; begin < rows.width; begin += kChunk) {
       const int end = HWY_MIN(begin + kChunk, rows.width);
       for (int x = begin; x < end; x += kLanes) {

@@ -236,6 +236,27 @@ TEST_P(VectorList, EveryWidthWithAndWithoutGain) {
   }
 }
 
+TEST_P(VectorList, WritesOverItsOwnInput) {
+  std::vector<std::int16_t> um = values(150 * 64 + 1, -32767, 32767);
+  um.push_back(kUntrusted);
+  const kernels::LookUp list{um.data(), -40 * 64, 110 * 64, 100 * 64};
+  // Longer than the places that are looked up at once, too.
+  for (const int width : {1, 31, 32, 33, 100, 640, 641, 1400}) {
+    const int stride = padded(width);
+    std::vector<std::int16_t> rows = values(2 * stride, -32768, 32767);
+    std::vector<std::int16_t> should = rows;
+    int beyond = 0;
+    for (std::ptrdiff_t y = 0; y < 2; ++y) {
+      beyond += kernels::gain_list_mask_row(rows.data() + y * stride, nullptr, nullptr, list, width,
+                                            should.data() + y * stride);
+    }
+    ASSERT_EQ(
+        gain_list_mask({rows.data(), stride, nullptr, 0, rows.data(), stride, width, 2}, list),
+        beyond);
+    ASSERT_EQ(rows, should) << width;
+  }
+}
+
 DTACT_EVERY_TARGET(VectorKernels);
 DTACT_EVERY_TARGET(VectorRectify);
 DTACT_EVERY_TARGET(VectorSmooth);
