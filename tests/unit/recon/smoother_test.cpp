@@ -86,6 +86,30 @@ TEST(Smoother, ReplicatesTheFirstAndLastColumn) {
   EXPECT_EQ(std::vector<int>(out.row(0), out.row(0) + 3), (std::vector<int>{300, 300, 600}));
 }
 
+TEST(Smoother, WhatLiesRightOfTheImageIsItsLastColumn) {
+  // The kernel reaches over the edge from the last columns of every width, also from the block
+  // before the last; RowBuffer holds what earlier frames left there.
+  for (int width = 33; width <= 100; ++width) {
+    Smoother smoother(gaussian_taps(2), width, 2);
+    RowBuffer in(2, width);
+    RowBuffer out(2, width);
+    for (int row = 0; row < 2; ++row) {
+      std::fill_n(in.row(row), width + smoother.radius(), std::int16_t{9999});
+      std::fill_n(in.row(row), width, std::int16_t{640});
+    }
+    const int blocks = (width + vec::kBlock - 1) / vec::kBlock;
+    // A block at a time, as tiles are.
+    for (int block = 0; block < blocks; ++block) {
+      smoother.push(0, in.row(0), in.row(1), block, block + 1);
+      if (block + 1 < blocks) std::fill_n(in.row(0) + width, smoother.radius(), std::int16_t{9999});
+    }
+    smoother.take(0, out.row(0), out.row(1), 0, blocks);
+    EXPECT_EQ(std::vector<int>(out.row(1), out.row(1) + width),
+              std::vector<int>(static_cast<std::size_t>(width), 640))
+        << width;
+  }
+}
+
 TEST(Smoother, EveryRowComesOutAtEveryHeight) {
   for (int height = 1; height < 60; ++height) {
     Smoother smoother(gaussian_taps(2), 3, height);
