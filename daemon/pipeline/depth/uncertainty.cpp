@@ -9,7 +9,7 @@
 namespace dtact::pipeline {
 namespace {
 
-/// Rows of a full map that are looked at: the layer blurs over several.
+/// Of a full map every so many rows are looked at: the layer blurs over several.
 constexpr int kRowStep = 4;
 
 /// Added error at 1/decimation of the resolution, in bends.
@@ -29,7 +29,7 @@ double added(int decimation) noexcept {
 double bend_um(std::span<const std::int16_t> depth_um, const recon::TileGrid& grid,
                const recon::TileRows& drawn, double mm_per_px, std::int16_t from_um) noexcept {
   const int reach = std::max(1, static_cast<int>(std::lround(kBendMm / mm_per_px)));
-  const int row_step = std::max(1, kRowStep / reach);
+  const int row_step = std::min(kRowStep, reach);
   const std::ptrdiff_t below = std::ptrdiff_t{reach} * grid.width;
   std::int64_t sum = 0;  // of |four neighbours − 4 × pixel|
   std::int64_t pixels = 0;

@@ -52,6 +52,22 @@ TEST(Bend, OnlyTheDrawnTilesAreLookedAt) {
   EXPECT_GT(bend_um(map, grid, all_tiles(grid), 0.166, 100), 0);
 }
 
+TEST(Bend, LooksAtEveryFourthRowOfAFullMapAndEveryRowOfAQuarterMap) {
+  const auto rows_seen = [](double mm_per_px) {
+    std::vector<int> seen;
+    for (int row = 0; row < 24; ++row) {
+      // A plane with one row that is not in it.
+      if (bend_of([row](int, int y) { return y == row ? 500 : 0; }, mm_per_px) > 0)
+        seen.push_back(row);
+    }
+    return seen;
+  };
+  EXPECT_EQ(rows_seen(0.0415), (std::vector<int>{4, 8, 12, 16, 20}));  // reach of 4 pixels
+  EXPECT_EQ(rows_seen(0.083), (std::vector<int>{2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22}));
+  EXPECT_EQ(rows_seen(0.166).size(), 23U);  // all but row 0: reach of 1 pixel
+  EXPECT_EQ(rows_seen(0.0277), (std::vector<int>{6, 10, 14, 18, 22}));  // reach of 6 pixels
+}
+
 TEST(Bend, AMapSmallerThanItsReachHasNone) {
   const std::vector<std::int16_t> map(16, 500);
   const recon::TileGrid grid(4, 4);
@@ -72,6 +88,31 @@ TEST(ResolutionChooser, GoesFinerAtOnceAndCoarserWithPatience) {
   for (int i = 1; i < ResolutionChooser::kPatience; ++i) EXPECT_NE(chooser.next(20, 1), 4) << i;
   int frames = 0;
   while (chooser.next(20, 1) != 4) ASSERT_LT(++frames, 3 * ResolutionChooser::kPatience);
+}
+
+TEST(ResolutionChooser, PatienceBeginsAnewAfterEveryFrameThatIsNotWellInside) {
+  ResolutionChooser chooser(50);
+  ASSERT_EQ(chooser.next(20, 6.4), 2);
+  for (int round = 0; round < 3; ++round) {
+    for (int i = 1; i < 15; ++i) ASSERT_EQ(chooser.next(20, 1), 2) << round << ", frame " << i;
+    ASSERT_EQ(chooser.next(20, 6.4), 2);  // fits half resolution, not a quarter
+  }
+  for (int i = 1; i < 15; ++i) ASSERT_EQ(chooser.next(20, 1), 2) << i;
+  EXPECT_EQ(chooser.next(20, 1), 4);
+  ASSERT_EQ(chooser.next(20, 6.4), 2);  // and after a step
+  for (int i = 1; i < 15; ++i) ASSERT_EQ(chooser.next(20, 1), 2) << i;
+  EXPECT_EQ(chooser.next(20, 1), 4);
+}
+
+TEST(ResolutionChooser, GoesOneStepCoarserAfterFifteenFramesEach) {
+  ResolutionChooser chooser(50);
+  ASSERT_EQ(chooser.next(60, 0), 1);
+  std::vector<int> chosen;
+  for (int i = 0; i < 31; ++i) chosen.push_back(chooser.next(20, 1));
+  std::vector<int> expected(14, 1);
+  expected.insert(expected.end(), 15, 2);
+  expected.insert(expected.end(), 2, 4);
+  EXPECT_EQ(chosen, expected);
 }
 
 TEST(ResolutionChooser, TakesFullResolutionWhereNothingIsInside) {
