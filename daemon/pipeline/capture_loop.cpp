@@ -99,6 +99,7 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
     exchange_.camera_returned.store(true, std::memory_order_release);
     exchange_.wake.signal();
   }
+  want_depth_ = exchange_.want_depth.load(std::memory_order_relaxed);
   controls_moved_ = (info.flags & hal::kFrameControlsMoved) != 0;
   const std::int64_t exposure_ns = exposure_start_ns(info, period_ns_);
 
@@ -140,7 +141,7 @@ void CaptureLoop::look(DepthFrame& out, const Moment& moment) noexcept {
   if (look.rezeroed) desk_.answer(*look.rezeroed);
   const bool measured = look.measurable && exchange_.want_contact.load(std::memory_order_relaxed);
   if (measured) {
-    depth_.make(frame_.luma(), untouched_, out);
+    depth_.make(frame_.luma(), untouched_, want_depth_, out);
   } else {
     depth_.skip(out);
   }
@@ -153,9 +154,8 @@ void CaptureLoop::look(DepthFrame& out, const Moment& moment) noexcept {
 void CaptureLoop::publish(DepthFrame& out) noexcept {
   const std::int64_t began_ns = clock_.monotonic_ns();
   const bool made = out.has_depth;
-  const bool want_depth = exchange_.want_depth.load(std::memory_order_relaxed);
   const bool want_luma = exchange_.want_luma.load(std::memory_order_relaxed);
-  out.has_depth = made && want_depth;
+  out.has_depth = made && want_depth_;
   out.has_luma = want_luma && area_ == whole_;  // not the frame before the one asked for
   if (out.has_luma) {
     const hal::LumaView& luma = frame_.luma();
@@ -171,7 +171,7 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   out.done_ns = clock_.monotonic_ns();
   out.times.publish_ns = out.done_ns - began_ns;
   exchange_.statistics.add(out.times, made, out.camera.ready_ns, out.done_ns);
-  if (!want_depth && !out.has_luma) return;
+  if (!want_depth_ && !out.has_luma) return;
   exchange_.slot.publish();
   exchange_.frames.fetch_add(1, std::memory_order_relaxed);
   exchange_.wake.signal();

@@ -76,6 +76,7 @@ class CaptureLoop {
   const hal::Area whole_;        // frame
   hal::Area area_;               // of the frame that is asked for
   const bool unusable_;          // the calibration to start with is for another camera mode
+  bool want_depth_ = false;      // somebody does, since before the newest frame was worked on
   bool controls_moved_ = false;  // as the newest frame says
 };
 

@@ -1,6 +1,7 @@
 #include "daemon/recon/kernels.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "daemon/recon/model.hpp"
 
@@ -146,6 +147,39 @@ int gain_list_mask_row(const std::int16_t* difference_q6, const std::int16_t* ga
 void mask_row(const std::uint8_t* untrusted, int width, std::int16_t* depth_um) noexcept {
   for (int x = 0; x < width; ++x) {
     if (untrusted[x] != 0) depth_um[x] = kUntrusted;
+  }
+}
+
+void sum_row(const std::int16_t* row_um, int y, int x0, int x1, DepthSums& sums) noexcept {
+  for (int x = x0; x < x1; ++x) {
+    const std::int16_t um = row_um[x];
+    if (um == kUntrusted) continue;
+    if (um > sums.rules.lost_um) ++sums.lost;
+    if (um > sums.rules.made_um) {
+      ++sums.made;
+      sums.um += um;
+      sums.um_x += um * x;
+      sums.um_y += um * y;
+    }
+    const bool earlier = y < sums.deepest_y || (y == sums.deepest_y && x < sums.deepest_x);
+    if (um > sums.deepest_um || (um == sums.deepest_um && earlier)) {
+      sums.deepest_um = um;
+      sums.deepest_x = x;
+      sums.deepest_y = y;
+    }
+  }
+}
+
+void bend_row(const std::int16_t* row_um, std::ptrdiff_t stride, int x0, int x1,
+              DepthSums& sums) noexcept {
+  const int reach = sums.rules.bend_reach;
+  const std::ptrdiff_t below = reach * stride;
+  for (int x = x0; x < x1; ++x) {
+    const std::int16_t* const at = row_um + x;
+    if (*at <= sums.rules.bend_from_um) continue;
+    if (std::min({at[-reach], at[reach], at[-below], at[below]}) == kUntrusted) continue;
+    ++sums.bent;
+    sums.bend_um += std::abs(at[-reach] + at[reach] + at[-below] + at[below] - 4 * *at);
   }
 }
 

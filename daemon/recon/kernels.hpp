@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include "daemon/recon/depth_sums.hpp"
 #include "daemon/recon/rectify.hpp"
 
 /// The steps of a reconstruction, one row at a time. These scalar loops are the specification: any
@@ -77,6 +78,15 @@ int gain_list_mask_row(const std::int16_t* difference_q6, const std::int16_t* ga
 
 /// Marks untrusted pixels in a row of depth.
 void mask_row(const std::uint8_t* untrusted, int width, std::int16_t* depth_um) noexcept;
+
+/// Adds the pixels [x0, x1) of row `y` of a depth map, which begins at `row_um`, to everything but
+/// the bend. In any order of pixels.
+void sum_row(const std::int16_t* row_um, int y, int x0, int x1, DepthSums& sums) noexcept;
+
+/// Adds the pixels [x0, x1) of a row of a depth map, whose rows are `stride` values apart, to the
+/// bend. All pixels rules.bend_reach away in four directions can be read.
+void bend_row(const std::int16_t* row_um, std::ptrdiff_t stride, int x0, int x1,
+              DepthSums& sums) noexcept;
 
 /// gain = calibration / now in Q12, rounded. Where either is darker than kDarkest_q6 or the
 /// quotient exceeds the Q12 range the gain is one and the pixel is marked in `untrusted`, which is

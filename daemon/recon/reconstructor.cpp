@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -153,7 +154,7 @@ void Reconstructor::run(const std::uint8_t* luma, std::ptrdiff_t stride,
   impl_->beyond = 0;
   impl_->plan.set_stride(stride);
   if (impl_->model->method == Method::list) {
-    impl_->run_list(luma, impl_->all_tiles, depth_um.data(), spent, watch);
+    impl_->run_list(luma, impl_->all_tiles, depth_um.data(), nullptr, spent, watch);
   } else {
     impl_->run_published(luma, depth_um.data(), spent, watch);
   }
@@ -162,17 +163,26 @@ void Reconstructor::run(const std::uint8_t* luma, std::ptrdiff_t stride,
 
 void Reconstructor::run_active(const std::uint8_t* luma, std::ptrdiff_t stride,
                                const TileRows& tiles, std::span<std::int16_t> depth_um,
-                               DrawnTiles& drawn, StepTimes* times) noexcept {
+                               DrawnTiles& drawn, StepTimes* times, DepthSums* sums) noexcept {
   StepTimes spent;
   Stopwatch watch(times != nullptr);
   impl_->beyond = 0;
   impl_->plan.set_stride(stride);
+  std::optional<StripSums> strips;
   if (impl_->model->method == Method::list) {
     impl_->clear_rest(tiles, drawn, depth_um.data());
-    if (count_tiles(tiles) > 0) impl_->run_list(luma, tiles, depth_um.data(), spent, watch);
+    if (sums != nullptr) strips.emplace(impl_->grid, tiles, depth_um.data(), *sums);
+    if (count_tiles(tiles) > 0) {
+      impl_->run_list(luma, tiles, depth_um.data(), strips ? &*strips : nullptr, spent, watch);
+    }
   } else {
     impl_->clear_rest(impl_->all_tiles, drawn, depth_um.data());
     impl_->run_published(luma, depth_um.data(), spent, watch);
+    if (sums != nullptr) {
+      strips.emplace(impl_->grid, impl_->all_tiles, depth_um.data(), *sums);
+      for (int row = 0; row < impl_->grid.rows(); ++row) strips->finished(row);
+      spent.sums_ns = watch.lap();
+    }
   }
   if (times != nullptr) *times = spent;
 }

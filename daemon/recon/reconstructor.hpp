@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "daemon/recon/depth_sums.hpp"
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/tiles.hpp"
 
@@ -15,6 +16,7 @@ struct StepTimes {
   std::int64_t rectify_ns = 0;  ///< Rectify and difference.
   std::int64_t smooth_ns = 0;
   std::int64_t list_ns = 0;  ///< Gain, list, untrusted mark.
+  std::int64_t sums_ns = 0;  ///< DepthSums; run_active() only.
 };
 
 /// What a depth buffer holds besides the untouched map: kept beside each buffer that run_active()
@@ -62,10 +64,11 @@ class Reconstructor {
   /// The same in some tiles of grid() only (TileReaders says which depend on what has changed):
   /// those hold what run() gives, bit for bit. Everywhere else `depth_um` is 0, or kUntrusted where
   /// the mask or the light say so. `drawn` belongs to this buffer. Method::published is computed in
-  /// full. Allocates when `drawn` is of another map, i.e. the first time.
+  /// full. Allocates when `drawn` is of another map, i.e. the first time. What is computed is added
+  /// to `sums`, by its rules.
   void run_active(const std::uint8_t* luma, std::ptrdiff_t stride, const TileRows& tiles,
-                  std::span<std::int16_t> depth_um, DrawnTiles& drawn,
-                  StepTimes* times = nullptr) noexcept;
+                  std::span<std::int16_t> depth_um, DrawnTiles& drawn, StepTimes* times = nullptr,
+                  DepthSums* sums = nullptr) noexcept;
 
   [[nodiscard]] const TileGrid& grid() const noexcept;
   /// How many pixels of the map a result depends on, on every side.

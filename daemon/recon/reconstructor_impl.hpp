@@ -12,6 +12,7 @@
 #include "daemon/recon/kernels.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/smoother.hpp"
+#include "daemon/recon/strip_sums.hpp"
 #include "daemon/recon/tiles.hpp"
 #include "daemon/recon/vector_kernels.hpp"
 
@@ -54,8 +55,9 @@ struct Reconstructor::Impl {
   void smooth_reference(std::span<std::int16_t> smoothed) noexcept;
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
   void set_light(double factor) noexcept;
+  /// `sums` null: nobody asks.
   void run_list(const std::uint8_t* luma, const TileRows& tiles, std::int16_t* depth,
-                StepTimes& times, Stopwatch& watch) noexcept;
+                StripSums* sums, StepTimes& times, Stopwatch& watch) noexcept;
   void clear_rest(const TileRows& tiles, DrawnTiles& drawn, std::int16_t* depth) const noexcept;
   void run_published(const std::uint8_t* luma, std::int16_t* depth, StepTimes& times,
                      Stopwatch& watch) noexcept;

@@ -73,7 +73,7 @@ void Reconstructor::Impl::push_pair(int pair, std::uint64_t tiles, int slot) noe
 }
 
 void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& tiles,
-                                   std::int16_t* depth, StepTimes& times,
+                                   std::int16_t* depth, StripSums* sums, StepTimes& times,
                                    Stopwatch& watch) noexcept {
   int pushed = 0;
   for (int row = 0; row < grid.rows(); ++row) {
@@ -113,6 +113,10 @@ void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& til
           list);
       times.list_ns += watch.lap();
     });
+    if (sums != nullptr) {
+      sums->finished(row);
+      times.sums_ns += watch.lap();
+    }
   }
 }
 

@@ -45,6 +45,7 @@ struct PairSum {
 #include "daemon/recon/vector_list-inl.hpp"
 #include "daemon/recon/vector_rectify-inl.hpp"
 #include "daemon/recon/vector_smooth-inl.hpp"
+#include "daemon/recon/vector_sums-inl.hpp"
 
 const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
 
@@ -58,6 +59,8 @@ HWY_EXPORT(RectifyDifference);
 HWY_EXPORT(SmoothAcross);
 HWY_EXPORT(SmoothDown);
 HWY_EXPORT(GainListMask);
+HWY_EXPORT(SumRows);
+HWY_EXPORT(BendRow);
 HWY_EXPORT(TargetName);
 
 void rectify_difference(const RectifyPlan& plan, int y, int first, int last,
@@ -79,6 +82,16 @@ void smooth_down(const std::int16_t* const* pairs, const TapPairs& taps, int fir
 
 int gain_list_mask(const ListRows& rows, const kernels::LookUp& list) noexcept {
   return HWY_DYNAMIC_DISPATCH(GainListMask)(rows, list);
+}
+
+void sum_rows(const std::int16_t* depth_um, std::ptrdiff_t stride, int x0, int x1, int y0, int y1,
+              DepthSums& sums) noexcept {
+  HWY_DYNAMIC_DISPATCH(SumRows)(depth_um, stride, x0, x1, y0, y1, sums);
+}
+
+void bend_row(const std::int16_t* row_um, std::ptrdiff_t stride, int x0, int x1,
+              DepthSums& sums) noexcept {
+  HWY_DYNAMIC_DISPATCH(BendRow)(row_um, stride, x0, x1, sums);
 }
 
 const char* target_name() noexcept { return HWY_DYNAMIC_DISPATCH(TargetName)(); }

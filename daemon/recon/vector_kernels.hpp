@@ -75,6 +75,15 @@ struct ListRows {
 /// kUntrusted once more: untrusted pixels look that up.
 int gain_list_mask(const ListRows& rows, const kernels::LookUp& list) noexcept;
 
+/// kernels::sum_row of the pixels [x0, x1) of the rows [y0, y1) of a map whose rows are `stride`
+/// values apart. Reads no other pixel.
+void sum_rows(const std::int16_t* depth_um, std::ptrdiff_t stride, int x0, int x1, int y0, int y1,
+              DepthSums& sums) noexcept;
+
+/// kernels::bend_row.
+void bend_row(const std::int16_t* row_um, std::ptrdiff_t stride, int x0, int x1,
+              DepthSums& sums) noexcept;
+
 /// Name of the instruction set the kernels run with.
 [[nodiscard]] const char* target_name() noexcept;
 

@@ -1,11 +1,8 @@
 #pragma once
 
-#include <cstdint>
-#include <span>
-
 #include "daemon/pipeline/depth_frame.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
-#include "daemon/recon/tiles.hpp"
+#include "daemon/recon/depth_sums.hpp"
 
 namespace dtact::pipeline {
 
@@ -16,12 +13,13 @@ class ContactDetector {
  public:
   explicit ContactDetector(const ContactRules& rules) : rules_(rules) {}
 
-  /// One depth map: micrometres, row-major, cut into tiles by `grid`, `mm_per_px` millimetres a
-  /// pixel. Only the tiles of `drawn` are looked at: the others hold no depth (recon::DrawnTiles).
-  /// The summary is in millimetres in the surface frame: origin at the map's centre, x right, y
-  /// down. Area, centroid and volume are those of the pixels deeper than `made_mm`.
-  [[nodiscard]] ContactSummary inspect(std::span<const std::int16_t> depth_um,
-                                       const recon::TileGrid& grid, const recon::TileRows& drawn,
+  /// What the reconstruction is to add up; no bend.
+  [[nodiscard]] recon::SumRules sum_rules() const noexcept;
+
+  /// What one depth map of `width` × `height` pixels, `mm_per_px` millimetres each, added up to by
+  /// sum_rules(). The summary is in millimetres in the surface frame: origin at the map's centre, x
+  /// right, y down. Area, centroid and volume are those of the pixels deeper than `made_mm`.
+  [[nodiscard]] ContactSummary inspect(const recon::DepthSums& sums, int width, int height,
                                        double mm_per_px) noexcept;
 
   [[nodiscard]] bool touching() const noexcept { return touching_; }

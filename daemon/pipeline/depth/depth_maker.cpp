@@ -29,7 +29,7 @@ void DepthMaker::skip(DepthFrame& out) noexcept {
   out.contact.touching = contact_.touching();
 }
 
-void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched,
+void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched, bool judged,
                       DepthFrame& out) noexcept {
   Resolution& resolution = maps_->in_use();
   recon::Reconstructor& reconstructor = resolution.reconstructor;
@@ -48,25 +48,27 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   out.drawn_generation = generation_;
   out.drawn_decimation = out.decimation;
   resolution.readers.mark(untouched.active(), resolution.tiles);
+  recon::SumRules rules = contact_.sum_rules();
+  if (judged || config_.reconstruction.decimation == 0) {
+    rules.bend_reach = bend_reach(out.mm_per_px);
+    rules.bend_from_um = rules.made_um;
+  }
+  recon::DepthSums sums(rules);
   recon::StepTimes steps;
   reconstructor.run_active(luma.data, luma.stride, resolution.tiles, out.depth_um, out.drawn,
-                           &steps);
+                           &steps, &sums);
   out.times.rectify_ns = steps.rectify_ns;
   out.times.smooth_ns = steps.smooth_ns;
   out.times.list_ns = steps.list_ns;
   const std::int64_t began_ns = clock_.monotonic_ns();
-  out.contact =
-      contact_.inspect(out.depth_um, reconstructor.grid(), out.drawn.tiles, out.mm_per_px);
+  out.contact = contact_.inspect(sums, out.width, out.height, out.mm_per_px);
   beyond_ = reconstructor.beyond_pixels() * out.decimation * out.decimation > config_.beyond_pixels;
-  judge(untouched.trust(), out);
-  out.times.inspect_ns = clock_.monotonic_ns() - began_ns;
+  judge(untouched.trust(), bend_um(sums, out.mm_per_px), out);
+  out.times.inspect_ns = steps.sums_ns + clock_.monotonic_ns() - began_ns;
 }
 
 /// What the map is worth, and at which resolution the next is made.
-void DepthMaker::judge(const Trust& trust, DepthFrame& out) noexcept {
-  const auto from_um = static_cast<std::int16_t>(1000 * config_.contact.made_mm);
-  const double bend = bend_um(out.depth_um, maps_->in_use().reconstructor.grid(), out.drawn.tiles,
-                              out.mm_per_px, from_um);
+void DepthMaker::judge(const Trust& trust, double bend, DepthFrame& out) noexcept {
   // Half of the deepest is about the mean over a contact.
   double list_um = maps_->list_um(0.5 * out.contact.deepest_mm);
   if (trust.stale) list_um = std::hypot(list_um, kStaleReferenceUm);

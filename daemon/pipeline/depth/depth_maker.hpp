@@ -29,8 +29,10 @@ class DepthMaker {
   void set_light(double factor) noexcept;
 
   /// Depth, contact and uncertainty of a frame that `untouched` has just looked at, into buffers
-  /// that hold a map of this calibration.
-  void make(const hal::LumaView& luma, const UntouchedImage& untouched, DepthFrame& out) noexcept;
+  /// that hold a map of this calibration. `judged`: somebody asks what the map is worth; else its
+  /// bend is left out of the uncertainty, unless the resolution is chosen by it.
+  void make(const hal::LumaView& luma, const UntouchedImage& untouched, bool judged,
+            DepthFrame& out) noexcept;
   /// The same of a frame of which no depth is made: what was known of contact stands.
   void skip(DepthFrame& out) noexcept;
 
@@ -39,7 +41,7 @@ class DepthMaker {
   [[nodiscard]] bool beyond() const noexcept { return beyond_; }
 
  private:
-  void judge(const Trust& trust, DepthFrame& out) noexcept;
+  void judge(const Trust& trust, double bend, DepthFrame& out) noexcept;
 
   const PipelineConfig& config_;
   base::Clock& clock_;

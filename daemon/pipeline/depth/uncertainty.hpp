@@ -1,19 +1,16 @@
 #pragma once
 
-#include <cstdint>
-#include <span>
-
-#include "daemon/recon/tiles.hpp"
+#include "daemon/recon/depth_sums.hpp"
 
 namespace dtact::pipeline {
 
+/// How far away a pixel's neighbours lie for bend_um(), in pixels of `mm_per_px` millimetres.
+[[nodiscard]] int bend_reach(double mm_per_px) noexcept;
+
 /// How sharply a depth map bends where something presses: the mean over the pressed pixels of
-/// |¼ of the four neighbours − the pixel| · 2, neighbours kBendMm away, in micrometres. Only the
-/// tiles of `drawn` are looked at, every fourth row of a full map; untrusted pixels and their
-/// neighbours count for nothing. 0 where nothing presses deeper than `from_um`.
-[[nodiscard]] double bend_um(std::span<const std::int16_t> depth_um, const recon::TileGrid& grid,
-                             const recon::TileRows& drawn, double mm_per_px,
-                             std::int16_t from_um) noexcept;
+/// |¼ of the four neighbours − the pixel| · 2, neighbours kBendMm away, in micrometres. `sums`: of
+/// the map, with bend_reach(mm_per_px). 0 where nothing presses deeper than its bend_from_um.
+[[nodiscard]] double bend_um(const recon::DepthSums& sums, double mm_per_px) noexcept;
 
 inline constexpr double kBendMm = 0.166;
 

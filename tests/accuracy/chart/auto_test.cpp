@@ -70,11 +70,15 @@ std::vector<Judged> scripted_run(double max_error_um, const image::Grey16& refer
     marks.rest = 0;  // one buffer for all resolutions
     const recon::TileGrid& grid = reconstructor.grid();
     depth.resize(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height));
+    const double mm_per_px = reconstructor.model().mm_per_px;
+    recon::DepthSums sums({.made_um = 100,
+                           .lost_um = 50,
+                           .bend_reach = pipeline::bend_reach(mm_per_px),
+                           .bend_from_um = 100});
     (void)cells.look({luma.data(), kWidth, kHeight, kWidth});
     resolution.readers.mark(cells.active(), resolution.tiles);
-    reconstructor.run_active(luma.data(), kWidth, resolution.tiles, depth, marks);
-    const double bend =
-        pipeline::bend_um(depth, grid, marks.tiles, reconstructor.model().mm_per_px, 100);
+    reconstructor.run_active(luma.data(), kWidth, resolution.tiles, depth, marks, nullptr, &sums);
+    const double bend = pipeline::bend_um(sums, mm_per_px);
     // As the capture loop has it: half of the deepest is about the mean over a contact.
     const double list_um = maps.list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)));
     Judged judged{.chosen = decimation,

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "daemon/recon/kernels.hpp"
 #include "daemon/recon/model.hpp"
 
 namespace dtact::pipeline {
@@ -23,11 +24,14 @@ class ContactTest : public ::testing::Test {
     map.assign(kPixels, 0);
     for (int i = 0; i < count; ++i) map[static_cast<std::size_t>(i)] = um;
   }
-  ContactSummary summarise() { return detector.inspect(map, grid, drawn, kMmPerPx); }
+  ContactSummary summarise() {
+    recon::DepthSums sums(detector.sum_rules());
+    for (int y = 0; y < kSide; ++y) {
+      recon::kernels::sum_row(map.data() + std::ptrdiff_t{y} * kSide, y, 0, kSide, sums);
+    }
+    return detector.inspect(sums, kSide, kSide, kMmPerPx);
+  }
   bool inspect() { return summarise().touching; }
-
-  recon::TileGrid grid{kSide, kSide};
-  recon::TileRows drawn{grid.all()};  // one tile
 
   ContactDetector detector{
       {.made_mm = 0.10, .lost_mm = 0.05, .area_mm2 = 0.5, .debounce_frames = 2}};
@@ -111,26 +115,19 @@ TEST_F(ContactTest, ResetForgets) {
   EXPECT_FALSE(inspect());
 }
 
-TEST_F(ContactTest, AnEmptyMapIsNoContact) {
-  EXPECT_FALSE(detector.inspect({}, {0, 0}, {}, kMmPerPx).touching);
+TEST_F(ContactTest, AMapOfWhichNothingWasComputedIsNoContact) {
+  const ContactSummary summary =
+      detector.inspect(recon::DepthSums(detector.sum_rules()), 580, 580, kMmPerPx);
+  EXPECT_FALSE(summary.touching);
+  EXPECT_EQ(summary.deepest_mm, 0);
+  EXPECT_EQ(summary.deepest_x_mm, 0);
 }
 
-// 70×33 pixels: three columns of tiles of 32 (the last six wide), three rows of 16 (the last one
-// high).
-TEST_F(ContactTest, LooksAtTheDrawnTilesOnly) {
-  const recon::TileGrid tiles{70, 33};
-  std::vector<std::int16_t> wide(std::size_t{70} * 33, 0);
-  wide[20 * 70 + 40] = 500;  // middle tile
-  wide[20 * 70 + 69] = 700;  // right of it
-  wide[32 * 70 + 69] = 900;  // the last
-  EXPECT_EQ(detector.inspect(wide, tiles, {0, 0, 0}, kMmPerPx).deepest_mm, 0);
-  EXPECT_DOUBLE_EQ(detector.inspect(wide, tiles, {0, 0b010, 0}, kMmPerPx).deepest_mm, 0.5);
-  const ContactSummary both = detector.inspect(wide, tiles, {0, 0b110, 0}, kMmPerPx);
-  EXPECT_DOUBLE_EQ(both.deepest_mm, 0.7);
-  EXPECT_DOUBLE_EQ(both.deepest_x_mm, 17.25);  // 69 − 34.5 pixels
-  EXPECT_DOUBLE_EQ(both.deepest_y_mm, 2);      // 20 − 16 pixels
-  EXPECT_DOUBLE_EQ(both.area_mm2, 0.5);
-  EXPECT_DOUBLE_EQ(detector.inspect(wide, tiles, {0, 0, 0b100}, kMmPerPx).deepest_mm, 0.9);
+TEST_F(ContactTest, AsksForItsOwnThresholdsAndForNoBend) {
+  const recon::SumRules rules = detector.sum_rules();
+  EXPECT_EQ(rules.made_um, 100);
+  EXPECT_EQ(rules.lost_um, 50);
+  EXPECT_EQ(rules.bend_reach, 0);
 }
 
 }  // namespace

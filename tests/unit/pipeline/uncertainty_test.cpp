@@ -5,15 +5,12 @@
 #include <vector>
 
 #include "daemon/recon/model.hpp"
+#include "daemon/recon/strip_sums.hpp"
 
 namespace dtact::pipeline {
 namespace {
 
 constexpr int kSide = 96;
-
-recon::TileRows all_tiles(const recon::TileGrid& grid) {
-  return recon::TileRows(static_cast<std::size_t>(grid.rows()), grid.all());
-}
 
 template <typename Depth>
 double bend_of(Depth depth, double mm_per_px) {
@@ -22,7 +19,11 @@ double bend_of(Depth depth, double mm_per_px) {
     for (int x = 0; x < kSide; ++x) map.push_back(static_cast<std::int16_t>(depth(x, y)));
   }
   const recon::TileGrid grid(kSide, kSide);
-  return bend_um(map, grid, all_tiles(grid), mm_per_px, 100);
+  const recon::TileRows all(static_cast<std::size_t>(grid.rows()), grid.all());
+  recon::DepthSums sums({.bend_reach = bend_reach(mm_per_px), .bend_from_um = 100});
+  recon::StripSums strips(grid, all, map.data(), sums);
+  for (int row = 0; row < grid.rows(); ++row) strips.finished(row);
+  return bend_um(sums, mm_per_px);
 }
 
 TEST(Bend, PlanesHaveNone) {
@@ -43,15 +44,6 @@ TEST(Bend, OnlyPressedAndTrustedPixelsCount) {
             0);
 }
 
-TEST(Bend, OnlyTheDrawnTilesAreLookedAt) {
-  std::vector<std::int16_t> map(std::size_t{kSide} * kSide);
-  for (std::size_t i = 0; i < map.size(); ++i) map[i] = i % 2 == 0 ? 500 : 300;
-  const recon::TileGrid grid(kSide, kSide);
-  const recon::TileRows none(static_cast<std::size_t>(grid.rows()), 0);
-  EXPECT_EQ(bend_um(map, grid, none, 0.166, 100), 0);
-  EXPECT_GT(bend_um(map, grid, all_tiles(grid), 0.166, 100), 0);
-}
-
 TEST(Bend, LooksAtEveryFourthRowOfAFullMapAndEveryRowOfAQuarterMap) {
   const auto rows_seen = [](double mm_per_px) {
     std::vector<int> seen;
@@ -68,10 +60,15 @@ TEST(Bend, LooksAtEveryFourthRowOfAFullMapAndEveryRowOfAQuarterMap) {
   EXPECT_EQ(rows_seen(0.0277), (std::vector<int>{6, 10, 14, 18, 22}));  // reach of 6 pixels
 }
 
-TEST(Bend, AMapSmallerThanItsReachHasNone) {
-  const std::vector<std::int16_t> map(16, 500);
-  const recon::TileGrid grid(4, 4);
-  EXPECT_EQ(bend_um(map, grid, all_tiles(grid), 0.02, 100), 0);
+TEST(Bend, IsZeroWhereNothingWasAddedUp) {
+  EXPECT_EQ(bend_um(recon::DepthSums({.bend_reach = 4}), 0.0415), 0);
+}
+
+TEST(Bend, ReachIsASixthOfAMillimetreAndAtLeastOnePixel) {
+  EXPECT_EQ(bend_reach(0.0415), 4);
+  EXPECT_EQ(bend_reach(0.083), 2);
+  EXPECT_EQ(bend_reach(0.166), 1);
+  EXPECT_EQ(bend_reach(0.5), 1);
 }
 
 TEST(Uncertainty, AddsListAndBlurInSquares) {

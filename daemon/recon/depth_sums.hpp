@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+
+#include "daemon/recon/model.hpp"
+
+namespace dtact::recon {
+
+/// What is to be added up while a map is made. What a contact is, the caller knows. Thresholds in
+/// micrometres, above kUntrusted.
+struct SumRules {
+  std::int16_t made_um = 0;  ///< Deeper pixels are summed.
+  std::int16_t lost_um = 0;  ///< Deeper pixels are counted, too.
+  /// Neighbours of the second difference lie so many pixels away; 0: nobody asks for the bend.
+  int bend_reach = 0;
+  std::int16_t bend_from_um = 0;  ///< Deeper pixels count for the bend.
+
+  /// Every so many rows are looked at for the bend: as far apart as its neighbours, at most four.
+  [[nodiscard]] constexpr int bend_step() const noexcept {
+    return bend_reach < kMostRows ? bend_reach : kMostRows;
+  }
+
+ private:
+  static constexpr int kMostRows = 4;
+};
+
+/// What the pixels of one map add up to, in pixels and micrometres. Untrusted pixels count for
+/// nothing. Depth within ±16383 (recon::check).
+struct DepthSums {
+  explicit DepthSums(const SumRules& the_rules) noexcept : rules(the_rules) {}
+
+  SumRules rules;
+  std::int64_t made = 0;  ///< Pixels deeper than rules.made_um, …
+  std::int64_t um = 0;    ///< … the sum of their depth, and of depth times column and row.
+  std::int64_t um_x = 0;
+  std::int64_t um_y = 0;
+  std::int64_t lost = 0;                 ///< Pixels deeper than rules.lost_um.
+  std::int16_t deepest_um = kUntrusted;  ///< kUntrusted: no trusted pixel was looked at.
+  int deepest_x = 0;                     ///< The first of the deepest in row-major order.
+  int deepest_y = 0;
+  /// Pixels deeper than rules.bend_from_um, all four neighbours in the map and trusted, of rows
+  /// bend_reach + n · bend_step …
+  std::int64_t bent = 0;
+  std::int64_t bend_um = 0;  ///< … and their sum of |four neighbours − 4 × pixel|.
+};
+
+}  // namespace dtact::recon

@@ -1,0 +1,153 @@
+// What a depth map adds up to.
+// Part of vector_kernels.cpp, which includes it once for each of Highway's targets.
+
+#if HWY_TARGET == HWY_SCALAR
+
+void SumRows(const int16_t* depth_um, std::ptrdiff_t stride, int x0, int x1, int y0, int y1,
+             DepthSums& sums) {
+  for (int y = y0; y < y1; ++y) kernels::sum_row(depth_um + y * stride, y, x0, x1, sums);
+}
+
+void BendRow(const int16_t* row_um, std::ptrdiff_t stride, int x0, int x1, DepthSums& sums) {
+  kernels::bend_row(row_um, stride, x0, x1, sums);
+}
+
+#else
+
+/// Calls visit(x, pixels) for [x0, x1), at least a vector wide, a vector at a time. The last one
+/// begins early; what it sees a second time is kUntrusted, which counts for nothing.
+template <class D16, class Visit>
+HWY_INLINE void ForEachVector(D16 d16, const int16_t* row, int x0, int x1, Visit visit) {
+  constexpr int kLanes = static_cast<int>(hn::MaxLanes(D16()));
+  int x = x0;
+  for (; x + kLanes <= x1; x += kLanes) visit(x, hn::LoadU(d16, row + x));
+  if (x == x1) return;
+  const auto seen = hn::FirstN(d16, static_cast<size_t>(kLanes - (x1 - x)));
+  x = x1 - kLanes;
+  visit(x, hn::IfThenElse(seen, hn::Set(d16, kUntrusted), hn::LoadU(d16, row + x)));
+}
+
+/// Looks for the deepest in a vector of pixels from column `x` on, where some are as deep as the
+/// deepest so far.
+template <class D16, class V16>
+HWY_NOINLINE void FindDeepest(D16 d16, V16 um, int x, int y, DepthSums& sums) {
+  const int16_t deepest = hn::GetLane(hn::MaxOfLanes(d16, um));
+  const auto first =
+      x + static_cast<int>(hn::FindFirstTrue(d16, hn::Eq(um, hn::Set(d16, deepest))));
+  const bool earlier = y < sums.deepest_y || (y == sums.deepest_y && first < sums.deepest_x);
+  if (deepest == sums.deepest_um && !earlier) return;
+  sums.deepest_um = deepest;
+  sums.deepest_x = first;
+  sums.deepest_y = y;
+}
+
+/// Adds up the pixels [x0, x1) of one row: few enough columns that sums of depth times column are
+/// int32.
+template <class D16>
+HWY_INLINE void SumRowPart(D16 d16, const int16_t* row, int y, int x0, int x1, DepthSums& sums) {
+  using V16 = hn::VFromD<D16>;
+  const hn::RepartitionToWide<D16> d32;
+  const V16 made_um = hn::Set(d16, sums.rules.made_um);
+  const V16 lost_um = hn::Set(d16, sums.rules.lost_um);
+  const V16 one = hn::Set(d16, 1);
+  const V16 columns = hn::Iota(d16, 0);
+  const V16 low = hn::Min(made_um, lost_um);
+  // Most pixels of most maps are shallower than this and leave nothing to be done.
+  const auto ignored = [&] {
+    const auto below = static_cast<int16_t>(HWY_MAX(sums.deepest_um - 1, int{kUntrusted}));
+    return hn::Min(low, hn::Set(d16, below));
+  };
+  V16 shallow = ignored();
+  PairSum<decltype(d32)> um{d32};
+  PairSum<decltype(d32)> um_x{d32};
+  size_t made = 0;
+  size_t lost = 0;
+  ForEachVector(d16, row, x0, x1, [&](int x, V16 pixels) HWY_ATTR {
+    if (HWY_LIKELY(hn::AllFalse(d16, hn::Gt(pixels, shallow)))) return;
+    lost += hn::CountTrue(d16, hn::Gt(pixels, lost_um));
+    const auto pressed = hn::Gt(pixels, made_um);
+    made += hn::CountTrue(d16, pressed);
+    const V16 depth = hn::IfThenElseZero(pressed, pixels);
+    um.Add(depth, one);
+    um_x.Add(depth, hn::Add(columns, hn::Set(d16, static_cast<int16_t>(x - x0))));
+    const auto below =
+        hn::Set(d16, static_cast<int16_t>(HWY_MAX(sums.deepest_um - 1, int{kUntrusted})));
+    if (HWY_UNLIKELY(!hn::AllFalse(d16, hn::Gt(pixels, below)))) {
+      FindDeepest(d16, pixels, x, y, sums);
+      shallow = ignored();
+    }
+  });
+  sums.lost += static_cast<std::int64_t>(lost);
+  if (made == 0) return;
+  sums.made += static_cast<std::int64_t>(made);
+  const std::int64_t part_um = hn::GetLane(hn::SumOfLanes(d32, um.Total()));
+  const std::int64_t part_um_x = hn::GetLane(hn::SumOfLanes(d32, um_x.Total()));
+  sums.um += part_um;
+  sums.um_x += part_um_x + part_um * x0;
+  sums.um_y += part_um * y;
+}
+
+void SumRows(const int16_t* depth_um, std::ptrdiff_t stride, int x0, int x1, int y0, int y1,
+             DepthSums& sums) {
+  const hn::CappedTag<int16_t, kBlock> d16;
+  constexpr int kLanes = static_cast<int>(hn::MaxLanes(d16));
+  // 16383 µm × (0 + 1 + … + 511) is less than 2³¹.
+  constexpr int kPart = 512;
+  for (int y = y0; y < y1; ++y) {
+    const int16_t* const row = depth_um + y * stride;
+    for (int x = x0; x < x1; x += kPart) {
+      const int end = HWY_MIN(x + kPart, x1);
+      if (end - x < kLanes) {
+        kernels::sum_row(row, y, x, end, sums);
+      } else {
+        SumRowPart(d16, row, y, x, end, sums);
+      }
+    }
+  }
+}
+
+void BendRow(const int16_t* row_um, std::ptrdiff_t stride, int x0, int x1, DepthSums& sums) {
+  const hn::CappedTag<int16_t, kBlock> d16;
+  using V16 = hn::VFromD<decltype(d16)>;
+  const hn::RepartitionToWide<decltype(d16)> d32;
+  if (x1 - x0 < static_cast<int>(hn::MaxLanes(d16))) {
+    kernels::bend_row(row_um, stride, x0, x1, sums);
+    return;
+  }
+  const int reach = sums.rules.bend_reach;
+  const std::ptrdiff_t below = reach * stride;
+  const V16 from = hn::Set(d16, sums.rules.bend_from_um);
+  const V16 one = hn::Set(d16, 1);
+  const V16 minus_two = hn::Set(d16, -2);
+  auto sum = hn::Zero(d32);
+  size_t bent = 0;
+  ForEachVector(d16, row_um, x0, x1, [&](int x, V16 pixels) HWY_ATTR {
+    const auto pressed = hn::Gt(pixels, from);
+    if (HWY_LIKELY(hn::AllFalse(d16, pressed))) return;
+    const int16_t* const at = row_um + x;
+    const V16 left = hn::LoadU(d16, at - reach);
+    const V16 right = hn::LoadU(d16, at + reach);
+    const V16 up = hn::LoadU(d16, at - below);
+    const V16 down = hn::LoadU(d16, at + below);
+    const V16 least = hn::Min(hn::Min(left, right), hn::Min(up, down));
+    const auto counts = hn::And(pressed, hn::Ne(least, hn::Set(d16, kUntrusted)));
+    bent += hn::CountTrue(d16, counts);
+    PairSum<decltype(d32)> low{d32};
+    low.Add(hn::InterleaveLower(d16, left, right), one);
+    low.Add(hn::InterleaveLower(d16, up, down), one);
+    low.Add(hn::InterleaveLower(d16, pixels, pixels), minus_two);
+    PairSum<decltype(d32)> high{d32};
+    high.Add(hn::InterleaveUpper(d16, left, right), one);
+    high.Add(hn::InterleaveUpper(d16, up, down), one);
+    high.Add(hn::InterleaveUpper(d16, pixels, pixels), minus_two);
+    const V16 kept = hn::VecFromMask(d16, counts);
+    const auto kept_low = hn::BitCast(d32, hn::InterleaveLower(d16, kept, kept));
+    const auto kept_high = hn::BitCast(d32, hn::InterleaveUpper(d16, kept, kept));
+    sum = hn::Add(sum, hn::And(hn::Abs(low.Total()), kept_low));
+    sum = hn::Add(sum, hn::And(hn::Abs(high.Total()), kept_high));
+  });
+  sums.bent += static_cast<std::int64_t>(bent);
+  sums.bend_um += hn::GetLane(hn::SumOfLanes(d32, sum));
+}
+
+#endif  // HWY_TARGET == HWY_SCALAR
