@@ -129,6 +129,14 @@ void smooth_vertical_row(const std::int16_t* const* rows, std::span<const std::i
   }
 }
 
+std::int16_t between(const Knots& knots, int place) noexcept {
+  const int bits = knots.step_bits;
+  const auto k = static_cast<std::size_t>(place >> bits);
+  const int inside = place & ((1 << bits) - 1);
+  const std::int32_t rise_q3 = (knots.rise_q3[k] * inside + (1 << (bits - 1))) >> bits;
+  return static_cast<std::int16_t>(round_shift<Knots::kFraction>(knots.at_q3[k] + rise_q3));
+}
+
 int gain_list_mask_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12,
                        const std::uint8_t* untrusted, const LookUp& list, int width,
                        std::int16_t* depth_um) noexcept {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -62,12 +63,31 @@ void smooth_horizontal_row(const std::int16_t* row, std::span<const std::int16_t
 void smooth_vertical_row(const std::int16_t* const* rows, std::span<const std::int16_t> taps,
                          int padded_width, std::int16_t* out) noexcept;
 
+/// A list that is straight between knots 2^step_bits entries apart: what between() says it is.
+struct alignas(64) Knots {
+  static constexpr std::size_t kCount = 128;  ///< As many as four registers of 512 bits hold.
+  static constexpr int kFraction = 3;         ///< Heights are in eighths of a micrometre, …
+  static constexpr int kDeepestUm = 4000;     ///< … so that this is the greatest one.
+
+  std::array<std::int16_t, kCount> at_q3{};
+  std::array<std::int16_t, kCount> rise_q3{};  ///< From each knot to the next.
+  int step_bits = 6;                           ///< 6 or 7: a knot each grey level, or every other.
+
+  [[nodiscard]] constexpr std::size_t step() const noexcept { return std::size_t{1} << step_bits; }
+};
+
+/// Micrometres at entry `place`, 0 … (kCount − 1) · step(): the rise rounded half up to an eighth,
+/// then the sum to whole ones.
+[[nodiscard]] std::int16_t between(const Knots& knots, int place) noexcept;
+
 /// A list in the shape the look-up wants.
 struct LookUp {
   const std::int16_t* um = nullptr;  ///< um[0] belongs to first_q6.
   int first_q6 = 0;
   int last_q6 = 0;     ///< Index of the last entry, which stands for everything darker.
   int covered_q6 = 0;  ///< A darkening above this is beyond the calibration.
+  /// Not null: um[i] is between(*knots, i) up to covered_q6, and kUntrusted above it.
+  const Knots* knots = nullptr;
 };
 
 /// Gain (32-bit product, rounded half up, saturated to int16), list, untrusted mark. `gain_q12`

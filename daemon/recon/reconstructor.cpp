@@ -32,25 +32,13 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model)
       zero(static_cast<std::size_t>(vec::padded(model->rectify.fine_width()))),
       between(2, grid.width),
       out(2 * kStrip, grid.width),
-      lookup(model->list.um),
+      list(*model),
       calibration_q6(at(grid.height)),
       taken_q6(at(grid.height)),
       taken_gain_q12(at(grid.height)),
       reference_q6(at(grid.height)),
       gain_q12(at(grid.height)),
       untrusted(at(grid.height)) {
-  const DepthList& from = model->list;
-  list.first_q6 = from.first_q6;
-  list.covered_q6 = from.covered_to_q6;
-  if (model->method == Method::list) {
-    // Everything beyond the covered range looks up the marker: no comparison per pixel is needed.
-    lookup.resize(static_cast<std::size_t>(from.covered_to_q6 - from.first_q6) + 1);
-    lookup.push_back(kUntrusted);
-  }
-  list.last_q6 = from.first_q6 + static_cast<int>(lookup.size()) - 1;
-  lookup.push_back(kUntrusted);  // what the vector kernel's marked pixels look up
-  list.um = lookup.data();
-
   rectify_reference(model->reference_q8);
   smooth_reference(calibration_q6);
   apply(model->gain, {grid.width, grid.height, vec::padded(grid.width), model->mm_per_px},

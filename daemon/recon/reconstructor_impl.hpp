@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/recon/kernels.hpp"
+#include "daemon/recon/list_table.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/smoother.hpp"
 #include "daemon/recon/strip_sums.hpp"
@@ -72,9 +73,8 @@ struct Reconstructor::Impl {
   RowBuffer fine;                  ///< The rows of one row of a coarse map.
   std::vector<std::int16_t> zero;  ///< As long as one of them.
   RowBuffer between;
-  RowBuffer out;                     ///< A strip after smoothing.
-  std::vector<std::int16_t> lookup;  ///< The list as the kernel reads it.
-  kernels::LookUp list;
+  RowBuffer out;  ///< A strip after smoothing.
+  ListTable list;
   std::vector<std::int16_t> calibration_q6;  ///< Smoothed reference of the calibration.
   // The reference as it was taken and its gain, 0 where untrusted; and both in the present light.
   std::vector<std::int16_t> taken_q6;

@@ -110,7 +110,7 @@ void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& til
       beyond += vec::gain_list_mask(
           {out.row(0) + x, out.stride(), gain_q12.data() + here, vec::padded(grid.width),
            depth + packed(y) + x, grid.width, columns, std::min(2 * end, grid.height) - y},
-          list);
+          list.look_up());
       times.list_ns += watch.lap();
     });
     if (sums != nullptr) {
@@ -133,7 +133,7 @@ void Reconstructor::Impl::run_published(const std::uint8_t* luma, std::int16_t* 
       times.rectify_ns += watch.lap();
       beyond += vec::gain_list_mask({in.row(0), in.stride(), nullptr, 0, in.row(0), in.stride(),
                                      grid.width, std::min(2, grid.height - 2 * pushed)},
-                                    list);
+                                    list.look_up());
       times.list_ns += watch.lap();
       smoother.push(pushed, in.row(0), in.row(1), 0, blocks);
     }

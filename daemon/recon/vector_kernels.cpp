@@ -1,6 +1,7 @@
 #include "daemon/recon/vector_kernels.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "daemon/recon/model.hpp"

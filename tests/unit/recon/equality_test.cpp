@@ -24,8 +24,8 @@ class Equality : public EveryTarget {
   int uniform(int low, int high) {
     return low + static_cast<int>(random_() % static_cast<unsigned>(high - low + 1));
   }
-  /// A lens that bends rows and columns, a steep list, a mask and a reference that is not the
-  /// calibration's.
+  /// A lens that bends rows and columns, a list that is looked up entry by entry or, at even
+  /// widths, has knots, a mask and a reference that is not the calibration's.
   Model make_model(const Shape& shape, Method method) {
     Model model;
     model.method = method;
@@ -51,7 +51,9 @@ class Equality : public EveryTarget {
     model.smoothing_px = shape.smoothing_px;
     model.list = {-40 * 64, {}, -20 * 64, 90 * 64};
     for (int q6 = -40 * 64; q6 <= 110 * 64; ++q6) {
-      model.list.um.push_back(static_cast<std::int16_t>(q6 < 0 ? q6 / 3 : 2 * q6));
+      model.list.um.push_back(static_cast<std::int16_t>(q6 < 0                 ? q6 / 3
+                                                        : shape.width % 2 == 0 ? q6 / 2
+                                                                               : 2 * q6));
     }
     model.reference_q8 = reference(model);
     model.untrusted.resize(table.entries.size());

@@ -23,14 +23,7 @@ std::vector<const std::int16_t*> rows_of(const std::vector<std::int16_t>& fine,
 }  // namespace
 
 Specification::Specification(const Model& model)
-    : model_(model),
-      width_(model.rectify.width),
-      height_(model.rectify.height),
-      lookup_(model.list.um) {
-  if (model.method == Method::list) {
-    lookup_.resize(static_cast<std::size_t>(model.list.covered_to_q6 - model.list.first_q6) + 1);
-    lookup_.push_back(kUntrusted);
-  }
+    : model_(model), width_(model.rectify.width), height_(model.rectify.height), list_(model) {
   set_reference(model.reference_q8);
 }
 
@@ -120,12 +113,8 @@ void Specification::set_reference(std::span<const std::uint16_t> reference_q8) {
 
 Specification::Plane Specification::look_up(const Plane& in, const std::int16_t* gain,
                                             const std::uint8_t* untrusted) {
-  const DepthList& from = model_.list;
-  const kernels::LookUp list{lookup_.data(), from.first_q6,
-                             from.first_q6 + static_cast<int>(lookup_.size()) - 1,
-                             from.covered_to_q6};
   Plane out(in.size());
-  beyond_ = kernels::gain_list_mask_row(in.data(), gain, untrusted, list,
+  beyond_ = kernels::gain_list_mask_row(in.data(), gain, untrusted, list_.look_up(),
                                         static_cast<int>(in.size()), out.data());
   return out;
 }

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "daemon/recon/list_table.hpp"
 #include "daemon/recon/model.hpp"
 
 namespace dtact::recon {
@@ -32,7 +33,7 @@ class Specification {
   const Model& model_;
   int width_;
   int height_;
-  Plane lookup_;
+  ListTable list_;
   Plane reference_q6_;
   Plane gain_q12_;
   std::vector<std::uint8_t> untrusted_;

@@ -197,7 +197,9 @@ class VectorList : public VectorKernels {
   void check(int first_q6, int entries, int covered_q6, bool gain) {
     std::vector<std::int16_t> um = values(entries, -32767, 32767);
     um.push_back(kUntrusted);
-    const kernels::LookUp list{um.data(), first_q6, first_q6 + entries - 1, covered_q6};
+    check({um.data(), first_q6, first_q6 + entries - 1, covered_q6}, gain);
+  }
+  void check(const kernels::LookUp& list, bool gain) {
     for (int width = 1; width < 140; width += uniform(1, 7)) {
       const int stride = padded(width) + uniform(0, 9);
       const std::vector<std::int16_t> difference = values(3 * stride, -32768, 32767);
@@ -233,6 +235,31 @@ TEST_P(VectorList, EveryWidthWithAndWithoutGain) {
     check(-16320, 32641, 16320, gain);
     check(16319, 2, 16320, gain);
     check(-5, 1, -5, gain);
+  }
+}
+
+TEST_P(VectorList, KnotsGiveWhatTheirTableGives) {
+  for (int round = 0; round < 30; ++round) {
+    kernels::Knots knots;
+    knots.step_bits = uniform(6, 7);
+    for (std::size_t k = 0; k < knots.at_q3.size(); ++k) {
+      const int at = k % 9 == 0 ? 32000 * uniform(-1, 1) : uniform(-15000, 15000);
+      knots.at_q3[k] = static_cast<std::int16_t>(at);
+      if (k == 0) continue;
+      const int rise = std::clamp(at - knots.at_q3[k - 1], -32767, 32767);
+      knots.at_q3[k] = static_cast<std::int16_t>(knots.at_q3[k - 1] + rise);
+      knots.rise_q3[k - 1] = static_cast<std::int16_t>(rise);
+    }
+    const int most = 127 << knots.step_bits;
+    const int places = uniform(0, 2) == 0 ? most : uniform(0, most);
+    const int first_q6 = uniform(-16320, 16320 - places);
+    std::vector<std::int16_t> um;
+    for (int i = 0; i <= places; ++i) um.push_back(kernels::between(knots, i));
+    um.push_back(kUntrusted);
+    um.push_back(kUntrusted);
+    const int covered_q6 = first_q6 + places;
+    check({um.data(), first_q6, covered_q6 + 1, covered_q6, &knots}, true);
+    check({um.data(), first_q6, covered_q6 + 1, covered_q6, &knots}, false);
   }
 }
 

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "daemon/recon/kernels.hpp"
+#include "daemon/recon/model.hpp"
+
+namespace dtact::recon {
+
+/// A model's list as the kernels look it up. Method::list: straight between knots a grey level
+/// apart wherever that says the same (kKnotsWithinUm), since a processor may hold the knots in
+/// registers and read no table; everything beyond the covered range looks up kUntrusted.
+class ListTable {
+ public:
+  /// Straight lines stand for a list that they follow within this, root mean square over the
+  /// covered range, micrometres: the last place of a depth, while lists are right within ten or
+  /// more. Other lists are looked up entry by entry.
+  static constexpr double kKnotsWithinUm = 1;
+
+  explicit ListTable(const Model& model);
+
+  /// Refers to this table.
+  [[nodiscard]] kernels::LookUp look_up() const noexcept;
+
+ private:
+  int first_q6_;
+  int covered_q6_;
+  /// The entries, and kUntrusted once more for what vector kernels mark.
+  std::vector<std::int16_t> um_;
+  std::unique_ptr<const kernels::Knots> knots_;
+};
+
+}  // namespace dtact::recon
