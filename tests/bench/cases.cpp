@@ -9,8 +9,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include "daemon/pipeline/depth/contact.hpp"
+#include "daemon/pipeline/depth/uncertainty.hpp"
 #include "daemon/pipeline/untouched/cells.hpp"
 #include "daemon/recon/decimate.hpp"
+#include "daemon/recon/kernels.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
 #include "hal/luma/luma_buffer.hpp"
@@ -24,7 +27,9 @@ namespace {
 
 using Depth = std::vector<std::int16_t>;
 
-constexpr double kPressRadius = 190;  ///< Changed area of the standard press: a third of the map.
+/// Radius of the standard press with its bulge: the least of the round ones that makes all tiles
+/// active.
+constexpr double kPressRadius = 380;
 
 /// What every case reads.
 struct Inputs {
@@ -69,33 +74,165 @@ std::string compare_roughly(const float* mm, const Depth& um) {
   return {};
 }
 
-Case full_field(const Inputs& in) {
+/// Contact and expected error, as the daemon's frames carry them.
+struct Told {
+  pipeline::ContactSummary contact;
+  double uncertainty_um = 0;
+};
+
+/// What the daemon does for a frame whose depth somebody wants: look for what changed, reconstruct
+/// that, see contact, state the uncertainty.
+class DaemonFrame {
+ public:
+  explicit DaemonFrame(std::shared_ptr<const recon::Model> model)
+      : model_(std::move(model)),
+        reconstructor_(model_),
+        cells_(recon::CellLattice(model_->rectify)),
+        readers_(cells_.lattice(), model_->rectify, reconstructor_.radius()),
+        tiles_(static_cast<std::size_t>(reconstructor_.grid().rows())),
+        depth_(static_cast<std::size_t>(model_->rectify.width * model_->rectify.height)) {
+    cells_.set_reference(model_->reference_q8);
+  }
+
+  void run(const std::uint8_t* luma, std::ptrdiff_t stride) {
+    recon::DepthSums sums(rules());
+    look(luma, stride);
+    reconstructor_.run_active(luma, stride, tiles_, depth_, drawn_, nullptr, &sums);
+    told_ = tell(sums, contact_);
+  }
+  /// The same without contact and uncertainty.
+  void run_bare(const std::uint8_t* luma, std::ptrdiff_t stride) {
+    look(luma, stride);
+    reconstructor_.run_active(luma, stride, tiles_, depth_, drawn_);
+  }
+  /// Empty, or what is wrong with the last run() on that frame.
+  [[nodiscard]] std::string wrong(const std::uint8_t* luma, std::ptrdiff_t stride) const {
+    recon::Specification specification(*model_);
+    Depth should = specification.run(luma, stride);
+    recon::DepthSums sums(rules());
+    for (int y = 0; y < grid().height; ++y) {
+      std::int16_t* const row = should.data() + std::ptrdiff_t{y} * grid().width;
+      for (int x = 0; x < grid().width; ++x) {
+        if (!drawn(x, y)) row[x] = 0;
+      }
+    }
+    std::string difference = compare(depth_, should);
+    if (!difference.empty()) return difference;
+    add_up(sums);
+    pipeline::ContactDetector contact({});
+    const Told is = told_;
+    const Told expected = tell(sums, contact);
+    if (is.contact.area_mm2 != expected.contact.area_mm2 ||
+        is.contact.x_mm != expected.contact.x_mm || is.contact.y_mm != expected.contact.y_mm ||
+        is.contact.volume_mm3 != expected.contact.volume_mm3 ||
+        is.contact.deepest_mm != expected.contact.deepest_mm ||
+        is.contact.deepest_x_mm != expected.contact.deepest_x_mm ||
+        is.contact.deepest_y_mm != expected.contact.deepest_y_mm) {
+      return "another contact";
+    }
+    return is.uncertainty_um == expected.uncertainty_um ? "" : "another uncertainty";
+  }
+  [[nodiscard]] const recon::TileGrid& grid() const { return reconstructor_.grid(); }
+  [[nodiscard]] const recon::TileRows& tiles() const { return drawn_.tiles; }
+  [[nodiscard]] recon::FrameRegion region() const { return cells_.lattice().region(); }
+
+ private:
+  void look(const std::uint8_t* luma, std::ptrdiff_t stride) {
+    (void)cells_.look({luma, kFrameWidth, kFrameHeight, stride});
+    readers_.mark(cells_.active(), tiles_);
+  }
+  [[nodiscard]] recon::SumRules rules() const {
+    recon::SumRules rules = contact_.sum_rules();
+    rules.bend_reach = pipeline::bend_reach(model_->mm_per_px);
+    rules.bend_from_um = rules.made_um;
+    return rules;
+  }
+  [[nodiscard]] Told tell(const recon::DepthSums& sums, pipeline::ContactDetector& contact) const {
+    constexpr double kListUm = 20;
+    return {contact.inspect(sums, grid().width, grid().height, model_->mm_per_px),
+            pipeline::uncertainty_at_um(kListUm, pipeline::bend_um(sums, model_->mm_per_px),
+                                        model_->rectify.decimation)};
+  }
+  [[nodiscard]] bool drawn(int x, int y) const {
+    const auto row = static_cast<std::size_t>(y / recon::TileGrid::kRows);
+    return (drawn_.tiles[row] >> (x / grid().tile_width()) & 1U) != 0;
+  }
+  /// The finished map, a pixel at a time.
+  void add_up(recon::DepthSums& sums) const {
+    const int reach = sums.rules.bend_reach;
+    for (int y = 0; y < grid().height; ++y) {
+      const std::int16_t* const row = depth_.data() + std::ptrdiff_t{y} * grid().width;
+      const bool bends =
+          y >= reach && y < grid().height - reach && (y - reach) % sums.rules.bend_step() == 0;
+      for (int x = 0; x < grid().width; ++x) {
+        if (!drawn(x, y)) continue;
+        recon::kernels::sum_row(row, y, x, x + 1, sums);
+        if (bends && x >= reach && x < grid().width - reach) {
+          recon::kernels::bend_row(row, grid().width, x, x + 1, sums);
+        }
+      }
+    }
+  }
+
+  std::shared_ptr<const recon::Model> model_;
+  recon::Reconstructor reconstructor_;
+  pipeline::Cells cells_;
+  recon::TileReaders readers_;
+  recon::TileRows tiles_;
+  pipeline::ContactDetector contact_{{}};
+  Depth depth_;
+  recon::DrawnTiles drawn_;
+  Told told_;
+};
+
+/// Share of the map's pixels that lie in the tiles: the tiles at its right edge are narrower.
+double share_of(const recon::TileRows& tiles, const recon::TileGrid& grid) {
+  int pixels = 0;
+  for (int row = 0; row < grid.rows(); ++row) {
+    const int height = std::min(recon::TileGrid::kRows, grid.height - row * recon::TileGrid::kRows);
+    recon::for_each_run(tiles[static_cast<std::size_t>(row)], [&](int first, int last) {
+      pixels +=
+          height * (std::min(last * grid.tile_width(), grid.width) - first * grid.tile_width());
+    });
+  }
+  return static_cast<double>(pixels) / (grid.width * grid.height);
+}
+
+/// One frame over and over. `everywhere`: all of its tiles must be active.
+Case daemon_frame(const std::string& name, std::shared_ptr<const recon::Model> model, Image frame,
+                  bool everywhere) {
   struct State {
-    recon::Reconstructor reconstructor;
-    Depth depth;
+    DaemonFrame daemon;
+    Image frame;
   };
-  auto state = std::make_shared<State>(recon::Reconstructor(in.model), Depth(in.specified.size()));
-  return {"full",
-          [&in, state] { state->reconstructor.run(in.press.data(), kFrameWidth, state->depth); },
-          [&in, state] { return compare(state->depth, in.specified); }};
+  auto state = std::make_shared<State>(State{DaemonFrame(std::move(model)), std::move(frame)});
+  const auto once = [state] { state->daemon.run(state->frame.data(), kFrameWidth); };
+  once();
+  const double share = share_of(state->daemon.tiles(), state->daemon.grid());
+  return {name, once,
+          [state, share, everywhere] {
+            if (everywhere && share < 1) return std::string("not all of the field is active");
+            return state->daemon.wrong(state->frame.data(), kFrameWidth);
+          },
+          share};
+}
+
+Case full_field(const Inputs& in) { return daemon_frame("full", in.model, in.press, true); }
+
+/// The full field without contact and uncertainty.
+Case bare(const Inputs& in) {
+  auto daemon = std::make_shared<DaemonFrame>(in.model);
+  return {"full-bare", [&in, daemon] { daemon->run_bare(in.press.data(), kFrameWidth); },
+          [&in, daemon] {
+            daemon->run(in.press.data(), kFrameWidth);
+            return daemon->wrong(in.press.data(), kFrameWidth);
+          }};
 }
 
 Case coarse(const Inputs& in, const std::string& name, int factor) {
-  struct State {
-    std::shared_ptr<const recon::Model> model;
-    recon::Reconstructor reconstructor;
-    Depth depth;
-  };
-  const auto model = std::make_shared<const recon::Model>(recon::decimate(*in.model, factor));
-  const auto pixels = static_cast<std::size_t>(model->rectify.width) *
-                      static_cast<std::size_t>(model->rectify.height);
-  auto state = std::make_shared<State>(State{model, recon::Reconstructor(model), Depth(pixels)});
-  return {name,
-          [&in, state] { state->reconstructor.run(in.press.data(), kFrameWidth, state->depth); },
-          [&in, state] {
-            recon::Specification specification(*state->model);
-            return compare(state->depth, specification.run(in.press.data(), kFrameWidth));
-          }};
+  return daemon_frame(name,
+                      std::make_shared<const recon::Model>(recon::decimate(*in.model, factor)),
+                      in.press, true);
 }
 
 Case scalar(const Inputs& in) {
@@ -118,97 +255,57 @@ Case opencv(const Inputs& in) {
           [&in, state] { return compare_roughly(state->depth.ptr<float>(), in.specified); }};
 }
 
-/// Decoding alone, and from the payload to depth.
-std::vector<Case> mjpeg(const Inputs& in) {
+/// From the payload to what the daemon tells, or the decoding alone.
+Case mjpeg(const Inputs& in, const std::string& name, bool reconstruct) {
   struct State {
     hal::mjpeg::GreyDecoder decoder{kFrameWidth, kFrameHeight};
     hal::luma::LumaBuffer luma{kFrameWidth, kFrameHeight};
-    recon::Reconstructor reconstructor;
-    Depth depth;
+    DaemonFrame daemon;
     bool ok = true;
-    explicit State(const Inputs& inputs)
-        : reconstructor(inputs.model), depth(inputs.specified.size()) {
-      const recon::FrameRegion read = reconstructor.region();
+    explicit State(const Inputs& inputs) : daemon(inputs.model) {
+      const recon::FrameRegion read = daemon.region();
       decoder.set_crop({read.x, read.y, read.width, read.height});
-    }
-    void decode(const Inputs& inputs) {
-      ok = decoder.decode(inputs.jpeg, luma.data(), luma.stride()) == hal::mjpeg::Status::ok && ok;
     }
   };
   auto state = std::make_shared<State>(in);
-  return {{"decode", [&in, state] { state->decode(in); },
-           [state] { return state->ok ? std::string() : "the decoder refuses the frame"; }},
-          {"decode+full",
-           [&in, state] {
-             state->decode(in);
-             state->reconstructor.run(state->luma.data(), state->luma.stride(), state->depth);
-           },
-           [state, &in] {
-             recon::Specification specification(*in.model);
-             return compare(state->depth,
-                            specification.run(state->luma.data(), state->luma.stride()));
-           }}};
-}
-
-/// Share of the map's pixels that lie in the tiles: the tiles at its right edge are narrower.
-double share_of(const recon::TileRows& tiles, const recon::TileGrid& grid) {
-  int pixels = 0;
-  for (int row = 0; row < grid.rows(); ++row) {
-    const int height = std::min(recon::TileGrid::kRows, grid.height - row * recon::TileGrid::kRows);
-    recon::for_each_run(tiles[static_cast<std::size_t>(row)], [&](int first, int last) {
-      pixels +=
-          height * (std::min(last * grid.tile_width(), grid.width) - first * grid.tile_width());
-    });
-  }
-  return static_cast<double>(pixels) / (grid.width * grid.height);
-}
-
-/// A press of some size where only what changed is computed.
-Case active(const Inputs& in, const std::string& name, double radius_px) {
-  struct State {
-    Image frame;
-    recon::Reconstructor reconstructor;
-    pipeline::Cells cells;
-    recon::TileReaders readers;
-    recon::TileRows tiles;
-    Depth depth;
-    recon::DrawnTiles drawn;
-  };
-  recon::Reconstructor reconstructor(in.model);
-  pipeline::Cells cells{recon::CellLattice(in.model->rectify)};
-  cells.set_reference(in.model->reference_q8);
-  recon::TileReaders readers(cells.lattice(), in.model->rectify, reconstructor.radius());
-  recon::TileRows tiles(static_cast<std::size_t>(reconstructor.grid().rows()));
-  auto state = std::make_shared<State>(State{Inputs::with_padding(make_frame(radius_px, 2)),
-                                             std::move(reconstructor),
-                                             std::move(cells),
-                                             std::move(readers),
-                                             std::move(tiles),
-                                             Depth(in.specified.size()),
-                                             {}});
-  const auto once = [state] {
-    (void)state->cells.look({state->frame.data(), kFrameWidth, kFrameHeight, kFrameWidth});
-    state->readers.mark(state->cells.active(), state->tiles);
-    state->reconstructor.run_active(state->frame.data(), kFrameWidth, state->tiles, state->depth,
-                                    state->drawn);
-  };
-  once();
-  return {name, once,
-          [&in, state] {
-            recon::Specification specification(*in.model);
-            Depth should = specification.run(state->frame.data(), kFrameWidth);
-            const recon::TileGrid& grid = state->reconstructor.grid();
-            for (int y = 0; y < kMapSide; ++y) {
-              for (int x = 0; x < kMapSide; ++x) {
-                const auto row = static_cast<std::size_t>(y / recon::TileGrid::kRows);
-                if ((state->drawn.tiles[row] >> (x / grid.tile_width()) & 1U) == 0) {
-                  should[static_cast<std::size_t>(y) * kMapSide + static_cast<std::size_t>(x)] = 0;
-                }
-              }
-            }
-            return compare(state->depth, should);
+  return {name,
+          [&in, state, reconstruct] {
+            const auto status =
+                state->decoder.decode(in.jpeg, state->luma.data(), state->luma.stride());
+            state->ok = status == hal::mjpeg::Status::ok && state->ok;
+            if (reconstruct) state->daemon.run(state->luma.data(), state->luma.stride());
           },
-          share_of(state->drawn.tiles, state->reconstructor.grid())};
+          [state, reconstruct]() -> std::string {
+            if (!state->ok) return "the decoder refuses the frame";
+            if (!reconstruct) return {};
+            return state->daemon.wrong(state->luma.data(), state->luma.stride());
+          }};
+}
+
+using Maker = std::function<Case(const std::string& name, const Inputs&)>;
+
+/// All cases, each made when it is asked for: those who count instructions start a process for one.
+const std::vector<std::pair<std::string, Maker>>& makers() {
+  static const auto the_makers = [] {
+    std::vector<std::pair<std::string, Maker>> all{
+        {"full", [](const auto&, const Inputs& in) { return full_field(in); }},
+        {"full-bare", [](const auto&, const Inputs& in) { return bare(in); }},
+        {"half", [](const auto& name, const Inputs& in) { return coarse(in, name, 2); }},
+        {"quarter", [](const auto& name, const Inputs& in) { return coarse(in, name, 4); }},
+        {"scalar", [](const auto&, const Inputs& in) { return scalar(in); }},
+        {"opencv", [](const auto&, const Inputs& in) { return opencv(in); }},
+        {"decode", [](const auto& name, const Inputs& in) { return mjpeg(in, name, false); }},
+        {"decode+full", [](const auto& name, const Inputs& in) { return mjpeg(in, name, true); }}};
+    for (const int radius : {0, 40, 80, 120, 160, 190, 220, 260, 300, 340, 380, 450}) {
+      // Only what changed is computed.
+      all.emplace_back(
+          fmt::format("press:{}", radius), [radius](const std::string& name, const Inputs& in) {
+            return daemon_frame(name, in.model, Inputs::with_padding(make_frame(radius, 2)), false);
+          });
+    }
+    return all;
+  }();
+  return the_makers;
 }
 
 template <typename Value>
@@ -236,15 +333,17 @@ std::vector<float> list_mm() {
   return mm;
 }
 
-std::vector<Case> make_cases() {
-  const Inputs& in = inputs();
-  std::vector<Case> cases{full_field(in), coarse(in, "half", 2), coarse(in, "quarter", 4),
-                          scalar(in), opencv(in)};
-  for (Case& c : mjpeg(in)) cases.push_back(std::move(c));
-  for (const int radius : {0, 40, 80, 120, 160, 190, 220, 260, 300, 340, 380, 450}) {
-    cases.push_back(active(in, fmt::format("press:{}", radius), radius));
+std::vector<std::string> case_names() {
+  std::vector<std::string> names;
+  for (const auto& [name, make] : makers()) names.push_back(name);
+  return names;
+}
+
+Case make_case(const std::string& name) {
+  for (const auto& [known, make] : makers()) {
+    if (known == name) return make(name, inputs());
   }
-  return cases;
+  throw std::runtime_error("no case named " + name);
 }
 
 void export_inputs(const std::string& folder) {

@@ -15,8 +15,12 @@ struct Case {
   double share = 1;  ///< Of the map's pixels that are computed.
 };
 
-/// All of them. They share their inputs, which live as long as the process.
-[[nodiscard]] std::vector<Case> make_cases();
+/// The names of all cases.
+[[nodiscard]] std::vector<std::string> case_names();
+
+/// Throws std::runtime_error where no case has that name. Cases share their inputs, which live as
+/// long as the process.
+[[nodiscard]] Case make_case(const std::string& name);
 
 /// Writes what the Python pipeline reads to `folder`: frame.raw, reference.raw (8-bit grey),
 /// frame.jpg, map_x.f32, map_y.f32, list.f32 (millimetres of 0 … 255 levels).
