@@ -29,50 +29,36 @@ std::int16_t pair_sum(std::int16_t a, std::int16_t b) noexcept {
   return static_cast<std::int16_t>(a + b);
 }
 
-template <int kDecimation>
-std::int32_t sum_of(const std::int16_t* const* fine, int x) noexcept {
-  std::int32_t sum = 0;
-  for (int k = 0; k < kDecimation; ++k) {
-    for (int i = 0; i < kDecimation; ++i) sum += fine[k][x * kDecimation + i];
-  }
-  return sum;
-}
-
-/// out[x] = finish(x, mean of `sign` times the fine pixels).
-template <int kDecimation, typename Finish>
-void average_row(const std::int16_t* const* fine, int width, int sign, Finish finish) noexcept {
-  constexpr int kBits = kDecimation == 2 ? 2 : 4;
-  for (int x = 0; x < width; ++x)
-    finish(x, round_shift<kBits>(sign * sum_of<kDecimation>(fine, x)));
-}
-
-template <typename Finish>
-void average(const std::int16_t* const* fine, int decimation, int width, int sign,
-             Finish finish) noexcept {
-  if (decimation == 1) {
-    for (int x = 0; x < width; ++x) finish(x, sign * fine[0][x]);
-  } else if (decimation == 2) {
-    average_row<2>(fine, width, sign, finish);
-  } else {
-    average_row<4>(fine, width, sign, finish);
-  }
-}
-
 }  // namespace
 
-void average_difference_row(const std::int16_t* const* fine, int decimation,
-                            const std::int16_t* reference_q6, int width,
-                            std::int16_t* difference_q6) noexcept {
-  average(fine, decimation, width, -1, [=](int x, std::int32_t luma_q6) {
-    difference_q6[x] = static_cast<std::int16_t>(reference_q6[x] - luma_q6);
-  });
+void rectify_mean_difference_row(const std::uint8_t* luma, std::ptrdiff_t stride,
+                                 const RectifyTable::Entry* entries, std::ptrdiff_t fine_width,
+                                 int decimation, const std::int16_t* reference_q6, int width,
+                                 std::int16_t* difference_q6) noexcept {
+  for (int x = 0; x < width; ++x) {
+    std::int32_t q14 = 0;
+    for (int k = 0; k < decimation; ++k) {
+      const RectifyTable::Entry* const fine = entries + k * fine_width + x * decimation;
+      for (int i = 0; i < decimation; ++i) {
+        q14 += bilinear(luma + fine[i].y * stride + fine[i].x, stride, fine[i]);
+      }
+    }
+    const std::int32_t mean_q6 = decimation == 2 ? round_shift<10>(q14) : round_shift<12>(q14);
+    difference_q6[x] = static_cast<std::int16_t>(reference_q6[x] - mean_q6);
+  }
 }
 
 void average_reference_row(const std::int16_t* const* fine, int decimation, int width,
                            std::int16_t* reference_q6) noexcept {
-  average(fine, decimation, width, 1, [=](int x, std::int32_t luma_q6) {
-    reference_q6[x] = static_cast<std::int16_t>(luma_q6);
-  });
+  const int pixels = decimation * decimation;
+  for (int x = 0; x < width; ++x) {
+    std::int32_t sum = 0;
+    for (int k = 0; k < decimation; ++k) {
+      for (int i = 0; i < decimation; ++i) sum += fine[k][x * decimation + i];
+    }
+    // Luma is not negative: half up.
+    reference_q6[x] = static_cast<std::int16_t>((sum + pixels / 2) / pixels);
+  }
 }
 
 void rectify_difference_row(const std::uint8_t* luma, std::ptrdiff_t stride,

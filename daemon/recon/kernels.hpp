@@ -42,14 +42,16 @@ void rectify_reference_row(const std::uint16_t* luma_q8, std::ptrdiff_t frame_wi
                            const RectifyTable::Entry* entries, int width,
                            std::int16_t* reference_q6) noexcept;
 
-/// Area means for a coarse map: `fine` is `decimation` rows (1, 2 or 4) of width · decimation
-/// values of −Q6 luma, as rectify_difference_row gives them against a reference of zero. difference
-/// = reference − mean, the mean rounded half up. Each fine pixel was rounded to Q6 before.
-void average_difference_row(const std::int16_t* const* fine, int decimation,
-                            const std::int16_t* reference_q6, int width,
-                            std::int16_t* difference_q6) noexcept;
+/// Area means for a coarse map, whose pixels are decimation × decimation (2 or 4) of the table's:
+/// their Q14 readings are added up and rounded once. `entries`: of the first of the row's
+/// `decimation` rows, `fine_width` entries each; difference = reference − mean.
+void rectify_mean_difference_row(const std::uint8_t* luma, std::ptrdiff_t stride,
+                                 const RectifyTable::Entry* entries, std::ptrdiff_t fine_width,
+                                 int decimation, const std::int16_t* reference_q6, int width,
+                                 std::int16_t* difference_q6) noexcept;
 
-/// The same mean of rows of a reference.
+/// The mean of a reference: `fine` is `decimation` rows (1, 2 or 4) of width · decimation values of
+/// rectify_reference_row, rounded half up. Each of them was rounded to Q6 before.
 void average_reference_row(const std::int16_t* const* fine, int decimation, int width,
                            std::int16_t* reference_q6) noexcept;
 

@@ -29,7 +29,6 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model)
       second(published_taps(), grid.width, grid.height),
       in(2 * kStrip, grid.width),
       fine(model->rectify.decimation, model->rectify.fine_width()),
-      zero(static_cast<std::size_t>(vec::padded(model->rectify.fine_width()))),
       between(2, grid.width),
       out(2 * kStrip, grid.width),
       list(*model),

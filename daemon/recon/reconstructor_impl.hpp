@@ -68,10 +68,9 @@ struct Reconstructor::Impl {
   TileRows all_tiles;
   RectifyPlan plan;
   Smoother smoother;
-  Smoother second;                 ///< The second filter of the published method.
-  RowBuffer in;                    ///< A strip before smoothing.
-  RowBuffer fine;                  ///< The rows of one row of a coarse map.
-  std::vector<std::int16_t> zero;  ///< As long as one of them.
+  Smoother second;  ///< The second filter of the published method.
+  RowBuffer in;     ///< A strip before smoothing.
+  RowBuffer fine;   ///< The rows of one row of a coarse map.
   RowBuffer between;
   RowBuffer out;  ///< A strip after smoothing.
   ListTable list;

@@ -1,6 +1,5 @@
 // What is done to the rows of a frame: rectified, smoothed and looked up, strip by strip.
 #include <algorithm>
-#include <array>
 
 #include "daemon/recon/reconstructor_impl.hpp"
 
@@ -44,15 +43,8 @@ void Reconstructor::Impl::rectify(const std::uint8_t* luma, int y, int x0, int x
                             reference_q6.data() + at(y), row);
     return;
   }
-  std::array<const std::int16_t*, kMaxDecimation> rows{};
-  for (int k = 0; k < decimation; ++k) {
-    const int fine_y = y * decimation + k;
-    vec::rectify_difference(plan, fine_y, first, last, luma, entries(fine_y), table.fine_width(),
-                            zero.data(), fine.row(k));
-    rows[static_cast<std::size_t>(k)] = fine.row(k) + std::ptrdiff_t{x0} * decimation;
-  }
-  kernels::average_difference_row(rows.data(), decimation, reference_q6.data() + at(y) + x0,
-                                  std::min(x1, grid.width) - x0, row + x0);
+  vec::rectify_mean_difference(plan, decimation, y, first, last, luma, entries(y * decimation),
+                               table.fine_width(), reference_q6.data() + at(y), row);
 }
 
 void Reconstructor::Impl::rectify_pair(const std::uint8_t* luma, int pair, std::uint64_t tiles,

@@ -57,6 +57,7 @@ HWY_AFTER_NAMESPACE();
 namespace dtact::recon::vec {
 
 HWY_EXPORT(RectifyDifference);
+HWY_EXPORT(RectifyMeanDifference);
 HWY_EXPORT(SmoothAcross);
 HWY_EXPORT(SmoothDown);
 HWY_EXPORT(GainListMask);
@@ -69,6 +70,14 @@ void rectify_difference(const RectifyPlan& plan, int y, int first, int last,
                         const std::int16_t* reference_q6, std::int16_t* difference_q6) noexcept {
   HWY_DYNAMIC_DISPATCH(RectifyDifference)
   (plan, y, first, last, luma, entries, width, reference_q6, difference_q6);
+}
+
+void rectify_mean_difference(const RectifyPlan& plan, int decimation, int y, int first, int last,
+                             const std::uint8_t* luma, const RectifyTable::Entry* entries,
+                             int fine_width, const std::int16_t* reference_q6,
+                             std::int16_t* difference_q6) noexcept {
+  HWY_DYNAMIC_DISPATCH(RectifyMeanDifference)
+  (plan, decimation, y, first, last, luma, entries, fine_width, reference_q6, difference_q6);
 }
 
 void smooth_across(const std::int16_t* row_a, const std::int16_t* row_b, const TapPairs& taps,

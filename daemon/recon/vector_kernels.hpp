@@ -26,6 +26,14 @@ void rectify_difference(const RectifyPlan& plan, int y, int first, int last,
                         const std::uint8_t* luma, const RectifyTable::Entry* entries, int width,
                         const std::int16_t* reference_q6, std::int16_t* difference_q6) noexcept;
 
+/// kernels::rectify_mean_difference_row of row `y` of a coarse map for the groups [first, last) of
+/// eight of the plan's pixels. `entries`: of the first of its rows in the table, `fine_width` a
+/// row.
+void rectify_mean_difference(const RectifyPlan& plan, int decimation, int y, int first, int last,
+                             const std::uint8_t* luma, const RectifyTable::Entry* entries,
+                             int fine_width, const std::int16_t* reference_q6,
+                             std::int16_t* difference_q6) noexcept;
+
 /// The taps of a symmetric kernel as the pair kernels want them: full length, made a multiple of
 /// two longer by zeros, two to a word. Two neighbouring results share every load: the second one's
 /// taps are the first one's, moved by one place.

@@ -13,7 +13,24 @@ void RectifyScalar(const uint8_t* luma, std::ptrdiff_t stride, const RectifyTabl
                                   difference_q6 + x0);
 }
 
+/// The same for a coarse map: pixels [x0, x1) of the fine ones, whole coarse ones.
+void RectifyMeanScalar(const uint8_t* luma, std::ptrdiff_t stride,
+                       const RectifyTable::Entry* entries, int fine_width, int decimation, int x0,
+                       int x1, const int16_t* reference_q6, int16_t* difference_q6) {
+  if (x0 >= x1) return;
+  kernels::rectify_mean_difference_row(luma, stride, entries + x0, fine_width, decimation,
+                                       reference_q6 + x0 / decimation, (x1 - x0) / decimation,
+                                       difference_q6 + x0 / decimation);
+}
+
 #if HWY_TARGET == HWY_SCALAR
+
+void RectifyMeanDifference(const RectifyPlan& plan, int decimation, int, int first, int last,
+                           const uint8_t* luma, const RectifyTable::Entry* entries, int fine_width,
+                           const int16_t* reference_q6, int16_t* difference_q6) {
+  RectifyMeanScalar(luma, plan.stride(), entries, fine_width, decimation, first * kGroup,
+                    HWY_MIN(last * kGroup, fine_width), reference_q6, difference_q6);
+}
 
 void RectifyDifference(const RectifyPlan& plan, int, int first, int last, const uint8_t* luma,
                        const RectifyTable::Entry* entries, int width, const int16_t* reference_q6,
@@ -78,15 +95,23 @@ HWY_INLINE V16 Across(D16 d16, V16 pairs, V16 fx) {
 }
 #endif
 
+/// A vector of pixels read across: the upper and the lower of the two rows that each lies between,
+/// and how far below the upper one, of 128.
+template <class V16>
+struct Readings {
+  V16 above_q7;
+  V16 below_q7;
+  V16 fy;
+};
+
 /// The pixels of as many groups as `d16` has room for; `at`: where each group's bytes begin in
 /// luma. kLevels 0: block.levels.
 template <int kLevels, class D16>
-HWY_INLINE void RectifyGroups(D16 d16, const RectifyPlan::Block& block, const uint8_t* data,
-                              int group, const uint8_t* luma, std::ptrdiff_t stride,
-                              const int16_t* reference_q6, int16_t* difference_q6) {
+HWY_INLINE Readings<hn::VFromD<D16> > ReadGroups(D16 d16, const RectifyPlan::Block& block,
+                                                 const uint8_t* data, int group,
+                                                 const uint8_t* luma, std::ptrdiff_t stride) {
   using V16 = hn::VFromD<D16>;
   const hn::Repartition<uint8_t, D16> d8;
-  const hn::RepartitionToWide<D16> d32;
   const hn::Rebind<uint8_t, D16> d8_half;
   const hn::RebindToUnsigned<D16> du16;
   const int levels = kLevels == 0 ? block.levels : kLevels;
@@ -113,8 +138,17 @@ HWY_INLINE void RectifyGroups(D16 d16, const RectifyPlan::Block& block, const ui
   }
 
   const V16 weights = Weights(d16, fx);
-  const V16 above_q7 = Across(d16, upper, weights);
-  const V16 below_q7 = Across(d16, lower, weights);
+  return {Across(d16, upper, weights), Across(d16, lower, weights), fy};
+}
+
+/// One row of a full map.
+template <int kLevels, class D16>
+HWY_INLINE void RectifyGroups(D16 d16, const RectifyPlan::Block& block, const uint8_t* data,
+                              int group, const uint8_t* luma, std::ptrdiff_t stride,
+                              const int16_t* reference_q6, int16_t* difference_q6) {
+  using V16 = hn::VFromD<D16>;
+  const hn::RepartitionToWide<D16> d32;
+  const auto [above_q7, below_q7, fy] = ReadGroups<kLevels>(d16, block, data, group, luma, stride);
   const V16 rest = hn::Sub(hn::Set(d16, 128), fy);
   const auto half = hn::Set(d32, (1 << 7) + 128 * kAcrossLow);
   // Pairs (above, below) times pairs of weights. Interleaving and packing undo each other within
@@ -175,6 +209,95 @@ void RectifyDifference(const RectifyPlan& plan, int y, int first, int last, cons
     }
     ++block;
     data += RectifyPlan::kBlockData;
+  }
+}
+
+/// The means of the groups that `d16` has room for, from `group` of one block on.
+template <int kDecimation, class D16>
+HWY_INLINE void RectifyMeanGroups(D16 d16, const RectifyPlan& plan, int y, int block, int group,
+                                  const uint8_t* luma, const int16_t* reference_q6,
+                                  int16_t* difference_q6) {
+  using V16 = hn::VFromD<D16>;
+  const hn::RepartitionToWide<D16> d32;
+  const std::ptrdiff_t stride = plan.stride();
+  const V16 whole = hn::Set(d16, 128);
+  // Neighbours in a row belong to one mean: their products are added up at once.
+  PairSum<decltype(d32)> sum{d32};
+  const auto add = [&](const Readings<V16>& read) HWY_ATTR {
+    sum.Add(read.above_q7, hn::Sub(whole, read.fy));
+    sum.Add(read.below_q7, read.fy);
+  };
+  for (int k = 0; k < kDecimation; ++k) {
+    const RectifyPlan::Block& here = plan.row(y * kDecimation + k)[block];
+    const uint8_t* const data =
+        plan.data(y * kDecimation + k) + std::ptrdiff_t{block} * RectifyPlan::kBlockData;
+    if (here.levels == 1) {
+      add(ReadGroups<1>(d16, here, data, group, luma, stride));
+    } else if (here.levels == 2) {
+      add(ReadGroups<2>(d16, here, data, group, luma, stride));
+    } else {
+      add(ReadGroups<0>(d16, here, data, group, luma, stride));
+    }
+  }
+  constexpr int kPixels = kDecimation * kDecimation;
+  constexpr int kShift = kDecimation == 2 ? 10 : 12;
+  const auto half = hn::Set(d32, (1 << (kShift - 1)) + kPixels * 128 * kAcrossLow);
+  const int x = (block * kGroups + group) * kGroup / kDecimation;
+  if constexpr (kDecimation == 2) {
+    const hn::Rebind<int16_t, decltype(d32)> d_out;
+    const auto mean_q6 = hn::DemoteTo(d_out, hn::ShiftRight<kShift>(hn::Add(sum.Total(), half)));
+    hn::StoreU(hn::Sub(hn::LoadU(d_out, reference_q6 + x), mean_q6), d_out, difference_q6 + x);
+  } else {
+    const hn::Half<decltype(d32)> d_half;
+    const hn::Rebind<int16_t, decltype(d_half)> d_out;
+    const auto pairs = sum.Total();
+    const auto left = hn::LowerHalf(d_half, hn::ConcatEven(d32, pairs, pairs));
+    const auto right = hn::LowerHalf(d_half, hn::ConcatOdd(d32, pairs, pairs));
+    const auto total = hn::Add(hn::Add(left, right), hn::LowerHalf(d_half, half));
+    const auto mean_q6 = hn::DemoteTo(d_out, hn::ShiftRight<kShift>(total));
+    hn::StoreU(hn::Sub(hn::LoadU(d_out, reference_q6 + x), mean_q6), d_out, difference_q6 + x);
+  }
+}
+
+template <int kDecimation>
+HWY_NOINLINE void RectifyMean(const RectifyPlan& plan, int y, int first, int last,
+                              const uint8_t* luma, const RectifyTable::Entry* entries,
+                              int fine_width, const int16_t* reference_q6, int16_t* difference_q6) {
+  const hn::CappedTag<int16_t, kBlock> wide;
+  const hn::CappedTag<int16_t, kGroup> narrow;
+  constexpr int kWide = static_cast<int>(hn::MaxLanes(wide) / kGroup);
+  for (int begin = first / kGroups * kGroups; begin < last; begin += kGroups) {
+    const int block = begin / kGroups;
+    const int from = HWY_MAX(first - begin, 0);
+    const int to = HWY_MIN(last - begin, kGroups);
+    bool near = true;
+    for (int k = 0; k < kDecimation; ++k) {
+      near = near && plan.row(y * kDecimation + k)[block].levels != 0;
+    }
+    if (!near) {
+      RectifyMeanScalar(luma, plan.stride(), entries, fine_width, kDecimation,
+                        (begin + from) * kGroup, HWY_MIN((begin + to) * kGroup, fine_width),
+                        reference_q6, difference_q6);
+    } else if (to - from == kGroups) {
+      for (int g = 0; g < kGroups; g += kWide) {
+        RectifyMeanGroups<kDecimation>(wide, plan, y, block, g, luma, reference_q6, difference_q6);
+      }
+    } else {
+      for (int g = from; g < to; ++g) {
+        RectifyMeanGroups<kDecimation>(narrow, plan, y, block, g, luma, reference_q6,
+                                       difference_q6);
+      }
+    }
+  }
+}
+
+void RectifyMeanDifference(const RectifyPlan& plan, int decimation, int y, int first, int last,
+                           const uint8_t* luma, const RectifyTable::Entry* entries, int fine_width,
+                           const int16_t* reference_q6, int16_t* difference_q6) {
+  if (decimation == 2) {
+    RectifyMean<2>(plan, y, first, last, luma, entries, fine_width, reference_q6, difference_q6);
+  } else {
+    RectifyMean<4>(plan, y, first, last, luma, entries, fine_width, reference_q6, difference_q6);
   }
 }
 

@@ -96,18 +96,35 @@ TEST(Decimate, RefusesWhatItCannotDo) {
   EXPECT_THROW((void)decimate(thin, 4), std::invalid_argument);
 }
 
-TEST(AverageRows, RoundTheMeanHalfUp) {
-  const std::array<std::int16_t, 4> upper{-1, -1, -16320, -16320};
-  const std::array<std::int16_t, 4> lower{-1, 1, -16320, -16320};
+TEST(AverageReferenceRow, RoundsTheMeanHalfUp) {
+  const std::array<std::int16_t, 4> upper{1, 1, 16320, 16320};
+  const std::array<std::int16_t, 4> lower{0, 0, 16320, 16319};
   const std::array<const std::int16_t*, 2> rows{upper.data(), lower.data()};
-  const std::array<std::int16_t, 2> reference{100, 0};
   std::array<std::int16_t, 2> out{};
-  kernels::average_difference_row(rows.data(), 2, reference.data(), 2, out.data());
-  EXPECT_EQ(out[0], 99);  // luma (1 + 1 + 1 − 1)/4 = 0.5 → 1
-  EXPECT_EQ(out[1], -16320);
   kernels::average_reference_row(rows.data(), 2, 2, out.data());
-  EXPECT_EQ(out[0], 0);  // −0.5 → 0
-  EXPECT_EQ(out[1], -16320);
+  EXPECT_EQ(out[0], 1);      // 0.5
+  EXPECT_EQ(out[1], 16320);  // 16319.75
+  kernels::average_reference_row(rows.data(), 1, 2, out.data());
+  EXPECT_EQ(out, (std::array<std::int16_t, 2>{1, 1}));
+}
+
+TEST(RectifyMeanRow, AddsReadingsUpBeforeItRounds) {
+  // Four pixels of 10 levels; an eighth of one is 14 levels: 4/32 of a level, 8 units of Q6, in the
+  // sum of four.
+  const std::vector<std::uint8_t> luma{10, 10, 10, 10, 14, 10, 10, 10, 10, 10, 10, 10};
+  std::vector<RectifyTable::Entry> entries(4);
+  for (RectifyTable::Entry& e : entries) e = {0, 0, 0, 0};
+  entries[3] = {0, 0, 0, 4};  // 4/128 of the row below: 1/8 of a level
+  const std::array<std::int16_t, 1> reference{1000};
+  std::array<std::int16_t, 1> out{};
+  kernels::rectify_mean_difference_row(luma.data(), 4, entries.data(), 2, 2, reference.data(), 1,
+                                       out.data());
+  EXPECT_EQ(out[0], 1000 - 642);                            // 640 + 8/4
+  for (RectifyTable::Entry& e : entries) e = {0, 0, 0, 1};  // 4/128 of a level each: 2 units
+  entries[0] = {0, 0, 0, 0};
+  kernels::rectify_mean_difference_row(luma.data(), 4, entries.data(), 2, 2, reference.data(), 1,
+                                       out.data());
+  EXPECT_EQ(out[0], 1000 - 642);  // 640 + 1.5, up
 }
 
 }  // namespace

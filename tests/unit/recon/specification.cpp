@@ -46,9 +46,6 @@ Specification::Plane Specification::difference(const std::uint8_t* luma,
                                                std::ptrdiff_t stride) const {
   const RectifyTable& table = model_.rectify;
   Plane out(static_cast<std::size_t>(at(height_)));
-  Plane fine(static_cast<std::size_t>(table.fine_width() * table.decimation));
-  const Plane zero(fine.size());
-  const std::vector<const std::int16_t*> rows = rows_of(fine, table);
   for (int y = 0; y < height_; ++y) {
     const RectifyTable::Entry* entries =
         table.entries.data() + std::ptrdiff_t{y} * table.decimation * table.fine_width();
@@ -57,10 +54,9 @@ Specification::Plane Specification::difference(const std::uint8_t* luma,
                                       out.data() + at(y));
       continue;
     }
-    kernels::rectify_difference_row(luma, stride, entries, zero.data(),
-                                    static_cast<int>(fine.size()), fine.data());
-    kernels::average_difference_row(rows.data(), table.decimation, reference_q6_.data() + at(y),
-                                    width_, out.data() + at(y));
+    kernels::rectify_mean_difference_row(luma, stride, entries, table.fine_width(),
+                                         table.decimation, reference_q6_.data() + at(y), width_,
+                                         out.data() + at(y));
   }
   return out;
 }

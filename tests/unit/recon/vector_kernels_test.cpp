@@ -80,6 +80,35 @@ class VectorRectify : public VectorKernels {
       }
     }
   }
+  /// One row of a coarse map whose `decimation` rows of the table are `entries`.
+  void check_mean(const std::vector<Entry>& entries, int decimation) {
+    const int fine_width = static_cast<int>(entries.size()) / decimation;
+    const int width = fine_width / decimation;
+    const RectifyTable table{kFrameWidth, kFrameHeight, width, 1, entries, decimation};
+    RectifyPlan plan(table);
+    const std::vector<std::int16_t> reference = values(padded(fine_width), 0, 16320);
+    const std::ptrdiff_t stride = kFrameWidth + uniform(0, 5);
+    const std::uint8_t* luma = luma_.data() + uniform(0, 3);
+    std::vector<std::int16_t> should(static_cast<std::size_t>(width));
+    kernels::rectify_mean_difference_row(luma, stride, entries.data(), fine_width, decimation,
+                                         reference.data(), width, should.data());
+    plan.set_stride(stride);
+    const int groups = padded(fine_width) / RectifyPlan::kGroup;
+    const int first = uniform(0, groups - 1);
+    for (const auto& [from, to] : {std::tuple(0, groups), std::tuple(first, groups),
+                                   std::tuple(first, first + 1), std::tuple(0, first)}) {
+      std::vector<std::int16_t> is(static_cast<std::size_t>(padded(fine_width)), 12345);
+      rectify_mean_difference(plan, decimation, 0, from, to, luma, entries.data(), fine_width,
+                              reference.data(), is.data());
+      for (int x = 0; x < width; ++x) {
+        const auto i = static_cast<std::size_t>(x);
+        const int fine_x = x * decimation;
+        const bool inside =
+            fine_x >= from * RectifyPlan::kGroup && fine_x < to * RectifyPlan::kGroup;
+        ASSERT_EQ(is[i], inside ? should[i] : 12345) << "pixel " << x << " of " << width;
+      }
+    }
+  }
   Entry entry(double x, double y) {
     return {static_cast<std::int16_t>(std::clamp<int>(static_cast<int>(x), 0, kFrameWidth - 2)),
             static_cast<std::int16_t>(std::clamp<int>(static_cast<int>(y), 0, kFrameHeight - 2)),
@@ -110,6 +139,26 @@ TEST_P(VectorRectify, WildTables) {
     std::vector<Entry> entries(static_cast<std::size_t>(uniform(1, 70)));
     for (Entry& e : entries) e = entry(uniform(0, kFrameWidth), uniform(0, kFrameHeight));
     check(entries);
+  }
+}
+
+TEST_P(VectorRectify, MeansOfLinesAndOfWildTables) {
+  for (const int decimation : {2, 4}) {
+    for (int round = 0; round < 200; ++round) {
+      const double step = uniform(-40, 250) / 100.0;
+      const double slope = uniform(-130, 130) / 100.0;
+      const double x0 = uniform(0, kFrameWidth);
+      const double y0 = uniform(-3, kFrameHeight + 3);
+      const int width = decimation * uniform(1, 60);
+      std::vector<Entry> entries;
+      for (int y = 0; y < decimation; ++y) {
+        for (int x = 0; x < width; ++x) entries.push_back(entry(x0 + step * x, y0 + slope * x + y));
+      }
+      if (round % 8 == 0) {
+        for (Entry& e : entries) e = entry(uniform(0, kFrameWidth), uniform(0, kFrameHeight));
+      }
+      check_mean(entries, decimation);
+    }
   }
 }
 
