@@ -24,7 +24,11 @@ CameraInfo NullCamera::info() const {
   return info;
 }
 
-CameraReport NullCamera::report() const { return {}; }
+CameraReport NullCamera::report() const {
+  CameraReport report;
+  report.delivered = delivered_;
+  return report;
+}
 
 void NullCamera::start() { next_ns_ = clock_.monotonic_ns() + period_ns_; }
 
@@ -36,7 +40,7 @@ GrabStatus NullCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexce
   }
   clock_.sleep_until(next_ns_);
   FrameInfo frame;
-  frame.sequence = sequence_++;
+  frame.sequence = delivered_++;
   frame.timestamp_ns = next_ns_;
   frame.ready_ns = next_ns_;
   frame.meaning = TimestampMeaning::end_of_frame;

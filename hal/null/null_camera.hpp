@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <vector>
 
@@ -29,7 +30,7 @@ class NullCamera final : public Camera, private FrameOwner {
   std::vector<std::uint8_t> pixels_;  // every frame is this one
   std::int64_t period_ns_;
   std::int64_t next_ns_ = 0;
-  std::uint64_t sequence_ = 0;
+  std::atomic<std::uint64_t> delivered_{0};  // any thread reads it
 };
 
 }  // namespace dtact::hal::null

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+
 namespace dtact::hal::null {
 namespace {
 
@@ -27,6 +31,7 @@ TEST(NullCamera, KeepsTheRateAndCountsUp) {
     ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
     EXPECT_EQ(frame.info().sequence, i);
     EXPECT_EQ(frame.info().timestamp_ns, 1000 + static_cast<std::int64_t>(i + 1) * 10'000'000);
+    EXPECT_EQ(camera.report().delivered, i + 1);
   }
   EXPECT_EQ(frame.luma().width, 800);
   EXPECT_EQ(frame.luma().row(599)[799 + kLumaPadding], NullCamera::kGrey);
@@ -41,6 +46,7 @@ TEST(NullCamera, TimesOutWhenTheFrameIsTooFarAway) {
   Frame frame;
   EXPECT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::timeout);
   EXPECT_FALSE(frame);
+  EXPECT_EQ(camera.report().delivered, 0U);
   EXPECT_EQ(camera.grab(frame, milliseconds(60)), GrabStatus::ok);
 }
 
