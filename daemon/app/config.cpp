@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <ostream>
+#include <sstream>
 #include <stdexcept>
 #include <string_view>
 

@@ -5,8 +5,6 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <memory>
@@ -16,6 +14,7 @@
 
 #include "daemon/app/give_way.hpp"
 #include "daemon/app/service.hpp"
+#include "daemon/app/watchdog.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/net/calibration_store.hpp"
 #include "daemon/net/light_schemes.hpp"
@@ -81,36 +80,6 @@ net::NetConfig make_net_config(const Config& config) {
   return net;
 }
 
-/// Tells systemd's watchdog that frames, or the camera's report of why there are none, still come
-/// from the capture thread.
-class Watchdog {
- public:
-  Watchdog(asio::io_context& io, const pipeline::Pipeline& pipeline)
-      : timer_(io), pipeline_(pipeline), interval_(watchdog_interval_us()) {
-    if (interval_.count() > 0) wait();
-  }
-  void stop() { timer_.cancel(); }
-
- private:
-  void wait() {
-    timer_.expires_after(interval_);
-    timer_.async_wait([this](const boost::system::error_code& error) {
-      if (error) return;
-      const hal::CameraReport report = pipeline_.status().camera_report;
-      if (report.delivered != delivered_ || report.state != hal::CameraState::streaming) {
-        notify_alive();
-      }
-      delivered_ = report.delivered;
-      wait();
-    });
-  }
-
-  asio::steady_timer timer_;
-  const pipeline::Pipeline& pipeline_;
-  std::chrono::microseconds interval_;
-  std::uint64_t delivered_ = 0;
-};
-
 }  // namespace
 
 void run_daemon(const Config& config) {
@@ -140,7 +109,7 @@ void run_daemon(const Config& config) {
   pipeline.start();
   for (const std::string& refused : pipeline.status().realtime) spdlog::warn("{}", refused);
 
-  Watchdog watchdog(io, pipeline);
+  Watchdog watchdog(io, [&pipeline] { return pipeline.heartbeat(); });
   GiveWay give_way(io);
   signals.async_wait([&](const boost::system::error_code& error, int signal) {
     if (error) return;

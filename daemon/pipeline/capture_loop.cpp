@@ -53,6 +53,7 @@ void CaptureLoop::run() noexcept {
 }
 
 void CaptureLoop::step() noexcept {
+  exchange_.turns.fetch_add(1, std::memory_order_relaxed);
   take_notes();
   desk_.take(watch_.away());
   choose_area();

@@ -58,6 +58,7 @@ struct Exchange {
   std::atomic<State> state{State::settling};
   std::atomic<std::uint32_t> health{0};  ///< HealthSet::bits()
   std::atomic<std::uint64_t> frames{0};
+  std::atomic<std::uint64_t> turns{0};       ///< Of the capture loop.
   std::atomic<double> light_followed{0};     ///< Share of the reference's light, ±.
   std::atomic<std::uint64_t> generation{0};  ///< Of the calibration in use; 0 = none.
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
@@ -35,6 +36,12 @@ class Pipeline final : public Port {
   /// Ends and joins the threads: within a tenth of a second and what the camera's and the ring's
   /// calls in progress take. The last good reference is written out before it returns.
   void stop() noexcept;
+
+  /// Turns of the capture loop so far: ten a second at least, whatever the camera's state, unless a
+  /// call of the camera does not come back. Any thread.
+  [[nodiscard]] std::uint64_t heartbeat() const noexcept {
+    return exchange_.turns.load(std::memory_order_relaxed);
+  }
 
   [[nodiscard]] int event_fd() const noexcept override { return exchange_.wake.get(); }
   [[nodiscard]] const DepthFrame* latest() noexcept override { return exchange_.slot.fetch(); }

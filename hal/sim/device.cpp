@@ -77,6 +77,7 @@ const Payload* Device::make_next() noexcept {
 bool Device::make(std::uint64_t sequence, Payload& payload) noexcept {
   const LedLevels light = exposed_light();
   const Fault* const fault = scene().fault_at(sequence);
+  hangs_ = fault != nullptr && fault->kind == FaultKind::hang;
   if (fault != nullptr && fault->kind == FaultKind::unplug) {
     ++lost_;
     if (state_.exchange(CameraState::unplugged) != CameraState::unplugged) {
@@ -85,7 +86,8 @@ bool Device::make(std::uint64_t sequence, Payload& payload) noexcept {
     }
     return false;
   }
-  if (fault != nullptr && (fault->kind == FaultKind::drop || fault->kind == FaultKind::stall)) {
+  if (hangs_ ||
+      (fault != nullptr && (fault->kind == FaultKind::drop || fault->kind == FaultKind::stall))) {
     ++lost_;
     state_ = fault->kind == FaultKind::stall ? CameraState::stalled : CameraState::streaming;
     return false;

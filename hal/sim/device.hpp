@@ -48,6 +48,8 @@ class Device {
   [[nodiscard]] const Payload* make_next() noexcept;
 
   [[nodiscard]] CameraState state() const noexcept { return state_; }
+  /// The scene has a driver's call hang now.
+  [[nodiscard]] bool hangs() const noexcept { return hangs_; }
   [[nodiscard]] std::uint64_t disconnects() const noexcept { return disconnects_; }
   [[nodiscard]] const Scene& scene() const noexcept { return renderer_.truth().scene(); }
 
@@ -76,6 +78,7 @@ class Device {
   base::UniqueFd event_;
   std::atomic<CameraState> state_{CameraState::streaming};
   std::atomic<std::uint64_t> disconnects_{0};
+  std::atomic<bool> hangs_{false};
   bool paced_ = false;
   std::atomic<bool> stop_{false};
   base::RtThread thread_;  // last: it uses all of the above

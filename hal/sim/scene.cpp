@@ -108,8 +108,8 @@ Press read_press(SceneReader& table, const std::filesystem::path& folder, double
 }
 
 Fault read_fault(SceneReader& table) {
-  static const std::vector<std::string> kKinds = {"drop",     "repeat", "torn",
-                                                  "truncate", "stall",  "unplug"};
+  static const std::vector<std::string> kKinds = {"drop",  "repeat", "torn", "truncate",
+                                                  "stall", "unplug", "hang"};
   Fault fault;
   table.require("kind");
   table.require("frame");

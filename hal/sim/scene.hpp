@@ -70,7 +70,7 @@ struct Press {
   std::vector<PressKey> keys;  ///< At least one, times strictly ascending.
 };
 
-enum class FaultKind : std::uint8_t { drop, repeat, torn, truncate, stall, unplug };
+enum class FaultKind : std::uint8_t { drop, repeat, torn, truncate, stall, unplug, hang };
 
 struct Fault {
   FaultKind kind = FaultKind::drop;

@@ -19,6 +19,9 @@
 namespace dtact::hal::sim {
 namespace {
 
+/// How often a call that the scene has hang looks whether it may return.
+constexpr std::int64_t kHangStep = 5'000'000;
+
 Scene configured_scene(const CameraConfig& config) {
   const Scene scene = config.sim.scene.empty() ? default_scene() : load_scene(config.sim.scene);
   return at_mode(scene, config.width, config.height, config.fps);
@@ -87,6 +90,7 @@ GrabStatus SimCamera::Impl::grab(Frame& out, std::int64_t timeout_ns) noexcept {
       if (device.state() == CameraState::stalled) return GrabStatus::timeout;
     }
   }
+  while (device.hangs()) clock.sleep_until(clock.monotonic_ns() + kHangStep);
   const std::int64_t latest = clock.monotonic_ns() + timeout_ns;
   for (;;) {
     // Told once as soon as it happens; later calls wait for the device to come back.

@@ -1,17 +1,12 @@
 #include "tests/e2e/daemon_process.hpp"
 
 #include <fcntl.h>
-#include <poll.h>
 #include <signal.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
 #include <chrono>
 #include <cstdlib>
-#include <cstring>
 #include <stdexcept>
 #include <thread>
 
@@ -25,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 
 /// Starts a program with both output streams in `output`. It reads `input`.
 pid_t spawn(const std::vector<std::string>& arguments, const fs::path& output,
-            const fs::path& input, const std::string& notify_socket) {
+            const fs::path& input, const Environment& environment) {
   std::vector<char*> argv;
   argv.reserve(arguments.size() + 1);
   for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
@@ -39,7 +34,7 @@ pid_t spawn(const std::vector<std::string>& arguments, const fs::path& output,
     ::dup2(in.get(), STDIN_FILENO);
     ::dup2(log.get(), STDOUT_FILENO);
     ::dup2(log.get(), STDERR_FILENO);
-    if (!notify_socket.empty()) ::setenv("NOTIFY_SOCKET", notify_socket.c_str(), 1);
+    for (const auto& [name, value] : environment) ::setenv(name.c_str(), value.c_str(), 1);
     ::execv(argv[0], argv.data());
     ::_exit(127);
   }
@@ -67,25 +62,19 @@ int run_program(const std::vector<std::string>& arguments, std::string* output,
                 const std::string& input) {
   const TempFolder folder;
   base::write_file_atomically(folder.path() / "input", input);
-  const pid_t pid = spawn(arguments, folder.path() / "log", folder.path() / "input", "");
+  const pid_t pid = spawn(arguments, folder.path() / "log", folder.path() / "input", {});
   int status = 0;
   ::waitpid(pid, &status, 0);
   if (output != nullptr) *output = base::read_file(folder.path() / "log");
   return exit_status(status);
 }
 
-DaemonProcess::DaemonProcess(const std::vector<std::string>& arguments) {
-  const std::string socket_path = (folder_.path() / "notify").string();
-  notify_.reset(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::strncpy(address.sun_path, socket_path.c_str(), sizeof address.sun_path - 1);
-  if (::bind(notify_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    throw std::runtime_error("cannot bind " + socket_path);
-  }
+DaemonProcess::DaemonProcess(const std::vector<std::string>& arguments, Environment environment)
+    : notify_(folder_.path() / "notify") {
+  environment.emplace_back("NOTIFY_SOCKET", notify_.path().string());
   std::vector<std::string> command{DTACTD_PROGRAM};
   command.insert(command.end(), arguments.begin(), arguments.end());
-  pid_ = spawn(command, folder_.path() / "log", "/dev/null", socket_path);
+  pid_ = spawn(command, folder_.path() / "log", "/dev/null", environment);
   wait_until_ready();
 }
 
@@ -93,14 +82,10 @@ void DaemonProcess::wait_until_ready() {
   const auto deadline = Clock::now() + std::chrono::seconds(60);
   const std::string marker = "listening on 127.0.0.1:";
   while (Clock::now() < deadline) {
-    pollfd waiting{notify_.get(), POLLIN, 0};
-    if (::poll(&waiting, 1, 100) > 0) {
-      std::array<char, 4096> buffer{};
-      const ssize_t n = ::recv(notify_.get(), buffer.data(), buffer.size() - 1, 0);
-      const std::string message(buffer.data(), static_cast<std::size_t>(std::max<ssize_t>(n, 0)));
-      const std::size_t at = message.find(marker);
-      if (message.find("READY=1") != std::string::npos && at != std::string::npos) {
-        port_ = static_cast<std::uint16_t>(std::stoi(message.substr(at + marker.size())));
+    if (const auto message = notify_.next(std::chrono::milliseconds(100))) {
+      const std::size_t at = message->find(marker);
+      if (message->find("READY=1") != std::string::npos && at != std::string::npos) {
+        port_ = static_cast<std::uint16_t>(std::stoi(message->substr(at + marker.size())));
         return;
       }
     }

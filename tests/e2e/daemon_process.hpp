@@ -2,12 +2,15 @@
 
 #include <sys/types.h>
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "hal/base/unique_fd.hpp"
+#include "tests/fakes/notify_socket.hpp"
 
 namespace dtact::e2e {
 
@@ -29,13 +32,16 @@ class TempFolder {
 int run_program(const std::vector<std::string>& arguments, std::string* output = nullptr,
                 const std::string& input = "");
 
+/// Variables beside those of this program.
+using Environment = std::vector<std::pair<std::string, std::string>>;
+
 /// A dtactd of the test's own on a loopback port that the system chose. Started the way systemd
 /// starts it: ready when it says READY=1 on its notify socket.
 class DaemonProcess {
  public:
-  /// `arguments` follow the program's name. Throws std::runtime_error with the log when the daemon
-  /// ends or is not ready within 60 s.
-  explicit DaemonProcess(const std::vector<std::string>& arguments);
+  /// `arguments` follow the program's name, `environment` adds to this program's. Throws
+  /// std::runtime_error with the log when the daemon ends or is not ready within 60 s.
+  explicit DaemonProcess(const std::vector<std::string>& arguments, Environment environment = {});
   DaemonProcess(const DaemonProcess&) = delete;
   DaemonProcess& operator=(const DaemonProcess&) = delete;
   ~DaemonProcess();
@@ -43,6 +49,11 @@ class DaemonProcess {
   [[nodiscard]] std::uint16_t port() const { return port_; }
   [[nodiscard]] pid_t pid() const { return pid_; }
   [[nodiscard]] std::string log() const;
+  /// What the daemon tells systemd next; none when nothing comes in time.
+  [[nodiscard]] std::optional<std::string> next_notification(
+      std::chrono::milliseconds timeout) const {
+    return notify_.next(timeout);
+  }
   /// Sends `signal` and waits. Returns the exit status, 128 + signal when it was killed, or −1 when
   /// it did not end within 20 s (it is killed then).
   int stop(int signal);
@@ -51,7 +62,7 @@ class DaemonProcess {
   void wait_until_ready();
 
   TempFolder folder_;
-  base::UniqueFd notify_;
+  fakes::NotifySocket notify_;
   pid_t pid_ = -1;
   std::uint16_t port_ = 0;
 };

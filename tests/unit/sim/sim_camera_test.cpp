@@ -263,6 +263,21 @@ TEST_F(SimCameraTest, PacedUnplugIsToldAtOnceAndEnds) {
   EXPECT_EQ(camera.report().disconnects, 1U);
 }
 
+TEST_F(SimCameraTest, AHangKeepsTheCallThatAsksForAFrame) {
+  SimCamera camera(config(fault("hang", 5, 50), "luma", true), link_);
+  camera.start();
+  Frame frame;
+  std::chrono::nanoseconds longest{0};
+  std::uint64_t last = 0;
+  while (last < 55) {
+    const auto began = std::chrono::steady_clock::now();
+    if (camera.grab(frame, 1ms) == GrabStatus::ok) last = frame.info().sequence;
+    longest = std::max<std::chrono::nanoseconds>(longest, std::chrono::steady_clock::now() - began);
+  }
+  EXPECT_GT(longest, 300ms);  // of the half second
+  EXPECT_EQ(camera.report().state, CameraState::streaming);
+}
+
 TEST_F(SimCameraTest, NothingComesBeforeStart) {
   SimCamera camera(config("", "luma", true), link_);
   Frame frame;

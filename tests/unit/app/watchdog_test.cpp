@@ -1,0 +1,73 @@
+#include "daemon/app/watchdog.hpp"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "tests/fakes/notify_socket.hpp"
+
+namespace dtact::app {
+namespace {
+
+using namespace std::chrono_literals;
+
+class WatchdogTest : public ::testing::Test {
+ protected:
+  WatchdogTest() { ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1); }
+  ~WatchdogTest() override {
+    ::unsetenv("NOTIFY_SOCKET");
+    ::unsetenv("WATCHDOG_USEC");
+  }
+  /// How often systemd was told.
+  int told() const {
+    int count = 0;
+    while (const auto message = manager.next(0ms)) {
+      EXPECT_EQ(*message, "WATCHDOG=1");
+      ++count;
+    }
+    return count;
+  }
+
+  fakes::NotifySocket manager{std::filesystem::path(::testing::TempDir()) /
+                              ("dtact_watchdog_" + std::to_string(::getpid()))};
+  boost::asio::io_context io{1};
+};
+
+TEST_F(WatchdogTest, IsFedWhileTheHeartMoves) {
+  ::setenv("WATCHDOG_USEC", "20000", 1);
+  std::uint64_t beats = 0;
+  Watchdog watchdog(io, [&] { return ++beats; });
+  for (int i = 0; i < 5; ++i) io.run_one();
+  EXPECT_EQ(told(), 5);
+}
+
+TEST_F(WatchdogTest, IsNotFedWhileTheHeartStandsStill) {
+  ::setenv("WATCHDOG_USEC", "20000", 1);
+  std::uint64_t beats = 7;  // not at zero when the watch begins
+  Watchdog watchdog(io, [&] { return beats; });
+  for (int i = 0; i < 5; ++i) io.run_one();
+  EXPECT_EQ(told(), 0);
+  ++beats;
+  for (int i = 0; i < 5; ++i) io.run_one();
+  EXPECT_EQ(told(), 1);
+  watchdog.stop();
+  io.run();  // ends: nothing is left to do
+  EXPECT_EQ(told(), 0);
+}
+
+TEST_F(WatchdogTest, HasNoWorkWhereNoWatchdogIsSet) {
+  ::unsetenv("WATCHDOG_USEC");
+  std::uint64_t beats = 0;
+  const Watchdog watchdog(io, [&] { return ++beats; });
+  io.run();
+  EXPECT_EQ(told(), 0);
+}
+
+}  // namespace
+}  // namespace dtact::app
