@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/calibration/key_reader.hpp"

@@ -1,6 +1,7 @@
 #include "daemon/recon/list.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <stdexcept>
 #include <string>

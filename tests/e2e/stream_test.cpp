@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstdio>
 
 #include "hal/null/null_camera.hpp"
 #include "hal/sim/scene.hpp"

@@ -1,5 +1,6 @@
 #include "tests/accuracy/table/judge.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 

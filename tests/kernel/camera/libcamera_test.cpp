@@ -1,5 +1,6 @@
 #include <map>
 #include <optional>
+#include <stdexcept>
 
 #include "hal/libcamera/libcamera_camera.hpp"
 #include "hal/v4l2/photometry.hpp"

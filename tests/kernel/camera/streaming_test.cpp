@@ -1,7 +1,9 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <cstdio>
 #include <fstream>
+#include <stdexcept>
 
 #include "tests/kernel/camera/guest_camera.hpp"
 

@@ -5,6 +5,7 @@
 
 #include <bit>
 #include <filesystem>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>

@@ -6,6 +6,7 @@
 #include <array>
 #include <filesystem>
 #include <sstream>
+#include <stdexcept>
 
 #include "clients/ctl/guided/cells.hpp"
 #include "clients/ctl/guided/console.hpp"

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
+
 #include "clients/ctl/light_text.hpp"
 
 namespace dtact::ctl {

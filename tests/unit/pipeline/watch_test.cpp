@@ -2,6 +2,8 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <stdexcept>
+
 #include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/camera_watch.hpp"
 #include "daemon/pipeline/light_timeline.hpp"

@@ -1,6 +1,7 @@
 // The whole reconstruction against the scalar kernels, on every instruction set.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <memory>
 #include <random>
 #include <vector>

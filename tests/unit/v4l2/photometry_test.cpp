@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <stdexcept>
 
 #include "hal/base/unique_fd.hpp"
 #include "tests/unit/v4l2/emulated_camera.hpp"

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cerrno>
+#include <stdexcept>
 #include <vector>
 
 #include "tests/unit/v4l2/emulated_camera.hpp"

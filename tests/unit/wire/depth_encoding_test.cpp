@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <zstd.h>
 
+#include <stdexcept>
 #include <string>
 #include <vector>
 
