@@ -11,11 +11,10 @@ root=${CHROOT_CACHE:-$HOME/.cache/dtactd-chroots}/$suite-arm64
 . "$(dirname "$0")/chroot.sh"
 
 [ "$(uname -m)" = x86_64 ] || skip "this machine is $(uname -m)"
-# Header-only packages have no architecture.
 foreign=()
 for package in "$@"; do
   case $package in
-    libcli11-dev | libboost-dev) foreign+=("$package") ;;
+    libcli11-dev) foreign+=("$package") ;;  # has no architecture
     lib*) foreign+=("$package:arm64") ;;
     *) foreign+=("$package") ;;
   esac
