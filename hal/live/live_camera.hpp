@@ -79,8 +79,14 @@ class LiveCamera : public Camera, private FrameOwner {
   // The capture thread's own.
   std::array<luma::LumaBuffer, 2> pool_;  // one with the caller, one to decode into
   std::array<std::atomic<bool>, 2> lent_{};
-  std::array<std::shared_ptr<Source>, 8> lenders_;  // of payloads lent as they are, by index
-  std::optional<Area> area_;                        // what will be read; none: the whole image
+  /// A payload lent as it is. Two sources may have lent buffers of the same index at a time: one
+  /// before and one after the camera was away.
+  struct Loan {
+    std::shared_ptr<Source> lender;
+    int index = -1;  // of the lender's buffer
+  };
+  std::array<Loan, 2> loans_;  // one with the caller, one to deliver; without lender: free
+  std::optional<Area> area_;   // what will be read; none: the whole image
   std::int64_t next_try_ns_ = 0;
   std::int64_t last_buffer_ns_ = 0;  // the last sign of life, damaged or not
   std::int64_t opened_ns_ = 0;

@@ -9,7 +9,7 @@
 namespace dtact::hal::live {
 namespace {
 
-/// Frame indices from here on are buffers of the source; below, of the pool.
+/// Frame indices from here on are loans of the source's buffers; below, buffers of the pool.
 constexpr int kLentPayload = 2;
 /// Buffers looked at in one call: they go back as others come out, so there could be no end.
 constexpr unsigned kMaxTaken = 8;
@@ -73,14 +73,14 @@ PayloadStatus LiveCamera::deliver(const Filled& filled, std::uint64_t sequence, 
   frame.meaning = filled.meaning;
   frame.ready_ns = last_buffer_ns_;
   const Format format = connection_->source->format();
-  const auto place = static_cast<std::size_t>(filled.index);
+  const auto loan = std::ranges::find(loans_, nullptr, &Loan::lender);
   kept = format.lendable && format.full_range && format.encoding == Encoding::grey &&
-         place < lenders_.size();
+         loan != loans_.end();
   if (kept) {
-    lenders_[place] = connection_->source;
+    *loan = {connection_->source, filled.index};
     frame.flags = take_flags();
     const std::ptrdiff_t stride = format.bytes_per_line > 0 ? format.bytes_per_line : format.width;
-    out = Frame(*this, kLentPayload + filled.index,
+    out = Frame(*this, kLentPayload + static_cast<int>(loan - loans_.begin()),
                 {filled.payload.data(), format.width, format.height, stride}, frame);
     note_delivery();
     return PayloadStatus::ok;
@@ -119,12 +119,10 @@ void LiveCamera::give_back(int index) noexcept {
     lent_[static_cast<std::size_t>(index)].store(false, std::memory_order_release);
     return;
   }
-  index -= kLentPayload;
-  const std::shared_ptr<Source> lender =
-      std::exchange(lenders_[static_cast<std::size_t>(index)], nullptr);
+  const Loan loan = std::exchange(loans_[static_cast<std::size_t>(index - kLentPayload)], Loan{});
   // Of a source that has been let go, nobody waits for the buffer. An error is met by the next
   // call of dequeue().
-  if (connection_ && lender == connection_->source) (void)lender->enqueue(index);
+  if (connection_ && loan.lender == connection_->source) (void)loan.lender->enqueue(loan.index);
 }
 
 void LiveCamera::count_gap(std::uint32_t counted) noexcept {

@@ -131,6 +131,31 @@ TEST(LiveCamera, AFrameOutlivesTheSourceItWasLentFrom) {
   EXPECT_EQ(rig.camera.report().disconnects, 1U);
 }
 
+// The capture thread keeps its frame while the camera is away, and another source numbers its
+// buffers alike.
+TEST(LiveCamera, AFrameOfTheSourceBeforeGoesToNoOther) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  const auto before = rig.source;
+  before->stopped = true;
+  const auto after = rig.source = std::make_shared<LendingSource>();
+  after->fill(1, 60);
+  Frame other;
+  ASSERT_EQ(rig.camera.grab(other, milliseconds(1000)), GrabStatus::ok);
+  other.reset();
+  EXPECT_EQ(after->home, (std::vector<int>{1}));
+  after->fill(0, 70);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
+  EXPECT_EQ(frame.luma().row(3)[3], 70);
+  EXPECT_EQ(before->home, (std::vector<int>{}));
+  EXPECT_EQ(after->home, (std::vector<int>{1})) << "the buffer that is being read";
+  frame.reset();
+  EXPECT_EQ(after->home, (std::vector<int>{1, 0}));
+}
+
 TEST(LiveCamera, SilenceIsAStallAndIsRestarted) {
   Rig rig;
   rig.camera.start();
