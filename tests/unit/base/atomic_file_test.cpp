@@ -1,8 +1,11 @@
 #include "hal/base/atomic_file.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <system_error>
+
+#include "tests/fakes/file_log.hpp"
 
 namespace dtact::base {
 namespace {
@@ -29,6 +32,15 @@ TEST_F(AtomicFile, WritesAndReplaces) {
   write_file_atomically(file, "");
   EXPECT_EQ(read_file(file), "");
   EXPECT_EQ(files(), 1);
+}
+
+// What is not on the disk before the rename is lost by a power cut after it, and so is a rename in
+// a folder that is not.
+TEST_F(AtomicFile, IsOnTheDiskBeforeItTakesThePlaceOfTheOldOne) {
+  const fakes::FileLog log(folder_);
+  write_file_atomically(folder_ / "a", "one");
+  EXPECT_THAT(log.calls(), testing::ElementsAre("write a.XXXXXX", "sync a.XXXXXX",
+                                                "rename a.XXXXXX to a", "sync ."));
 }
 
 TEST_F(AtomicFile, FailureLeavesTheOldFileAndNoOther) {

@@ -9,6 +9,7 @@
 
 #include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "tests/fakes/file_log.hpp"
 #include "tests/unit/calibration/sample.hpp"
 
 namespace dtact::net {
@@ -82,6 +83,31 @@ TEST_F(Store, KeepsFilesUnderTheirName) {
   EXPECT_EQ(files.name, "ball");
   EXPECT_EQ(files.toml, "a toml");
   EXPECT_EQ(files.png, "a png");
+}
+
+// Each file before its folder, all of it before it gets its number, and the number before the link.
+TEST_F(Store, IsOnTheDiskBeforeItIsConfirmed) {
+  FolderCalibrationStore store(state_, {});
+  {
+    const fakes::FileLog log(state_);
+    store.keep(whole("ball"));
+    EXPECT_THAT(log.calls(),
+                ElementsAre("write calibrations/.new/ball/calibration.toml.XXXXXX",
+                            "sync calibrations/.new/ball/calibration.toml.XXXXXX",
+                            "rename calibrations/.new/ball/calibration.toml.XXXXXX to "
+                            "calibrations/.new/ball/calibration.toml",
+                            "sync calibrations/.new/ball",
+                            "write calibrations/.new/ball/reference.png.XXXXXX",
+                            "sync calibrations/.new/ball/reference.png.XXXXXX",
+                            "rename calibrations/.new/ball/reference.png.XXXXXX to "
+                            "calibrations/.new/ball/reference.png",
+                            "sync calibrations/.new/ball", "sync calibrations/.new",
+                            "rename calibrations/.new to calibrations/1", "sync calibrations",
+                            "rename calibration.new to calibration", "sync ."));
+  }
+  const fakes::FileLog log(state_);
+  store.make_current(1);
+  EXPECT_THAT(log.calls(), ElementsAre("rename calibration.new to calibration", "sync ."));
 }
 
 TEST_F(Store, ListsWhatEachIs) {
