@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <thread>
 
@@ -203,6 +204,53 @@ TEST(ClientLibrary, SaysWhyItWasRefused) {
     FAIL() << "not refused";
   } catch (const client::ConnectionError& e) {
     EXPECT_THAT(e.what(), HasSubstr("max_clients"));
+  }
+}
+
+/// A daemon that greets, says why it ends, and resets the connection.
+std::thread greet_and_reset(int listening, const std::string& reason) {
+  return std::thread([=] {
+    const base::UniqueFd fd(::accept(listening, nullptr, nullptr));
+    const auto send = [&fd](const v1::ServerMessage& message) {
+      const auto length = wire::encode_length(message.ByteSizeLong());
+      std::string bytes(reinterpret_cast<const char*>(length.data()), length.size());
+      message.AppendToString(&bytes);
+      (void)::send(fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    };
+    std::array<char, 1024> hello{};
+    (void)::recv(fd.get(), hello.data(), hello.size(), 0);
+    v1::ServerMessage greeting;
+    greeting.mutable_reply()->set_id(1);
+    greeting.mutable_reply()->mutable_hello()->set_major(wire::kMajor);
+    send(greeting);
+    v1::ServerMessage end;
+    end.mutable_reply()->mutable_error()->set_message(reason);
+    send(end);
+    const linger now{1, 0};
+    ::setsockopt(fd.get(), SOL_SOCKET, SO_LINGER, &now, sizeof now);
+  });
+}
+
+TEST(ClientLibrary, SaysTheReasonThatCameBeforeAReset) {
+  const base::UniqueFd listening(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  ASSERT_EQ(::bind(listening.get(), reinterpret_cast<sockaddr*>(&address), size), 0);
+  ASSERT_EQ(::listen(listening.get(), 1), 0);
+  ASSERT_EQ(::getsockname(listening.get(), reinterpret_cast<sockaddr*>(&address), &size), 0);
+  std::thread daemon = greet_and_reset(listening.get(), "too many answers lay unread");
+  Options o;
+  o.port = ntohs(address.sin_port);
+  o.timeout = kPatience;
+  Client client(o);
+  daemon.join();
+  try {
+    (void)client.status();
+    FAIL() << "an answer from nobody";
+  } catch (const client::ConnectionError& e) {
+    EXPECT_STREQ(e.what(), "too many answers lay unread");
   }
 }
 

@@ -109,5 +109,29 @@ TEST(FrameEncoder, RefusesWhatExceedsTheWire) {
   EXPECT_NE(encoder.encode({2, 0}), nullptr);  // flat, so it compresses
 }
 
+// The cap is 16 MiB; what stands round a body takes 5 bytes before and 11 after it at most.
+TEST(FrameEncoder, LeavesRoomForTheEnvelope) {
+  FrameEncoder encoder("f");
+  pipeline::DepthFrame frame;
+  frame.has_luma = true;
+  frame.luma_height = 1;
+  const auto encode = [&](int pixels) {
+    frame.luma_width = pixels;
+    frame.luma.resize(static_cast<std::size_t>(pixels));
+    encoder.begin(frame);
+    return encoder.encode({0, 1});
+  };
+  constexpr int kLess = 16'700'000;
+  const std::size_t rest = encode(kLess)->body.size() - kLess;
+  const int cap = 16'777'216 - static_cast<int>(rest);
+  EXPECT_NE(encode(cap - 80), nullptr);
+  for (int pixels = cap - 80; pixels < cap + 16; pixels += 4) {
+    const auto encoded = encode(pixels);
+    if (encoded != nullptr) {
+      EXPECT_LE(encoded->body.size() + 5 + 11, 16'777'216U) << pixels;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace dtact::net

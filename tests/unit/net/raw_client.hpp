@@ -94,6 +94,15 @@ class RawClient {
     return true;
   }
 
+  /// The other side closes its end altogether: what is sent comes back as a reset. Waits 20 s.
+  bool is_let_go() {
+    for (int i = 0; i < 400; ++i) {
+      if (::send(fd_.get(), "x", 1, MSG_NOSIGNAL) < 0) return true;
+      ::poll(nullptr, 0, 50);
+    }
+    return false;
+  }
+
   v1::Reply request(v1::ClientMessage message) {
     message.set_id(next_id_++);
     send(message);

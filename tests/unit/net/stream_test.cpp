@@ -149,6 +149,27 @@ TEST(Stream, GivesEveryNthFrame) {
   }
 }
 
+TEST(Stream, ANewSubscriptionBeginsWithTheNextFrame) {
+  Rig rig;
+  RawClient all(rig.tcp_port());
+  RawClient third(rig.tcp_port());
+  all.hello();
+  third.hello();
+  all.subscribe(v1::DEPTH_INT16);
+  third.subscribe(v1::DEPTH_INT16, v1::LUMA_NONE, 3);
+  const auto publish = [&](std::uint64_t sequence) {
+    rig.port.publish(make_frame(sequence));
+    ASSERT_EQ(all.frame().sequence(), sequence);
+  };
+  publish(1);
+  publish(2);
+  EXPECT_EQ(third.frame().sequence(), 1U);
+  third.subscribe(v1::DEPTH_INT16, v1::LUMA_NONE, 3);
+  for (const std::uint64_t sequence : {3U, 4U, 5U, 6U}) publish(sequence);
+  EXPECT_EQ(third.frame().sequence(), 3U);
+  EXPECT_EQ(third.frame().sequence(), 6U);
+}
+
 TEST(Stream, CountsWhatThePipelineSkippedAsMissed) {
   Rig rig;
   RawClient client(rig.tcp_port());
@@ -275,6 +296,29 @@ TEST(Stream, SurvivesAClientKilledInTheMiddleOfAFrame) {
   }
   ASSERT_TRUE(rig.wait_log("disconnected"));
   EXPECT_EQ(other.request(get_status()).status().clients_size(), 1);
+}
+
+/// Asks for a calibration of a mebibyte.
+v1::ClientMessage get_large(Rig& rig, RawClient& client) {
+  v1::ClientMessage message;
+  auto& upload = *message.mutable_upload_calibration();
+  upload.set_name("large");
+  upload.set_calibration_toml("toml");
+  upload.set_reference_png(std::string(1U << 20U, 'x'));
+  const std::uint64_t number = client.request(message).done().calibration();
+  EXPECT_EQ(number, *rig.store.current_number());
+  message.mutable_get_calibration()->set_number(number);
+  return message;
+}
+
+TEST(Stream, WhatAClientHasReadIsNotUnread) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto get = get_large(rig, client);
+  for (int i = 0; i < 6; ++i) {
+    ASSERT_EQ(client.request(get).calibration().reference_png().size(), 1U << 20U) << i;
+  }
 }
 
 TEST(Stream, LetsAClientGoThatLeavesEventsUnread) {
