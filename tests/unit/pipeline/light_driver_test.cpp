@@ -6,7 +6,9 @@
 #include <memory>
 #include <optional>
 #include <thread>
+#include <utility>
 #include <variant>
+#include <vector>
 
 #include "tests/fakes/fake_ring.hpp"
 
@@ -23,18 +25,21 @@ hal::Light dimmed(int brightness) {
 
 class LightDriverTest : public ::testing::Test {
  protected:
+  void take_notes() {
+    LightNote note;
+    while (driver.next_note(note)) notes.push_back(note);
+  }
   /// The next event; waits for it.
   std::optional<Event> next() {
     Event event;
     for (int i = 0; i < 5000; ++i) {
-      LightNote note;
-      while (driver.next_note(note)) {
-      }
+      take_notes();
       if (driver.next_event(event)) return event;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return std::nullopt;
   }
+  std::vector<LightNote> notes;
   EventFd wake;
   fakes::FakeRing::Handle ring;
   LightDriver driver{std::make_unique<fakes::FakeRing>(ring), dimmed(200), base::system_clock(),
@@ -92,6 +97,14 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   EXPECT_EQ(std::get<CommandDone>(next().value()).outcome, Outcome::done);
   EXPECT_FALSE(driver.trouble());
   EXPECT_EQ(driver.message(), "");
+  driver.stop();
+  take_notes();
+  // At the start, then the light that failed and the one that still shone, then it again.
+  std::vector<std::pair<bool, int>> told;
+  for (const LightNote& note : notes) told.emplace_back(note.begins, note.light.brightness);
+  EXPECT_EQ(told,
+            (std::vector<std::pair<bool, int>>{
+                {true, 200}, {false, 200}, {true, 100}, {false, 200}, {true, 100}, {false, 100}}));
 }
 
 TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
@@ -116,8 +129,16 @@ TEST_F(LightDriverTest, RefusesWhenTooManyWait) {
 
 TEST_F(LightDriverTest, StopsWhileItsQueuesAreFull) {
   driver.start();
-  for (int i = 0; i < 16; ++i) (void)driver.submit(1, dimmed(i));  // 32 notes for 16 places
+  for (int i = 0; i < 16; ++i) ASSERT_TRUE(driver.submit(1, dimmed(i)));
+  // The first light and seven more fill the 16 places for notes; the next one waits.
+  for (int i = 0; i < 5000 && ring.all().size() < 8; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));  // in which it tries four times
+  EXPECT_EQ(ring.all().size(), 8U);
   driver.stop();
+  take_notes();
+  EXPECT_EQ(notes.size(), 16U);
 }
 
 }  // namespace

@@ -58,15 +58,24 @@ TEST_F(PipelineTest, DeeperThanTheListIsACondition) {
 TEST_F(PipelineTest, AFullEventQueueLosesNoAnswerAndNoState) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
-  // Nobody reads events while contact comes and goes more often than the queue is long.
-  for (int i = 0; i < 80; ++i) {
+  // Nobody reads events while contact comes and goes more often than the queue is long, 64.
+  const auto shown = [&](bool touching) {
+    for (int i = 0; i < 5000; ++i) {
+      const DepthFrame* newest = pipeline->latest();
+      if (newest != nullptr && newest->contact.touching == touching) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    return false;
+  };
+  for (int i = 0; i <= 80; ++i) {
     camera.press(i % 2 == 0 ? 1 : 0);
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    ASSERT_TRUE(shown(i % 2 == 0)) << i;
   }
-  camera.press(1);
-  std::this_thread::sleep_for(std::chrono::milliseconds(100));
   ASSERT_TRUE(pipeline->submit({777, Rezero{}}));
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  std::size_t waiting = 0;
+  for (; auto event = pipeline->next_event(); ++waiting) events.push_back(std::move(*event));
+  EXPECT_GE(waiting, 64U) << "the queue was never full";
   ASSERT_TRUE(until([&] {
     const auto answers = all<CommandDone>();
     return !answers.empty() && answers.back().ticket == 777;

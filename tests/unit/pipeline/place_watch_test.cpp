@@ -81,6 +81,16 @@ TEST_F(PlaceWatchTest, TellsAMovedCameraAndHowFar) {
   EXPECT_FALSE(watch.moved());
 }
 
+TEST_F(PlaceWatchTest, AveragesNothingFromBeforeANewReference) {
+  watch.use_calibration(calibrated(), kAll);
+  show(kFrames - 1, 4);
+  watch.hurry();
+  show(1, 0);
+  EXPECT_FALSE(watch.moved());
+  show(kFrames - 1, 0);
+  EXPECT_FALSE(watch.moved());
+}
+
 TEST_F(PlaceWatchTest, LooksAgainAfterAPauseByItself) {
   watch.use_marks(calibrated());
   show(kFrames, 0);

@@ -104,6 +104,11 @@ TEST(LightTimeline, FramesBelongToTheLightTheyWereExposedUnder) {
   timeline.change_ends(dim, 101 * kMs);
   EXPECT_FALSE(timeline.settled_at(120 * kMs));
   EXPECT_TRUE(timeline.settled_at(121 * kMs));  // 101 + 2 periods
+  hal::Light dark;
+  dark.brightness = 3;
+  timeline.change_begins(dark, 200 * kMs);
+  EXPECT_EQ(timeline.light_at(199 * kMs).brightness, 100);
+  EXPECT_EQ(timeline.light_at(200 * kMs).brightness, 3);
 }
 
 TEST(LightTimeline, AFailedWriteLeavesTheOldLight) {
