@@ -112,6 +112,17 @@ TEST(ContactWidth, OfABall) {
   EXPECT_NEAR(depth_of_width_mm(6.06, 4), 1.5, 0.01);
 }
 
+TEST(Covered, IsTheDepthWhereTheListsCoverageEnds) {
+  auto model = std::make_shared<recon::Model>();
+  model->list = {.first_q6 = -2,
+                 .covered_from_q6 = -1,
+                 .covered_to_q6 = 3,
+                 .um = {-9, -4, 0, 30, 70, 1250, 1500}};
+  calibration::Calibration made;
+  made.model = std::move(model);
+  EXPECT_DOUBLE_EQ(covered_mm(made), 1.25);
+}
+
 TEST(Fitness, NamesWhatKeepsFromCalibrating) {
   client::Status status;
   status.state = "uncalibrated";
@@ -124,7 +135,9 @@ TEST(Fitness, NamesWhatKeepsFromCalibrating) {
   status.advice = "";
   status.state = "camera_lost";
   EXPECT_THAT(unfit(status), HasSubstr("camera_lost"));
-  EXPECT_TRUE(passing_trouble({"light_unsettled"}));
+  for (const char* passing : {"starting", "light_unsettled", "image_repeated", "camera_trouble"}) {
+    EXPECT_TRUE(passing_trouble({"light_drifted", passing})) << passing;
+  }
   EXPECT_FALSE(passing_trouble({"light_drifted", "frames_lost"}));
 }
 
@@ -137,7 +150,12 @@ TEST(Fault, OfAnUntouchedPicture) {
   EXPECT_EQ(fault_of(still, table), "");
   still.noise_levels = 3;
   EXPECT_THAT(fault_of(still, table), HasSubstr("gain"));
-  std::fill_n(still.frames[0].pixels.begin(), 200, std::uint8_t{255});
+  still.noise_levels = 2.5;
+  std::fill_n(still.frames[0].pixels.begin(), 200, std::uint8_t{253});
+  EXPECT_EQ(fault_of(still, table), "");
+  std::fill_n(still.frames[0].pixels.begin(), 100, std::uint8_t{254});
+  EXPECT_EQ(fault_of(still, table), "");
+  std::fill_n(still.frames[0].pixels.begin(), 200, std::uint8_t{254});
   EXPECT_THAT(fault_of(still, table), HasSubstr("2 % of the picture is white"));
   still.cells.assign(64, 12);
   EXPECT_THAT(fault_of(still, table), HasSubstr("too dark (mean grey 12)"));

@@ -100,6 +100,18 @@ TEST_F(GreyDecoderTest, TruncationHiddenByAnEndMarkerIsTold) {
   EXPECT_EQ(decode(jpeg), Status::corrupt);
 }
 
+TEST_F(GreyDecoderTest, StuffingBeforeTheEndMarkerIsToleratedUpTo16Bytes) {
+  const auto stuffed = [](std::size_t bytes) {
+    Bytes jpeg = make_jpeg({}, slope);
+    jpeg.insert(jpeg.end() - 2, bytes, 0x55);
+    return jpeg;
+  };
+  EXPECT_EQ(decode(stuffed(16)), Status::ok);
+  EXPECT_LE(worst_error(), 3);
+  // Up to eight of them have gone into the decoder's 64 bits and are not counted.
+  EXPECT_EQ(decode(stuffed(16 + 8 + 1)), Status::corrupt);
+}
+
 TEST_F(GreyDecoderTest, AnotherSizeIsTold) {
   EXPECT_EQ(decode(make_jpeg({.width = 48, .height = 64}, slope)), Status::wrong_size);
   Size size;

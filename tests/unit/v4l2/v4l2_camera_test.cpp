@@ -331,6 +331,16 @@ TEST(V4l2Camera, AModeTheDriverBendsIsAnErrorThatNamesTheOffer) {
   EXPECT_THROW(camera.start(), std::runtime_error);
 }
 
+TEST(V4l2Camera, ToleratesHalfAFrameASecond) {
+  EmulatedCamera device;
+  device.insist_on_rate(61);
+  CameraConfig config = small();
+  config.fps = 60.4;  // offered: 60
+  EXPECT_THROW(V4l2Camera(config).start(), std::runtime_error);
+  config.fps = 60.5;
+  EXPECT_NO_THROW(V4l2Camera(config).start());
+}
+
 TEST(V4l2Camera, ADriverWithoutRatesIsTakenAtItsWord) {
   EmulatedCamera device;
   device.fail(VIDIOC_ENUM_FRAMEINTERVALS, ENOTTY);
