@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <deque>
 #include <memory>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "hal/base/clock.hpp"
 #include "hal/live/device_error.hpp"
@@ -35,7 +38,7 @@ class LendingSource final : public Source {
     base::system_clock().sleep_until(deadline_ns);
   }
   DequeueStatus dequeue(Filled& out) noexcept override {
-    if (stopped) return DequeueStatus::failed;
+    if (stopped || broken) return DequeueStatus::failed;
     if (filled.empty()) return DequeueStatus::none;
     out.index = filled.front();
     filled.pop_front();
@@ -49,7 +52,9 @@ class LendingSource final : public Source {
     return true;
   }
   void stop() noexcept override { stopped = true; }
-  std::string check_controls(std::vector<CameraControl>& /*controls*/) override { return {}; }
+  std::string check_controls(std::vector<CameraControl>& /*controls*/) override {
+    return moved ? "gain moved from 5 to 60 by itself" : "";
+  }
 
   void fill(int index, std::uint8_t grey) {
     memory[static_cast<std::size_t>(index)].fill(grey);
@@ -57,7 +62,9 @@ class LendingSource final : public Source {
   }
 
   bool full_range = true;
+  bool broken = false;
   bool stopped = false;
+  std::atomic<bool> moved{false};  // asked for by another thread
   std::shared_ptr<bool> destroyed = std::make_shared<bool>(false);
   std::array<std::array<std::uint8_t, kPixels + kLumaPadding>, 3> memory{};
   std::deque<int> filled;
@@ -154,6 +161,55 @@ TEST(LiveCamera, AFrameOfTheSourceBeforeGoesToNoOther) {
   EXPECT_EQ(after->home, (std::vector<int>{1})) << "the buffer that is being read";
   frame.reset();
   EXPECT_EQ(after->home, (std::vector<int>{1, 0}));
+}
+
+// A device that is still open somewhere cannot be opened again.
+TEST(LiveCamera, ALostSourceIsStoppedAtOnceThoughAFrameKeepsIt) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  rig.source->broken = true;
+  const auto lost = std::exchange(rig.source, nullptr);
+  Frame none;
+  EXPECT_EQ(rig.camera.grab(none, milliseconds(20)), GrabStatus::unplugged);
+  EXPECT_TRUE(lost->stopped);
+}
+
+TEST(LiveCamera, ANewSourcesCountIsNoGap) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().sequence, 1U);
+  rig.source->stopped = true;
+  rig.source = std::make_shared<LendingSource>();
+  rig.source->sequence = 500;
+  rig.source->fill(1, 60);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().sequence, 2U);
+  EXPECT_EQ(rig.camera.report().lost, 0U);
+}
+
+TEST(LiveCamera, AMovedControlIsTheFramesFlagUntilItStays) {
+  Rig rig;
+  rig.camera.start();
+  const auto eventually = [&](std::uint32_t flags, const std::string& sentence) {
+    for (int i = 0; i < 500; ++i) {  // looked at once a second
+      Frame frame;
+      rig.source->fill(0, 50);
+      if (rig.camera.grab(frame, milliseconds(100)) != GrabStatus::ok) return false;
+      if (frame.info().flags == flags && rig.camera.report().moved == sentence) return true;
+      base::system_clock().sleep_until(base::system_clock().monotonic_ns() + 20'000'000);
+    }
+    return false;
+  };
+  rig.source->moved = true;
+  EXPECT_TRUE(eventually(kFrameControlsMoved, "gain moved from 5 to 60 by itself"));
+  rig.source->moved = false;
+  EXPECT_TRUE(eventually(kFrameNormal, ""));
 }
 
 TEST(LiveCamera, SilenceIsAStallAndIsRestarted) {

@@ -29,6 +29,11 @@ constexpr const char* kDevices =
     "P: /devices/usb/1-1\n"
     "E: SUBSYSTEM=usb\n"
     "A: serial=4711\\n\n"
+    "A: idVendor=1d6b\\n\n"
+    "\n"
+    "P: /devices/usb\n"
+    "E: SUBSYSTEM=usb\n"
+    "A: serial=0000:00:14.0\\n\n"
     "A: idVendor=1d6b\\n\n";
 
 constexpr std::uint32_t kMaxBuffers = 8;
@@ -57,7 +62,8 @@ EmulatedCamera::EmulatedCamera()
   umockdev_testbed_attach_ioctl(testbed_, "/dev/video0", handler_, &error);
   if (error != nullptr) throw std::runtime_error(error->message);
   gchar* root = umockdev_testbed_get_root_dir(testbed_);
-  backing_ = std::string(root) + "/dev/video0";
+  root_ = root;
+  backing_ = root_ + "/dev/video0";
   g_free(root);
   if (::truncate(backing_.c_str(), static_cast<off_t>(buffer_bytes()) * kMaxBuffers) != 0) {
     throw std::runtime_error("no backing file");
@@ -106,6 +112,10 @@ void EmulatedCamera::insist_on_width(std::uint32_t width) {
 void EmulatedCamera::insist_on_rate(std::uint32_t fps) {
   const std::lock_guard guard(mutex_);
   forced_fps_ = fps;
+}
+
+void EmulatedCamera::forget_serial() const {
+  ::unlink((root_ + "/sys/devices/usb/1-1/serial").c_str());
 }
 
 void EmulatedCamera::grant_buffers(std::uint32_t count) {

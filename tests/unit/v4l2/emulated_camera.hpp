@@ -46,6 +46,8 @@ class EmulatedCamera {
   void insist_on_width(std::uint32_t width);
   void insist_on_rate(std::uint32_t fps);
   void grant_buffers(std::uint32_t count);
+  /// As of a camera that has none; its hub has.
+  void forget_serial() const;
   void set_control(std::uint32_t id, std::int32_t value);
   [[nodiscard]] std::int32_t control(std::uint32_t id) const;
   [[nodiscard]] bool streaming() const;
@@ -63,6 +65,7 @@ class EmulatedCamera {
 
   UMockdevTestbed* testbed_;
   UMockdevIoctlBase* handler_;
+  std::string root_;     // of the emulated folders
   std::string backing_;  // the file behind the node, which is what gets mapped
   mutable std::mutex mutex_;
   std::map<unsigned long, std::pair<int, int>> failures_;  // request → errno, times left

@@ -68,5 +68,13 @@ TEST(ListAttached, TellsNamesApartAndLeavesOutWhatCapturesNothing) {
   EXPECT_TRUE(list_attached().empty());
 }
 
+TEST(ListAttached, DoesNotTakeTheHubsSerialForTheCameras) {
+  const EmulatedCamera device;
+  device.forget_serial();
+  const auto cameras = list_attached();
+  ASSERT_EQ(cameras.size(), 1U);
+  EXPECT_EQ(cameras[0].serial, "");
+}
+
 }  // namespace
 }  // namespace dtact::hal::v4l2

@@ -37,6 +37,13 @@ TEST(Modes, PrefersRawLumaWhereTheRateAllows) {
   EXPECT_EQ(choose(kModes, asked(800, 600, 30, "mjpeg"), "cam"), V4L2_PIX_FMT_MJPEG);
 }
 
+TEST(Modes, JpegIsMotionJpegByAnotherName) {
+  const std::vector<Mode> modes{mode(V4L2_PIX_FMT_JPEG, 800, 600, {60})};
+  EXPECT_EQ(choose(modes, asked(800, 600, 60), "cam"), V4L2_PIX_FMT_JPEG);
+  EXPECT_EQ(choose(modes, asked(800, 600, 60, "mjpeg"), "cam"), V4L2_PIX_FMT_JPEG);
+  EXPECT_EQ(describe(modes), "MJPEG 800x600 at 60");
+}
+
 TEST(Modes, NamesWhatIsOffered) {
   EXPECT_THROW((void)choose(kModes, asked(800, 600, 60, "yuyv"), "cam"), ModeError);
   EXPECT_THROW((void)choose(kModes, asked(1920, 1080, 60), "cam"), ModeError);  // H264 is no luma
