@@ -112,6 +112,8 @@ TEST(Upload, NamesWhatIsWrong) {
   client.hello();
   expect_invalid(client, upload("../etc", "good"), "\"../etc\"; allowed are 1 to 64 letters");
   expect_invalid(client, upload("", "good"), "upload_calibration.name");
+  expect_invalid(client, upload("..", "good"), "upload_calibration.name");
+  expect_invalid(client, upload("a.b", "good"), "upload_calibration.name");
   expect_invalid(client, upload(std::string(65, 'x'), "good"), "upload_calibration.name");
   expect_invalid(client, upload("x", ""), "calibration_toml or reference_png is empty");
   expect_invalid(client, upload("x", "bad"), "calibration.toml:3: scale missing");
@@ -173,6 +175,17 @@ TEST(GetCalibration, TakesANumber) {
   expect_invalid(client, get_calibration(7), "there is no calibration 7");
   be_calibrated(rig);
   EXPECT_EQ(client.request(get_calibration()).calibration().number(), 1U);
+}
+
+// At most 16 may wait, which says nothing of those that have been answered.
+TEST(GetCalibration, OneAfterAnotherAreNeverTooMany) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  for (int i = 0; i < 17; ++i) {
+    ASSERT_EQ(client.request(get_calibration(1)).calibration().name(), "first") << i;
+    ASSERT_EQ(client.request(list()).calibrations().calibrations_size(), 4) << i;
+  }
 }
 
 TEST(ListCalibrations, TellsEverything) {

@@ -96,6 +96,12 @@ TEST(SetLight, NamesTheFieldThatIsWrong) {
   for (int i = 0; i < 7; ++i) message.mutable_set_light()->add_leds();
   message.mutable_set_light()->mutable_leds(5)->set_g(1000);
   expect_invalid(client, message, "set_light.leds[5]: 0, 1000, 0");
+  message.mutable_set_light()->mutable_leds(5)->set_g(255);
+  message.mutable_set_light()->mutable_leds(7)->set_b(256);
+  expect_invalid(client, message, "set_light.leds[7]: 0, 0, 256; allowed are 0 to 255");
+  message.mutable_set_light()->mutable_leds(7)->set_b(255);
+  message.mutable_set_light()->mutable_leds(0)->set_r(256);
+  expect_invalid(client, message, "set_light.leds[0]: 256, 0, 0");
 }
 
 TEST(SetLight, AnswersOnlyWhenTheRingHasBeenWritten) {
@@ -151,6 +157,32 @@ TEST(SetLight, AChangeBuildsOnTheOneThatIsStillUnderWay) {
   const auto second = rig.port.wait_command(1);
   ASSERT_TRUE(second.has_value());
   EXPECT_EQ(std::get<pipeline::SetLight>(second->what).light.brightness, 10);
+}
+
+// The light of the first is told while the second is still to be written.
+TEST(SetLight, AChangeBuildsOnTheLastOneAskedFor) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  std::uint64_t id = 50;
+  const auto send = [&](v1::ClientMessage message) {
+    message.set_id(id++);
+    client.send(message);
+  };
+  send(brightness(10));
+  send(scheme("scheme2"));
+  const auto first = rig.port.wait_command(0);
+  ASSERT_TRUE(first.has_value() && rig.port.wait_command(1).has_value());
+  rig.port.emit(CommandDone{first->ticket, Outcome::done, ""});
+  rig.port.emit(pipeline::LightChanged{std::get<pipeline::SetLight>(first->what).light});
+  EXPECT_EQ(client.event().light().brightness(), 10U);
+  send(brightness(30));
+  const auto third = rig.port.wait_command(2);
+  ASSERT_TRUE(third.has_value());
+  const auto& light = std::get<pipeline::SetLight>(third->what).light;
+  EXPECT_EQ(light.brightness, 30);
+  EXPECT_EQ(light.leds[0], (hal::Rgb{0, 0, 0})) << "scheme2 lights 2, 3, 6 and 7";
+  EXPECT_EQ(light.leds[2], (hal::Rgb{255, 255, 255}));
 }
 
 TEST(SetLight, AFailedWriteIsNotBuiltOn) {

@@ -1,5 +1,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <memory>
+#include <vector>
 
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/rig.hpp"
@@ -196,6 +201,39 @@ TEST(Server, SaysWhoMayHaveThePort) {
     EXPECT_THAT(e.what(), HasSubstr("127.0.0.1 port " + std::to_string(rig.tcp_port())));
     EXPECT_THAT(e.what(), HasSubstr("another dtactd may be running"));
   }
+}
+
+TEST(Server, AcceptsAgainOnceThereAreDescriptors) {
+  Rig rig;
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
+  rlimit few = before;
+  few.rlim_cur = 64;
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &few), 0);
+  std::vector<base::UniqueFd> taken;
+  for (int fd = 0; (fd = ::dup(STDERR_FILENO)) >= 0;) taken.emplace_back(fd);
+  ASSERT_FALSE(taken.empty());
+  taken.pop_back();
+  RawClient client(rig.tcp_port());  // takes the last one; the kernel connects it without accept()
+  EXPECT_TRUE(rig.wait_log("cannot accept clients"));
+  taken.clear();
+  EXPECT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
+  EXPECT_NO_THROW(client.hello());
+}
+
+// The side that ends a connection keeps its port for a minute.
+TEST(Server, StartsAgainThoughItEndedConnections) {
+  auto rig = std::make_unique<Rig>();
+  NetConfig config;
+  config.port = rig->tcp_port();
+  RawClient client(config.port);
+  client.hello();
+  rig.reset();
+  EXPECT_TRUE(client.ends());
+  boost::asio::io_context io;
+  FakePort port;
+  FakeStore store;
+  EXPECT_NO_THROW(Server(io, config, port, store));
 }
 
 TEST(Server, RefusesWhatIsNoAddress) {

@@ -185,6 +185,36 @@ TEST(Stream, CountsWhatThePipelineSkippedAsMissed) {
   EXPECT_EQ(client.frame().dropped(), 3U);
 }
 
+TEST(Stream, OfEveryNthFrameOnlyThoseWantedAreMissed) {
+  Rig rig;
+  RawClient third(rig.tcp_port());
+  RawClient all(rig.tcp_port());
+  all.hello();
+  third.hello();
+  all.subscribe(v1::DEPTH_INT16);
+  third.subscribe(v1::DEPTH_INT16, v1::LUMA_NONE, 3);
+  std::uint64_t skipped = 0;
+  const auto publish = [&](std::uint64_t sequence, std::uint64_t missed) {
+    auto frame = make_frame(sequence);
+    frame.skipped = skipped += missed;
+    rig.port.publish(frame);
+    ASSERT_EQ(all.frame().sequence(), sequence);
+  };
+  // Of the frames 0, 1, 2, ... it is to get 0, 3, 6, 9.
+  publish(0, 0);
+  EXPECT_EQ(third.frame().dropped(), 0U);
+  publish(3, 2);
+  auto frame = third.frame();
+  EXPECT_EQ(frame.sequence(), 3U);
+  EXPECT_EQ(frame.dropped(), 0U);
+  publish(7, 3);
+  publish(8, 0);
+  publish(9, 0);
+  frame = third.frame();
+  EXPECT_EQ(frame.sequence(), 9U);
+  EXPECT_EQ(frame.dropped(), 1U);
+}
+
 TEST(Stream, SendsEventsToEveryoneGreeted) {
   Rig rig;
   RawClient subscribed(rig.tcp_port());
@@ -319,6 +349,42 @@ TEST(Stream, WhatAClientHasReadIsNotUnread) {
   for (int i = 0; i < 6; ++i) {
     ASSERT_EQ(client.request(get).calibration().reference_png().size(), 1U << 20U) << i;
   }
+}
+
+TEST(Stream, LetsAClientGoThatLeavesMegabytesUnread) {
+  Rig rig({}, answer_done);
+  RawClient deaf(rig.tcp_port(), kSmallBuffer);
+  deaf.hello();
+  auto get = get_large(rig, deaf);
+  for (std::uint64_t id = 100; id < 112; ++id) {
+    get.set_id(id);
+    deaf.send(get);
+  }
+  EXPECT_TRUE(rig.wait_log(" answers and events ("));
+  EXPECT_THAT(rig.log(), HasSubstr("bytes) lay unread"));
+  EXPECT_TRUE(deaf.ends());
+}
+
+TEST(Stream, SaysOnceThatFramesAreTooLarge) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  RawClient summary(rig.tcp_port());
+  client.hello();
+  summary.hello();
+  client.subscribe(v1::DEPTH_NONE, v1::LUMA_GREY8);
+  summary.subscribe(v1::DEPTH_NONE, v1::LUMA_NONE, 1, true);
+  for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
+    auto frame = make_frame(sequence);
+    frame.luma_width = 4096;
+    frame.luma_height = 4096;
+    frame.luma.resize(16U << 20U);
+    rig.port.publish(frame);
+    EXPECT_EQ(summary.frame().sequence(), sequence);
+  }
+  const std::string log = rig.log();
+  const std::size_t told = log.find("above the wire's cap");
+  ASSERT_NE(told, std::string::npos);
+  EXPECT_EQ(log.find("above the wire's cap", told + 1), std::string::npos);
 }
 
 TEST(Stream, LetsAClientGoThatLeavesEventsUnread) {
