@@ -59,6 +59,7 @@ TEST(ParseCalibration, RefusesImpossibleValues) {
   expect_refused(with("smoothing_px = 1.5", "smoothing_px = -1"), "smoothing_px", "not allowed");
   expect_refused(with("created = \"2026-", "created = \"26-"), "created", "2026-01-31T12:00:00Z");
   expect_refused(with("width = 12", "width = 1"), "frame.width", "from 2");
+  expect_refused(with("width = 12", "width = 16385"), "frame.width", "16385 is not allowed");
   expect_refused(with("col = 3", "col = 7"), "crop.width", "from 1 to 5");
   expect_refused(with("row = 2", "row = -2"), "crop.row", "not allowed");
   expect_refused(with("leds = [255,", "leds = [256,"), "light.leds", "entry 1");
@@ -113,6 +114,28 @@ TEST(ParseCalibration, ReadsBackTheLens) {
   expect_refused(with("[lens]", "[lens]\nk1 = 0.1"), "lens.homography", "missing");
 }
 
+TEST(ParseCalibration, WhatTheLensDoesNotSeeIsUntrustedBesideTheMask) {
+  Calibration with_lens = sample();
+  recon::Lens lens;
+  // Three pixels of the frame, 12×9, for each of the map: its rim lies outside.
+  lens.homography = {60, 0, 5.5, 0, 60, 4, 0, 0, 1};
+  lens.centre_col = 5.5;
+  lens.centre_row = 4;
+  lens.radius_px = 10;
+  auto model = std::make_shared<recon::Model>(*with_lens.model);
+  std::vector<std::uint8_t> outside;
+  model->rectify = make_lens_table(lens, 12, 9, {3, 2, 6, 5, model->mm_per_px}, outside);
+  with_lens.lens = lens;
+  with_lens.model = model;
+  const Files files = format(with_lens);
+  const std::vector<std::uint8_t> expected = {1, 1, 1, 1, 1, 1,  //
+                                              1, 1, 1, 0, 0, 1,  // the mask has two inside
+                                              1, 0, 0, 0, 0, 1,  //
+                                              1, 0, 0, 0, 0, 1,  //
+                                              1, 1, 1, 1, 1, 1};
+  EXPECT_EQ(parse(files.toml, files.reference_png, "upload").model->untrusted, expected);
+}
+
 TEST(ParseCalibration, ReservedTablesMayBeEmptyOrAbsentButNotFilled) {
   const std::string png = format(sample()).reference_png;
   EXPECT_NO_THROW((void)parse(with("[surface]\n", ""), png, "upload"));
@@ -125,6 +148,8 @@ TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {
   expect_refused(with("per_mm = -0.0125", ""), "gain.per_mm", "missing");
   expect_refused(with("polynomial = [0.015625, -0.5]", "polynomial = [0.015625]"),
                  "gain.polynomial", "two numbers");
+  expect_refused(with("polynomial = [0.015625, -0.5]", "polynomial = [0.015625, -0.5, 0]"),
+                 "gain.polynomial", "five");
   expect_refused(with("  0.25, 1.1,", "  1.1, 0.25,"), "uncertainty.depth_mm", "ascending");
   expect_refused(with("  0.25, 1.1,", "  0.25,"), "uncertainty.error_um", "one for each");
   expect_refused(with("  12.5, 20,", "  12.5, -1,"), "uncertainty.error_um", "entry 2");
@@ -158,7 +183,9 @@ void expect_reference_refused(const std::string& png, const std::string& what) {
 TEST(ParseCalibration, RefusesAReferenceThatCannotBe) {
   expect_reference_refused("not a PNG", "reference.png");
   expect_reference_refused(
-      image::encode_png(image::Grey16{9, 12, std::vector<std::uint16_t>(108, 1)}), "9x12");
+      image::encode_png(image::Grey16{12, 10, std::vector<std::uint16_t>(120, 1)}), "12x10");
+  expect_reference_refused(
+      image::encode_png(image::Grey16{13, 9, std::vector<std::uint16_t>(117, 1)}), "13x9");
   expect_reference_refused(
       image::encode_png(image::Grey16{12, 9, std::vector<std::uint16_t>(108, 65281)}), "65280");
 }
