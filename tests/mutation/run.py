@@ -6,8 +6,8 @@ once, what stands there instead, what a user would suffer, and the tests that ar
 of it happens in a copy of the tree under --work with a build folder of its own, so that neither an
 interrupt nor a killed run leaves a bug behind.
 
-Prints one line a bug and the share of each area. Exit code: 0 every bug was caught, 1 some survived,
-2 the list or the tree is not in order.
+Prints one line a bug and the share of each area. Exit code: 0 every bug was caught, 1 some were not,
+or the list or the tree is not in order.
 """
 import argparse
 import collections
@@ -41,9 +41,11 @@ def load():
         for entry in document["mutant"]:
             entry = {"tests": document.get("tests"), **entry}
             if set(entry) != KEYS or not entry["tests"]:
-                raise Trouble(f"{path.name}: {entry.get('name', '?')}: needs the keys {sorted(KEYS)} and no other")
+                raise Trouble(f"{path.name}: {entry.get('name', '?')}: needs the keys "
+                              f"{', '.join(sorted(KEYS))} and no other")
             mutants.append(Mutant(path.stem, **entry))
-    twice = [name for name, count in collections.Counter(m.name for m in mutants).items() if count > 1]
+    names = collections.Counter(m.name for m in mutants)
+    twice = [name for name, count in names.items() if count > 1]
     if twice:
         raise Trouble(f"names must differ: {', '.join(twice)}")
     return sorted(mutants, key=lambda m: (m.area, m.file))
@@ -101,8 +103,9 @@ class Tree:
 
     def run(self, command, seconds, **environment):
         """A process group of its own, so that nothing of a hanging test outlives its time."""
-        with subprocess.Popen(command, cwd=self.source, stdout=subprocess.PIPE, text=True, errors="replace",
-                              stderr=subprocess.STDOUT, start_new_session=True,
+        with subprocess.Popen(command, cwd=self.source, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, text=True, errors="replace",
+                              start_new_session=True,
                               env={**os.environ, **environment}) as process:
             try:
                 output, _ = process.communicate(timeout=seconds)
@@ -119,8 +122,9 @@ class Tree:
 
     def test(self, targets):
         """The first failure ends it. A test may hang with a bug: 120 s are its limit."""
-        return self.run(["ctest", "--test-dir", self.build, "--output-on-failure", "--stop-on-failure",
-                         "--timeout", "120", "-R", f"^({'|'.join(targets)})$"], 900,
+        return self.run(["ctest", "--test-dir", self.build, "--output-on-failure",
+                         "--stop-on-failure", "--timeout", "120",
+                         "-R", f"^({'|'.join(targets)})$"], 900,
                         GTEST_BRIEF="1", GTEST_FAIL_FAST="1")
 
 
@@ -155,16 +159,18 @@ def expect_well(tree, mutants):
         raise Trouble(f"the tests fail without any bug:\n{tested.stdout}")
 
 
+def print_share(name, verdicts):
+    built = len(verdicts) - verdicts.count(UNBUILT)
+    caught = verdicts.count(CAUGHT)
+    rest = f", {verdicts.count(UNBUILT)} do not build" if built < len(verdicts) else ""
+    print(f"{name:12} {caught} of {built} caught ({100 * caught / max(1, built):.0f} %){rest}")
+
+
 def summary(results):
     for area in sorted({m.area for m, _ in results}):
         of_area = [what for m, what in results if m.area == area]
-        built = [what for what in of_area if what != UNBUILT]
-        caught = built.count(CAUGHT)
-        unbuilt = f", {len(of_area) - len(built)} do not build" if len(built) < len(of_area) else ""
-        print(f"{area:12} {caught} of {len(built)} caught ({100 * caught / max(1, len(built)):.0f} %){unbuilt}")
-    built = [what for _, what in results if what != UNBUILT]
-    print(f"{'all':12} {built.count(CAUGHT)} of {len(built)} caught "
-          f"({100 * built.count(CAUGHT) / max(1, len(built)):.0f} %)")
+        print_share(area, of_area)
+    print_share("all", [what for _, what in results])
 
 
 def main():
@@ -188,7 +194,8 @@ def main():
             begin = time.monotonic()
             what, by = verdict(tree, mutant)
             results.append((mutant, what))
-            print(f"{mutant.area:12} {mutant.name:34} {what} ({time.monotonic() - begin:.0f} s)  {by}", flush=True)
+            seconds = time.monotonic() - begin
+            print(f"{mutant.area:12} {mutant.name:34} {what} ({seconds:.0f} s)  {by}", flush=True)
     summary(results)
     return 0 if all(what == CAUGHT for _, what in results) else 1
 

@@ -52,6 +52,17 @@ TEST(Decimate, KeepsMillimetresAndDropsWhatFillsNoPixel) {
   EXPECT_EQ(decimate(model, 1).rectify.entries.size(), 15U * 11U);
 }
 
+TEST(Decimate, WhatFillsNoPixelIsDroppedOnBothSides) {
+  Model model = make_model();
+  model.rectify = make_crop_table(24, 20, 2, 3, 15, 11);
+  // Of 15 columns 12 stay and of 11 rows 8: one is dropped before them and two after.
+  const RectifyTable quarter = decimate(model, 4).rectify;
+  EXPECT_EQ(quarter.entries.front().x, 3);
+  EXPECT_EQ(quarter.entries.front().y, 4);
+  EXPECT_EQ(quarter.entries.back().x, 14);
+  EXPECT_EQ(quarter.entries.back().y, 11);
+}
+
 TEST(Decimate, APixelIsTheMeanOfItsArea) {
   // One dark pixel of 120 levels below the reference, alone in its area.
   const auto dark = [](int x, int y) { return x == 2 + 5 && y == 3 + 6 ? 70 : 150; };
@@ -78,12 +89,14 @@ TEST(Decimate, NothingAliases) {
 }
 
 TEST(Decimate, AnUntrustedPixelMarksItsArea) {
-  Model model = make_model();
-  model.untrusted.assign(std::size_t{16} * 12, 0);
-  model.untrusted[5 * 16 + 7] = 1;
-  const std::vector<std::int16_t> half = run(decimate(model, 2), [](int, int) { return 150; });
-  for (std::size_t i = 0; i < half.size(); ++i) {
-    EXPECT_EQ(half[i], i == 2 * 8 + 3 ? kUntrusted : 0) << i;
+  for (const unsigned pixel : {4U * 16 + 6, 4U * 16 + 7, 5U * 16 + 6, 5U * 16 + 7}) {
+    Model model = make_model();
+    model.untrusted.assign(std::size_t{16} * 12, 0);
+    model.untrusted[pixel] = 1;
+    const std::vector<std::int16_t> half = run(decimate(model, 2), [](int, int) { return 150; });
+    for (std::size_t i = 0; i < half.size(); ++i) {
+      EXPECT_EQ(half[i], i == 2 * 8 + 3 ? kUntrusted : 0) << pixel << " " << i;
+    }
   }
 }
 

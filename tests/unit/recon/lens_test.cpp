@@ -83,6 +83,17 @@ TEST(Lens, LastColumnIsReachedWithTheFullWeight) {
   EXPECT_EQ(table.entries[0].fy, 128);
 }
 
+TEST(Lens, BesideTheFramesLastPixelNothingIsSeen) {
+  // Rectified and frame pixels are the same here, without rounding; the frame has 12×9.
+  Lens lens = sample();
+  lens.homography = {16, 0, 5, 0, 16, 4, 0, 0, 1};
+  std::vector<std::uint8_t> outside;
+  (void)make_lens_table(lens, 12, 9, {11, 8, 2, 2, 0.0625}, outside);
+  EXPECT_EQ(outside, (std::vector<std::uint8_t>{0, 1, 1, 1}));
+  (void)make_lens_table(lens, 12, 9, {-1, -1, 2, 2, 0.0625}, outside);
+  EXPECT_EQ(outside, (std::vector<std::uint8_t>{1, 1, 1, 0}));
+}
+
 TEST(Lens, RefusesWhatNoCameraSees) {
   Lens lens = sample();
   EXPECT_NO_THROW(check(lens, 12, 9));
