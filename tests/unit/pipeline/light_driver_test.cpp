@@ -122,6 +122,18 @@ TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
   EXPECT_TRUE(eventually([&] { return !driver.trouble() && driver.message().empty(); }));
 }
 
+// It writes for nobody but us, so that its report says nothing of how it goes.
+TEST_F(LightDriverTest, ARingThatNeverReSendsHealsByTheNextWriteAlone) {
+  driver.start();
+  ring.broken = true;
+  ASSERT_TRUE(driver.submit(6, dimmed(100)));
+  ASSERT_TRUE(next());
+  ring.tell({.ok = true, .message = {}, .note = {}, .writes = 0, .failures = 0});
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));  // in which it is looked at twice
+  EXPECT_TRUE(driver.trouble());
+  EXPECT_EQ(driver.message(), "the fake ring is broken: mend it");
+}
+
 TEST_F(LightDriverTest, RefusesWhenTooManyWait) {
   for (int i = 0; i < 16; ++i) ASSERT_TRUE(driver.submit(1, dimmed(i)));  // not started
   EXPECT_FALSE(driver.submit(1, dimmed(0)));

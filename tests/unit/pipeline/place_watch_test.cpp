@@ -54,7 +54,8 @@ class PlaceWatchTest : public ::testing::Test {
       for (int y = 0; y < fakes::kToyHeight; ++y) {
         for (int x = 0; x < fakes::kToyWidth; ++x) {
           auto& pixel = frame.pixels[at(x, y)];
-          pixel = static_cast<std::uint8_t>(std::lround(pixel + toy_mark(x - dx, y)));
+          const int moved = x < still_columns ? 0 : dx;
+          pixel = static_cast<std::uint8_t>(std::lround(pixel + toy_mark(x - moved, y)));
         }
       }
       now_ns += 16'666'667;
@@ -64,6 +65,7 @@ class PlaceWatchTest : public ::testing::Test {
   }
 
   PlaceWatch watch{fakes::kToyWidth, fakes::kToyHeight, kFrames};
+  int still_columns = 0;  ///< At the left, of what is shown.
   std::uint64_t sequence = 0;
   std::int64_t now_ns = 0;
 };
@@ -89,6 +91,16 @@ TEST_F(PlaceWatchTest, AveragesNothingFromBeforeANewReference) {
   EXPECT_FALSE(watch.moved());
   show(kFrames - 1, 0);
   EXPECT_FALSE(watch.moved());
+}
+
+TEST_F(PlaceWatchTest, LooksOnlyWhereTheMapIs) {
+  still_columns = fakes::kToyWidth / 2;
+  watch.use_calibration(calibrated(), {0, 0, kGridWidth / 2, kGridHeight});
+  show(kFrames, 4);
+  EXPECT_FALSE(watch.moved());
+  watch.use_calibration(calibrated(), {kGridWidth / 2, 0, kGridWidth, kGridHeight});
+  show(kFrames, 4);
+  EXPECT_TRUE(watch.moved());
 }
 
 TEST_F(PlaceWatchTest, LooksAgainAfterAPauseByItself) {

@@ -62,7 +62,9 @@ TEST_F(StoreTest, AnotherCalibrationsReferenceIsNotUsed) {
 
 TEST_F(StoreTest, AnotherFrameSizeIsNotUsed) {
   save_reference(some(), *calibration, folder);
-  EXPECT_FALSE(load_reference(*calibration, 320, 240, folder));
+  EXPECT_TRUE(load_reference(*calibration, 160, 120, folder));
+  EXPECT_FALSE(load_reference(*calibration, 320, 120, folder));
+  EXPECT_FALSE(load_reference(*calibration, 160, 240, folder));
 }
 
 TEST_F(StoreTest, HalvesOfDifferentAgesAreNoticed) {
@@ -111,6 +113,11 @@ TEST_F(StoreTest, TheWriterSaysWhatFailed) {
   writer.stop();
   EXPECT_NE(writer.message().find("make the state folder writable"), std::string::npos)
       << writer.message();
+  std::filesystem::remove(folder);  // mended
+  writer.start();
+  EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
+  writer.stop();
+  EXPECT_EQ(writer.message(), "");
 }
 
 TEST_F(StoreTest, WithoutAFolderNothingIsKept) {

@@ -87,6 +87,8 @@ TEST(LightTimeline, ExposureBeginsAPeriodBeforeTheFramesEnd) {
   info.timestamp_ns = 50 * kMs;
   info.meaning = hal::TimestampMeaning::end_of_frame;
   EXPECT_EQ(exposure_start_ns(info, kPeriod), 40 * kMs);
+  info.meaning = hal::TimestampMeaning::arrival;
+  EXPECT_EQ(exposure_start_ns(info, kPeriod), 40 * kMs);
   info.meaning = hal::TimestampMeaning::start_of_exposure;
   EXPECT_EQ(exposure_start_ns(info, kPeriod), 50 * kMs);
 }
