@@ -70,6 +70,15 @@ def check(mutants):
         raise Trouble("the code has changed; bring these up to date:\n" + "\n".join(wrong))
 
 
+def end(process):
+    """Politely at first: ninja gives its compilers groups of their own and ends them itself."""
+    os.killpg(process.pid, signal.SIGTERM)
+    try:
+        process.wait(10)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+
+
 class Tree:
     """A copy of the sources with a build folder, kept from run to run."""
 
@@ -110,10 +119,10 @@ class Tree:
             try:
                 output, _ = process.communicate(timeout=seconds)
             except subprocess.TimeoutExpired:
-                os.killpg(process.pid, 9)
+                end(process)
                 output, _ = process.communicate()
             except BaseException:
-                os.killpg(process.pid, 9)
+                end(process)
                 raise
         return subprocess.CompletedProcess(command, process.returncode, output)
 
