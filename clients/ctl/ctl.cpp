@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <ostream>
 
+#include "clients/calibrate/offline/offline.hpp"
+#include "clients/common/exit_codes.hpp"
 #include "clients/cpp/errors.hpp"
 #include "clients/ctl/cameras.hpp"
-#include "clients/ctl/exit_codes.hpp"
-#include "clients/ctl/offline/offline.hpp"
 #include "clients/ctl/online.hpp"
 #include "version.hpp"
 

@@ -6,8 +6,8 @@
 #include <ostream>
 #include <stdexcept>
 
+#include "clients/calibrate/offline/depth_file.hpp"
 #include "clients/ctl/json/json.hpp"
-#include "clients/ctl/offline/depth_file.hpp"
 #include "clients/ctl/online.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"

@@ -8,8 +8,8 @@
 #include <memory>
 #include <utility>
 
-#include "clients/ctl/exit_codes.hpp"
-#include "clients/ctl/interruptible.hpp"
+#include "clients/common/exit_codes.hpp"
+#include "clients/common/interruptible.hpp"
 #include "clients/ctl/json/json.hpp"
 #include "clients/ctl/online.hpp"
 #include "clients/ctl/watch_meter.hpp"

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-/// Exit codes of dtactctl (clients/ctl/exit_codes.hpp).
+/// Exit codes of dtactctl (clients/common/exit_codes.hpp).
 constexpr int kDone = 0;
 constexpr int kFailed = 1;
 constexpr int kNoConnection = 3;

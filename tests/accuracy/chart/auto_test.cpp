@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "daemon/calibration/build.hpp"
-#include "daemon/calibration/press_set.hpp"
+#include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/depth/uncertainty.hpp"
 #include "hal/sim/renderer.hpp"

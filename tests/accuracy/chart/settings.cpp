@@ -7,10 +7,10 @@
 #include <cmath>
 #include <optional>
 
-#include "daemon/calibration/build.hpp"
-#include "daemon/calibration/contact.hpp"
-#include "daemon/calibration/difference.hpp"
-#include "daemon/calibration/list_fit.hpp"
+#include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/contact.hpp"
+#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
 #include "daemon/recon/decimate.hpp"
 
 namespace dtact::chart {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/calibration/press_set.hpp"
+#include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/pipeline/untouched/cells.hpp"
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"

@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "clients/ctl/offline/folder_evaluation.hpp"
+#include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/accuracy/real/press_images.hpp"
 #include "tests/unit/calibration/sample.hpp"

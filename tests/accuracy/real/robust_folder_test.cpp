@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string>
 
-#include "clients/ctl/offline/folder_evaluation.hpp"
+#include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
 #include "tests/accuracy/real/press_images.hpp"

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "clients/ctl/lens/pins.hpp"
+#include "clients/calibrate/lens/pins.hpp"
 #include "tests/accuracy/real/press_images.hpp"
 
 namespace dtact::ctl {

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "daemon/calibration/build.hpp"
+#include "clients/calibrate/fit/build.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "hal/image/png.hpp"
 #include "tests/accuracy/recon/double_pipeline.hpp"

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <optional>
 
-#include "daemon/calibration/build.hpp"
-#include "daemon/calibration/evaluate.hpp"
+#include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "hal/image/png.hpp"
 
 namespace dtact::calibration {

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "daemon/calibration/published.hpp"
+#include "clients/calibrate/fit/published.hpp"
 #include "hal/sim/truth.hpp"
 
 namespace dtact::table {

@@ -3,7 +3,7 @@
 #include <array>
 #include <string>
 
-#include "daemon/calibration/build.hpp"
+#include "clients/calibrate/fit/build.hpp"
 
 namespace dtact::table {
 namespace {

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/calibration/press_set.hpp"
+#include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/recon/model.hpp"
 #include "hal/image/png.hpp"
 #include "tests/accuracy/table/sensor.hpp"

@@ -11,7 +11,7 @@
 #include <tuple>
 #include <utility>
 
-#include "daemon/calibration/press_set.hpp"
+#include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "hal/sim/objects.hpp"
 #include "tests/accuracy/table/judge.hpp"

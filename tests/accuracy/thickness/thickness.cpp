@@ -10,7 +10,7 @@
 #include <memory>
 #include <numbers>
 
-#include "daemon/calibration/build.hpp"
+#include "clients/calibrate/fit/build.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "hal/sim/objects.hpp"
 #include "tests/accuracy/table/judge.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "daemon/calibration/difference.hpp"
+#include "clients/calibrate/fit/difference.hpp"
 #include "hal/image/png.hpp"
 
 namespace dtact::calibration {

@@ -1,4 +1,4 @@
-#include "daemon/calibration/build.hpp"
+#include "clients/calibrate/fit/build.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <functional>
 #include <stdexcept>
 
-#include "daemon/calibration/evaluate.hpp"
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "tests/unit/calibration/ball.hpp"
 
 namespace dtact::calibration {

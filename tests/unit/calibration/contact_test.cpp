@@ -1,4 +1,4 @@
-#include "daemon/calibration/contact.hpp"
+#include "clients/calibrate/fit/contact.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "clients/ctl/offline/drawing.hpp"
+#include "clients/calibrate/offline/drawing.hpp"
 
 #include <gtest/gtest.h>
 

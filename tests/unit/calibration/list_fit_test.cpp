@@ -1,4 +1,4 @@
-#include "daemon/calibration/list_fit.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

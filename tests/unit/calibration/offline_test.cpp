@@ -1,4 +1,4 @@
-#include "clients/ctl/offline/offline.hpp"
+#include "clients/calibrate/offline/offline.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/ctl/offline/depth_file.hpp"
+#include "clients/calibrate/offline/depth_file.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"

@@ -1,4 +1,4 @@
-#include "daemon/calibration/press_set.hpp"
+#include "clients/calibrate/fit/press_set.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "daemon/calibration/chain_fit.hpp"
-#include "daemon/calibration/press_chain.hpp"
+#include "clients/calibrate/fit/chain_fit.hpp"
+#include "clients/calibrate/fit/press_chain.hpp"
 #include "tests/unit/calibration/ball.hpp"
 
 namespace dtact::calibration {

@@ -1,4 +1,4 @@
-#include "daemon/calibration/published.hpp"
+#include "clients/calibrate/fit/published.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "clients/ctl/guided/console.hpp"
-#include "clients/ctl/guided/sensor.hpp"
+#include "clients/calibrate/guided/console.hpp"
+#include "clients/calibrate/guided/sensor.hpp"
 
 namespace dtact::ctl::guided::test {
 

@@ -8,11 +8,11 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "clients/ctl/guided/cells.hpp"
-#include "clients/ctl/guided/console.hpp"
-#include "clients/ctl/guided/coverage.hpp"
-#include "clients/ctl/guided/fitness.hpp"
-#include "clients/ctl/guided/preview.hpp"
+#include "clients/calibrate/guided/cells.hpp"
+#include "clients/calibrate/guided/console.hpp"
+#include "clients/calibrate/guided/coverage.hpp"
+#include "clients/calibrate/guided/fitness.hpp"
+#include "clients/calibrate/guided/preview.hpp"
 
 namespace dtact::ctl::guided {
 namespace {

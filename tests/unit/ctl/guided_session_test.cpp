@@ -4,7 +4,7 @@
 
 #include <cstdlib>
 
-#include "clients/ctl/guided/session.hpp"
+#include "clients/calibrate/guided/session.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/ctl/guided_fakes.hpp"
 

@@ -1,4 +1,4 @@
-#include "clients/ctl/lens/chessboard.hpp"
+#include "clients/calibrate/lens/chessboard.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "clients/ctl/lens/lattice.hpp"
+#include "clients/calibrate/lens/lattice.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "clients/ctl/lens/pin_gain.hpp"
+#include "clients/calibrate/lens/pin_gain.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "clients/ctl/lens/pins.hpp"
+#include "clients/calibrate/lens/pins.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "clients/ctl/lens/point_fit.hpp"
+#include "clients/calibrate/lens/point_fit.hpp"
 
 #include <gtest/gtest.h>
 

@@ -36,10 +36,13 @@ ROOMS = {
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
     "clients/ctl/json": [],
-    "clients/ctl/lens": ["daemon/recon"],
-    "clients/ctl/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/ctl/lens", "clients/ctl/json"],
-    "clients/ctl/guided": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/ctl/offline"],
-    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/cpp", "clients/ctl/json", "clients/ctl/offline", "clients/ctl/guided"],
+    "clients/common": [],
+    "clients/calibrate/fit": ["hal/image", "daemon/recon", "daemon/calibration"],
+    "clients/calibrate/lens": ["daemon/recon"],
+    "clients/calibrate/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/calibrate/fit", "clients/calibrate/lens", "clients/ctl/json"],
+    "clients/calibrate/guided": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
+    "clients/calibrate": ["clients/common", "clients/calibrate/guided", "clients/calibrate/offline", "clients/ctl"],
+    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/ctl/json", "clients/calibrate/offline", "clients/calibrate/guided"],
 }
 # Only standard headers and Highway may stand in angle brackets here.
 STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}

@@ -1,0 +1,82 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "clients/calibrate/guided/session.hpp"
+#include "clients/common/exit_codes.hpp"
+#include "clients/common/interruptible.hpp"
+#include "clients/ctl/online.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+/// The command that goes on with the work folder, for a shell.
+std::string command_of(const Context& context, const guided::Plan& plan) {
+  const client::Options usual;
+  std::string text = "dtactctl";
+  if (context.target.host != usual.host) text += " --host " + context.target.host;
+  if (context.target.port != usual.port) text += fmt::format(" --port {}", context.target.port);
+  text += fmt::format(" calibrate --radius-mm {}", plan.ball_radius_mm);
+  if (!plan.map.lens.empty()) text += fmt::format(" --lens '{}'", plan.map.lens);
+  if (plan.map.mm_per_px != 0) text += fmt::format(" --mm-per-px {}", plan.map.mm_per_px);
+  if (!plan.map.centre.empty())
+    text += fmt::format(" --centre {}", fmt::join(plan.map.centre, ","));
+  if (!plan.map.crop.empty()) text += fmt::format(" --crop {}", fmt::join(plan.map.crop, ","));
+  return text + fmt::format(" --folder '{}'", plan.folder.string());
+}
+
+void run_guided(const Context& context, guided::Plan plan) {
+  plan.again = command_of(context, plan);
+  const bool terminal =
+      &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1 && ::isatty(STDIN_FILENO) == 1;
+  const Interruptible while_guiding;
+  guided::LiveSensor sensor(context.target);
+  guided::StreamConsole console(STDIN_FILENO, context.out, terminal, Interruptible::happened);
+  try {
+    if (guided::Session(sensor, console, plan).run() == guided::Outcome::unfinished) {
+      throw Failure(kNotMet, "there is no calibration yet");
+    }
+  } catch (const guided::NotTaken& e) {
+    throw Failure(kNotMet, e.what());
+  }
+}
+
+}  // namespace
+
+void add_guided_calibration(CLI::App& app, Context& context) {
+  CLI::App* calibrate = app.get_subcommand("calibrate");
+  calibrate->description(
+      "Make a calibration: without a further command a guided session with the running daemon, "
+      "from the untouched surface over presses of a ball to the upload");
+  const auto plan = std::make_shared<guided::Plan>();
+  plan->folder = "dtact-calibration";
+  CLI::Option* radius =
+      calibrate->add_option("--radius-mm", plan->ball_radius_mm, "Radius of the ball, mm")
+          ->check(CLI::Range(0.1, 100.0));
+  add_map_options(*calibrate, plan->map);
+  calibrate
+      ->add_option("--presses", plan->presses,
+                   "After so many presses the calibration is made, where they suffice")
+      ->capture_default_str()
+      ->check(CLI::Range(2, 99));
+  calibrate
+      ->add_option("--folder", plan->folder,
+                   "Work folder: everything taken is saved there at once, and a session with the "
+                   "same folder goes on; its name becomes the calibration's")
+      ->capture_default_str();
+  calibrate
+      ->add_option("--patience", plan->patience_s, "Seconds to wait for a surface that holds still")
+      ->capture_default_str()
+      ->check(CLI::PositiveNumber);
+  calibrate->callback([&context, calibrate, plan, radius] {
+    if (!calibrate->get_subcommands().empty()) return;  // calibrate depth or lens
+    if (radius->empty()) throw CLI::RequiredError("--radius-mm (of the ball, for the session)");
+    run_guided(context, *plan);
+  });
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,181 @@
+#include "clients/calibrate/fit/build.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <stdexcept>
+
+#include "clients/calibrate/fit/list_fit.hpp"
+#include "clients/calibrate/fit/published.hpp"
+#include "daemon/calibration/map_table.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+/// Part of the contact that may be black or white before the press is refused.
+constexpr double kClipped = 0.01;
+
+/// An image as the depth map shows it: for each of its pixels the nearest of the frame.
+template <typename Pixel>
+image::Grey8 rectified(const recon::RectifyTable& table, const Pixel& pixel) {
+  image::Grey8 part{table.width, table.height, {}};
+  for (const recon::RectifyTable::Entry& e : table.entries) {
+    const int x = e.x + (e.fx + 64) / 128;
+    const int y = e.y + (e.fy + 64) / 128;
+    part.pixels.push_back(
+        pixel(static_cast<std::size_t>(y) * static_cast<std::size_t>(table.frame_width) +
+              static_cast<std::size_t>(x)));
+  }
+  return part;
+}
+
+void refuse_clipped(const image::Grey8& part, const Contact& contact, double mm_per_px,
+                    std::uint8_t limit, const char* message) {
+  std::size_t all = 0;
+  std::size_t clipped = 0;
+  for (int y = 0; y < part.height; ++y) {
+    for (int x = 0; x < part.width; ++x) {
+      if (std::hypot(x - contact.col, y - contact.row) * mm_per_px >= contact.radius_mm) continue;
+      ++all;
+      clipped += static_cast<std::size_t>(
+          part.pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(part.width) +
+                      static_cast<std::size_t>(x)] == limit);
+    }
+  }
+  if (static_cast<double>(clipped) > kClipped * static_cast<double>(all)) {
+    throw std::runtime_error(message);
+  }
+}
+
+/// What the frame shows of the image that the lens rectifies; without a lens the frame.
+Crop seen(const std::optional<recon::Lens>& lens, int width, int height, double mm_per_px) {
+  if (!lens) return {0, 0, width, height};
+  std::vector<std::uint8_t> outside;
+  (void)map_table(lens, width, height, {0, 0, width, height, mm_per_px}, outside);
+  int left = width;
+  int right = 0;
+  int top = height;
+  int bottom = 0;
+  for (int y = 0, i = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x, ++i) {
+      if (outside[static_cast<std::size_t>(i)] != 0) continue;
+      left = std::min(left, x);
+      right = std::max(right, x);
+      top = std::min(top, y);
+      bottom = std::max(bottom, y);
+    }
+  }
+  return {left, top, right - left + 1, bottom - top + 1};
+}
+
+/// The press's gain with places from the map's centre.
+recon::SpatialGain gain_of(const BallPress& press, const Calibration& calibration) {
+  if (!press.lens) return press.gain;
+  const recon::RectifyTable& map = calibration.model->rectify;
+  const recon::Point centre = surface_point(
+      *press.lens,
+      {calibration.crop_col, calibration.crop_row, map.width, map.height, press.mm_per_px},
+      0.5 * (map.width - 1), 0.5 * (map.height - 1));
+  return moved(press.gain, centre.x, centre.y);
+}
+
+void check(const BallPress& press) {
+  if (press.frames.empty()) throw std::invalid_argument("no image of the ball");
+  for (const image::Grey8& frame : press.frames) {
+    if (frame.width != press.reference_q8.width || frame.height != press.reference_q8.height) {
+      throw std::invalid_argument(fmt::format(
+          "the ball's image is {}x{} but the reference is {}x{}; take both with one camera mode",
+          frame.width, frame.height, press.reference_q8.width, press.reference_q8.height));
+    }
+  }
+  if (!(press.ball_radius_mm > 0.1 && press.ball_radius_mm < 100)) {
+    throw std::invalid_argument("the ball's radius must be 0.1 to 100 mm");
+  }
+  if (!(press.mm_per_px >= 0.001 && press.mm_per_px <= 1)) {
+    throw std::invalid_argument("the scale must be 0.001 to 1 mm a pixel");
+  }
+}
+
+}  // namespace
+
+image::Grey8 rectified_reference(const recon::RectifyTable& table, const image::Grey16& q8) {
+  return rectified(table, [&](std::size_t at) {
+    return static_cast<std::uint8_t>(std::min(255, (q8.pixels[at] + 128) / 256));
+  });
+}
+
+image::Grey8 rectified_mean(const recon::RectifyTable& table,
+                            const std::vector<image::Grey8>& frames) {
+  const auto count = static_cast<int>(frames.size());
+  return rectified(table, [&](std::size_t at) {
+    int sum = 0;
+    for (const image::Grey8& frame : frames) sum += frame.pixels[at];
+    return static_cast<std::uint8_t>((sum + count / 2) / count);
+  });
+}
+
+Calibration empty_calibration(const image::Grey16& reference_q8, const std::optional<Crop>& crop,
+                              double mm_per_px, const std::optional<recon::Lens>& lens) {
+  const int width = reference_q8.width;
+  const int height = reference_q8.height;
+  const Crop part = crop.value_or(seen(lens, width, height, mm_per_px));
+  auto model = std::make_shared<recon::Model>();
+  std::vector<std::uint8_t> outside;
+  model->rectify = map_table(lens, width, height,
+                             {part.col, part.row, part.width, part.height, mm_per_px}, outside);
+  add_untrusted(*model, outside);
+  model->mm_per_px = mm_per_px;
+  model->smoothing_px = std::min(10.0, kSmoothingMm / mm_per_px);
+  model->reference_q8 = reference_q8.pixels;
+  Calibration calibration;
+  calibration.crop_col = part.col;
+  calibration.crop_row = part.row;
+  calibration.lens = lens;
+  calibration.model = std::move(model);
+  return calibration;
+}
+
+SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> reference_q8,
+                    std::span<const image::Grey8> frames, double ball_radius_mm) {
+  SettledPress press;
+  press.reference_q8.assign(reference_q8.begin(), reference_q8.end());
+  press.map = smoothed_difference(model, press.reference_q8, frames);
+  press.contact = find_contact(press.map, ball_radius_mm);
+  press.drift_levels = far_field_drift(press.map, press.contact);
+  if (press.drift_levels != 0) {
+    const auto drift_q8 = static_cast<int>(std::lround(256 * press.drift_levels));
+    for (std::uint16_t& value : press.reference_q8) {
+      value = static_cast<std::uint16_t>(std::clamp(value - drift_q8, 0, 255 * 256));
+    }
+    press.map = smoothed_difference(model, press.reference_q8, frames);
+    press.contact = find_contact(press.map, ball_radius_mm);
+  }
+  return press;
+}
+
+Calibration build(const BallPress& press) {
+  check(press);
+  Calibration calibration =
+      empty_calibration(press.reference_q8, press.crop, press.mm_per_px, press.lens);
+  auto model = std::make_shared<recon::Model>(*calibration.model);
+  model->method = press.method;
+  if (press.method == recon::Method::list) model->gain = gain_of(press, calibration);
+
+  const SettledPress settled =
+      settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
+  const image::Grey8 reference = rectified_reference(model->rectify, press.reference_q8);
+  const image::Grey8 ball = rectified_mean(model->rectify, press.frames);
+  refuse_clipped(reference, settled.contact, press.mm_per_px, 255,
+                 "the reference is white at the contact; lower the exposure or the light");
+  refuse_clipped(ball, settled.contact, press.mm_per_px, 0,
+                 "the ball's image is black at the contact; raise the exposure or the light");
+  model->list = press.method == recon::Method::list
+                    ? fit_list(settled.map, settled.contact)
+                    : fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
+  calibration.model = std::move(model);
+  return calibration;
+}
+
+}  // namespace dtact::calibration

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "clients/calibrate/fit/contact.hpp"
+#include "daemon/calibration/calibration.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::calibration {
+
+/// A ball press and what was read off it.
+struct SettledPress {
+  Contact contact;
+  double drift_levels = 0;
+  DifferenceMap map;                        ///< Smoothed, drift taken off.
+  std::vector<std::uint16_t> reference_q8;  ///< The reference moved by the drift.
+};
+
+/// Finds the contact and, where the far field is sure that the light drifted between reference and
+/// frames, moves the reference by the drift and looks again. Throws as find_contact().
+[[nodiscard]] SettledPress settle(const recon::Model& model,
+                                  std::span<const std::uint16_t> reference_q8,
+                                  std::span<const image::Grey8> frames, double ball_radius_mm);
+
+/// The depth map's place in the frame.
+struct Crop {
+  int col = 0;
+  int row = 0;
+  int width = 0;
+  int height = 0;
+};
+
+/// What a depth calibration is built from.
+struct BallPress {
+  image::Grey16 reference_q8;        ///< Untouched, Q8 luma, the mean of many frames.
+  std::vector<image::Grey8> frames;  ///< The ball pressed in and at rest.
+  double ball_radius_mm = 0;
+  double mm_per_px = 0;             ///< Of the depth map.
+  std::optional<recon::Lens> lens;  ///< None: the frame as it is.
+  /// Of the frame or, with a lens, of the rectified image; none: all that the frame shows.
+  std::optional<Crop> crop;
+  /// Places in millimetres of the lens's surface; without a lens from the map's centre. The
+  /// published method has none.
+  recon::SpatialGain gain = {};
+  recon::Method method = recon::Method::list;
+};
+
+/// A calibration without a list: frame, crop (none: all that the frame shows), scale, lens,
+/// smoothing, reference. Throws std::invalid_argument when the crop leaves the frame.
+[[nodiscard]] Calibration empty_calibration(const image::Grey16& reference_q8,
+                                            const std::optional<Crop>& crop, double mm_per_px,
+                                            const std::optional<recon::Lens>& lens);
+
+/// The depth map's part of the reference, the nearest pixels, to whole grey levels.
+[[nodiscard]] image::Grey8 rectified_reference(const recon::RectifyTable& table,
+                                               const image::Grey16& q8);
+/// The same of the mean of the frames.
+[[nodiscard]] image::Grey8 rectified_mean(const recon::RectifyTable& table,
+                                          const std::vector<image::Grey8>& frames);
+
+/// The smoothing's standard deviation, millimetres. Light scatters sideways by about 0.3 mm in the
+/// layer, so that smoothing by 0.1 mm widens an edge by 5 % and takes a frame's noise of one grey
+/// level (32 µm) to 0.14 (5 µm) at 0.05 mm a pixel. On the real ball presses the error of the half
+/// that was not fitted falls by less than 1 µm a pixel from there on.
+inline constexpr double kSmoothingMm = 0.1;
+
+/// Builds a calibration from images alone. `origin` is left for the caller to fill. Throws
+/// std::runtime_error saying what is wrong with the images and what to do, std::invalid_argument
+/// when sizes or numbers cannot be.
+[[nodiscard]] Calibration build(const BallPress& press);
+
+}  // namespace dtact::calibration

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <vector>
+
+#include "clients/calibrate/fit/difference.hpp"
+
+namespace dtact::calibration {
+
+/// Where a ball touches.
+struct Contact {
+  double col = 0;             ///< Centre, pixels of the depth map.
+  double row = 0;             ///< Centre, pixels of the depth map.
+  double radius_mm = 0;       ///< Contact radius, at most 0.85 of the ball's.
+  double ball_radius_mm = 0;  ///< Of the ball.
+  double peak_levels = 0;     ///< Greatest darkening, grey levels.
+};
+
+/// Mean darkening over rings about a point.
+struct RadialProfile {
+  double step_mm = 0;          ///< Width of a ring; ring i spans i·step to (i + 1)·step.
+  std::vector<double> levels;  ///< Mean of each ring; NaN where it has no pixel.
+  std::vector<double> shown;   ///< Part of each ring's area that lies in the map, 0 … about 1.
+
+  /// Interpolated between the rings' middles, held at both ends.
+  [[nodiscard]] double at(double radius_mm) const;
+};
+
+/// Beyond this many ball radii from the contact's centre the bright ring has gone: on real images
+/// of a 4 mm ball it ends at about 8 mm.
+inline constexpr double kFarField = 2.25;
+
+/// Distance of a pixel from the contact's centre, millimetres.
+[[nodiscard]] double distance_mm(const DifferenceMap& map, const Contact& contact, int x, int y);
+
+[[nodiscard]] RadialProfile radial_profile(const DifferenceMap& map, const Contact& contact,
+                                           double reach_mm);
+
+/// Finds a ball's contact. The centre is the centroid of the darkening over the connected patch
+/// darker than 0.3 of the peak, weighted with the darkening; the radius is where the mean darkening
+/// about it falls to 3 grey levels, at most 0.85 of the ball's radius (further out the sphere is so
+/// steep that a pixel spans 0.1 mm of depth). Throws std::runtime_error saying what to do when
+/// nothing touches (less than 8 grey levels), or the contact leaves the map.
+[[nodiscard]] Contact find_contact(const DifferenceMap& map, double ball_radius_mm);
+
+/// How much darker the untouched surroundings became between reference and frame, grey levels: the
+/// median over tiles of the far field. 0 unless it is sure, that is: at least 0.5 levels, twice the
+/// spread of the tiles, and the far field shows in at least eight tiles on both sides of the
+/// contact. (The faint outskirts of the bulge are uneven and fail this; a drifted lamp passes.)
+[[nodiscard]] double far_field_drift(const DifferenceMap& map, const Contact& contact);
+
+}  // namespace dtact::calibration

@@ -1,0 +1,59 @@
+#include "clients/calibrate/fit/difference.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+
+#include "daemon/recon/reconstructor.hpp"
+
+namespace dtact::calibration {
+
+std::vector<float> mean_depth_um(const recon::Model& model,
+                                 std::span<const std::uint16_t> reference_q8,
+                                 std::span<const image::Grey8> frames) {
+  if (frames.empty()) throw std::invalid_argument("no frame to reconstruct");
+  if (reference_q8.size() != model.reference_q8.size()) {
+    throw std::invalid_argument("the reference has not the size of the calibration's frame");
+  }
+  recon::Reconstructor reconstructor(std::make_shared<recon::Model>(model));
+  reconstructor.set_reference(reference_q8);
+  std::vector<std::int16_t> depth(model.rectify.entries.size());
+  std::vector<float> mean(depth.size());
+  std::vector<std::uint8_t> padded(model.reference_q8.size() + recon::kLumaPadding);
+  const auto share = 1.0F / static_cast<float>(frames.size());
+  for (const image::Grey8& frame : frames) {
+    if (frame.width != model.rectify.frame_width || frame.height != model.rectify.frame_height) {
+      throw std::invalid_argument("a frame has not the size of the calibration's frame");
+    }
+    std::ranges::copy(frame.pixels, padded.begin());
+    reconstructor.run(padded.data(), frame.width, depth);
+    std::ranges::transform(mean, depth, mean.begin(), [share](float sum, std::int16_t um) {
+      return um == recon::kUntrusted ? std::numeric_limits<float>::quiet_NaN()
+                                     : sum + share * static_cast<float>(um);
+    });
+  }
+  return mean;
+}
+
+void answer_darkening(recon::Model& model) {
+  constexpr int kReach = 255 * recon::kEntriesPerLevel;
+  model.method = recon::Method::list;
+  model.list = {-kReach, {}, -kReach, kReach};
+  for (int q6 = -kReach; q6 <= kReach; ++q6) {
+    model.list.um.push_back(static_cast<std::int16_t>(q6));
+  }
+}
+
+DifferenceMap smoothed_difference(const recon::Model& model,
+                                  std::span<const std::uint16_t> reference_q8,
+                                  std::span<const image::Grey8> frames) {
+  recon::Model identity = model;
+  answer_darkening(identity);
+  DifferenceMap map{model.rectify.width, model.rectify.height, model.mm_per_px,
+                    mean_depth_um(identity, reference_q8, frames)};
+  for (float& level : map.levels) level /= recon::kEntriesPerLevel;
+  return map;
+}
+
+}  // namespace dtact::calibration

@@ -1,0 +1,111 @@
+#include "clients/calibrate/fit/evaluate.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+constexpr int kHalves = 8;  // directions of the cut, 45 degrees apart
+
+/// Median and the mean distance from it: the offset that makes the mean absolute error least.
+struct Spread {
+  double offset = 0;
+  double mean = 0;
+};
+
+Spread spread_of(std::vector<double> errors) {
+  if (errors.empty()) return {};
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::ranges::nth_element(errors, middle);
+  Spread spread{*middle, 0};
+  for (const double error : errors) spread.mean += std::abs(error - spread.offset);
+  spread.mean /= static_cast<double>(errors.size());
+  return spread;
+}
+
+/// Calls `visit(x, y, sphere_mm)` for each pixel in the contact.
+template <typename Visit>
+void for_contact(const DifferenceMap& map, const Contact& contact, const Visit& visit) {
+  const double r2 = contact.ball_radius_mm * contact.ball_radius_mm;
+  const double edge = std::sqrt(r2 - contact.radius_mm * contact.radius_mm);
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const double r = distance_mm(map, contact, x, y);
+      if (r < contact.radius_mm) visit(x, y, std::sqrt(r2 - r * r) - edge);
+    }
+  }
+}
+
+double look_up_mm(const recon::DepthList& list, double level) {
+  const long entry = std::lround(level * recon::kEntriesPerLevel) - list.first_q6;
+  const long last = static_cast<long>(list.um.size()) - 1;
+  return 0.001 * list.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))];
+}
+
+double half_error(const DifferenceMap& map, const Contact& contact, double angle) {
+  const double dx = std::cos(angle);
+  const double dy = std::sin(angle);
+  const auto fitted = [&](int x, int y) {
+    return (x - contact.col) * dx + (y - contact.row) * dy > 0;
+  };
+  const recon::DepthList list = fit_list(map, contact, fitted);
+  std::vector<double> errors;
+  for_contact(map, contact, [&](int x, int y, double sphere) {
+    const double level = map.at(x, y);
+    if (fitted(x, y) || std::isnan(level)) return;
+    errors.push_back(look_up_mm(list, level) - sphere);
+  });
+  return spread_of(std::move(errors)).mean;
+}
+
+}  // namespace
+
+Evaluation evaluate(const Calibration& calibration, std::span<const std::uint16_t> reference_q8,
+                    std::span<const image::Grey8> frames, double ball_radius_mm) {
+  const recon::Model& model = *calibration.model;
+  Evaluation result;
+  const SettledPress press = settle(model, reference_q8, frames, ball_radius_mm);
+  result.contact = press.contact;
+  result.drift_levels = press.drift_levels;
+
+  const std::vector<float> depth = mean_depth_um(model, press.reference_q8, frames);
+  std::vector<double> errors;
+  for_contact(press.map, press.contact, [&](int x, int y, double sphere) {
+    ++result.pixels;
+    const double um =
+        depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(press.map.width) +
+              static_cast<std::size_t>(x)];
+    if (std::isnan(um)) {
+      ++result.untrusted;
+    } else {
+      errors.push_back(0.001 * um - sphere);
+    }
+  });
+  for (const double error : errors) result.raw_mae_mm += std::abs(error);
+  result.raw_mae_mm /= std::max<double>(1, static_cast<double>(errors.size()));
+  const Spread spread = spread_of(std::move(errors));
+  result.offset_mm = spread.offset;
+  result.mae_mm = spread.mean;
+
+  if (model.method == recon::Method::list) {
+    double sum = 0;
+    double worst = 0;
+    for (int i = 0; i < kHalves; ++i) {
+      const double error = half_error(press.map, press.contact, i * 2 * std::numbers::pi / kHalves);
+      sum += error;
+      worst = std::max(worst, error);
+    }
+    result.half_mae_mm = sum / kHalves;
+    result.half_worst_mm = worst;
+  }
+  return result;
+}
+
+}  // namespace dtact::calibration

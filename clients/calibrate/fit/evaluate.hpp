@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include "clients/calibrate/fit/contact.hpp"
+#include "daemon/calibration/calibration.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::calibration {
+
+/// How well a calibration reads a ball whose depth nobody knows: against a sphere about the
+/// contact's centre that meets zero at the contact's edge.
+struct Evaluation {
+  Contact contact;
+  double drift_levels = 0;  ///< Taken off the difference; see far_field_drift().
+  double offset_mm = 0;     ///< Depth minus sphere, the median over the contact.
+  double mae_mm = 0;        ///< Mean absolute error without the offset.
+  double raw_mae_mm = 0;    ///< Mean absolute error with it.
+  /// List fitted on one half of the disc, tested on the other (its offset removed): mean and worst
+  /// of eight halves. Empty for the published method.
+  std::optional<double> half_mae_mm;
+  std::optional<double> half_worst_mm;
+  std::size_t pixels = 0;     ///< In the contact.
+  std::size_t untrusted = 0;  ///< Of them, marked.
+};
+
+/// `reference_q8`: frame sized Q8 luma under the frames' light. Throws std::runtime_error when no
+/// contact is found and std::invalid_argument when sizes disagree.
+[[nodiscard]] Evaluation evaluate(const Calibration& calibration,
+                                  std::span<const std::uint16_t> reference_q8,
+                                  std::span<const image::Grey8> frames, double ball_radius_mm);
+
+}  // namespace dtact::calibration

@@ -1,0 +1,127 @@
+#include "clients/calibrate/fit/list_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+#include "clients/calibrate/fit/list_shape.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+constexpr double kSure = 0.9;        // of the contact radius
+constexpr double kBinsPerLevel = 2;  // of the monotone fit
+constexpr int kFewest = 4;           // pixels that make a grey level's vote
+constexpr std::size_t kRange = 256;  // grey levels
+
+double sag(double ball_radius, double r) {
+  return ball_radius - std::sqrt(std::max(0.0, ball_radius * ball_radius - r * r));
+}
+
+/// sag = depth − slope · level.
+struct Line {
+  double depth_mm = 0;
+  double slope = 0;  ///< Millimetres a grey level.
+};
+
+/// Means of (level, sag) over pixels within `reach_mm` of the centre, `per_level` bins a level.
+std::vector<Knot> sag_by_level(const DifferenceMap& map, const Contact& contact,
+                               const PixelFilter& use, double reach_mm, double per_level) {
+  std::vector<Knot> bins(static_cast<std::size_t>(static_cast<double>(kRange) * per_level));
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const double r = distance_mm(map, contact, x, y);
+      const double level = map.at(x, y);
+      if (r >= reach_mm || !(level >= 0) || (use && !use(x, y))) continue;
+      Knot& bin = bins[static_cast<std::size_t>(level * per_level)];
+      bin.level += level;
+      bin.depth_mm += sag(contact.ball_radius_mm, r);
+      bin.weight += 1;
+    }
+  }
+  std::erase_if(bins, [](const Knot& bin) { return bin.weight < kFewest; });
+  for (Knot& bin : bins) {
+    bin.level /= bin.weight;
+    bin.depth_mm /= bin.weight;
+  }
+  return bins;
+}
+
+/// Step 1.
+Line fit_line(const std::vector<Knot>& bins) {
+  double n = 0;
+  double x = 0;
+  double y = 0;
+  double xx = 0;
+  double xy = 0;
+  for (const Knot& bin : bins) {
+    n += 1;
+    x += bin.level;
+    y += bin.depth_mm;
+    xx += bin.level * bin.level;
+    xy += bin.level * bin.depth_mm;
+  }
+  const double spread = n * xx - x * x;
+  const double slope = spread > 0 ? -(n * xy - x * y) / spread : 0;
+  if (bins.size() < 4 || !(slope > 0)) {
+    throw std::runtime_error(
+        "the image does not darken steadily from the contact's edge to its centre; the ball's "
+        "radius or the scale may be wrong, or the press was too light");
+  }
+  return {(y + slope * x) / n, slope};
+}
+
+/// Step 2: pool adjacent violators (Ayer et al. 1955), weighted.
+void make_monotone(std::vector<Knot>& knots) {
+  std::vector<Knot> pools(knots.size());
+  std::vector<std::size_t> members(knots.size());
+  std::size_t used = 0;
+  for (const Knot& knot : knots) {
+    pools[used] = knot;
+    members[used++] = 1;
+    while (used > 1 && pools[used - 2].depth_mm > pools[used - 1].depth_mm) {
+      const Knot& last = pools[--used];
+      Knot& pool = pools[used - 1];
+      const double weight = pool.weight + last.weight;
+      pool.depth_mm = (pool.depth_mm * pool.weight + last.depth_mm * last.weight) / weight;
+      pool.weight = weight;
+      members[used - 1] += members[used];
+    }
+  }
+  std::size_t i = 0;
+  for (std::size_t pool = 0; pool < used; ++pool) {
+    for (std::size_t k = 0; k < members[pool]; ++k) knots[i++].depth_mm = pools[pool].depth_mm;
+  }
+}
+
+/// Step 3. Returns the slope at zero, millimetres a grey level: that of the line to the origin, but
+/// within a factor of four of the contact's own, should a lopsided press put the edge at nothing.
+double hand_over(std::vector<Knot>& knots, double sure_level, double line_slope) {
+  const double slope =
+      std::clamp(interpolate(knots, sure_level) / sure_level, line_slope / 4, line_slope * 4);
+  for (Knot& knot : knots) {
+    if (knot.level >= sure_level) break;
+    knot.depth_mm = std::lerp(slope * knot.level, knot.depth_mm, knot.level / sure_level);
+  }
+  double deepest = 0;
+  for (Knot& knot : knots) knot.depth_mm = deepest = std::max(deepest, knot.depth_mm);
+  return slope;
+}
+
+}  // namespace
+
+recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
+                          const PixelFilter& use) {
+  const double sure_mm = kSure * contact.radius_mm;
+  const Line line = fit_line(sag_by_level(map, contact, use, sure_mm, 1));
+  std::vector<Knot> knots = sag_by_level(map, contact, use, contact.radius_mm, kBinsPerLevel);
+  for (Knot& knot : knots) knot.depth_mm = line.depth_mm - knot.depth_mm;
+  make_monotone(knots);
+
+  const RadialProfile profile = radial_profile(map, contact, kFarField * contact.ball_radius_mm);
+  const double slope = hand_over(knots, std::max(1.0, profile.at(sure_mm)), line.slope);
+  return make_list(knots, slope, line.slope, profile);
+}
+
+}  // namespace dtact::calibration

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+
+#include "clients/calibrate/fit/contact.hpp"
+#include "daemon/recon/list.hpp"
+
+namespace dtact::calibration {
+
+/// Which pixels of the depth map a fit may use; empty: all.
+using PixelFilter = std::function<bool(int x, int y)>;
+
+/// The list of one press of a ball, from its image alone.
+///
+/// Inside the contact the surface is the ball: its indentation is g − sag(r) with
+/// sag(r) = R − √(R² − r²) and a depth g that nobody measured, so one press shows only the list's
+/// slope. The published list finds g by putting zero indentation at the contact's edge, which is
+/// biased: the layer's surface is still pressed there, by 0.03 … 0.2 mm depending on its thickness.
+/// What is known without any circle is that an untouched pixel (no darkening) is at zero. So:
+///
+/// 1. In the sure part of the contact (0.9 of its radius) the sag is a straight line of the
+///    darkening, fitted with one vote a grey level, since shallow and deep places count alike for a
+///    line that is extended to zero. Its value at no darkening is g.
+/// 2. Indentation g − sag over the whole contact, one mean for each half grey level, made monotone
+///    (pool adjacent violators).
+/// 3. Towards the contact's edge the bright ring's scattered light lowers the darkening, the more
+///    the deeper the press, so what one press shows there is not true of another. From the sure
+///    part's edge down to zero the fit hands over to the straight line to the origin.
+/// 4. make_list() adds what lies beyond and the bulge, along the line of 1.
+///
+/// Throws std::runtime_error when the image doesn't darken from the contact's edge to its centre.
+[[nodiscard]] recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
+                                        const PixelFilter& use = {});
+
+}  // namespace dtact::calibration

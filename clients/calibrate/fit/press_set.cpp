@@ -1,0 +1,279 @@
+#include "clients/calibrate/fit/press_set.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "clients/calibrate/fit/press_chain.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+constexpr double kDepthBinMm = 0.2;
+/// Presses of one ball agree among themselves within a micrometre or two however the layer scatters
+/// light; a ball of another radius is off by more: 0.012 to 0.036 mm on depths about 0.8 in layers
+/// of 1.5 to 3 mm (simulator). The share that covers them.
+constexpr double kOtherShape = 0.05;
+
+/// What a refusal ends with, so that nobody looks in vain for a press that was made but not used.
+std::string name_left_out(const std::vector<std::string>& left_out) {
+  return left_out.empty() ? "" : fmt::format("; left out: {}", fmt::join(left_out, "; "));
+}
+
+/// The presses in which a contact is found; the others' reasons go to `left_out`.
+std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set,
+                                     std::vector<std::string>& left_out) {
+  std::vector<SettledPress> presses;
+  std::vector<BallPresses::Press> used;
+  for (BallPresses::Press& press : set.presses) {
+    try {
+      presses.push_back(settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm));
+      used.push_back(std::move(press));
+    } catch (const std::runtime_error& e) {
+      left_out.push_back(fmt::format("{}: {}", press.name, e.what()));
+    }
+  }
+  set.presses = std::move(used);
+  if (presses.size() < 2) {
+    throw std::runtime_error(
+        fmt::format("a chain of presses needs at least two in which a contact is found: press "
+                    "lighter and deeper{}",
+                    name_left_out(left_out)));
+  }
+  return presses;
+}
+
+/// One gain, and how the presses meet each other under it.
+struct Trial {
+  const std::vector<SettledPress>* presses = nullptr;
+  recon::GainShape shape = recon::GainShape::none;
+  std::vector<PressRings> rings;
+  ChainFit fit;  ///< Of all presses.
+  LeftOut left_out;
+  std::vector<double> errors_mm;  ///< Of each press left out; NaN: nothing to say.
+};
+
+std::string name_of(const Trial& trial) {
+  const std::size_t terms = trial.rings.front().all.place.size();
+  std::string name = trial.shape == recon::GainShape::uniform ? "share of the light" : "";
+  if (terms > 0) {
+    name += fmt::format("{}{}", name.empty() ? "" : ", ", terms == 2 ? "plane" : "quadratic");
+  }
+  return name.empty() ? "none" : name;
+}
+
+Trial try_gain(const std::vector<SettledPress>& presses, const BallPresses& set,
+               recon::GainShape shape, int terms) {
+  Trial trial{
+      .presses = &presses, .shape = shape, .rings = {}, .fit = {}, .left_out = {}, .errors_mm = {}};
+  for (std::size_t p = 0; p < presses.size(); ++p) {
+    trial.rings.push_back(rings_of(presses[p], set.presses[p].depth_mm, terms));
+  }
+  trial.fit = chain_presses(trial.rings).fit;
+  trial.left_out = leave_each_out(trial.rings);
+  for (const MetPress& met : trial.left_out.met) trial.errors_mm.push_back(met.mean_error_mm());
+  return trial;
+}
+
+/// A gain is fitted where presses are and used everywhere: what halves or doubles at a corner of
+/// the map was not seen but extended there.
+bool reaches_corners(const Trial& trial) {
+  const DifferenceMap& map = trial.presses->front().map;
+  const recon::SpatialGain gain{.polynomial = trial.fit.gain};
+  const double x = 0.5 * map.width * map.mm_per_px;
+  const double y = 0.5 * map.height * map.mm_per_px;
+  return std::ranges::all_of(std::array{-1, 1}, [&](int right) {
+    return std::ranges::all_of(std::array{-1, 1}, [&](int down) {
+      const double factor = gain.polynomial_at(right * x, down * y);
+      return factor > 0.5 && factor < 2;
+    });
+  });
+}
+
+/// Mean of `value(press)` over the presses of which every trial says something, and its standard
+/// error.
+struct Mean {
+  double mean = 0;
+  double standard_error = 0;
+};
+template <typename Value>
+Mean mean_over(const std::vector<Trial>& trials, const Value& value) {
+  double n = 0;
+  double sum = 0;
+  double squares = 0;
+  for (std::size_t p = 0; p < trials.front().errors_mm.size(); ++p) {
+    if (std::ranges::any_of(trials, [p](const Trial& t) { return std::isnan(t.errors_mm[p]); })) {
+      continue;
+    }
+    n += 1;
+    sum += value(p);
+    squares += value(p) * value(p);
+  }
+  if (n < 2) return {n > 0 ? sum : 0, std::numeric_limits<double>::infinity()};
+  const double mean = sum / n;
+  return {mean, std::sqrt(std::max(0.0, squares / n - mean * mean) / (n - 1))};
+}
+
+/// The first trial that predicts no worse than the best by more than one standard error of their
+/// difference (Breiman et al. 1984, section 3.4.3).
+std::size_t simplest(const std::vector<Trial>& trials, std::vector<PressReport::Gain>& report) {
+  std::size_t best = 0;
+  for (std::size_t t = 0; t < trials.size(); ++t) {
+    const auto error = [&](std::size_t p) { return trials[t].errors_mm[p]; };
+    report[t].error_mm = mean_over(trials, error).mean;
+    if (report[t].error_mm < report[best].error_mm) best = t;
+  }
+  std::size_t chosen = best;
+  for (std::size_t t = trials.size(); t-- > 0;) {
+    const auto worse = [&](std::size_t p) {
+      return trials[t].errors_mm[p] - trials[best].errors_mm[p];
+    };
+    const Mean difference = mean_over(trials, worse);
+    report[t].standard_error_mm = t == best ? 0 : difference.standard_error;
+    if (difference.mean <= difference.standard_error) chosen = t;
+  }
+  return chosen;
+}
+
+/// The darkening at which the first of some lists that reaches so far reads a depth.
+double level_at(const std::vector<ChainFit>& lists, double depth_mm) {
+  for (const ChainFit& list : lists) {
+    Knot below;
+    for (const Knot& knot : list.knots) {
+      if (knot.depth_mm >= depth_mm && knot.depth_mm > below.depth_mm) {
+        return std::lerp(below.level, knot.level,
+                         (depth_mm - below.depth_mm) / (knot.depth_mm - below.depth_mm));
+      }
+      below = knot;
+    }
+  }
+  return lists.front().knots.back().level;
+}
+
+/// How much the list at a depth moves with the presses that make it: the jackknife's standard error
+/// (Efron and Tibshirani 1993, section 11.2), millimetres.
+double jackknife_mm(const LeftOut& left_out, double depth_mm) {
+  double n = 0;
+  double sum = 0;
+  double squares = 0;
+  // Levels differ from press to press by the gain; at the mean place it is about one.
+  const double level = level_at(left_out.without, depth_mm);
+  for (const ChainFit& list : left_out.without) {
+    if (level > list.knots.back().level) continue;
+    const double read = interpolate(list.knots, level);
+    n += 1;
+    sum += read;
+    squares += read * read;
+  }
+  if (n < 2) return 0;
+  return std::sqrt(std::max(0.0, (n - 1) / n * (squares - sum * sum / n)));
+}
+
+/// At each indentation bin: how far left-out presses are from the known shape, how much the list
+/// moves with the presses that make it, and what another shape would read otherwise.
+std::vector<recon::Model::Uncertainty> uncertainty_of(const LeftOut& left_out) {
+  struct Bin {
+    double depth = 0;
+    double error = 0;
+    double weight = 0;
+  };
+  std::vector<Bin> bins;
+  for (const MetPress& met : left_out.met) {
+    for (const MetPress::Ring& ring : met.rings) {
+      const auto bin = static_cast<std::size_t>(std::max(0.0, ring.depth_mm) / kDepthBinMm);
+      if (bin >= bins.size()) bins.resize(bin + 1);
+      bins[bin].depth += ring.depth_mm * ring.weight;
+      bins[bin].error += std::abs(ring.error_mm) * ring.weight;
+      bins[bin].weight += ring.weight;
+    }
+  }
+  std::vector<recon::Model::Uncertainty> rows;
+  for (const Bin& bin : bins) {
+    if (bin.weight > 0) {
+      const double depth_mm = std::max(0.0, bin.depth / bin.weight);
+      const double error_mm = std::hypot(bin.error / bin.weight, jackknife_mm(left_out, depth_mm),
+                                         kOtherShape * depth_mm);
+      rows.push_back({std::round(1000 * depth_mm) / 1000, std::round(10000 * error_mm) / 10});
+    }
+  }
+  return rows;
+}
+
+void refuse_gaps(const ChainFit& chain, const BallPresses& set,
+                 const std::vector<std::string>& left_out) {
+  const bool tied = std::ranges::any_of(set.presses, [](const auto& p) { return !!p.depth_mm; });
+  if (chain.gaps.empty() || tied) return;
+  const ChainFit::Gap& gap = chain.gaps.front();
+  const double g = std::min(gap.to_mm, set.ball_radius_mm);
+  throw std::runtime_error(fmt::format(
+      "no press shows indentations from {:.2f} to {:.2f} mm, so the list cannot be chained there: "
+      "press the ball about {:.2f} mm deep (a contact {:.1f} mm wide) and add that press{}",
+      gap.from_mm, gap.to_mm, g, 2 * kContactOfCut * std::sqrt(g * (2 * set.ball_radius_mm - g)),
+      name_left_out(left_out)));
+}
+
+}  // namespace
+
+Calibration build(const BallPresses& presses, PressReport* report) {
+  BallPresses set = presses;
+  Calibration calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
+  const recon::Model plain = *calibration.model;
+  recon::Model uniform = plain;
+  uniform.gain.shape = recon::GainShape::uniform;
+
+  PressReport found;
+  // With one gain a faint press may be seen and with the other not: both get what both see.
+  (void)settle_all(plain, set, found.left_out);
+  const std::vector<SettledPress> lit = settle_all(uniform, set, found.left_out);
+  const std::vector<SettledPress> seen = settle_all(plain, set, found.left_out);
+  std::vector<Trial> trials;
+  for (const int terms : {0, 2, 5}) {
+    // As many presses as the gain has factors say nothing of how it predicts another.
+    if (terms > 0 && static_cast<int>(seen.size()) < terms + 3) break;
+    trials.push_back(try_gain(seen, set, recon::GainShape::none, terms));
+    trials.push_back(try_gain(lit, set, recon::GainShape::uniform, terms));
+  }
+  std::erase_if(trials, [](const Trial& trial) { return !reaches_corners(trial); });
+  for (const Trial& trial : trials) found.gains.push_back({.name = name_of(trial)});
+  const std::size_t choice = simplest(trials, found.gains);
+  const Trial& chosen = trials[choice];
+  const ChainFit& fit = chosen.fit;
+  refuse_gaps(fit, set, found.left_out);
+
+  auto model =
+      std::make_shared<recon::Model>(chosen.shape == recon::GainShape::none ? plain : uniform);
+  model->gain.polynomial = fit.gain;
+  // The bulge of the deepest press is the one seen best.
+  const auto deepest =
+      static_cast<std::size_t>(std::ranges::max_element(fit.depth_mm) - fit.depth_mm.begin());
+  const SettledPress& press = (*chosen.presses)[deepest];
+  RadialProfile profile = radial_profile(press.map, press.contact, kFarField * set.ball_radius_mm);
+  for (double& level : profile.levels) {
+    level *= gain_at(fit.gain, chosen.rings[deepest].all.place);
+  }
+  const std::vector<Knot>& knots = fit.knots;
+  const std::size_t last = knots.size() - 1;
+  const std::size_t before = last >= 4 ? last - 4 : 0;
+  const double beyond =
+      (knots[last].depth_mm - knots[before].depth_mm) / (knots[last].level - knots[before].level);
+  model->list = make_list(knots, knots.front().depth_mm / knots.front().level, beyond, profile);
+  model->uncertainty = uncertainty_of(chosen.left_out);
+  calibration.model = std::move(model);
+  if (report != nullptr) {
+    for (std::size_t p = 0; p < set.presses.size(); ++p) {
+      found.presses.push_back({set.presses[p].name, fit.depth_mm[p]});
+    }
+    found.gains[choice].chosen = true;
+    *report = std::move(found);
+  }
+  return calibration;
+}
+
+}  // namespace dtact::calibration

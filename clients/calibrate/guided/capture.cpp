@@ -1,0 +1,189 @@
+#include "clients/calibrate/guided/capture.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "clients/calibrate/guided/fitness.hpp"
+
+namespace dtact::ctl::guided {
+namespace {
+
+constexpr std::chrono::milliseconds kFrameWait{100};
+/// Frames that have to agree before the first is taken: a press on its way down slower than 0.2 mm
+/// a second passes for still, and the drift of those taken tells it.
+constexpr int kSettleFrames = 10;
+/// Grey levels a cell may move while it counts as still (about 0.05 mm). The most noise that the
+/// daemon calls tolerable, 2.5 a pixel, moves the worst of all cells by 1.
+constexpr double kStill = 1.5;
+/// Grey levels between the means of the first and the last half.
+constexpr double kDrift = 0.5;
+/// A press that differs less from the one before, somewhere, is the same.
+constexpr double kSamePress = 2.0;
+constexpr int kBrighterFrames = 5;
+/// Waits for a frame in vain until the user is told, two seconds.
+constexpr int kMisses = 20;
+
+/// Ends a wait by the frames' times; where none come, by how often that was.
+class Patience {
+ public:
+  explicit Patience(double seconds) : seconds_(seconds) {}
+  bool over(const Look* look) {
+    if (look == nullptr) {
+      without_s_ += std::chrono::duration<double>(kFrameWait).count();
+    } else {
+      if (first_ns_ == 0) first_ns_ = look->time_ns;
+      with_s_ = 1e-9 * static_cast<double>(look->time_ns - first_ns_);
+    }
+    return std::max(with_s_, without_s_) > seconds_;
+  }
+
+ private:
+  double seconds_;
+  double with_s_ = 0;
+  double without_s_ = 0;
+  std::int64_t first_ns_ = 0;  // 0: no frame yet
+};
+
+CellMeans mean_of(const std::vector<CellMeans>& all, std::size_t first, std::size_t last) {
+  CellMeans mean(all[first].size());
+  for (std::size_t i = first; i < last; ++i) {
+    for (std::size_t c = 0; c < mean.size(); ++c) mean[c] += all[i][c];
+  }
+  for (float& value : mean) value /= static_cast<float>(last - first);
+  return mean;
+}
+
+/// From the differences of neighbouring frames, at every 61st pixel.
+double noise_of(const std::vector<image::Grey8>& frames) {
+  double sum = 0;
+  double count = 0;
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    for (std::size_t p = 0; p < frames[i].pixels.size(); p += 61) {
+      const double change = frames[i].pixels[p] - frames[i - 1].pixels[p];
+      sum += change * change;
+      count += 1;
+    }
+  }
+  return count > 0 ? std::sqrt(sum / count / 2) : 0;
+}
+
+}  // namespace
+
+Capture::Capture(Sensor& sensor, Console& console, const CellGrid& grid, const Rules& rules,
+                 std::function<void(const Look&, const std::string&)> shown)
+    : sensor_(sensor), console_(console), grid_(grid), rules_(rules), shown_(std::move(shown)) {}
+
+const Look* Capture::next() {
+  if (console_.interrupted()) throw Ended{Ended::Why::interrupt};
+  auto frame = sensor_.next(kFrameWait);
+  if (!frame || !frame->luma || passing_trouble(frame->health)) return nullptr;
+  if (!leds_.empty() && leds_of(frame->light) != leds_) {
+    throw std::runtime_error(
+        "the light is another than when the reference was taken: set it back with dtactctl led, or "
+        "begin again in another --folder");
+  }
+  look_.image = {frame->luma->width, frame->luma->height, std::move(frame->luma->values)};
+  look_.time_ns = frame->monotonic_ns;
+  look_.cells = grid_.of(look_.image.pixels, look_.image.width);
+  return &look_;
+}
+
+std::string Capture::trouble() {
+  const client::Status status = sensor_.status();
+  return fmt::format("no usable frame came; the daemon's state is {}. {}", status.state,
+                     status.advice);
+}
+
+bool Capture::line_typed() {
+  if (!console_.interactive()) return false;
+  const Typed typed = console_.typed();
+  if (typed.kind == Typed::Kind::interrupted) throw Ended{Ended::Why::interrupt};
+  if (typed.kind == Typed::Kind::end) throw Ended{Ended::Why::input};
+  if (typed.line == "q") throw Ended{Ended::Why::quit};
+  return typed.kind == Typed::Kind::line;
+}
+
+Still Capture::hold(int count, bool forcible, const Objection& objection) {
+  Steadiness steadiness(kStill);
+  Patience patience(rules_.patience_s);
+  Still still;
+  std::vector<CellMeans> cells;
+  std::string why;
+  bool force = false;
+  int misses = 0;
+  const auto restart = [&](std::string reason) {
+    why = std::move(reason);
+    still.frames.clear();
+    cells.clear();
+  };
+  for (;;) {
+    const Look* look = next();
+    if (patience.over(look)) {
+      throw NotTaken(fmt::format("not taken within {:g} s: {}", rules_.patience_s,
+                                 look == nullptr ? trouble() : why));
+    }
+    force = (line_typed() && forcible) || force;
+    if (look == nullptr) {
+      if (++misses == kMisses) console_.say(trouble());
+      restart("");
+      steadiness.restart();
+      continue;
+    }
+    misses = 0;
+    std::string against = objection(*look);
+    if (!against.empty()) {
+      shown_(*look, against);
+      restart(std::move(against));
+      steadiness.restart();
+      continue;
+    }
+    const int row = steadiness.add(look->cells);
+    if (row <= kSettleFrames && !force) {
+      restart(fmt::format("the picture does not hold still (a place moves by {:.1f} grey levels)",
+                          steadiness.broke_at()));
+      shown_(*look, "not still");
+      continue;
+    }
+    still.frames.push_back(look->image);
+    cells.push_back(look->cells);
+    shown_(*look, fmt::format("still, {} of {} frames", still.frames.size(), count));
+    if (still.frames.size() < static_cast<std::size_t>(count)) continue;
+    const std::size_t half = cells.size() / 2;
+    still.drift_levels =
+        half == 0 ? 0 : largest_change(mean_of(cells, 0, half), mean_of(cells, half, cells.size()));
+    if (still.drift_levels > kDrift && !force) {
+      restart(fmt::format("the picture still creeps (a place by {:.1f} grey levels)",
+                          still.drift_levels));
+      steadiness.restart();
+      continue;
+    }
+    still.cells = mean_of(cells, 0, cells.size());
+    still.noise_levels = noise_of(still.frames);
+    return still;
+  }
+}
+
+Still Capture::untouched(int count) {
+  return hold(count, false, [](const Look&) { return std::string(); });
+}
+
+Still Capture::press(int count, const CellMeans& untouched, const CellMeans& last) {
+  int brighter = 0;
+  return hold(count, true, [&](const Look& look) -> std::string {
+    const Seen seen = compare(untouched, look.cells);
+    brighter = reference_was_touched(seen) ? brighter + 1 : 0;
+    if (brighter == kBrighterFrames) throw ReferenceTouched{};
+    if (brighter > 0) return "brighter than the reference somewhere";
+    if (seen.darkest < kTouchLevels) return "nothing touches the surface";
+    if (!last.empty() && largest_change(last, look.cells) < kSamePress) {
+      return "this press is taken already, press elsewhere";
+    }
+    return {};
+  });
+}
+
+}  // namespace dtact::ctl::guided

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "clients/calibrate/guided/cells.hpp"
+#include "clients/calibrate/guided/console.hpp"
+#include "clients/calibrate/guided/sensor.hpp"
+#include "clients/calibrate/guided/still.hpp"
+
+namespace dtact::ctl::guided {
+
+/// The user or the input ended the session.
+struct Ended {
+  enum class Why { quit, input, interrupt };
+  Why why = Why::quit;
+};
+
+/// Frames could not be taken in time; the sentence says why.
+class NotTaken : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Something touched when the reference was taken: the surface is brighter there now.
+struct ReferenceTouched {};
+
+/// A frame and its cells.
+struct Look {
+  image::Grey8 image;
+  std::int64_t time_ns = 0;  ///< Its capture, of the daemon's clock.
+  CellMeans cells;
+};
+
+/// Watches the sensor's frames and takes some where they hold still. It goes by what the frames
+/// show and by their own times, so that a sensor played faster or slower is taken alike.
+class Capture {
+ public:
+  struct Rules {
+    double patience_s = 60;  ///< Of the frames' times, until NotTaken.
+  };
+  /// `shown` is called with each usable frame and a few words about it.
+  Capture(Sensor& sensor, Console& console, const CellGrid& grid, const Rules& rules,
+          std::function<void(const Look&, const std::string&)> shown);
+
+  /// Frames have to come under this light from now on (r, g, b of each LED after brightness).
+  void expect_light(std::vector<std::uint8_t> leds) { leds_ = std::move(leds); }
+
+  /// The next usable frame; null when none came in 100 ms. Throws Ended on Ctrl-C,
+  /// std::runtime_error when the light is another.
+  [[nodiscard]] const Look* next();
+
+  /// Waits for `count` frames in a row that hold still. Throws NotTaken, Ended and as next().
+  [[nodiscard]] Still untouched(int count);
+  /// The same where something presses the surface that was untouched, and elsewhere or otherwise
+  /// than in `last` (empty: none). A line typed meanwhile takes the press as it is. Throws
+  /// ReferenceTouched too.
+  [[nodiscard]] Still press(int count, const CellMeans& untouched, const CellMeans& last);
+
+ private:
+  /// What speaks against a frame; empty: nothing.
+  using Objection = std::function<std::string(const Look&)>;
+  /// `forcible`: a line typed meanwhile takes what there is.
+  [[nodiscard]] Still hold(int count, bool forcible, const Objection& objection);
+  [[nodiscard]] std::string trouble();
+  /// A line was typed by a person who waits. Throws Ended.
+  [[nodiscard]] bool line_typed();
+
+  Sensor& sensor_;
+  Console& console_;
+  const CellGrid& grid_;
+  Rules rules_;
+  std::function<void(const Look&, const std::string&)> shown_;
+  std::vector<std::uint8_t> leds_;
+  Look look_;
+};
+
+}  // namespace dtact::ctl::guided

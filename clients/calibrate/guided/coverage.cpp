@@ -1,0 +1,82 @@
+#include "clients/calibrate/guided/coverage.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace dtact::ctl::guided {
+namespace {
+
+/// The layer's contact is narrower than the circle in which the ball cuts the untouched surface.
+constexpr double kContactOfCut = 0.97;
+constexpr double kFirstOfRadius = 0.3;
+
+std::vector<double> rough_depths_mm(const PressImages& images,
+                                    const calibration::Calibration& empty) {
+  std::vector<double> depths;
+  for (const auto& press : images.set.presses) {
+    try {
+      const calibration::SettledPress settled = calibration::settle(
+          *empty.model, images.set.reference_q8.pixels, press.frames, images.set.ball_radius_mm);
+      depths.push_back(depth_of_width_mm(2 * settled.contact.radius_mm, images.set.ball_radius_mm));
+    } catch (const std::runtime_error&) {
+      continue;  // what shows no contact shows no depth either
+    }
+  }
+  return depths;
+}
+
+}  // namespace
+
+Coverage cover(const PressImages& images, const calibration::Calibration& empty) {
+  Coverage coverage;
+  if (images.set.presses.size() < 2) {
+    coverage.missing = "at least two presses of different depths are needed";
+  } else {
+    try {
+      coverage.made =
+          std::make_shared<const calibration::Calibration>(build_list(images, &coverage.report));
+    } catch (const std::exception& e) {
+      coverage.missing = e.what();
+    }
+  }
+  if (coverage.made) {
+    for (const auto& press : coverage.report.presses) coverage.depths_mm.push_back(press.depth_mm);
+  } else {
+    coverage.depths_mm = rough_depths_mm(images, empty);
+  }
+  return coverage;
+}
+
+double covered_mm(const calibration::Calibration& made) {
+  const recon::DepthList& list = made.model->list;
+  return 0.001 * list.um[static_cast<std::size_t>(list.covered_to_q6 - list.first_q6)];
+}
+
+double contact_width_mm(double depth_mm, double ball_radius_mm) {
+  const double g = std::clamp(depth_mm, 0.0, ball_radius_mm);
+  return 2 * kContactOfCut * std::sqrt(g * (2 * ball_radius_mm - g));
+}
+
+double depth_of_width_mm(double width_mm, double ball_radius_mm) {
+  const double half = std::min(width_mm / 2 / kContactOfCut, ball_radius_mm);
+  return ball_radius_mm - std::sqrt(ball_radius_mm * ball_radius_mm - half * half);
+}
+
+double next_depth_mm(std::vector<double> depths_mm, double ball_radius_mm) {
+  if (depths_mm.empty()) return kFirstOfRadius * ball_radius_mm;
+  std::ranges::sort(depths_mm);
+  double below = kLightestMm;
+  double widest = 0;
+  double middle = kLightestMm;
+  for (const double depth : depths_mm) {
+    if (depth - below > widest) {
+      widest = depth - below;
+      middle = (below + depth) / 2;
+    }
+    below = std::max(below, depth);
+  }
+  return middle;
+}
+
+}  // namespace dtact::ctl::guided

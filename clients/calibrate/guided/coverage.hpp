@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "clients/calibrate/offline/depth_build.hpp"
+
+namespace dtact::ctl::guided {
+
+/// What the presses so far come to.
+struct Coverage {
+  std::shared_ptr<const calibration::Calibration> made;  ///< Null where they determine no list.
+  calibration::PressReport report;                       ///< Of `made`.
+  std::string missing;            ///< Where they do not: why, and what to press.
+  std::vector<double> depths_mm;  ///< Of the presses: as fitted, else by their contacts' width.
+};
+
+/// `empty`: the map and the reference of these images, without a list.
+[[nodiscard]] Coverage cover(const PressImages& images, const calibration::Calibration& empty);
+
+/// How deep the covered list reaches, millimetres.
+[[nodiscard]] double covered_mm(const calibration::Calibration& made);
+
+/// Width of the contact of a ball pressed `depth_mm` deep, millimetres.
+[[nodiscard]] double contact_width_mm(double depth_mm, double ball_radius_mm);
+/// How deep a ball is that makes a contact of this width; a rough figure, from the same formula.
+[[nodiscard]] double depth_of_width_mm(double width_mm, double ball_radius_mm);
+
+/// How deep to press next: first as deep as three tenths of the ball's radius (1.2 mm of a ball of
+/// 4 mm), then into the middle of the widest gap between the depths there are. A press lighter than
+/// kLightestMm hardly shows.
+[[nodiscard]] double next_depth_mm(std::vector<double> depths_mm, double ball_radius_mm);
+inline constexpr double kLightestMm = 0.3;
+
+}  // namespace dtact::ctl::guided

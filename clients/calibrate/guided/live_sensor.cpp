@@ -1,0 +1,27 @@
+#include <utility>
+
+#include "clients/calibrate/guided/sensor.hpp"
+
+namespace dtact::ctl::guided {
+
+LiveSensor::LiveSensor(const client::Options& target) : client_(target) {
+  client::Subscription luma;
+  luma.depth = client::Depth::none;
+  luma.luma = client::Luma::grey8;
+  client_.subscribe(luma);
+}
+
+std::optional<client::Frame> LiveSensor::next(std::chrono::milliseconds timeout) {
+  const auto end = std::chrono::steady_clock::now() + timeout;
+  for (;;) {
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+    if (left.count() <= 0) return std::nullopt;
+    auto message = client_.next(left);
+    if (!message.has_value()) return std::nullopt;
+    auto* frame = std::get_if<client::Frame>(&*message);
+    if (frame != nullptr && frame->luma.has_value()) return std::move(*frame);
+  }
+}
+
+}  // namespace dtact::ctl::guided

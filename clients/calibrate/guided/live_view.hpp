@@ -1,0 +1,49 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/calibrate/fit/contact.hpp"
+#include "clients/calibrate/guided/capture.hpp"
+#include "clients/calibrate/guided/work_folder.hpp"
+#include "daemon/calibration/calibration.hpp"
+
+namespace dtact::ctl::guided {
+
+/// Shows frames: in the terminal where there is one, and as preview.png in the work folder.
+class LiveView {
+ public:
+  LiveView(Console& console, WorkFolder& folder) : console_(console), folder_(folder) {}
+
+  /// The depth map's place and, once there is a reference, its image and cells (empty before).
+  /// `cell_mm`: side of a look's cells.
+  void use(const calibration::Calibration& empty, CellMeans untouched, double cell_mm);
+  /// The lines under the live picture, drawn at once, even while no frame comes.
+  void set_prompt(const std::string& prompt);
+
+  /// Draws at most four times a second of the frames' time, and saves once a second; only where a
+  /// person watches.
+  void show(const Look& look, const std::string& words);
+  /// Saves one frame, with the contact where it is known, and draws it to stay where something
+  /// touches.
+  void still(const image::Grey8& frame, const std::optional<calibration::Contact>& contact,
+             bool touched = true);
+
+ private:
+  [[nodiscard]] image::Grey8 picture(const image::Grey8& frame) const;
+  [[nodiscard]] std::string words_on(const Look& look, const std::string& words) const;
+
+  Console& console_;
+  WorkFolder& folder_;
+  std::shared_ptr<const recon::Model> model_;
+  std::optional<image::Grey8> untouched_;
+  CellMeans untouched_cells_;
+  std::vector<std::string> prompt_;
+  double cell_mm_ = 0;
+  std::int64_t drawn_ns_ = 0;
+  std::int64_t saved_ns_ = 0;
+};
+
+}  // namespace dtact::ctl::guided

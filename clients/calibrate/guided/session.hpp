@@ -1,0 +1,82 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "clients/calibrate/guided/capture.hpp"
+#include "clients/calibrate/guided/coverage.hpp"
+#include "clients/calibrate/guided/live_view.hpp"
+#include "clients/calibrate/guided/work_folder.hpp"
+#include "clients/calibrate/offline/depth_build.hpp"
+
+namespace dtact::ctl::guided {
+
+/// What the command line asks for.
+struct Plan {
+  std::filesystem::path folder;  ///< The work folder.
+  double ball_radius_mm = 0;
+  MapOptions map;
+  int presses = 6;  ///< After so many the calibration is made, where they suffice.
+  int reference_frames = 32;
+  int press_frames = 16;
+  double patience_s = 60;  ///< For each take.
+  std::string again;       ///< The command that goes on with the work folder.
+};
+
+enum class Outcome {
+  uploaded,    ///< The daemon uses the calibration.
+  kept,        ///< It was made and, as the user wished, not uploaded.
+  unfinished,  ///< The user or the input ended the session before there was one.
+};
+
+/// The guided calibration: reference, presses, list, upload; each saved in the work folder as soon
+/// as it is taken, so that the session can end anywhere and another one goes on.
+class Session {
+ public:
+  /// Throws std::runtime_error when the work folder cannot be made.
+  Session(Sensor& sensor, Console& console, Plan plan);
+
+  /// Throws std::runtime_error with a remedy when the daemon is not fit, a take fails where nobody
+  /// is there to mend it, or camera or light changed since the work folder was begun;
+  /// client::Error as the sensor does.
+  [[nodiscard]] Outcome run();
+
+ private:
+  [[nodiscard]] Outcome guide();
+  void greet();
+  void prepare_map(const client::Status& status);
+  void resume();
+  /// The daemon's state, after a while where it is unfit: a camera that stumbles comes back by
+  /// itself.
+  [[nodiscard]] client::Status steady_status();
+  /// Throws unless camera and light are those of the reference.
+  void require_same_sensor();
+  void load();
+  [[nodiscard]] std::string ask(const std::string& prompt);
+
+  void reference_step();
+  /// Until there is a list and the user, or the number of presses, says that it is enough.
+  void press_steps();
+  [[nodiscard]] std::string press_prompt() const;
+  void take_press(const std::string& name);
+  void judge();
+  [[nodiscard]] Outcome finish();
+  void upload();
+
+  Sensor& sensor_;
+  Console& console_;
+  Plan plan_;
+  WorkFolder folder_;
+  LiveView view_;
+  CellGrid grid_;
+  double cell_mm_ = 0;
+  std::unique_ptr<Capture> capture_;
+  PressImages images_;
+  calibration::Calibration empty_;  ///< The map and the reference, without a list.
+  CellMeans untouched_;
+  CellMeans last_;  ///< The press taken last.
+  Coverage coverage_;
+};
+
+}  // namespace dtact::ctl::guided

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "clients/calibrate/lens/point_fit.hpp"
+#include "daemon/recon/spatial_gain.hpp"
+
+namespace dtact::ctl {
+
+/// What the pins of a board, all of one length, tell of how much the same dent darkens from place
+/// to place.
+struct PinGain {
+  recon::SpatialGain gain;  ///< Places in millimetres of the marks.
+  /// RMS of the relative error with which the others predict each pin's darkening, with no gain,
+  /// with the share of the light, with a quadratic.
+  std::vector<double> left_out_of_each;
+  /// For each mark, the gain that the others chose at its place over the one above.
+  std::vector<double> left_out_ratio;
+
+  /// In a sentence.
+  [[nodiscard]] std::string describe() const;
+};
+
+/// Chooses the gain: none; the share of the light (a lens that darkens towards its corners, an
+/// uneven ring); a quadratic of the place (a layer thicker in the middle). A later one is taken
+/// only when the pins that are left out are clearly better predicted (clearly_lower()). A plane is
+/// no choice: it is always taken off, since a board pressed in aslant looks the same.
+///
+/// `reference`, `frame`: grey levels; `marks`: as find_pins() gives them, at least twelve;
+/// `smoothing_px`: standard deviation of the Gaussian that the darkening is read with.
+[[nodiscard]] PinGain choose_gain(const cv::Mat1f& reference, const cv::Mat1f& frame,
+                                  std::span<const Mark> marks, double smoothing_px);
+
+}  // namespace dtact::ctl

@@ -1,0 +1,238 @@
+#include "clients/calibrate/lens/pins.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "clients/calibrate/lens/lattice.hpp"
+#include "clients/calibrate/lens/pin_fit.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using recon::Lens;
+using recon::Point;
+
+/// Standard deviation of the pixel noise: from the median absolute response of the 3×3 filter that
+/// is blind to planes and edges (Immerkær 1996), which the pins hardly move.
+double noise_of(const cv::Mat1f& image) {
+  const cv::Matx33f filter(1, -2, 1, -2, 4, -2, 1, -2, 1);  // norm 6
+  cv::Mat1f response;
+  cv::filter2D(image, response, CV_32F, filter);
+  std::vector<float> sizes;
+  for (const float value : response) sizes.push_back(std::abs(value));
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::ranges::nth_element(sizes, middle);
+  return 1.4826 * *middle / 6;
+}
+
+/// Darkening in grey levels of the mean light, as if the light were even.
+cv::Mat1f relative_darkening(const cv::Mat1f& reference, const cv::Mat1f& frame) {
+  constexpr double kSmooth = 3;      // pixels: the light is smooth, the camera's noise is not
+  constexpr double kDarkest = 0.05;  // of the mean; below it there is nothing to see
+  cv::Mat1f light;
+  cv::GaussianBlur(reference, light, {}, kSmooth, kSmooth, cv::BORDER_REPLICATE);
+  const double mean = cv::mean(light)[0];
+  return cv::Mat1f((reference - frame).mul(mean / cv::max(light, kDarkest * mean)));
+}
+
+Point place_mm(const Board& board, const Lattice& lattice, int row, int col) {
+  return {(col - 0.5 * (lattice.cols - 1)) * board.pitch_mm,
+          (row - 0.5 * (lattice.rows - 1)) * board.pitch_mm};
+}
+
+[[noreturn]] void refuse(const std::vector<std::string>& missing, int pins) {
+  throw std::runtime_error(fmt::format(
+      "board: {} of {} pins not found: {} (rows and columns counted from the image's upper left "
+      "corner); press the board in more evenly, or give the number of pins that the picture shows",
+      missing.size(), pins, fmt::join(missing, "; ")));
+}
+
+/// What the pins are first looked for with: not led astray by a few bad places.
+LensModel searching_model(std::size_t marks) {
+  return marks >= 24 ? LensModel::radial1 : LensModel::affine;
+}
+
+/// A lattice followed up in the image: the pins found and those that are not.
+struct Settled {
+  const Lattice* lattice = nullptr;
+  std::vector<Mark> marks;
+  std::vector<std::string> missing;
+  double rms_mm = 0;  ///< Of the marks about a lens of twelve parameters.
+};
+
+/// The median of the heights around a place of the lattice.
+double neighbours_height(const std::vector<double>& heights, const Lattice& lattice, int row,
+                         int col) {
+  std::vector<double> around;
+  for (int y = std::max(0, row - 1); y <= std::min(lattice.rows - 1, row + 1); ++y) {
+    for (int x = std::max(0, col - 1); x <= std::min(lattice.cols - 1, col + 1); ++x) {
+      if (x == col && y == row) continue;
+      around.push_back(
+          heights[static_cast<std::size_t>(y) * static_cast<std::size_t>(lattice.cols) +
+                  static_cast<std::size_t>(x)]);
+    }
+  }
+  std::ranges::sort(around);
+  return around[around.size() / 2];
+}
+
+std::string name_of(int row, int col) { return fmt::format("row {}, column {}", row + 1, col + 1); }
+
+/// What lies far off the lens through all of them is no pin but something else in its place, such
+/// as the rim of a leak. Returns whether there was any.
+bool drop_strays(Settled& settled, const Lens& lens, const Board& board) {
+  constexpr double kFar = 6;  // medians of the distances; seven standard deviations if normal
+  std::vector<double> distances;
+  for (const Point& r : residuals_mm(lens, settled.marks)) {
+    distances.push_back(std::hypot(r.x, r.y));
+  }
+  std::vector<double> sorted = distances;
+  std::ranges::sort(sorted);
+  const double limit = kFar * sorted[sorted.size() / 2];
+  std::vector<Mark> kept;
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    const Mark& mark = settled.marks[i];
+    if (distances[i] <= limit) {
+      kept.push_back(mark);
+    } else {
+      const auto index = [&](double mm, int count) {
+        return static_cast<int>(std::lround(mm / board.pitch_mm + 0.5 * (count - 1)));
+      };
+      settled.missing.push_back(name_of(index(mark.mm.y, settled.lattice->rows),
+                                        index(mark.mm.x, settled.lattice->cols)));
+    }
+  }
+  const bool any = kept.size() < settled.marks.size();
+  settled.marks = std::move(kept);
+  return any;
+}
+
+Settled settle(const cv::Mat1f& image, double noise, const Lattice& lattice, const Board& board) {
+  constexpr double kSure = 5;          // standard deviations of the noise
+  constexpr double kWithin = 0.25;     // of the pitch
+  constexpr double kNeighbours = 0.2;  // of the neighbours' height
+  constexpr int kRounds = 3;
+  Settled settled{&lattice, {}, {}, 0};
+  int i = 0;
+  for (const auto& place : lattice.places) {
+    if (place) {
+      settled.marks.push_back(
+          {place_mm(board, lattice, i / lattice.cols, i % lattice.cols), {place->x, place->y}});
+    }
+    ++i;
+  }
+  Lens lens = fit_lens(settled.marks, searching_model(settled.marks.size()));
+  for (int round = 0; round < kRounds; ++round) {
+    const PinFit fit(image, board.pitch_mm, recon::central_mm_per_px(lens));
+    std::vector<Point> places;
+    std::vector<double> heights;
+    for (int pin = 0; pin < lattice.rows * lattice.cols; ++pin) {
+      const auto peak =
+          fit.find(lens, place_mm(board, lattice, pin / lattice.cols, pin % lattice.cols),
+                   kWithin * board.pitch_mm);
+      places.push_back(peak ? peak->mm : Point{});
+      heights.push_back(peak ? peak->height : 0);
+    }
+    settled.marks.clear();
+    settled.missing.clear();
+    for (int pin = 0; pin < lattice.rows * lattice.cols; ++pin) {
+      const int row = pin / lattice.cols;
+      const int col = pin % lattice.cols;
+      const double height = heights[static_cast<std::size_t>(pin)];
+      if (height > kSure * fit.height_noise(noise) &&
+          height > kNeighbours * neighbours_height(heights, lattice, row, col)) {
+        settled.marks.push_back({place_mm(board, lattice, row, col),
+                                 project(lens, places[static_cast<std::size_t>(pin)])});
+      } else {
+        settled.missing.push_back(name_of(row, col));
+      }
+    }
+    if (2 * settled.missing.size() > lattice.places.size()) return settled;
+    lens = fit_lens(settled.marks, LensModel::radial2);
+    if (drop_strays(settled, lens, board)) lens = fit_lens(settled.marks, LensModel::radial2);
+  }
+  settled.rms_mm = rms(residuals_mm(lens, settled.marks));
+  return settled;
+}
+
+/// Whether two lattices are of the same places, found at other scales.
+bool same_places(const Lattice& a, const Lattice& b, double apart) {
+  if (a.rows != b.rows) return false;
+  for (std::size_t i = 0; i < a.places.size(); ++i) {
+    const auto& here = a.places[i];
+    const auto& there = b.places[i];
+    if (here && there && cv::norm(*here - *there) > apart) return false;
+  }
+  return true;
+}
+
+/// All lattices at several scales, of the board as it is and on edge.
+std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
+  // Of the image's shorter side: from pins a few pixels wide to a board twice as large as the
+  // frame.
+  constexpr double kScales[] = {1 / 160., 1 / 120., 1 / 80., 1 / 60., 1 / 48., 1 / 36., 1 / 24.};
+  std::vector<Lattice> all;
+  for (const double scale : kScales) {
+    const double sigma = scale * std::min(image.rows, image.cols);
+    if (sigma < 1) continue;
+    const std::vector<Candidate> candidates = find_candidates(image, sigma);
+    for (const auto& [rows, cols] : {std::pair{board.rows, board.cols}, {board.cols, board.rows}}) {
+      std::ranges::move(find_lattices(candidates, rows, cols), std::back_inserter(all));
+      if (board.rows == board.cols) break;
+    }
+  }
+  // The fullest first; of those of the same places one is enough.
+  std::ranges::stable_sort(all, std::greater<>{}, &Lattice::found);
+  const double apart = 0.25 * std::min(image.rows, image.cols) / std::max(board.rows, board.cols);
+  std::vector<Lattice> distinct;
+  for (Lattice& lattice : all) {
+    if (std::ranges::none_of(
+            distinct, [&](const Lattice& other) { return same_places(lattice, other, apart); })) {
+      distinct.push_back(std::move(lattice));
+    }
+  }
+  return distinct;
+}
+
+}  // namespace
+
+PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Board& board) {
+  constexpr std::size_t kTries = 30;
+  constexpr int kMayMiss = 10;  // one in so many: a lattice that is a row off misses more
+  const cv::Mat1f image = relative_darkening(reference, frame);
+  std::vector<Lattice> lattices = lattices_of(image, board);
+  lattices.resize(std::min(lattices.size(), kTries));
+  const double noise = noise_of(image);
+  Settled best;
+  for (const Lattice& lattice : lattices) {
+    Settled settled = settle(image, noise, lattice, board);
+    // The most pins, and of those windows and scales that have them the most regular one.
+    const bool better =
+        best.lattice == nullptr || settled.missing.size() < best.missing.size() ||
+        (settled.missing.size() == best.missing.size() && settled.rms_mm < best.rms_mm);
+    if (better) best = std::move(settled);
+  }
+  if (best.lattice == nullptr || 2 * best.missing.size() > best.lattice->places.size()) {
+    throw std::runtime_error(fmt::format(
+        "board: no lattice of {}x{} pins found; check that the images are an untouched surface and "
+        "the same with the board pressed in, and the numbers of rows and columns",
+        board.rows, board.cols));
+  }
+  const int pins = board.rows * board.cols;
+  if (kMayMiss * static_cast<int>(best.missing.size()) > pins) refuse(best.missing, pins);
+  PinPress press{
+      best.lattice->rows, best.lattice->cols, std::move(best.marks), std::move(best.missing), {}};
+  press.lens = choose_lens(press.marks);
+  level(press.lens.lens, press.marks);
+  return press;
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,277 @@
+#include "clients/calibrate/lens/point_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <stdexcept>
+
+namespace dtact::ctl {
+namespace {
+
+using recon::Lens;
+using recon::Point;
+
+constexpr LensModel kModels[] = {LensModel::affine,  LensModel::projective, LensModel::radial1,
+                                 LensModel::radial2, LensModel::radial3,    LensModel::radial4};
+constexpr std::size_t kHomography = 8;
+
+std::size_t radial_terms(LensModel model) {
+  return static_cast<std::size_t>(std::max(0, static_cast<int>(model) - 1));
+}
+
+/// Units in which all parameters are of the order of one: the marks' own extents.
+struct Units {
+  Point px;        ///< Their middle, pixels.
+  Point mm;        ///< Their middle, millimetres.
+  double px_size;  ///< Greatest distance from the middle.
+  double mm_size;
+};
+
+Units units_of(std::span<const Mark> marks) {
+  Units units{};
+  for (const Mark& mark : marks) {
+    units.px = {units.px.x + mark.px.x, units.px.y + mark.px.y};
+    units.mm = {units.mm.x + mark.mm.x, units.mm.y + mark.mm.y};
+  }
+  const auto n = static_cast<double>(marks.size());
+  units.px = {units.px.x / n, units.px.y / n};
+  units.mm = {units.mm.x / n, units.mm.y / n};
+  for (const Mark& mark : marks) {
+    units.px_size =
+        std::max(units.px_size, std::hypot(mark.px.x - units.px.x, mark.px.y - units.px.y));
+    units.mm_size =
+        std::max(units.mm_size, std::hypot(mark.mm.x - units.mm.x, mark.mm.y - units.mm.y));
+  }
+  return units;
+}
+
+/// Parameters in `units`: eight of the homography, two of the centre, the radial ones.
+using Parameters = std::vector<double>;
+
+Lens lens_of(const Parameters& p, const Units& u) {
+  const cv::Matx33d inner(p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], 1);
+  const cv::Matx33d to_px(u.px_size, 0, u.px.x, 0, u.px_size, u.px.y, 0, 0, 1);
+  const cv::Matx33d from_mm(1 / u.mm_size, 0, -u.mm.x / u.mm_size, 0, 1 / u.mm_size,
+                            -u.mm.y / u.mm_size, 0, 0, 1);
+  cv::Matx33d h = to_px * inner * from_mm;
+  h = h * (1 / h(2, 2));
+  Lens lens;
+  std::copy(std::begin(h.val), std::end(h.val), lens.homography.begin());
+  lens.centre_col = u.px.x + p[8] * u.px_size;
+  lens.centre_row = u.px.y + p[9] * u.px_size;
+  lens.radius_px = u.px_size;
+  lens.radial.assign(p.begin() + kHomography + 2, p.end());
+  return lens;
+}
+
+cv::Mat1d errors_of(const Parameters& p, const Units& u, std::span<const Mark> marks) {
+  const Lens lens = lens_of(p, u);
+  cv::Mat1d errors(static_cast<int>(2 * marks.size()), 1);
+  int i = 0;
+  for (const Mark& mark : marks) {
+    const Point at = project(lens, mark.mm);
+    errors(i++) = (at.x - mark.px.x) / u.px_size;
+    errors(i++) = (at.y - mark.px.y) / u.px_size;
+  }
+  return errors;
+}
+
+Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t terms) {
+  cv::Mat1d a(static_cast<int>(marks.size()), 3);
+  cv::Mat1d b(static_cast<int>(marks.size()), 2);
+  int i = 0;
+  for (const Mark& mark : marks) {
+    a(i, 0) = (mark.mm.x - u.mm.x) / u.mm_size;
+    a(i, 1) = (mark.mm.y - u.mm.y) / u.mm_size;
+    a(i, 2) = 1;
+    b(i, 0) = (mark.px.x - u.px.x) / u.px_size;
+    b(i, 1) = (mark.px.y - u.px.y) / u.px_size;
+    ++i;
+  }
+  // Places on a line leave one direction of the plane open. The places are in units of their own
+  // extent, so that noise alone stays far below a thousandth.
+  constexpr double kLine = 1e-3;
+  const cv::SVD svd(a);
+  cv::Mat1d x;
+  svd.backSubst(b, x);
+  if (svd.w.at<double>(2) < kLine * svd.w.at<double>(0)) {
+    throw std::runtime_error("lens: the points lie on a line; use a board with several rows");
+  }
+  Parameters p(kHomography + 2 + terms, 0.0);
+  for (int c = 0; c < 3; ++c) {
+    p[static_cast<std::size_t>(c)] = x(c, 0);
+    p[static_cast<std::size_t>(c) + 3] = x(c, 1);
+  }
+  return p;
+}
+
+/// By differences, of the first `n` parameters.
+cv::Mat1d jacobian_of(const Parameters& p, const cv::Mat1d& errors, const Units& u,
+                      std::span<const Mark> marks, int n) {
+  constexpr double kStep = 1e-6;  // of parameters of the order of one
+  std::vector<cv::Mat1d> columns;
+  for (std::size_t c = 0; c < static_cast<std::size_t>(n); ++c) {
+    Parameters changed = p;
+    changed[c] += kStep;
+    columns.emplace_back((errors_of(changed, u, marks) - errors) / kStep);
+  }
+  cv::Mat1d jacobian;
+  cv::hconcat(columns, jacobian);
+  return jacobian;
+}
+
+void minimise(Parameters& p, const Units& u, std::span<const Mark> marks, LensModel model) {
+  constexpr int kIterations = 60;
+  constexpr double kSettled = 1e-12;  // relative change of the sum of squares
+  const int n = parameters(model);    // the first ones of p
+  double damping = 1e-3;
+  cv::Mat1d errors = errors_of(p, u, marks);
+  double sum = errors.dot(errors);
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    const cv::Mat1d jacobian = jacobian_of(p, errors, u, marks, n);
+    const cv::Mat1d normal(jacobian.t() * jacobian);
+    const cv::Mat1d gradient(jacobian.t() * errors);
+    bool lower = false;
+    while (!lower && damping < 1e9) {
+      cv::Mat1d damped = normal.clone();
+      for (int c = 0; c < n; ++c) damped(c, c) += damping * (normal(c, c) + 1e-9);
+      cv::Mat1d step;
+      Parameters tried = p;
+      if (cv::solve(damped, gradient, step, cv::DECOMP_CHOLESKY)) {
+        for (int c = 0; c < n; ++c) tried[static_cast<std::size_t>(c)] -= step(c);
+      }
+      const cv::Mat1d after = errors_of(tried, u, marks);
+      const double after_sum = after.dot(after);  // NaN where the lens folds: not lower
+      lower = after_sum < sum;
+      damping *= lower ? 0.2 : 8;
+      if (!lower) continue;
+      const bool settled = sum - after_sum <= kSettled * sum;
+      p = tried;
+      errors = after;
+      sum = after_sum;
+      if (settled) return;
+    }
+    if (!lower) return;
+  }
+}
+
+/// The best parameters for all marks, in `u`.
+Parameters fit(std::span<const Mark> marks, const Units& u, LensModel model) {
+  if (marks.size() < static_cast<std::size_t>(parameters(model))) {
+    throw std::runtime_error("lens: too few points");
+  }
+  Parameters p = affine_start(marks, u, radial_terms(model));
+  // The larger model starts from the smaller one's end: a lens's terms trade against each other.
+  for (const LensModel stage : kModels) {
+    if (stage > model) break;
+    if (stage != LensModel::affine) minimise(p, u, marks, stage);
+  }
+  return p;
+}
+
+double square(Point p) { return p.x * p.x + p.y * p.y; }
+
+}  // namespace
+
+int parameters(LensModel model) {
+  constexpr int kParameters[] = {6, 8, 11, 12, 13, 14};
+  return kParameters[static_cast<int>(model)];
+}
+
+Lens fit_lens(std::span<const Mark> marks, LensModel model) {
+  const Units u = units_of(marks);
+  return lens_of(fit(marks, u, model), u);
+}
+
+std::vector<Point> residuals_mm(const Lens& lens, std::span<const Mark> marks) {
+  constexpr double kStep = 1e-3;  // mm
+  std::vector<Point> residuals;
+  for (const Mark& mark : marks) {
+    const Point at = project(lens, mark.mm);
+    const Point right = project(lens, {mark.mm.x + kStep, mark.mm.y});
+    const Point below = project(lens, {mark.mm.x, mark.mm.y + kStep});
+    const cv::Matx22d jacobian((right.x - at.x) / kStep, (below.x - at.x) / kStep,
+                               (right.y - at.y) / kStep, (below.y - at.y) / kStep);
+    const cv::Vec2d mm = jacobian.inv() * cv::Vec2d(mark.px.x - at.x, mark.px.y - at.y);
+    residuals.push_back({mm[0], mm[1]});
+  }
+  return residuals;
+}
+
+double rms(std::span<const Point> residuals) {
+  double sum = 0;
+  for (const Point& r : residuals) sum += square(r);
+  return std::sqrt(sum / static_cast<double>(residuals.size()));
+}
+
+std::vector<Point> leave_one_out(std::span<const Mark> marks, LensModel model) {
+  const Units u = units_of(marks);
+  const Parameters all = fit(marks, u, model);
+  std::vector<Point> residuals;
+  for (std::size_t out = 0; out < marks.size(); ++out) {
+    std::vector<Mark> others(marks.begin(), marks.end());
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(out));
+    Parameters p = all;  // One mark moves the minimum a little: a few steps from here.
+    minimise(p, u, others, model);
+    residuals.push_back(residuals_mm(lens_of(p, u), marks.subspan(out, 1)).front());
+  }
+  return residuals;
+}
+
+bool clearly_lower(std::span<const double> squares, std::span<const double> others) {
+  constexpr double kErrors = 2;  // standard errors: about one chance in forty
+  double sum = 0;
+  double sum2 = 0;
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    const double gain = others[i] - squares[i];
+    sum += gain;
+    sum2 += gain * gain;
+  }
+  const auto n = static_cast<double>(squares.size());
+  const double mean = sum / n;
+  return mean > kErrors * std::sqrt(std::max(0.0, sum2 / n - mean * mean) / (n - 1));
+}
+
+ChosenLens choose_lens(std::span<const Mark> marks) {
+  ChosenLens best;
+  std::vector<double> best_squares;
+  for (const LensModel model : kModels) {
+    // Twice as many coordinates as parameters at least, also with one mark left out.
+    if (marks.size() < static_cast<std::size_t>(parameters(model)) + 1) break;
+    std::vector<Point> left_out = leave_one_out(marks, model);
+    const double error = rms(left_out);
+    best.left_out_rms_of_each.push_back(error);
+    std::vector<double> squares;
+    squares.reserve(left_out.size());
+    for (const Point& r : left_out) squares.push_back(square(r));
+    if (best.left_out.empty() || clearly_lower(squares, best_squares)) {
+      best_squares = std::move(squares);
+      best.model = model;
+      best.left_out = std::move(left_out);
+    }
+  }
+  if (best.left_out.empty()) throw std::runtime_error("lens: too few points");
+  best.lens = fit_lens(marks, best.model);
+  best.in_sample = residuals_mm(best.lens, marks);
+  return best;
+}
+
+void level(Lens& lens, std::span<Mark> marks) {
+  constexpr double kStep = 1e-4;  // mm
+  const Point at = project(lens, {0, 0});
+  const Point right = project(lens, {kStep, 0});
+  const Point below = project(lens, {0, kStep});
+  // J = R·S with S symmetric: the rotation's angle is that of (J + cofactor(J)).
+  const double angle =
+      std::atan2((right.y - at.y) - (below.x - at.x), (right.x - at.x) + (below.y - at.y));
+  const cv::Matx33d turn(std::cos(angle), std::sin(angle), 0, -std::sin(angle), std::cos(angle), 0,
+                         0, 0, 1);
+  const cv::Matx33d h = cv::Matx33d(lens.homography.data()) * turn;
+  std::copy(std::begin(h.val), std::end(h.val), lens.homography.begin());
+  for (Mark& mark : marks) {
+    const cv::Vec3d mm = turn.t() * cv::Vec3d(mark.mm.x, mark.mm.y, 1);
+    mark.mm = {mm[0], mm[1]};
+  }
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,123 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <stdexcept>
+
+#include "clients/calibrate/offline/depth_build.hpp"
+#include "clients/calibrate/offline/offline.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+struct Options {
+  std::vector<std::string> reference;
+  std::vector<std::string> ball;
+  std::vector<std::string> presses;
+  double radius_mm = 0;
+  MapOptions map;
+  std::string method = "list";
+  std::vector<double> gain_centre{0, 0};  ///< x, y in millimetres from the map's centre.
+  std::string output;
+};
+
+/// From one press.
+calibration::Calibration make_from_one(const Options& options) {
+  const ImageSet reference = load_images(options.reference, "--reference");
+  const ImageSet ball = load_images(options.ball, "--ball");
+  require_same_size(reference, "--reference", ball, "--ball");
+  const MapChoice map = choose_map(options.map, reference.width(), reference.height());
+  calibration::Calibration made = calibration::build(
+      {.reference_q8 = reference.mean_q8(),
+       .frames = ball.frames(),
+       .ball_radius_mm = options.radius_mm,
+       .mm_per_px = map.mm_per_px,
+       .lens = map.lens,
+       .crop = map.crop,
+       .gain = map.gain,
+       .method = options.method == "published" ? recon::Method::published : recon::Method::list});
+  made.origin = recorded_origin(options.reference);
+  made.origin.created = utc_now();
+  made.origin.sources = reference.sources;
+  made.origin.sources.insert(made.origin.sources.end(), ball.sources.begin(), ball.sources.end());
+  return made;
+}
+
+/// From several.
+calibration::Calibration make_from_many(const Options& options) {
+  PressImages images = begin_presses(options.reference, options.radius_mm, options.map);
+  for (const std::string& press : options.presses) add_press(images, press);
+  if (options.method == "regression") {
+    calibration::Calibration made =
+        calibration::build_regression(images.set, options.gain_centre[0], options.gain_centre[1]);
+    made.origin = images.origin;
+    made.origin.created = utc_now();
+    return made;
+  }
+  calibration::PressReport report;
+  calibration::Calibration made = build_list(images, &report);
+  fmt::print("{}", report_text(report));
+  return made;
+}
+
+void check(const Options& options) {
+  const bool many = !options.presses.empty();
+  if (many == !options.ball.empty()) {
+    throw std::runtime_error("either --ball (one press) or --press for each of several is needed");
+  }
+  if (many ? options.method == "published" : options.method == "regression") {
+    throw std::runtime_error(many ? "--method published takes one press: --ball"
+                                  : "--method regression takes several presses: --press");
+  }
+}
+
+void run(const Options& options) {
+  check(options);
+  const calibration::Calibration made =
+      options.presses.empty() ? make_from_one(options) : make_from_many(options);
+  calibration::save(made, options.output);
+  const recon::RectifyTable& map = made.model->rectify;
+  fmt::print("{}: method {}, {}x{} at column {}, row {}\n{}", options.output, options.method,
+             map.width, map.height, made.crop_col, made.crop_row, list_text(*made.model));
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app) {
+  CLI::App* calibrate = app.add_subcommand("calibrate", "Make a calibration");
+  calibrate->require_subcommand(0, 1);
+  CLI::App* depth = calibrate->add_subcommand(
+      "depth", "Make the list of darkening and indentation from the press of a ball");
+  const auto options = std::make_shared<Options>();
+  depth
+      ->add_option("--reference", options->reference,
+                   "Untouched surface: PNG files, or a folder of them (averaged); camera and light "
+                   "are recorded from the folder's sensor.toml where there is one")
+      ->required();
+  depth->add_option("--ball", options->ball,
+                    "One press of the ball: PNG files, or a folder of them (averaged)");
+  depth
+      ->add_option("--press", options->presses,
+                   "One of several presses, at any place and depth, some of them light: a PNG file "
+                   "or a folder; repeat. FOLDER@MM where the depth was measured")
+      ->take_all();
+  depth->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")->required();
+  add_map_options(*depth, options->map);
+  depth
+      ->add_option("--method", options->method,
+                   "list (default); to compare with: published (one press), regression (several)")
+      ->check(CLI::IsMember({"list", "published", "regression"}));
+  depth
+      ->add_option("--gain-centre", options->gain_centre,
+                   "Where the regression's distance is taken from, mm right and down of the middle")
+      ->delimiter(',')
+      ->expected(2)
+      ->type_name("X,Y");
+  depth
+      ->add_option("-o,--output", options->output,
+                   "Folder to write; an old calibration is replaced")
+      ->required();
+  depth->callback([options] { run(*options); });
+  add_calibrate_lens(*calibrate);
+}
+
+}  // namespace dtact::ctl

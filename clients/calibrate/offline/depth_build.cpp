@@ -1,0 +1,167 @@
+#include "clients/calibrate/offline/depth_build.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+#include <filesystem>
+#include <stdexcept>
+
+#include "daemon/calibration/lens_file.hpp"
+#include "daemon/calibration/sensor_file.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<calibration::Crop> crop_of(const MapOptions& options, int width, int height) {
+  if (options.crop.empty()) {
+    if (!options.centre.empty()) throw std::runtime_error("--centre needs --crop HEIGHT,WIDTH");
+    return std::nullopt;
+  }
+  const std::vector<int> centre =
+      options.centre.empty() ? std::vector<int>{height / 2, width / 2} : options.centre;
+  return calibration::Crop{centre[1] - options.crop[1] / 2, centre[0] - options.crop[0] / 2,
+                           options.crop[1], options.crop[0]};
+}
+
+calibration::LensFile lens_for(const std::string& path, int width, int height) {
+  calibration::LensFile file = calibration::load_lens(path);
+  if (file.frame_width != width || file.frame_height != height) {
+    throw std::runtime_error(fmt::format(
+        "--lens: {} was measured on {}x{} but the images are {}x{}; both must come from one camera "
+        "mode",
+        path, file.frame_width, file.frame_height, width, height));
+  }
+  return file;
+}
+
+/// "FOLDER@0.8": the images and the depth that was measured.
+std::pair<std::string, std::optional<double>> split_press(const std::string& text) {
+  const std::size_t at = text.rfind('@');
+  if (at == std::string::npos) return {text, std::nullopt};
+  double depth_mm = 0;
+  std::size_t read = 0;
+  try {
+    depth_mm = std::stod(text.substr(at + 1), &read);
+  } catch (const std::exception&) {
+    read = 0;
+  }
+  if (read == 0 || read != text.size() - at - 1 || !(depth_mm > 0)) {
+    throw std::runtime_error("--press " + text + ": after @ comes a depth in millimetres");
+  }
+  return {text.substr(0, at), depth_mm};
+}
+
+}  // namespace
+
+void add_map_options(CLI::App& command, MapOptions& options) {
+  command.add_option("--mm-per-px", options.mm_per_px,
+                     "Scale of the depth map, mm per pixel (default: the lens's in the middle)");
+  command.add_option("--lens", options.lens,
+                     "Lens file of calibrate lens, or a calibration folder: rectifies the map; a "
+                     "list of one press takes its gain as well, several presses tell their own");
+  command
+      .add_option("--centre", options.centre,
+                  "Middle of the crop in the frame (default: the frame's)")
+      ->delimiter(',')
+      ->expected(2)
+      ->type_name("ROW,COL");
+  command.add_option("--crop", options.crop, "Size of the depth map (default: the whole frame)")
+      ->delimiter(',')
+      ->expected(2)
+      ->type_name("H,W");
+}
+
+MapChoice choose_map(const MapOptions& options, int frame_width, int frame_height) {
+  MapChoice map{{}, {}, options.mm_per_px, crop_of(options, frame_width, frame_height)};
+  if (!options.lens.empty()) {
+    const calibration::LensFile file = lens_for(options.lens, frame_width, frame_height);
+    map.lens = file.lens;
+    map.gain = file.gain;
+    if (map.mm_per_px == 0) map.mm_per_px = recon::central_mm_per_px(*map.lens);
+  } else if (map.mm_per_px == 0) {
+    throw std::runtime_error("--mm-per-px or --lens is required: one of them says the scale");
+  }
+  return map;
+}
+
+PressImages begin_presses(const std::vector<std::string>& reference, double ball_radius_mm,
+                          const MapOptions& map) {
+  const ImageSet untouched = load_images(reference, "--reference");
+  const MapChoice choice = choose_map(map, untouched.width(), untouched.height());
+  PressImages images{.set = {.reference_q8 = untouched.mean_q8(),
+                             .presses = {},
+                             .ball_radius_mm = ball_radius_mm,
+                             .mm_per_px = choice.mm_per_px,
+                             .crop = choice.crop,
+                             .lens = choice.lens},
+                     .origin = recorded_origin(reference)};
+  images.origin.sources = untouched.sources;
+  return images;
+}
+
+void add_press(PressImages& images, const std::string& press) {
+  const auto [path, depth_mm] = split_press(press);
+  ImageSet pressed = load_images({path}, "--press");
+  const image::Grey16& reference = images.set.reference_q8;
+  if (pressed.width() != reference.width || pressed.height() != reference.height) {
+    throw std::runtime_error(fmt::format(
+        "--press {} is {}x{} but --reference is {}x{}; both must come from one camera mode", press,
+        pressed.width(), pressed.height(), reference.width, reference.height));
+  }
+  images.set.presses.push_back({.name = press, .frames = pressed.frames(), .depth_mm = depth_mm});
+  images.origin.sources.insert(images.origin.sources.end(), pressed.sources.begin(),
+                               pressed.sources.end());
+}
+
+calibration::Calibration build_list(const PressImages& images, calibration::PressReport* report) {
+  calibration::Calibration made = calibration::build(images.set, report);
+  made.origin = images.origin;
+  made.origin.created = utc_now();
+  return made;
+}
+
+calibration::Origin recorded_origin(const std::vector<std::string>& paths) {
+  for (const std::string& path : paths) {
+    const fs::path file = fs::path(path) / calibration::kSensorName;
+    if (fs::exists(file)) return calibration::load_sensor(file);
+  }
+  return {};
+}
+
+std::string utc_now() {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+}
+
+std::string report_text(const calibration::PressReport& report) {
+  std::string text;
+  for (const std::string& press : report.left_out) text += fmt::format("left out: {}\n", press);
+  for (const auto& press : report.presses) {
+    text += fmt::format("{}: {:.3f} mm deep\n", press.name, press.depth_mm);
+  }
+  for (const auto& gain : report.gains) {
+    text +=
+        fmt::format("gain {}: a press is {:.4f} mm off the sphere under the list of the others{}\n",
+                    gain.name, gain.error_mm, gain.chosen ? " (used)" : "");
+  }
+  return text;
+}
+
+std::string list_text(const recon::Model& model) {
+  const recon::DepthList& list = model.list;
+  const auto at = [&](int q6) {
+    return 0.001 * list.um[static_cast<std::size_t>(q6 - list.first_q6)];
+  };
+  std::string text =
+      fmt::format("list: {:.1f} grey levels = {:.3f} mm to {:.1f} grey levels = {:.3f} mm\n",
+                  list.covered_from_q6 / 64.0, at(list.covered_from_q6), list.covered_to_q6 / 64.0,
+                  at(list.covered_to_q6));
+  for (const auto& row : model.uncertainty) {
+    text += fmt::format("uncertain at {:.2f} mm by {:.1f} um\n", row.depth_mm, row.error_um);
+  }
+  return text;
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "clients/calibrate/fit/press_set.hpp"
+#include "clients/calibrate/offline/images.hpp"
+
+namespace dtact::ctl {
+
+/// Where the depth map lies in the frame and how large its pixels are, as the command line says it.
+struct MapOptions {
+  double mm_per_px = 0;     ///< 0: the lens's in the middle.
+  std::string lens;         ///< A lens file or a calibration folder; empty: the frame as it is.
+  std::vector<int> centre;  ///< Row, column; empty: the frame's.
+  std::vector<int> crop;    ///< Height, width; empty: all that the frame shows.
+};
+
+/// Adds --mm-per-px, --lens, --centre and --crop.
+void add_map_options(CLI::App& command, MapOptions& options);
+
+/// The same, for a frame of known size.
+struct MapChoice {
+  std::optional<recon::Lens> lens;
+  recon::SpatialGain gain;  ///< Of the lens file: what its board's pins ask for.
+  double mm_per_px = 0;
+  std::optional<calibration::Crop> crop;
+};
+
+/// Throws std::runtime_error naming the option when neither scale nor lens is given, the lens
+/// belongs to another frame size or the centre stands alone.
+[[nodiscard]] MapChoice choose_map(const MapOptions& options, int frame_width, int frame_height);
+
+/// Several presses of one ball, and what is recorded of where they come from.
+struct PressImages {
+  calibration::BallPresses set;
+  calibration::Origin origin;
+};
+
+/// The untouched images and no press yet. Camera and light are recorded from the sensor.toml of a
+/// folder in `reference` that has one. Throws as load_images() and choose_map().
+[[nodiscard]] PressImages begin_presses(const std::vector<std::string>& reference,
+                                        double ball_radius_mm, const MapOptions& map);
+
+/// Adds the images of one press: a PNG file or a folder, FOLDER@MM where the depth was measured.
+/// Throws std::runtime_error naming --press.
+void add_press(PressImages& images, const std::string& press);
+
+/// The calibration of several presses, its origin filled in. Throws as calibration::build().
+[[nodiscard]] calibration::Calibration build_list(const PressImages& images,
+                                                  calibration::PressReport* report);
+
+/// Camera and light of the images in these folders, where a sensor.toml says so.
+[[nodiscard]] calibration::Origin recorded_origin(const std::vector<std::string>& paths);
+
+/// Now, as calibrations write it.
+[[nodiscard]] std::string utc_now();
+
+/// Each press's depth, those left out, and what decided about the gain; lines.
+[[nodiscard]] std::string report_text(const calibration::PressReport& report);
+/// What the list covers and what it is uncertain by; lines.
+[[nodiscard]] std::string list_text(const recon::Model& model);
+
+}  // namespace dtact::ctl

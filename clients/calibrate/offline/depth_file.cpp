@@ -1,0 +1,59 @@
+#include "clients/calibrate/offline/depth_file.hpp"
+
+#include <fmt/format.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+namespace dtact::ctl {
+namespace {
+
+void append_float(std::string& out, float value) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  for (unsigned shift = 0; shift < 32; shift += 8) {
+    out += static_cast<char>(static_cast<std::uint8_t>(bits >> shift));
+  }
+}
+
+}  // namespace
+
+std::string encode_npy(const DepthImage& depth) {
+  std::string header = fmt::format(
+      "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", depth.height, depth.width);
+  // Magic, version, length and header fill whole 64 bytes, the last of which is a newline.
+  constexpr std::size_t kBefore = 10;
+  header.append(63 - (kBefore + header.size()) % 64, ' ');
+  header += '\n';
+  std::string out("\x93NUMPY\x01\x00", 8);
+  out += static_cast<char>(header.size() % 256);
+  out += static_cast<char>(header.size() / 256);
+  out += header;
+  for (const float mm : depth.mm) append_float(out, mm);
+  return out;
+}
+
+std::string encode_ply(const DepthImage& depth) {
+  std::string points;
+  std::size_t count = 0;
+  std::size_t pixel = 0;
+  for (int y = 0; y < depth.height; ++y) {
+    for (int x = 0; x < depth.width; ++x) {
+      const float mm = depth.mm[pixel++];
+      if (std::isnan(mm)) continue;
+      append_float(points, static_cast<float>((x - 0.5 * (depth.width - 1)) * depth.mm_per_px));
+      append_float(points, static_cast<float>((y - 0.5 * (depth.height - 1)) * depth.mm_per_px));
+      append_float(points, -mm);
+      ++count;
+    }
+  }
+  return fmt::format(
+             "ply\nformat binary_little_endian 1.0\n"
+             "comment millimetres; x right, y down, z away from the camera; pressed is negative z\n"
+             "element vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
+             "end_header\n",
+             count) +
+         points;
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,203 @@
+#include "clients/calibrate/offline/folder_evaluation.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/offline/board_images.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The reference and the press of one object, or why they are not there.
+std::string load_pair(const fs::path& folder, const char* object, ImageSet& reference,
+                      ImageSet& press) {
+  const fs::path reference_path = folder / (std::string(object) + "_reference.png");
+  const fs::path press_path = folder / (std::string(object) + ".png");
+  for (const fs::path& path : {reference_path, press_path}) {
+    if (!fs::exists(path)) return path.filename().string() + " is not there";
+  }
+  reference = load_images({reference_path.string()}, reference_path.string());
+  press = load_images({press_path.string()}, press_path.string());
+  require_same_size(reference, reference_path.string(), press, press_path.string());
+  return {};
+}
+
+void evaluate_ball(FolderEvaluation& e, const recon::Lens& lens, double radius_mm) {
+  calibration::BallPress press;
+  press.reference_q8 = e.ball_reference.mean_q8();
+  press.frames = e.ball_images.frames();
+  press.ball_radius_mm = radius_mm;
+  press.lens = lens;
+  press.gain = e.gain.gain;
+  press.mm_per_px = recon::central_mm_per_px(lens);
+  const calibration::Calibration made = calibration::build(press);
+  e.ball = calibration::evaluate(made, press.reference_q8.pixels, press.frames, radius_mm);
+  e.calibration = made;
+}
+
+/// Takes the plane through the pins' depths off and fills in what is left.
+void judge(PinDepths& depths, const std::vector<Mark>& marks) {
+  const auto n = static_cast<int>(marks.size());
+  cv::Mat1d plane(n, 3);
+  cv::Mat1d depth(n, 1);
+  for (int i = 0; i < n; ++i) {
+    const auto pin = static_cast<std::size_t>(i);
+    plane(i, 0) = 1;
+    plane(i, 1) = marks[pin].mm.x;
+    plane(i, 2) = marks[pin].mm.y;
+    depth(i) = depths.mm[pin];
+  }
+  cv::Mat1d fit;
+  cv::solve(plane, depth, fit, cv::DECOMP_QR);
+  const cv::Mat1d rest(depth - plane * fit);
+  depths.mean_mm = cv::mean(depth)[0];
+  depths.tilt_x_um_per_mm = 1000 * fit(1);
+  depths.tilt_y_um_per_mm = 1000 * fit(2);
+  depths.spread = std::sqrt(rest.dot(rest) / n) / depths.mean_mm;
+}
+
+/// Depth at a place from a paraboloid through the disc of `reach` pixels about it: the greatest
+/// single pixel would be the one with the most noise. NaN when not all of the disc is trusted.
+double peak_um(const std::vector<float>& um, int width, int height, double col, double row,
+               double reach) {
+  constexpr int kTerms = 6;
+  std::vector<double> terms;
+  std::vector<double> depths;
+  for (int y = static_cast<int>(std::ceil(row - reach)); y <= row + reach; ++y) {
+    for (int x = static_cast<int>(std::ceil(col - reach)); x <= col + reach; ++x) {
+      const double dx = (x - col) / reach;
+      const double dy = (y - row) / reach;
+      if (std::hypot(dx, dy) > 1) continue;
+      if (x < 0 || y < 0 || x >= width || y >= height) return std::nan("");
+      terms.insert(terms.end(), {1, dx, dy, dx * dx, dx * dy, dy * dy});
+      depths.push_back(um[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                          static_cast<std::size_t>(x)]);
+    }
+  }
+  const auto n = static_cast<int>(depths.size());
+  if (n < 2 * kTerms) return std::nan("");
+  cv::Mat1d fit;
+  cv::solve(cv::Mat1d(n, kTerms, terms.data()), cv::Mat1d(n, 1, depths.data()), fit, cv::DECOMP_QR);
+  return fit(0);
+}
+
+PinDepths read_pins(const FolderEvaluation& e, const PinPress& pins,
+                    const calibration::Calibration& calibration, const Board& board) {
+  const recon::Model& model = *calibration.model;
+  const int width = model.rectify.width;
+  const std::vector<float> um =
+      calibration::mean_depth_um(model, e.board_reference.mean_q8().pixels, e.board.frames());
+  const recon::Point corner = surface_point(
+      pins.lens.lens,
+      {calibration.crop_col, calibration.crop_row, width, model.rectify.height, model.mm_per_px}, 0,
+      0);
+  const double reach = board.pitch_mm / 5 / model.mm_per_px;
+  PinDepths depths;
+  std::vector<Mark> read;  // Those inside the trusted map.
+  for (std::size_t i = 0; i < pins.marks.size(); ++i) {
+    const Mark& mark = pins.marks[i];
+    const double col = (mark.mm.x - corner.x) / model.mm_per_px;
+    const double row = (mark.mm.y - corner.y) / model.mm_per_px;
+    const double peak = peak_um(um, width, model.rectify.height, col, row, reach);
+    if (std::isnan(peak)) continue;
+    depths.mm.push_back(0.001 * peak * e.gain.left_out_ratio[i]);
+    read.push_back(mark);
+  }
+  if (4 * read.size() < 3 * pins.marks.size()) {
+    throw std::runtime_error(fmt::format("only {} of {} pins lie inside the trusted map",
+                                         read.size(), pins.marks.size()));
+  }
+  judge(depths, read);
+  if (!(depths.mean_mm > 0)) throw std::runtime_error("the pins read no depth");
+  return depths;
+}
+
+}  // namespace
+
+FolderEvaluation evaluate_folder(const fs::path& folder, const Board& board,
+                                 double ball_radius_mm) {
+  if (!fs::is_directory(folder)) throw std::runtime_error(folder.string() + ": no such folder");
+  FolderEvaluation e;
+  e.no_pins = load_pair(folder, "board", e.board_reference, e.board);
+  if (e.no_pins.empty()) {
+    try {
+      const cv::Mat1f untouched = mean_levels(e.board_reference);
+      const cv::Mat1f frame = mean_levels(e.board);
+      PinPress pins = find_pins(untouched, frame, board);
+      e.gain = choose_gain(untouched, frame, pins.marks,
+                           calibration::kSmoothingMm / recon::central_mm_per_px(pins.lens.lens));
+      e.pins = std::move(pins);
+    } catch (const std::runtime_error& error) {
+      e.no_pins = error.what();
+    }
+  }
+  e.no_ball = load_pair(folder, "ball", e.ball_reference, e.ball_images);
+  if (e.no_ball.empty() && !e.pins) e.no_ball = "without a lens there is no scale";
+  if (e.pins && e.no_ball.empty()) {
+    try {
+      require_same_size(e.board, "board.png", e.ball_images, "ball.png");
+      evaluate_ball(e, e.pins->lens.lens, ball_radius_mm);
+    } catch (const std::runtime_error& error) {
+      e.no_ball = error.what();
+    }
+  }
+  if (!e.pins || !e.calibration) {
+    e.no_pin_depths = e.pins ? "without a ball there is no list" : "without the pins' places";
+    return e;
+  }
+  try {
+    e.pin_depths = read_pins(e, *e.pins, *e.calibration, board);
+  } catch (const std::runtime_error& error) {
+    e.no_pin_depths = error.what();
+  }
+  return e;
+}
+
+std::vector<std::string> lines_of(const FolderEvaluation& e) {
+  std::vector<std::string> lines;
+  if (e.pins) {
+    const ChosenLens& lens = e.pins->lens;
+    lines.push_back(fmt::format(
+        "lens: {} pins ({} rows, {} columns), RMS distance from the ideal grid {:.4f} mm in "
+        "sample, "
+        "{:.4f} mm each left out; {} parameters; {:.5f} mm per pixel in the middle",
+        e.pins->marks.size(), e.pins->rows, e.pins->cols, rms(lens.in_sample), rms(lens.left_out),
+        parameters(lens.model), recon::central_mm_per_px(lens.lens)));
+    if (!e.pins->missing.empty()) {
+      lines.push_back(fmt::format("lens: pins not found: {}", fmt::join(e.pins->missing, "; ")));
+    }
+    lines.push_back(e.gain.describe());
+  } else {
+    lines.push_back("lens: skipped: " + e.no_pins);
+  }
+  if (e.ball) {
+    lines.push_back(fmt::format(
+        "ball: contact at row {:.1f}, column {:.1f} of the rectified image, offset {:+.4f} mm "
+        "taken "
+        "off; mean absolute error {:.4f} mm in sample, {:.4f} mm half-disc (worst of eight {:.4f})",
+        e.ball->contact.row, e.ball->contact.col, e.ball->offset_mm, e.ball->mae_mm,
+        e.ball->half_mae_mm.value_or(0), e.ball->half_worst_mm.value_or(0)));
+  } else {
+    lines.push_back("ball: skipped: " + e.no_ball);
+  }
+  if (e.pin_depths) {
+    const PinDepths& p = *e.pin_depths;
+    lines.push_back(fmt::format(
+        "pin depths: {} pins, mean {:.3f} mm, spread (std/mean) {:.1f} % after a tilt of {:+.2f}, "
+        "{:+.2f} "
+        "um/mm",
+        p.mm.size(), p.mean_mm, 100 * p.spread, p.tilt_x_um_per_mm, p.tilt_y_um_per_mm));
+  } else {
+    lines.push_back("pin depths: skipped: " + e.no_pin_depths);
+  }
+  return lines;
+}
+
+}  // namespace dtact::ctl

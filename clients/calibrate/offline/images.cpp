@@ -1,0 +1,85 @@
+#include "clients/calibrate/offline/images.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+
+#include "daemon/calibration/sha256.hpp"
+#include "hal/base/atomic_file.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> files_of(const fs::path& path, const std::string& option) {
+  if (!fs::is_directory(path)) return {path};
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
+    if (entry.path().extension() == ".png") files.push_back(entry.path());
+  }
+  if (files.empty()) {
+    throw std::runtime_error(
+        fmt::format("{}: no .png file in the folder {}", option, path.string()));
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+}  // namespace
+
+std::vector<image::Grey8> ImageSet::frames() const {
+  std::vector<image::Grey8> all;
+  for (const image::Grey16& wide : images) {
+    image::Grey8& frame = all.emplace_back(image::Grey8{wide.width, wide.height, {}});
+    frame.pixels.resize(wide.pixels.size());
+    std::ranges::transform(wide.pixels, frame.pixels.begin(), [](std::uint16_t value) {
+      return static_cast<std::uint8_t>((value + 128) / 257);
+    });
+  }
+  return all;
+}
+
+image::Grey16 ImageSet::mean_q8() const {
+  image::Grey16 mean{width(), height(), {}};
+  mean.pixels.resize(images.front().pixels.size());
+  // 65535 is grey level 255, in Q8 65280: 256/257 of it.
+  const auto divisor = 257.0 * static_cast<double>(images.size());
+  for (std::size_t i = 0; i < mean.pixels.size(); ++i) {
+    double sum = 0;
+    for (const image::Grey16& wide : images) sum += wide.pixels[i];
+    mean.pixels[i] = static_cast<std::uint16_t>(std::lround(sum * 256 / divisor));
+  }
+  return mean;
+}
+
+ImageSet load_images(const std::vector<std::string>& paths, const std::string& option) {
+  ImageSet set;
+  for (const std::string& path : paths) {
+    for (const fs::path& file : files_of(path, option)) {
+      const std::string bytes = base::read_file(file);
+      image::Grey16 image = image::decode_png_grey16(bytes, file.string());
+      if (!set.images.empty() && (image.width != set.width() || image.height != set.height())) {
+        throw std::runtime_error(fmt::format("{}: {} is {}x{} but {} is {}x{}", option,
+                                             file.string(), image.width, image.height,
+                                             set.sources.front().name, set.width(), set.height()));
+      }
+      set.images.push_back(std::move(image));
+      set.sources.push_back({file.filename().string(), calibration::sha256_hex(bytes)});
+    }
+  }
+  return set;
+}
+
+void require_same_size(const ImageSet& a, const std::string& a_option, const ImageSet& b,
+                       const std::string& b_option) {
+  if (a.width() == b.width() && a.height() == b.height()) return;
+  throw std::runtime_error(
+      fmt::format("{} is {}x{} but {} is {}x{}; both must come from one camera mode", a_option,
+                  a.width(), a.height(), b_option, b.width(), b.height()));
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,85 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <stdexcept>
+
+#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/offline/depth_file.hpp"
+#include "clients/calibrate/offline/images.hpp"
+#include "clients/calibrate/offline/offline.hpp"
+#include "hal/base/atomic_file.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+struct Options {
+  std::string calibration;
+  std::vector<std::string> reference;
+  std::string frame;
+  std::string output;
+};
+
+using Encoder = std::string (*)(const DepthImage&);
+
+Encoder encoder_for(const std::string& output) {
+  const std::string ending = std::filesystem::path(output).extension().string();
+  if (ending == ".npy") return encode_npy;
+  if (ending == ".png") return encode_colour_png;
+  if (ending == ".ply") return encode_ply;
+  throw std::runtime_error(output + ": the name must end in .npy, .png or .ply");
+}
+
+void run(const Options& options) {
+  const Encoder encode = encoder_for(options.output);
+  const calibration::Calibration calibration = calibration::load(options.calibration);
+  const ImageSet reference = load_images(options.reference, "--reference");
+  const ImageSet frame = load_images({options.frame}, "--frame");
+  require_same_size(reference, "--reference", frame, "--frame");
+  const recon::Model& model = *calibration.model;
+  if (frame.width() != model.rectify.frame_width || frame.height() != model.rectify.frame_height) {
+    throw std::runtime_error(fmt::format("--frame is {}x{} but the calibration is for {}x{}",
+                                         frame.width(), frame.height(), model.rectify.frame_width,
+                                         model.rectify.frame_height));
+  }
+  std::vector<float> mm =
+      calibration::mean_depth_um(model, reference.mean_q8().pixels, frame.frames());
+  for (float& value : mm) value *= 0.001F;
+  base::write_file_atomically(
+      options.output, encode({model.rectify.width, model.rectify.height, model.mm_per_px, mm}));
+
+  float deepest = 0;
+  std::size_t untrusted = 0;
+  for (const float value : mm) {
+    if (std::isnan(value)) {
+      ++untrusted;
+    } else {
+      deepest = std::max(deepest, value);
+    }
+  }
+  fmt::print("{}: {}x{}, deepest {:.3f} mm, {} pixels untrusted\n", options.output,
+             model.rectify.width, model.rectify.height, deepest, untrusted);
+}
+
+}  // namespace
+
+void add_reconstruct(CLI::App& app) {
+  CLI::App* reconstruct =
+      app.add_subcommand("reconstruct", "Reconstruct the depth of an image, as the daemon does");
+  const auto options = std::make_shared<Options>();
+  reconstruct->add_option("--calibration", options->calibration, "Calibration folder")->required();
+  reconstruct
+      ->add_option("--reference", options->reference,
+                   "Untouched surface: PNG files, or a folder of them (averaged)")
+      ->required();
+  reconstruct->add_option("--frame", options->frame, "The image: a PNG file")->required();
+  reconstruct
+      ->add_option("-o,--output", options->output,
+                   "depth.npy (float32 mm), depth.png (colours) or depth.ply (points)")
+      ->required();
+  reconstruct->callback([options] { run(*options); });
+}
+
+}  // namespace dtact::ctl
