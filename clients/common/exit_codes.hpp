@@ -3,9 +3,9 @@
 #include <stdexcept>
 #include <string>
 
-namespace dtact::ctl {
+namespace dtact::cli {
 
-/// What dtactctl returns to the shell; `dtactctl --help` prints kExitCodesHelp.
+/// What the programs return to the shell; `--help` prints kExitCodesHelp.
 enum ExitCode : int {
   kOk = 0,
   kFailed = 1,        ///< The command failed or the daemon refused it.
@@ -30,4 +30,4 @@ class Failure : public std::runtime_error {
   ExitCode code_;
 };
 
-}  // namespace dtact::ctl
+}  // namespace dtact::cli

@@ -2,7 +2,7 @@
 
 #include <csignal>
 
-namespace dtact::ctl {
+namespace dtact::cli {
 
 /// While one of these lasts, Ctrl-C and SIGTERM do not end the program; happened() tells that one
 /// came. One at a time.
@@ -28,4 +28,4 @@ class Interruptible {
   void (*terminate_)(int);
 };
 
-}  // namespace dtact::ctl
+}  // namespace dtact::cli

@@ -1,12 +1,13 @@
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <ostream>
 #include <stdexcept>
 
-#include "clients/calibrate/offline/depth_file.hpp"
+#include "clients/common/depth_file.hpp"
 #include "clients/ctl/json/json.hpp"
 #include "clients/ctl/online.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -21,14 +22,27 @@ struct SnapshotOptions {
   double timeout_s = 5;
 };
 
-using Encode = std::string (*)(const DepthImage&);
-
-Encode encoder_for(const std::string& path) {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  if (extension == ".npy") return encode_npy;
-  if (extension == ".png") return encode_colour_png;
-  if (extension == ".ply") return encode_ply;
-  throw CLI::ValidationError("-o " + path, "the name must end in .npy, .png or .ply");
+/// The map as a picture: the deeper, the lighter, from the shallowest pixel to the deepest; what is
+/// not to be believed is orange. dtact-calibrate has colours and a legend.
+std::string encode_grey_png(const cli::DepthImage& depth) {
+  float low = 0;
+  float high = 0.1F;
+  for (const float mm : depth.mm) {
+    if (std::isnan(mm)) continue;
+    low = std::min(low, mm);
+    high = std::max(high, mm);
+  }
+  image::Rgb8 picture{depth.width, depth.height, {}};
+  picture.pixels.reserve(3 * depth.mm.size());
+  for (const float mm : depth.mm) {
+    if (std::isnan(mm)) {
+      picture.pixels.insert(picture.pixels.end(), {230, 90, 0});
+    } else {
+      const auto grey = static_cast<std::uint8_t>(std::lround(255 * (mm - low) / (high - low)));
+      picture.pixels.insert(picture.pixels.end(), 3, grey);
+    }
+  }
+  return image::encode_png(picture);
 }
 
 /// The next frame that holds what is asked for.
@@ -63,13 +77,13 @@ std::string encode(const client::Frame& frame, const SnapshotOptions& options) {
         image::Grey8{frame.luma->width, frame.luma->height, frame.luma->values});
   }
   const auto mm = frame.depth->millimetres();
-  return encoder_for(options.output)(
+  return cli::encoder_for(options.output, encode_grey_png)(
       {frame.depth->width, frame.depth->height, frame.depth->mm_per_px, mm});
 }
 
 void run_snapshot(const Context& context, const SnapshotOptions& options) {
   if (!options.luma) {
-    (void)encoder_for(options.output);
+    (void)cli::encoder_for(options.output, encode_grey_png);
   } else if (std::filesystem::path(options.output).extension() != ".png") {
     throw CLI::ValidationError("-o " + options.output, "with --luma the name must end in .png");
   }
@@ -97,9 +111,10 @@ void add_snapshot(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("snapshot", "Save one frame of the running daemon");
   const auto options = std::make_shared<SnapshotOptions>();
   command
-      ->add_option("-o,--output", options->output,
-                   "depth.npy (float32 mm, NaN where untrusted), depth.png (colours) or depth.ply "
-                   "(points, mm); with --luma a .png")
+      ->add_option(
+          "-o,--output", options->output,
+          "depth.npy (float32 mm, NaN where untrusted), depth.png (the deeper, the lighter) "
+          "or depth.ply (points, mm); with --luma a .png")
       ->required();
   command->add_flag("--luma", options->luma, "The camera's grey image instead of the depth");
   command->add_option("--timeout", options->timeout_s, "Seconds to wait for a frame")

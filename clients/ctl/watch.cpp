@@ -35,7 +35,7 @@ class Watch {
         client_(context.target) {}
 
   void run() {
-    const Interruptible while_watching;
+    const cli::Interruptible while_watching;
     client::Subscription subscription;
     subscription.summary = options_.summary;
     client_.subscribe(subscription);
@@ -44,7 +44,7 @@ class Watch {
       loop();
     } catch (const client::ConnectionError&) {
       // One Ctrl-C may end the daemon as well.
-      if (!Interruptible::happened()) throw;
+      if (!cli::Interruptible::happened()) throw;
     }
     finish();
   }
@@ -58,7 +58,7 @@ class Watch {
                                     : INT64_MAX;
     const std::int64_t interval_ns = terminal_ ? kSecondNs / 2 : kSecondNs;
     std::int64_t next_line_ns = start_ns_ + interval_ns;
-    while (!Interruptible::happened() && now() < end_ns) {
+    while (!cli::Interruptible::happened() && now() < end_ns) {
       const auto wait_ns = std::min(next_line_ns, end_ns) - now();
       // At most 100 ms, so that a signal is soon seen.
       auto message = client_.next(
@@ -139,9 +139,10 @@ class Watch {
           all_.health().empty() ? "none" : fmt::format("{}", fmt::join(all_.health(), ", ")));
     }
     if (fps < options_.min_fps) {
-      throw Failure(kNotMet, fmt::format("depth came at {:.1f} frames a second, {:g} were asked "
-                                         "for: dtactctl status says why",
-                                         fps, options_.min_fps));
+      throw cli::Failure(cli::kNotMet,
+                         fmt::format("depth came at {:.1f} frames a second, {:g} were asked "
+                                     "for: dtactctl status says why",
+                                     fps, options_.min_fps));
     }
   }
 

@@ -15,7 +15,7 @@ evaluate() {
     echo "skipped: $images is not there"
     return
   fi
-  "$bin/dtactctl" evaluate --folder "$images" -o "$out/$1"
+  "$bin/dtact-calibrate" evaluate --folder "$images" -o "$out/$1"
 }
 evaluate sensor_a
 evaluate sensor_b
@@ -26,9 +26,9 @@ raw() {
   local images=../shared/data/$1
   [[ -d $images ]] || return 0
   echo "== $1, real images, without a lens ($2 mm/px)"
-  "$bin/dtactctl" calibrate depth --reference "$images/ball_reference.png" \
+  "$bin/dtact-calibrate" depth --reference "$images/ball_reference.png" \
     --ball "$images/ball.png" --radius-mm 4.0 --mm-per-px "$2" -o "$out/$1_raw"
-  "$bin/dtactctl" evaluate --calibration "$out/$1_raw" --reference "$images/ball_reference.png" \
+  "$bin/dtact-calibrate" evaluate --calibration "$out/$1_raw" --reference "$images/ball_reference.png" \
     --ball "$images/ball.png" --radius-mm 4.0
 }
 raw sensor_a 0.0510
@@ -38,10 +38,10 @@ echo "== pictures, simulated sensor"
 scene=config/scenes/calibrate_ball.toml
 "$bin/dtact-sim-render" --scene "$scene" --frames 0:32 -o "$out/reference"
 "$bin/dtact-sim-render" --scene "$scene" --frames 300:332 -o "$out/ball"
-"$bin/dtactctl" calibrate depth --reference "$out/reference" --ball "$out/ball" --radius-mm 4.0 \
+"$bin/dtact-calibrate" depth --reference "$out/reference" --ball "$out/ball" --radius-mm 4.0 \
   --mm-per-px 0.0413793 --centre 300,400 --crop 580,580 -o "$out/simulated"
 # Frame 540 of the built-in scene: an M4 nut pressed 0.9 mm deep.
 "$bin/dtact-sim-render" --frames 540 -o "$out/nut.png"
-"$bin/dtactctl" reconstruct --calibration "$out/simulated" --reference "$out/reference" \
+"$bin/dtact-calibrate" reconstruct --calibration "$out/simulated" --reference "$out/reference" \
   --frame "$out/nut.png" -o tests/accuracy/m4_nut.png
 echo "pictures: $out/sensor_*/index.html, tests/accuracy/m4_nut.png"

@@ -214,5 +214,22 @@ TEST(Ctl, SaysWhatIsWrong) {
   EXPECT_THAT(output, HasSubstr("dtactd"));
 }
 
+TEST(Ctl, StartsTheProgramThatMakesCalibrations) {
+  std::string output;
+  EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "--version", "calibrate"}, &output), 0);
+  EXPECT_THAT(output, HasSubstr("dtactctl "));
+  EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "calibrate", "depth", "--help"}, &output), 0);
+  EXPECT_THAT(output, HasSubstr("--ball"));
+  EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "evaluate"}, &output), 1);
+  EXPECT_THAT(output, HasSubstr("dtact-calibrate: give --folder, or"));
+  // Neither beside dtactctl nor in PATH.
+  const TempFolder folder;
+  const std::string alone = (folder.path() / "dtactctl").string();
+  std::filesystem::copy_file(DTACTCTL_PROGRAM, alone);
+  EXPECT_EQ(run_program({"/usr/bin/env", "PATH=/", alone, "calibrate", "depth"}, &output), 1);
+  EXPECT_THAT(output, AllOf(HasSubstr("dtactctl: cannot start dtact-calibrate"),
+                            HasSubstr("No such file"), HasSubstr(folder.path().string())));
+}
+
 }  // namespace
 }  // namespace dtact::e2e

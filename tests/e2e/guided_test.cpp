@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-/// Exit codes of dtactctl (clients/common/exit_codes.hpp).
+/// Exit codes of the programs (clients/common/exit_codes.hpp).
 constexpr int kDone = 0;
 constexpr int kFailed = 1;
 constexpr int kNoConnection = 3;
@@ -27,7 +27,8 @@ constexpr int kNotMet = 4;
 
 std::string enters(int count) { return std::string(static_cast<std::size_t>(count), '\n'); }
 
-/// `dtactctl calibrate` in the sensor's folder, with these lines typed.
+/// `dtactctl calibrate`, which starts dtact-calibrate, in the sensor's folder, with these lines
+/// typed.
 int guide(const Sensor& sensor, const std::string& typed, std::string* output,
           const std::vector<std::string>& more = {}) {
   std::vector<std::string> arguments = {DTACTCTL_PROGRAM,
@@ -109,7 +110,8 @@ TEST(Guided, QuitRetakeAndGoOn) {
   const Sensor sensor(scene_file("calibration_presses.toml"), false);
   std::string output;
   EXPECT_EQ(guide(sensor, "\n\n\nr\nq\n", &output), kNotMet) << output;
-  EXPECT_THAT(output, AllOf(HasSubstr("[r] retake press-02"), HasSubstr("To go on: dtactctl")));
+  EXPECT_THAT(output, AllOf(HasSubstr("[r] retake press-02"),
+                            HasSubstr("To go on: dtact-calibrate guided")));
   EXPECT_TRUE(there(sensor, "reference/sensor.toml"));
   EXPECT_TRUE(there(sensor, "press-02/15.png"));
   EXPECT_FALSE(there(sensor, "press-03"));

@@ -18,7 +18,7 @@ inline constexpr int kCropRow = 10;
 inline constexpr int kCropSide = 580;
 
 /// A calibration folder of the simulated sensor, made once in a test program the way a user makes
-/// it: images of the scene calibrate_ball.toml and `dtactctl calibrate depth`. The simulator's
+/// it: images of the scene calibrate_ball.toml and `dtact-calibrate depth`. The simulator's
 /// truth has no part in it.
 const std::filesystem::path& calibration_folder();
 

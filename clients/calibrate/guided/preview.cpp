@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "clients/calibrate/offline/drawing.hpp"
@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kUntouchedGrey = 200;
 constexpr int kShadesPerLevel = 4;
-constexpr Colour kMark{230, 90, 0};
+const cv::Scalar kMark(230, 90, 0);
 constexpr int kMargin = 12;
 /// The first of the terminal's greys, which run from almost black to almost white.
 constexpr int kFirstGrey = 232;
@@ -51,28 +51,24 @@ image::Grey8 darkening_picture(const image::Grey8& untouched, const image::Grey8
 
 image::Rgb8 annotated(const image::Grey8& picture, double mm_per_px,
                       const std::optional<calibration::Contact>& contact) {
-  image::Rgb8 out{picture.width, picture.height, {}};
-  out.pixels.reserve(3 * picture.pixels.size());
-  for (const std::uint8_t grey : picture.pixels) out.pixels.insert(out.pixels.end(), 3, grey);
+  Picture out(picture.height, picture.width);
+  std::ranges::transform(picture.pixels, out.begin(), cv::Vec3b::all);
   if (contact) {
     const double radius = contact->radius_mm / mm_per_px;
-    const int steps = static_cast<int>(8 * radius) + 8;
-    for (int i = 0; i < steps; ++i) {
-      const double angle = 2 * std::numbers::pi * i / steps;
-      fill(out, static_cast<int>(std::lround(contact->col + radius * std::cos(angle))),
-           static_cast<int>(std::lround(contact->row + radius * std::sin(angle))), 2, 2, kMark);
-    }
+    cv::circle(out, cv::Point2d(contact->col, contact->row), static_cast<int>(std::lround(radius)),
+               kMark, 2);
     const std::string text = fmt::format("{:.1f} mm", 2 * contact->radius_mm);
-    draw_text(out, static_cast<int>(contact->col) - text_width(text) / 2,
-              std::min(picture.height - 2 * kTextHeight,
-                       static_cast<int>(contact->row + radius) + kTextHeight / 2),
+    draw_text(out,
+              {static_cast<int>(contact->col) - text_width(text) / 2,
+               std::min(picture.height - 2 * kTextHeight,
+                        static_cast<int>(contact->row + radius) + kTextHeight / 2)},
               text, kMark);
   }
   const int bar = std::min(picture.width, static_cast<int>(std::lround(5 / mm_per_px)));
   const int top = picture.height - kMargin - kTextHeight;
-  fill(out, kMargin, top - 6, bar, 3, kMark);
-  draw_text(out, kMargin, top, "5 mm", kMark);
-  return out;
+  cv::rectangle(out, cv::Rect(kMargin, top - 6, bar, 3), kMark, cv::FILLED);
+  draw_text(out, {kMargin, top}, "5 mm", kMark);
+  return to_image(out);
 }
 
 std::vector<std::string> half_blocks(const image::Grey8& picture, int columns) {

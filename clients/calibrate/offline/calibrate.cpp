@@ -83,10 +83,8 @@ void run(const Options& options) {
 }  // namespace
 
 void add_calibrate(CLI::App& app) {
-  CLI::App* calibrate = app.add_subcommand("calibrate", "Make a calibration");
-  calibrate->require_subcommand(0, 1);
-  CLI::App* depth = calibrate->add_subcommand(
-      "depth", "Make the list of darkening and indentation from the press of a ball");
+  CLI::App* depth = app.add_subcommand(
+      "depth", "Make a calibration from images: the press of a ball, or several presses");
   const auto options = std::make_shared<Options>();
   depth
       ->add_option("--reference", options->reference,
@@ -117,7 +115,6 @@ void add_calibrate(CLI::App& app) {
                    "Folder to write; an old calibration is replaced")
       ->required();
   depth->callback([options] { run(*options); });
-  add_calibrate_lens(*calibrate);
 }
 
 }  // namespace dtact::ctl

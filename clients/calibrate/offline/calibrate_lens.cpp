@@ -102,8 +102,8 @@ void run(const Options& options) {
 
 }  // namespace
 
-void add_calibrate_lens(CLI::App& calibrate) {
-  CLI::App* lens = calibrate.add_subcommand(
+void add_calibrate_lens(CLI::App& app) {
+  CLI::App* lens = app.add_subcommand(
       "lens", "Measure where the camera shows the surface, from a board of pins or chessboards");
   const auto options = std::make_shared<Options>();
   CLI::Option* reference =

@@ -1,26 +1,23 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
-#include <string_view>
+#include <opencv2/core.hpp>
+#include <string>
 
 #include "hal/image/png.hpp"
 
 namespace dtact::ctl {
 
-using Colour = std::array<std::uint8_t, 3>;  ///< r, g, b
-
-/// A canvas of one colour.
-[[nodiscard]] image::Rgb8 canvas(int width, int height, Colour colour);
-
-/// What lies outside the canvas is left out.
-void fill(image::Rgb8& image, int left, int top, int width, int height, Colour colour);
+/// A picture to draw on with OpenCV, whose channels are r, g, b.
+using Picture = cv::Mat3b;
 
 /// Height of a line of text, pixels.
 inline constexpr int kTextHeight = 14;
 /// Width of a text, pixels.
-[[nodiscard]] int text_width(std::string_view text);
-/// Digits, '.', '-', '+', 'm' and blanks; others are blank.
-void draw_text(image::Rgb8& image, int left, int top, std::string_view text, Colour colour);
+[[nodiscard]] int text_width(const std::string& text);
+/// Writes a line of text with its upper left corner there.
+void draw_text(Picture& picture, cv::Point corner, const std::string& text,
+               const cv::Scalar& colour);
+
+[[nodiscard]] image::Rgb8 to_image(const Picture& picture);
 
 }  // namespace dtact::ctl

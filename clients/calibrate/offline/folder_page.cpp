@@ -4,9 +4,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <opencv2/imgproc.hpp>
 
 #include "clients/calibrate/offline/board_images.hpp"
-#include "clients/calibrate/offline/depth_file.hpp"
+#include "clients/calibrate/offline/colour_map.hpp"
 #include "clients/calibrate/offline/drawing.hpp"
 #include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "hal/base/atomic_folder.hpp"
@@ -14,46 +15,32 @@
 namespace dtact::ctl {
 namespace {
 
-constexpr Colour kFound{230, 60, 30};
-constexpr Colour kIdeal{30, 140, 250};
-constexpr Colour kPaper{255, 255, 255};
+const cv::Scalar kFound(230, 60, 30);
+const cv::Scalar kIdeal(30, 140, 250);
 
-void cross(image::Rgb8& image, recon::Point at, int arm, Colour colour) {
-  const auto x = static_cast<int>(std::lround(at.x));
-  const auto y = static_cast<int>(std::lround(at.y));
-  fill(image, x - arm, y, 2 * arm + 1, 1, colour);
-  fill(image, x, y - arm, 1, 2 * arm + 1, colour);
-}
-
-/// A dotted line.
-void line(image::Rgb8& image, recon::Point from, recon::Point to, Colour colour) {
-  const double length = std::hypot(to.x - from.x, to.y - from.y);
-  for (double s = 0; s <= length; s += 0.5) {
-    const double part = length > 0 ? s / length : 0;
-    fill(image, static_cast<int>(std::lround(std::lerp(from.x, to.x, part))),
-         static_cast<int>(std::lround(std::lerp(from.y, to.y, part))), 1, 1, colour);
-  }
+void cross(Picture& picture, recon::Point at, int arm, const cv::Scalar& colour) {
+  cv::drawMarker(picture, cv::Point2d(at.x, at.y), colour, cv::MARKER_CROSS, 2 * arm + 1);
 }
 
 /// Darkening as grey: black least, white most, the outermost two parts in a thousand cut off.
-image::Rgb8 grey_of(int width, int height, const std::vector<float>& levels) {
+Picture grey_of(int width, int height, const std::vector<float>& levels) {
   std::vector<float> sorted;
   std::ranges::copy_if(levels, std::back_inserter(sorted), [](float v) { return !std::isnan(v); });
   std::ranges::sort(sorted);
   const std::size_t cut = sorted.size() / 500;
   const float low = sorted.empty() ? 0 : sorted[cut];
   const float high = sorted.empty() ? 1 : sorted[sorted.size() - 1 - cut];
-  image::Rgb8 image = canvas(width, height, kPaper);
+  Picture picture(height, width, cv::Vec3b(255, 255, 255));
   for (int y = 0, i = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x, ++i) {
       const float level = levels[static_cast<std::size_t>(i)];
       if (std::isnan(level)) continue;
       const auto grey = static_cast<std::uint8_t>(
           std::lround(230 * std::clamp((level - low) / std::max(high - low, 1e-3F), 0.F, 1.F)));
-      fill(image, x, y, 1, 1, {grey, grey, grey});
+      picture(y, x) = {grey, grey, grey};
     }
   }
-  return image;
+  return picture;
 }
 
 /// The camera's view of the board with the pins found and, twenty times as long, how far each is
@@ -61,15 +48,16 @@ image::Rgb8 grey_of(int width, int height, const std::vector<float>& levels) {
 std::string pins_png(const FolderEvaluation& e) {
   constexpr double kLonger = 20;
   const cv::Mat1f levels(mean_levels(e.board_reference) - mean_levels(e.board));
-  image::Rgb8 image = grey_of(levels.cols, levels.rows, {levels.begin(), levels.end()});
+  Picture picture = grey_of(levels.cols, levels.rows, {levels.begin(), levels.end()});
   for (std::size_t i = 0; i < e.pins->marks.size(); ++i) {
     const recon::Point px = e.pins->marks[i].px;
     const recon::Point residual = e.pins->lens.left_out[i];
     const double scale = kLonger / recon::central_mm_per_px(e.pins->lens.lens);
-    cross(image, px, 5, kFound);
-    line(image, px, {px.x + scale * residual.x, px.y + scale * residual.y}, kIdeal);
+    cross(picture, px, 5, kFound);
+    cv::line(picture, cv::Point2d(px.x, px.y),
+             cv::Point2d(px.x + scale * residual.x, px.y + scale * residual.y), kIdeal);
   }
-  return image::encode_png(image);
+  return image::encode_png(to_image(picture));
 }
 
 /// The board as the lens rectifies it, with the ideal grid.
@@ -86,14 +74,14 @@ std::string grid_png(const FolderEvaluation& e) {
                             ? std::numeric_limits<float>::quiet_NaN()
                             : levels(at.y + (at.fy + 64) / 128, at.x + (at.fx + 64) / 128));
   }
-  image::Rgb8 image = grey_of(place.width, place.height, rectified);
+  Picture picture = grey_of(place.width, place.height, rectified);
   const recon::Point corner = surface_point(lens, place, 0, 0);
   for (const Mark& mark : e.pins->marks) {
-    cross(image,
+    cross(picture,
           {(mark.mm.x - corner.x) / place.mm_per_px, (mark.mm.y - corner.y) / place.mm_per_px}, 7,
           kIdeal);
   }
-  return image::encode_png(image);
+  return image::encode_png(to_image(picture));
 }
 
 std::string depth_png(const FolderEvaluation& e, const ImageSet& reference, const ImageSet& press) {
@@ -104,11 +92,11 @@ std::string depth_png(const FolderEvaluation& e, const ImageSet& reference, cons
   return encode_colour_png({model.rectify.width, model.rectify.height, model.mm_per_px, mm});
 }
 
-struct Picture {
+struct Figure {
   const char* file;
   const char* caption;
 };
-constexpr std::array<Picture, 4> kPictures{{
+constexpr std::array<Figure, 4> kFigures{{
     {"pins.png",
      "The camera's view of the board: darkening, the pins found (red) and, twenty times as long, "
      "how "
@@ -158,12 +146,12 @@ void write_page(const FolderEvaluation& e, const std::string& name,
   for (const std::string& text : lines_of(e)) html += fmt::format("<li>{}</li>\n", escaped(text));
   html += "</ul>\n";
   std::vector<std::string> known{"index.html"};
-  for (const Picture& picture : kPictures) {
-    known.emplace_back(picture.file);
-    if (std::ranges::none_of(files, [&](const auto& f) { return f.first == picture.file; }))
+  for (const Figure& figure : kFigures) {
+    known.emplace_back(figure.file);
+    if (std::ranges::none_of(files, [&](const auto& f) { return f.first == figure.file; }))
       continue;
     html += fmt::format("<figure><img src=\"{}\" alt=\"\"><figcaption>{}</figcaption></figure>\n",
-                        picture.file, picture.caption);
+                        figure.file, figure.caption);
   }
   files.emplace_back("index.html", html + "</body></html>\n");
   base::write_folder_atomically(folder, files, known, "an evaluation's page");

@@ -7,11 +7,10 @@ namespace dtact::ctl {
 // Each adds a command to `app` whose callback does the work and prints its result to standard
 // output; it throws std::runtime_error or std::invalid_argument with a sentence on failure.
 
-/// calibrate depth --reference R.png --ball B.png --radius-mm 4.0 --mm-per-px S -o cal/
-/// and calibrate lens (below).
+/// depth --reference R.png --ball B.png --radius-mm 4.0 --mm-per-px S -o cal/
 void add_calibrate(CLI::App& app);
-/// lens --board-reference R.png --board B.png -o lens.toml, a command of `calibrate`.
-void add_calibrate_lens(CLI::App& calibrate);
+/// lens --board-reference R.png --board B.png -o lens.toml
+void add_calibrate_lens(CLI::App& app);
 /// reconstruct --calibration cal/ --reference R.png --frame F.png -o depth.{npy,png,ply}
 void add_reconstruct(CLI::App& app);
 /// evaluate --calibration cal/ --reference R.png --ball B.png --radius-mm 4.0, or --folder DIR.
@@ -21,6 +20,7 @@ void add_evaluate(CLI::App& app, const bool& json);
 /// All of the above.
 inline void add_offline_commands(CLI::App& app, const bool& json) {
   add_calibrate(app);
+  add_calibrate_lens(app);
   add_reconstruct(app);
   add_evaluate(app, json);
 }

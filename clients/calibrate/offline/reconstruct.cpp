@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 #include <stdexcept>
 
 #include "clients/calibrate/fit/difference.hpp"
-#include "clients/calibrate/offline/depth_file.hpp"
+#include "clients/calibrate/offline/colour_map.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -22,18 +21,8 @@ struct Options {
   std::string output;
 };
 
-using Encoder = std::string (*)(const DepthImage&);
-
-Encoder encoder_for(const std::string& output) {
-  const std::string ending = std::filesystem::path(output).extension().string();
-  if (ending == ".npy") return encode_npy;
-  if (ending == ".png") return encode_colour_png;
-  if (ending == ".ply") return encode_ply;
-  throw std::runtime_error(output + ": the name must end in .npy, .png or .ply");
-}
-
 void run(const Options& options) {
-  const Encoder encode = encoder_for(options.output);
+  const cli::DepthEncoder encode = cli::encoder_for(options.output, encode_colour_png);
   const calibration::Calibration calibration = calibration::load(options.calibration);
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet frame = load_images({options.frame}, "--frame");

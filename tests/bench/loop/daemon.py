@@ -16,7 +16,8 @@ class Programs:
 
     def __init__(self, build):
         self.dtactd = os.path.join(build, "daemon", "dtactd")
-        self.dtactctl = os.path.join(build, "clients", "ctl", "dtactctl")
+        self.dtactctl = os.path.join(build, "clients", "dtactctl")
+        self.calibrate = os.path.join(build, "clients", "dtact-calibrate")
         self.render = os.path.join(build, "hal", "sim", "dtact-sim-render")
         self.client = os.path.join(build, "tests", "bench", "loop", "loop_client")
         self.jitter = os.path.join(build, "tests", "bench", "loop", "loop_jitter")
@@ -36,7 +37,7 @@ def prepare(programs, folder):
           ("reference", "press", "calibration", "mjpeg", "grey")}
     run(programs.render, "--scene", scene, "--frames", "0:32", "-o", at["reference"])
     run(programs.render, "--scene", scene, "--frames", "300:316", "-o", at["press"])
-    run(programs.dtactctl, "calibrate", "depth", "--reference", at["reference"], "--ball",
+    run(programs.calibrate, "depth", "--reference", at["reference"], "--ball",
         at["press"], "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400",
         "--crop", "580,580", "-o", at["calibration"])
     ball = os.path.join(HERE, "ball.toml")

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/calibrate/calibrate.hpp"
 #include "clients/ctl/ctl.hpp"
 
 namespace dtact::ctl {
@@ -21,11 +22,10 @@ using testing::UnorderedElementsAre;
 
 /// What bash offers for the last of `words`, which are separated by blanks ("" for an empty one).
 std::set<std::string> complete(const std::string& words) {
-  const std::string script = "source '" DTACT_SOURCE_DIR
-                             "/clients/ctl/dtactctl.bash-completion'; COMP_WORDS=(dtactctl " +
-                             words +
-                             "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _dtactctl; "
-                             "printf '%s\\n' \"${COMPREPLY[@]}\"";
+  const std::string script =
+      "source '" DTACT_SOURCE_DIR "/clients/common/dtact.bash-completion'; COMP_WORDS=(" + words +
+      "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _dtact; "
+      "printf '%s\\n' \"${COMPREPLY[@]}\"";
   std::string quoted;
   for (const char c : script) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
   FILE* pipe = ::popen(("bash --norc -c '" + quoted + "'").c_str(), "r");
@@ -42,8 +42,10 @@ std::set<std::string> complete(const std::string& words) {
   return found;
 }
 
-/// The long options that the program's help for a command names.
-std::set<std::string> options_of(std::vector<std::string> command) {
+using Run = int (*)(const std::vector<std::string>&, std::ostream&, std::ostream&);
+
+/// The long options that a program's help for a command names.
+std::set<std::string> options_of(Run run, std::vector<std::string> command) {
   command.emplace_back("--help");
   std::ostringstream out;
   std::ostringstream error;
@@ -59,42 +61,53 @@ std::set<std::string> options_of(std::vector<std::string> command) {
 }
 
 TEST(Completion, OffersCommands) {
-  EXPECT_THAT(complete("re"), UnorderedElementsAre("rezero", "reconstruct"));
-  EXPECT_THAT(complete("--port 7 s"), UnorderedElementsAre("status", "snapshot"));
-  EXPECT_THAT(complete("calibration \"\""),
+  EXPECT_THAT(complete("dtactctl re"), UnorderedElementsAre("rezero", "reconstruct"));
+  EXPECT_THAT(complete("dtactctl --port 7 s"), UnorderedElementsAre("status", "snapshot"));
+  EXPECT_THAT(complete("dtactctl calibration \"\""),
               UnorderedElementsAre("upload", "list", "show", "activate", "export", "--help"));
+  EXPECT_THAT(complete("dtactctl calibrate d"), UnorderedElementsAre("depth"));
+  EXPECT_THAT(complete("dtact-calibrate re"), UnorderedElementsAre("reconstruct"));
 }
 
 TEST(Completion, OffersValues) {
-  EXPECT_THAT(complete("led --scheme scheme"),
+  EXPECT_THAT(complete("dtactctl led --scheme scheme"),
               UnorderedElementsAre("scheme1", "scheme2", "scheme3", "scheme4"));
-  EXPECT_THAT(complete("calibrate depth --method p"), UnorderedElementsAre("published"));
-  EXPECT_THAT(complete("led --brightness \"\""), UnorderedElementsAre());
+  EXPECT_THAT(complete("dtactctl calibrate depth --method p"), UnorderedElementsAre("published"));
+  EXPECT_THAT(complete("dtact-calibrate depth --method p"), UnorderedElementsAre("published"));
+  EXPECT_THAT(complete("dtactctl led --brightness \"\""), UnorderedElementsAre());
+}
+
+void expect_options(const std::string& program, Run run,
+                    const std::vector<std::vector<std::string>>& commands) {
+  for (const auto& command : commands) {
+    std::string words = program + " ";
+    for (const auto& word : command) words += word + " ";
+    EXPECT_THAT(options_of(run, command), IsSubsetOf(complete(words + "--"))) << words;
+    EXPECT_FALSE(options_of(run, command).empty()) << words;
+  }
 }
 
 TEST(Completion, KnowsEveryOptionOfEveryCommand) {
-  EXPECT_THAT(options_of({}), IsSubsetOf(complete("--")));
-  const std::vector<std::vector<std::string>> commands = {{"status"},
-                                                          {"cameras"},
-                                                          {"watch"},
-                                                          {"led"},
-                                                          {"rezero"},
-                                                          {"snapshot"},
-                                                          {"calibration", "upload"},
-                                                          {"calibration", "list"},
-                                                          {"calibration", "show"},
-                                                          {"calibration", "activate"},
-                                                          {"calibration", "export"},
-                                                          {"calibrate"},
-                                                          {"calibrate", "depth"},
-                                                          {"reconstruct"},
-                                                          {"evaluate"}};
-  for (const auto& command : commands) {
-    std::string words;
-    for (const auto& word : command) words += word + " ";
-    EXPECT_THAT(options_of(command), IsSubsetOf(complete(words + "--"))) << words;
-    EXPECT_FALSE(options_of(command).empty()) << words;
-  }
+  expect_options("dtactctl", ctl::run,
+                 {{},
+                  {"status"},
+                  {"cameras"},
+                  {"watch"},
+                  {"led"},
+                  {"rezero"},
+                  {"snapshot"},
+                  {"calibration", "upload"},
+                  {"calibration", "list"},
+                  {"calibration", "show"},
+                  {"calibration", "activate"},
+                  {"calibration", "export"}});
+  expect_options("dtact-calibrate", calibrate::run,
+                 {{}, {"guided"}, {"depth"}, {"lens"}, {"reconstruct"}, {"evaluate"}});
+  // What dtactctl hands over.
+  EXPECT_THAT(options_of(calibrate::run, {"depth"}),
+              IsSubsetOf(complete("dtactctl calibrate depth --")));
+  EXPECT_THAT(options_of(calibrate::run, {"guided"}),
+              IsSubsetOf(complete("dtactctl calibrate --")));
 }
 
 }  // namespace

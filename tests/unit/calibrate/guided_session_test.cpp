@@ -6,7 +6,7 @@
 
 #include "clients/calibrate/guided/session.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "tests/unit/ctl/guided_fakes.hpp"
+#include "tests/unit/calibrate/guided_fakes.hpp"
 
 namespace dtact::ctl::guided {
 namespace {
@@ -33,7 +33,7 @@ class GuidedSession : public testing::Test {
     plan_.reference_frames = 8;
     plan_.press_frames = 4;
     plan_.patience_s = 20;
-    plan_.again = "dtactctl calibrate --folder X";
+    plan_.again = "dtact-calibrate guided --folder X";
   }
   ~GuidedSession() override { fs::remove_all(plan_.folder.parent_path()); }
 
@@ -108,7 +108,7 @@ TEST_F(GuidedSession, GoesOnAfterQuit) {
     FakeSensor sensor(kEnough);
     FakeConsole console({"", "", "", "q"});
     EXPECT_EQ(run(sensor, console), Outcome::unfinished);
-    EXPECT_THAT(console.said, HasSubstr("To go on: dtactctl calibrate --folder X"));
+    EXPECT_THAT(console.said, HasSubstr("To go on: dtact-calibrate guided --folder X"));
   }
   EXPECT_TRUE(has("reference/sensor.toml"));
   EXPECT_TRUE(has("press-02/03.png"));
@@ -143,7 +143,7 @@ TEST_F(GuidedSession, ADaemonThatGoesSaysHowToGoOn) {
   sensor.frames_until_gone = 100;
   FakeConsole console({"", "", "", ""});
   EXPECT_THROW((void)run(sensor, console), client::ConnectionError);
-  EXPECT_THAT(console.said, HasSubstr("To go on: dtactctl calibrate --folder X"));
+  EXPECT_THAT(console.said, HasSubstr("To go on: dtact-calibrate guided --folder X"));
   EXPECT_TRUE(has("press-01/00.png"));
 }
 

@@ -3,7 +3,7 @@
 #include <span>
 #include <string>
 
-namespace dtact::ctl {
+namespace dtact::cli {
 
 /// A depth map to write: millimetres, NaN where untrusted, row-major.
 struct DepthImage {
@@ -21,7 +21,10 @@ struct DepthImage {
 /// point has negative z.
 [[nodiscard]] std::string encode_ply(const DepthImage& depth);
 
-/// PNG: the map in colours over a legend's numbers in millimetres, a bar of the scale below.
-[[nodiscard]] std::string encode_colour_png(const DepthImage& depth);
+using DepthEncoder = std::string (*)(const DepthImage&);
 
-}  // namespace dtact::ctl
+/// What writes a file of this name: by its ending .npy, .ply or, with `png`, .png. Throws Failure
+/// (wrong usage) for another.
+[[nodiscard]] DepthEncoder encoder_for(const std::string& path, DepthEncoder png);
+
+}  // namespace dtact::cli

@@ -1,26 +1,26 @@
+#include "clients/calibrate/guided_command.hpp"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 
 #include "clients/calibrate/guided/session.hpp"
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/interruptible.hpp"
-#include "clients/ctl/online.hpp"
 
 namespace dtact::ctl {
 namespace {
 
 /// The command that goes on with the work folder, for a shell.
-std::string command_of(const Context& context, const guided::Plan& plan) {
+std::string command_of(const cli::Context& context, const guided::Plan& plan) {
   const client::Options usual;
-  std::string text = "dtactctl";
+  std::string text = "dtact-calibrate";
   if (context.target.host != usual.host) text += " --host " + context.target.host;
   if (context.target.port != usual.port) text += fmt::format(" --port {}", context.target.port);
-  text += fmt::format(" calibrate --radius-mm {}", plan.ball_radius_mm);
+  text += fmt::format(" guided --radius-mm {}", plan.ball_radius_mm);
   if (!plan.map.lens.empty()) text += fmt::format(" --lens '{}'", plan.map.lens);
   if (plan.map.mm_per_px != 0) text += fmt::format(" --mm-per-px {}", plan.map.mm_per_px);
   if (!plan.map.centre.empty())
@@ -29,54 +29,50 @@ std::string command_of(const Context& context, const guided::Plan& plan) {
   return text + fmt::format(" --folder '{}'", plan.folder.string());
 }
 
-void run_guided(const Context& context, guided::Plan plan) {
+void run_guided(const cli::Context& context, guided::Plan plan) {
   plan.again = command_of(context, plan);
   const bool terminal =
       &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1 && ::isatty(STDIN_FILENO) == 1;
-  const Interruptible while_guiding;
+  const cli::Interruptible while_guiding;
   guided::LiveSensor sensor(context.target);
-  guided::StreamConsole console(STDIN_FILENO, context.out, terminal, Interruptible::happened);
+  guided::StreamConsole console(STDIN_FILENO, context.out, terminal, cli::Interruptible::happened);
   try {
     if (guided::Session(sensor, console, plan).run() == guided::Outcome::unfinished) {
-      throw Failure(kNotMet, "there is no calibration yet");
+      throw cli::Failure(cli::kNotMet, "there is no calibration yet");
     }
   } catch (const guided::NotTaken& e) {
-    throw Failure(kNotMet, e.what());
+    throw cli::Failure(cli::kNotMet, e.what());
   }
 }
 
 }  // namespace
 
-void add_guided_calibration(CLI::App& app, Context& context) {
-  CLI::App* calibrate = app.get_subcommand("calibrate");
-  calibrate->description(
-      "Make a calibration: without a further command a guided session with the running daemon, "
-      "from the untouched surface over presses of a ball to the upload");
+void add_guided(CLI::App& app, cli::Context& context) {
+  CLI::App* guided = app.add_subcommand(
+      "guided",
+      "Make a calibration in a session with the running daemon, from the untouched surface over "
+      "presses of a ball to the upload");
   const auto plan = std::make_shared<guided::Plan>();
   plan->folder = "dtact-calibration";
-  CLI::Option* radius =
-      calibrate->add_option("--radius-mm", plan->ball_radius_mm, "Radius of the ball, mm")
-          ->check(CLI::Range(0.1, 100.0));
-  add_map_options(*calibrate, plan->map);
-  calibrate
+  guided->add_option("--radius-mm", plan->ball_radius_mm, "Radius of the ball, mm")
+      ->required()
+      ->check(CLI::Range(0.1, 100.0));
+  add_map_options(*guided, plan->map);
+  guided
       ->add_option("--presses", plan->presses,
                    "After so many presses the calibration is made, where they suffice")
       ->capture_default_str()
       ->check(CLI::Range(2, 99));
-  calibrate
+  guided
       ->add_option("--folder", plan->folder,
                    "Work folder: everything taken is saved there at once, and a session with the "
                    "same folder goes on; its name becomes the calibration's")
       ->capture_default_str();
-  calibrate
+  guided
       ->add_option("--patience", plan->patience_s, "Seconds to wait for a surface that holds still")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
-  calibrate->callback([&context, calibrate, plan, radius] {
-    if (!calibrate->get_subcommands().empty()) return;  // calibrate depth or lens
-    if (radius->empty()) throw CLI::RequiredError("--radius-mm (of the ball, for the session)");
-    run_guided(context, *plan);
-  });
+  guided->callback([&context, plan] { run_guided(context, *plan); });
 }
 
 }  // namespace dtact::ctl

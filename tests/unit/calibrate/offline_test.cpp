@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/calibrate/offline/depth_file.hpp"
+#include "clients/calibrate/offline/colour_map.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
@@ -57,9 +57,9 @@ class Offline : public testing::Test {
     return testing::internal::GetCapturedStdout();
   }
   [[nodiscard]] std::vector<std::string> calibrate() const {
-    return {"calibrate",   "depth",        "--reference", at("reference.png"),
-            "--ball",      at("ball.png"), "--radius-mm", "4.0",
-            "--mm-per-px", "0.05",         "-o",          at("cal")};
+    return {"depth",       "--reference", at("reference.png"), "--ball", at("ball.png"),
+            "--radius-mm", "4.0",         "--mm-per-px",       "0.05",   "-o",
+            at("cal")};
   }
   [[nodiscard]] std::vector<std::string> reconstruct(const std::string& output) const {
     return {"reconstruct", "--calibration", at("cal"), "--reference", at("reference.png"),
@@ -107,7 +107,7 @@ TEST_F(Offline, AFolderStandsForItsImages) {
   write("frames/2.png", image);
   base::write_file_atomically(at("frames/notes.txt"), "not an image");
   std::vector<std::string> arguments = calibrate();
-  arguments[3] = at("frames");
+  arguments[2] = at("frames");
   run(arguments);
   const calibration::Calibration made = calibration::load(at("cal"));
   EXPECT_EQ(made.model->reference_q8[0], 200 * 256 + 128) << "the mean keeps its fraction";
@@ -124,7 +124,7 @@ TEST_F(Offline, AFolderSaysUnderWhichCameraAndLight) {
   std::vector<std::string> arguments = calibrate();
   run(arguments);
   EXPECT_EQ(calibration::load(at("cal")).origin.camera, "") << "images alone say nothing";
-  arguments[3] = at("frames");
+  arguments[2] = at("frames");
   run(arguments);
   const calibration::Origin origin = calibration::load(at("cal")).origin;
   EXPECT_EQ(origin.camera, "usb-1");
@@ -180,16 +180,16 @@ TEST_F(Offline, NamesWhatIsWrong) {
   EXPECT_THAT([&] { run(reconstruct("depth.tif")); },
               ThrowsMessage<std::runtime_error>(HasSubstr(".npy, .png or .ply")));
   std::vector<std::string> missing = calibrate();
-  missing[3] = at("none.png");
+  missing[2] = at("none.png");
   EXPECT_THAT([&] { run(missing); }, ThrowsMessage<std::runtime_error>(HasSubstr("none.png")));
   write("wide.png", Ball{.width = 300}.frame());
   std::vector<std::string> sizes = calibrate();
-  sizes[5] = at("wide.png");
+  sizes[4] = at("wide.png");
   EXPECT_THAT([&] { run(sizes); },
               ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("300x240"), HasSubstr("--ball"))));
   fs::create_directory(at("empty"));
   std::vector<std::string> empty = calibrate();
-  empty[3] = at("empty");
+  empty[2] = at("empty");
   EXPECT_THAT([&] { run(empty); }, ThrowsMessage<std::runtime_error>(HasSubstr("no .png file")));
   write("wide_reference.png", Ball{.width = 300}.untouched());
   std::vector<std::string> other = reconstruct("depth.npy");
@@ -202,7 +202,7 @@ TEST_F(Offline, NamesWhatIsWrong) {
 
 TEST(DepthFile, NpyIsLittleEndianFloats) {
   const std::vector<float> mm{0.0F, 1.5F, -0.25F, std::numeric_limits<float>::quiet_NaN()};
-  const std::string npy = encode_npy({2, 2, 0.05, mm});
+  const std::string npy = cli::encode_npy({2, 2, 0.05, mm});
   ASSERT_EQ(npy.size(), 128U + 16U);
   EXPECT_EQ(npy[127], '\n');
   EXPECT_EQ(npy.substr(128, 12), std::string("\0\0\0\0\0\0\xC0\x3F\0\0\x80\xBE", 12));
@@ -210,7 +210,7 @@ TEST(DepthFile, NpyIsLittleEndianFloats) {
 
 TEST(DepthFile, PlyLeavesUntrustedOutAndPressesDown) {
   const std::vector<float> mm{std::numeric_limits<float>::quiet_NaN(), 0.5F};
-  const std::string ply = encode_ply({2, 1, 0.1, mm});
+  const std::string ply = cli::encode_ply({2, 1, 0.1, mm});
   EXPECT_THAT(ply, AllOf(HasSubstr("binary_little_endian"), HasSubstr("element vertex 1\n")));
   const std::string point = ply.substr(ply.size() - 12);
   EXPECT_EQ(point, std::string("\xCD\xCC\x4C\x3D\0\0\0\0\0\0\0\xBF", 12)) << "0.05, 0, -0.5";

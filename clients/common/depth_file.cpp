@@ -1,12 +1,15 @@
-#include "clients/calibrate/offline/depth_file.hpp"
+#include "clients/common/depth_file.hpp"
 
 #include <fmt/format.h>
 
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 
-namespace dtact::ctl {
+#include "clients/common/exit_codes.hpp"
+
+namespace dtact::cli {
 namespace {
 
 void append_float(std::string& out, float value) {
@@ -56,4 +59,12 @@ std::string encode_ply(const DepthImage& depth) {
          points;
 }
 
-}  // namespace dtact::ctl
+DepthEncoder encoder_for(const std::string& path, DepthEncoder png) {
+  const std::string ending = std::filesystem::path(path).extension().string();
+  if (ending == ".npy") return encode_npy;
+  if (ending == ".png") return png;
+  if (ending == ".ply") return encode_ply;
+  throw Failure(kUsage, path + ": the name must end in .npy, .png or .ply");
+}
+
+}  // namespace dtact::cli

@@ -1,0 +1,60 @@
+#include "clients/common/program.hpp"
+
+#include <algorithm>
+#include <ostream>
+
+#include "clients/common/exit_codes.hpp"
+#include "version.hpp"
+
+namespace dtact::cli {
+namespace {
+
+int parse(CLI::App& app, std::vector<std::string> arguments, std::ostream& out,
+          std::ostream& error) {
+  try {
+    // CLI11 takes them from the back.
+    std::ranges::reverse(arguments);
+    app.parse(std::move(arguments));
+    out.flush();
+    return kOk;
+  } catch (const CLI::ParseError& e) {
+    // Also --help and --version, with exit code 0.
+    return app.exit(e, out, error) == 0 ? kOk : kUsage;
+  }
+}
+
+}  // namespace
+
+void add_global_options(CLI::App& app, Context& context) {
+  const std::string name = app.get_name() + " " DTACT_VERSION;
+  app.set_version_flag("--version", name);
+  app.footer(kExitCodesHelp);
+  app.require_subcommand(1);
+  app.fallthrough();  // global options may stand behind the command
+  context.target.program = name;
+  app.add_option("--host", context.target.host, "Name or address of the daemon's machine")
+      ->capture_default_str();
+  app.add_option("--port", context.target.port, "TCP port of the daemon")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 65535));
+  app.add_flag("--json", context.json, "Print JSON, one object a line");
+}
+
+int run(CLI::App& app, std::vector<std::string> arguments, std::ostream& out, std::ostream& error) {
+  const auto fail = [&](const std::exception& e, ExitCode code) {
+    out.flush();
+    error << app.get_name() << ": " << e.what() << '\n';
+    return code;
+  };
+  try {
+    return parse(app, std::move(arguments), out, error);
+  } catch (const Failure& e) {
+    return fail(e, e.code());
+  } catch (const client::ConnectionError& e) {
+    return fail(e, kNoConnection);
+  } catch (const std::exception& e) {
+    return fail(e, kFailed);
+  }
+}
+
+}  // namespace dtact::cli

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/client.hpp"
+
+namespace dtact::cli {
+
+/// What all commands of a program share. Filled while the command line is parsed.
+struct Context {
+  client::Options target;
+  bool json = false;
+  std::ostream& out;
+};
+
+/// --host, --port, --json and --version, allowed before and behind the command, of which there has
+/// to be one; the exit codes below the help. The daemon knows the program by its name and version.
+void add_global_options(CLI::App& app, Context& context);
+
+/// Parses `arguments` (without the program's own name), which runs the command. Help goes to `out`,
+/// what went wrong as a sentence to `error`. Returns an ExitCode.
+[[nodiscard]] int run(CLI::App& app, std::vector<std::string> arguments, std::ostream& out,
+                      std::ostream& error);
+
+}  // namespace dtact::cli

@@ -1,0 +1,72 @@
+#include "clients/ctl/hand_over.hpp"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+
+#include "clients/common/exit_codes.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+constexpr const char* kProgram = "dtact-calibrate";
+
+using Arguments = std::vector<std::string>;
+
+/// The first word from `place` on that is neither an option nor the value of a global one.
+Arguments::iterator word_from(Arguments& arguments, Arguments::iterator place) {
+  while (place != arguments.end() && place->starts_with('-')) {
+    const bool has_value = *place == "--host" || *place == "--port";
+    if (++place != arguments.end() && has_value) ++place;
+  }
+  return place;
+}
+
+/// Comes back only as a Failure, when dtact-calibrate is neither beside dtactctl nor in PATH.
+[[noreturn]] void start_calibrate(Arguments arguments) {
+  arguments.insert(arguments.begin(), kProgram);
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  argv.push_back(nullptr);
+  std::error_code unknown;
+  const auto folder = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
+  if (!unknown) ::execv((folder / kProgram).c_str(), argv.data());
+  ::execvp(kProgram, argv.data());
+  const int error = errno;
+  throw cli::Failure(
+      cli::kFailed,
+      fmt::format("cannot start {}, which makes calibrations: {}. It belongs beside dtactctl ({}) "
+                  "or into PATH: install it from the same release",
+                  kProgram, std::strerror(error), folder.string()));
+}
+
+}  // namespace
+
+std::vector<std::string> for_calibrate(std::vector<std::string> arguments) {
+  const auto command = word_from(arguments, arguments.begin());
+  if (command == arguments.end() || *command != "calibrate") return arguments;
+  const auto verb = word_from(arguments, command + 1);
+  if (verb != arguments.end() && (*verb == "depth" || *verb == "lens")) {
+    arguments.erase(command);
+  } else {
+    *command = "guided";
+  }
+  return arguments;
+}
+
+void add_handed_over(CLI::App& app, const std::vector<std::string>& arguments) {
+  const auto add = [&](const char* name, const char* help) {
+    CLI::App* command = app.add_subcommand(name, help);
+    // All that follows is the other program's, --help included.
+    command->allow_extras()->fallthrough(false)->set_help_flag();
+    command->callback([&arguments] { start_calibrate(for_calibrate(arguments)); });
+  };
+  add("calibrate", "Make a calibration: guided, or depth or lens from images (dtact-calibrate)");
+  add("reconstruct", "Reconstruct the depth of an image (dtact-calibrate)");
+  add("evaluate", "Compare a calibration with the press of a ball (dtact-calibrate)");
+}
+
+}  // namespace dtact::ctl
