@@ -107,7 +107,7 @@ TEST(NextDepth, FillsTheWidestGap) {
 
 TEST(ContactWidth, OfABall) {
   // A ball of 4 mm 1.5 mm deep cuts the surface in a circle of 3.122 mm radius; the layer's
-  // contact is 3.04 (daemon/calibration/press_set.cpp).
+  // contact is 3.04 (fit/press_set.cpp).
   EXPECT_NEAR(contact_width_mm(1.5, 4), 6.06, 0.02);
   EXPECT_NEAR(depth_of_width_mm(6.06, 4), 1.5, 0.01);
 }
