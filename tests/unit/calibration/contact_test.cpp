@@ -89,6 +89,19 @@ TEST(FarFieldDrift, AnUnevenOrFaintOneIsNot) {
   EXPECT_EQ(far_field_drift(map, contact), 0);
 }
 
+TEST(FarFieldDrift, UnsureWhereTheFarFieldIsOnOneSideOnly) {
+  // Tiles of 40 pixels begin at columns 0 to 440 and rows 0 to 360. About the lower left corner all
+  // of them are to the right and above, about the upper right one of the tall map all to the left
+  // and below; rows taken for columns or columns for rows would find some on either side.
+  const DifferenceMap wide{500, 400, 0.05, std::vector<float>(std::size_t{500} * 400, 2)};
+  EXPECT_EQ(far_field_drift(wide, {.col = 0, .row = 399, .ball_radius_mm = 1}), 0);
+  const DifferenceMap tall{400, 500, 0.05, std::vector<float>(std::size_t{400} * 500, 2)};
+  EXPECT_EQ(far_field_drift(tall, {.col = 399, .row = 0, .ball_radius_mm = 1}), 0);
+  // Above and below, if nothing to the left, is both sides.
+  EXPECT_EQ(far_field_drift(wide, {.col = 0, .row = 200, .ball_radius_mm = 1}), 2);
+  EXPECT_EQ(far_field_drift(wide, {.col = 250, .row = 399, .ball_radius_mm = 1}), 2);
+}
+
 TEST(FarFieldDrift, UnsureWithoutAFarField) {
   DifferenceMap map = Ball{}.map();
   for (float& level : map.levels) level += 2;

@@ -38,6 +38,18 @@ TEST(CameraMismatches, EachIsNamed) {
                   HasSubstr("exposure absolute is 158 but was 157"), HasSubstr("gain")));
 }
 
+TEST(CameraMismatches, FrameRatesMayDifferByAHundredth) {
+  const auto found_at = [](double fps) {
+    AttachedCamera now = same_camera();
+    now.fps = fps;
+    return camera_mismatches(sample(), now);
+  };
+  EXPECT_THAT(found_at(60.53), IsEmpty());
+  EXPECT_THAT(found_at(59.35), IsEmpty());
+  EXPECT_THAT(found_at(60.55), ElementsAre("the frame rate is 60.55 but was 59.94 at calibration"));
+  EXPECT_THAT(found_at(59.33), ElementsAre("the frame rate is 59.33 but was 59.94 at calibration"));
+}
+
 TEST(CameraMismatches, WhatWasNotRecordedIsNotCompared) {
   Calibration calibration = sample();
   calibration.origin = {};

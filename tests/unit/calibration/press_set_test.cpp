@@ -48,6 +48,20 @@ TEST(FitChain, AMeasuredDepthTiesTheChain) {
   EXPECT_NEAR(fit.depth_mm[0], 1.0, 0.02);
 }
 
+TEST(FitChain, NeverFalls) {
+  // 24 to 30 grey levels measured at 0.8 to 1.0 mm, 31 to 36 at 0.5 to 0.7 mm: a layer that
+  // answered so could not be read.
+  SagProfile deep = rings(1.0, 1.2);
+  deep.depth_mm = 1.0;
+  SagProfile darker = rings(1.2, 1.2);
+  darker.depth_mm = 0.7;
+  const ChainFit fit = fit_chain({deep, darker});
+  for (std::size_t k = 1; k < fit.knots.size(); ++k) {
+    EXPECT_GE(fit.knots[k].depth_mm, fit.knots[k - 1].depth_mm) << k;
+  }
+  EXPECT_GT(fit.knots.back().depth_mm, 0.8);
+}
+
 TEST(FitChain, NamesWhatNoPressShows) {
   const ChainFit shallow = fit_chain({rings(1.0, 0.9), rings(1.4, 1.2)});
   ASSERT_EQ(shallow.gaps.size(), 2U);
@@ -133,6 +147,22 @@ TEST(BuildFromPresses, AnEvenSensorGetsNoGain) {
   EXPECT_EQ(report.gains[0].name, "none");
   EXPECT_TRUE(report.gains[0].chosen);
   EXPECT_EQ(report.gains[3].name, "share of the light, plane");
+}
+
+TEST(BuildFromPresses, NoGainIsTriedThatThePressesCannotJudge) {
+  // A plane has two factors and needs five presses, a quadratic five and needs eight.
+  const std::vector<Ball> balls = eight_balls();
+  const auto tried = [&](std::size_t presses) {
+    PressReport report;
+    (void)build(set_of({balls.begin(), balls.begin() + static_cast<std::ptrdiff_t>(presses)}),
+                &report);
+    std::vector<std::string> names;
+    for (const auto& gain : report.gains) names.push_back(gain.name);
+    return names;
+  };
+  EXPECT_THAT(tried(4), testing::ElementsAre("none", "share of the light"));
+  EXPECT_THAT(tried(5), testing::ElementsAre("none", "share of the light", "plane",
+                                             "share of the light, plane"));
 }
 
 TEST(BuildFromPresses, AThickerSidePaysForAPlane) {
