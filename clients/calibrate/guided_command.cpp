@@ -26,6 +26,7 @@ std::string command_of(const cli::Context& context, const guided::Plan& plan) {
   if (!plan.map.centre.empty())
     text += fmt::format(" --centre {}", fmt::join(plan.map.centre, ","));
   if (!plan.map.crop.empty()) text += fmt::format(" --crop {}", fmt::join(plan.map.crop, ","));
+  if (plan.force) text += " --force";
   return text + fmt::format(" --folder '{}'", plan.folder.string());
 }
 
@@ -72,6 +73,9 @@ void add_guided(CLI::App& app, cli::Context& context) {
       ->add_option("--patience", plan->patience_s, "Seconds to wait for a surface that holds still")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
+  guided->add_flag("--force", plan->force,
+                   "Make the calibration although list and ball disagree: a wrong scale or radius, "
+                   "another light, a contact that is cut off");
   guided->callback([&context, plan] { run_guided(context, *plan); });
 }
 

@@ -65,13 +65,9 @@ double half_error(const DifferenceMap& map, const Contact& contact, double angle
   return spread_of(std::move(errors)).mean;
 }
 
-}  // namespace
-
-Evaluation evaluate(const Calibration& calibration, std::span<const std::uint16_t> reference_q8,
-                    std::span<const image::Grey8> frames, double ball_radius_mm) {
-  const recon::Model& model = *calibration.model;
+Evaluation read(const recon::Model& model, const SettledPress& press,
+                std::span<const image::Grey8> frames) {
   Evaluation result;
-  const SettledPress press = settle(model, reference_q8, frames, ball_radius_mm);
   result.contact = press.contact;
   result.drift_levels = press.drift_levels;
 
@@ -82,6 +78,7 @@ Evaluation evaluate(const Calibration& calibration, std::span<const std::uint16_
     const double um =
         depth[static_cast<std::size_t>(y) * static_cast<std::size_t>(press.map.width) +
               static_cast<std::size_t>(x)];
+    result.unseen += static_cast<std::size_t>(std::isnan(press.map.at(x, y)));
     if (std::isnan(um)) {
       ++result.untrusted;
     } else {
@@ -93,7 +90,22 @@ Evaluation evaluate(const Calibration& calibration, std::span<const std::uint16_
   const Spread spread = spread_of(std::move(errors));
   result.offset_mm = spread.offset;
   result.mae_mm = spread.mean;
+  return result;
+}
 
+}  // namespace
+
+Evaluation read_ball(const Calibration& calibration, std::span<const std::uint16_t> reference_q8,
+                     std::span<const image::Grey8> frames, double ball_radius_mm) {
+  const recon::Model& model = *calibration.model;
+  return read(model, settle(model, reference_q8, frames, ball_radius_mm), frames);
+}
+
+Evaluation evaluate(const Calibration& calibration, std::span<const std::uint16_t> reference_q8,
+                    std::span<const image::Grey8> frames, double ball_radius_mm) {
+  const recon::Model& model = *calibration.model;
+  const SettledPress press = settle(model, reference_q8, frames, ball_radius_mm);
+  Evaluation result = read(model, press, frames);
   if (model.method == recon::Method::list) {
     double sum = 0;
     double worst = 0;

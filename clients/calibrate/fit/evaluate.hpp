@@ -24,6 +24,7 @@ struct Evaluation {
   std::optional<double> half_worst_mm;
   std::size_t pixels = 0;     ///< In the contact.
   std::size_t untrusted = 0;  ///< Of them, marked.
+  std::size_t unseen = 0;     ///< Of them, too dark or masked, whatever the list says.
 };
 
 /// `reference_q8`: frame sized Q8 luma under the frames' light. Throws std::runtime_error when no
@@ -31,5 +32,10 @@ struct Evaluation {
 [[nodiscard]] Evaluation evaluate(const Calibration& calibration,
                                   std::span<const std::uint16_t> reference_q8,
                                   std::span<const image::Grey8> frames, double ball_radius_mm);
+
+/// The same without the halves.
+[[nodiscard]] Evaluation read_ball(const Calibration& calibration,
+                                   std::span<const std::uint16_t> reference_q8,
+                                   std::span<const image::Grey8> frames, double ball_radius_mm);
 
 }  // namespace dtact::calibration

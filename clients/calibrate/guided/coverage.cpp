@@ -1,8 +1,13 @@
 #include "clients/calibrate/guided/coverage.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+
+#include "clients/calibrate/fit/plausibility.hpp"
 
 namespace dtact::ctl::guided {
 namespace {
@@ -28,7 +33,7 @@ std::vector<double> rough_depths_mm(const PressImages& images,
 
 }  // namespace
 
-Coverage cover(const PressImages& images, const calibration::Calibration& empty) {
+Coverage cover(const PressImages& images, const calibration::Calibration& empty, bool force) {
   Coverage coverage;
   if (images.set.presses.size() < 2) {
     coverage.missing = "at least two presses of different depths are needed";
@@ -36,6 +41,12 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty)
     try {
       coverage.made =
           std::make_shared<const calibration::Calibration>(build_list(images, &coverage.report));
+      coverage.doubts = calibration::doubts_about(*coverage.made, images.set);
+      if (!coverage.doubts.empty() && !force) {
+        coverage.made = nullptr;
+        coverage.missing =
+            fmt::format("{} (--force takes it as it is)", fmt::join(coverage.doubts, "; "));
+      }
     } catch (const std::exception& e) {
       coverage.missing = e.what();
     }

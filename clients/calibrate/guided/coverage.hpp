@@ -10,14 +10,18 @@ namespace dtact::ctl::guided {
 
 /// What the presses so far come to.
 struct Coverage {
-  std::shared_ptr<const calibration::Calibration> made;  ///< Null where they determine no list.
-  calibration::PressReport report;                       ///< Of `made`.
-  std::string missing;            ///< Where they do not: why, and what to press.
-  std::vector<double> depths_mm;  ///< Of the presses: as fitted, else by their contacts' width.
+  /// Null where they determine no list, or one that is doubted.
+  std::shared_ptr<const calibration::Calibration> made;
+  calibration::PressReport report;  ///< Of `made`.
+  std::string missing;              ///< Where they do not: why, and what to press.
+  std::vector<std::string> doubts;  ///< What speaks against a list, a sentence each.
+  std::vector<double> depths_mm;    ///< Of the presses: as fitted, else by their contacts' width.
 };
 
-/// `empty`: the map and the reference of these images, without a list.
-[[nodiscard]] Coverage cover(const PressImages& images, const calibration::Calibration& empty);
+/// `empty`: the map and the reference of these images, without a list. `force`: a list is made
+/// although it is doubted.
+[[nodiscard]] Coverage cover(const PressImages& images, const calibration::Calibration& empty,
+                             bool force);
 
 /// How deep the covered list reaches, millimetres.
 [[nodiscard]] double covered_mm(const calibration::Calibration& made);

@@ -21,6 +21,7 @@ struct Plan {
   int reference_frames = 32;
   int press_frames = 16;
   double patience_s = 60;  ///< For each take.
+  bool force = false;      ///< A doubtful list is taken, too.
   std::string again;       ///< The command that goes on with the work folder.
 };
 

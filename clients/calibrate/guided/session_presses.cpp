@@ -13,7 +13,7 @@ std::string Session::press_prompt() const {
   std::string text =
       fmt::format("Press {} of {}: ", taken + 1,
                   std::max<std::size_t>(taken + 1, static_cast<std::size_t>(plan_.presses)));
-  if (taken >= 2 && !coverage_.made) {
+  if (taken >= 2 && !coverage_.made && coverage_.doubts.empty()) {
     text += "the one that is missing";
   } else {
     const double depth = next_depth_mm(coverage_.depths_mm, plan_.ball_radius_mm);
@@ -96,12 +96,13 @@ void Session::take_press(const std::string& name) {
 }
 
 void Session::judge() {
-  coverage_ = cover(images_, empty_);
+  coverage_ = cover(images_, empty_, plan_.force);
   if (!coverage_.made) {
     if (!images_.set.presses.empty()) console_.say("not yet a list: " + coverage_.missing);
     return;
   }
   for (const std::string& press : coverage_.report.left_out) console_.say("left out: " + press);
+  for (const std::string& doubt : coverage_.doubts) console_.say("doubtful: " + doubt);
   std::vector<std::string> depths;
   depths.reserve(coverage_.depths_mm.size());
   for (const double depth : coverage_.depths_mm) depths.push_back(fmt::format("{:.2f}", depth));

@@ -1,8 +1,11 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
+#include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/offline/depth_build.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 
@@ -18,32 +21,41 @@ struct Options {
   std::string method = "list";
   std::vector<double> gain_centre{0, 0};  ///< x, y in millimetres from the map's centre.
   std::string output;
+  bool force = false;
+};
+
+/// A calibration and what speaks against it.
+struct Made {
+  calibration::Calibration calibration;
+  std::vector<std::string> doubts;
 };
 
 /// From one press.
-calibration::Calibration make_from_one(const Options& options) {
+Made make_from_one(const Options& options) {
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet ball = load_images(options.ball, "--ball");
   require_same_size(reference, "--reference", ball, "--ball");
   const MapChoice map = choose_map(options.map, reference.width(), reference.height());
-  calibration::Calibration made = calibration::build(
-      {.reference_q8 = reference.mean_q8(),
-       .frames = ball.frames(),
-       .ball_radius_mm = options.radius_mm,
-       .mm_per_px = map.mm_per_px,
-       .lens = map.lens,
-       .crop = map.crop,
-       .gain = map.gain,
-       .method = options.method == "published" ? recon::Method::published : recon::Method::list});
+  const calibration::BallPress press{
+      .reference_q8 = reference.mean_q8(),
+      .frames = ball.frames(),
+      .ball_radius_mm = options.radius_mm,
+      .mm_per_px = map.mm_per_px,
+      .lens = map.lens,
+      .crop = map.crop,
+      .gain = map.gain,
+      .method = options.method == "published" ? recon::Method::published : recon::Method::list};
+  calibration::Calibration made = calibration::build(press);
   made.origin = recorded_origin(options.reference);
   made.origin.created = utc_now();
   made.origin.sources = reference.sources;
   made.origin.sources.insert(made.origin.sources.end(), ball.sources.begin(), ball.sources.end());
-  return made;
+  std::vector<std::string> doubts = calibration::doubts_about(made, press);
+  return {std::move(made), std::move(doubts)};
 }
 
 /// From several.
-calibration::Calibration make_from_many(const Options& options) {
+Made make_from_many(const Options& options) {
   PressImages images = begin_presses(options.reference, options.radius_mm, options.map);
   for (const std::string& press : options.presses) add_press(images, press);
   if (options.method == "regression") {
@@ -51,12 +63,14 @@ calibration::Calibration make_from_many(const Options& options) {
         calibration::build_regression(images.set, options.gain_centre[0], options.gain_centre[1]);
     made.origin = images.origin;
     made.origin.created = utc_now();
-    return made;
+    std::vector<std::string> doubts = calibration::doubts_about(made, images.set);
+    return {std::move(made), std::move(doubts)};
   }
   calibration::PressReport report;
   calibration::Calibration made = build_list(images, &report);
   fmt::print("{}", report_text(report));
-  return made;
+  std::vector<std::string> doubts = calibration::doubts_about(made, images.set);
+  return {std::move(made), std::move(doubts)};
 }
 
 void check(const Options& options) {
@@ -72,8 +86,13 @@ void check(const Options& options) {
 
 void run(const Options& options) {
   check(options);
-  const calibration::Calibration made =
+  const auto [made, doubts] =
       options.presses.empty() ? make_from_one(options) : make_from_many(options);
+  if (!doubts.empty() && !options.force) {
+    throw std::runtime_error(fmt::format("{}; nothing was written (--force writes it as it is)",
+                                         fmt::join(doubts, "; ")));
+  }
+  for (const std::string& doubt : doubts) fmt::print("doubtful: {}\n", doubt);
   calibration::save(made, options.output);
   const recon::RectifyTable& map = made.model->rectify;
   fmt::print("{}: method {}, {}x{} at column {}, row {}\n{}", options.output, options.method,
@@ -114,6 +133,9 @@ void add_calibrate(CLI::App& app) {
       ->add_option("-o,--output", options->output,
                    "Folder to write; an old calibration is replaced")
       ->required();
+  depth->add_flag("--force", options->force,
+                  "Write the calibration although list and ball disagree: a wrong scale or radius, "
+                  "another light, a contact that is cut off");
   depth->callback([options] { run(*options); });
 }
 

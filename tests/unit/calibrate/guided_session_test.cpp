@@ -103,6 +103,25 @@ TEST_F(GuidedSession, TheBatchCommandReadsTheWorkFolder) {
   EXPECT_EQ(batch.origin.leds, guided.origin.leds);
 }
 
+TEST_F(GuidedSession, ADoubtfulListIsNotMadeUnlessForced) {
+  plan_.map.mm_per_px = 0.005;
+  {
+    FakeSensor sensor(kEnough);
+    FakeConsole console({"", "", "", "", "", "s", "q"});
+    EXPECT_EQ(run(sensor, console), Outcome::unfinished) << console.said;
+    EXPECT_THAT(console.said, AllOf(HasSubstr("not yet a list: a grey level is 0.3 um"),
+                                    HasSubstr("that is not yet enough: a grey level is"),
+                                    HasSubstr("--force takes it as it is")));
+    EXPECT_FALSE(has("calibration"));
+  }
+  plan_.force = true;
+  FakeSensor sensor(presses({}));
+  FakeConsole console({"", "n"});
+  EXPECT_EQ(run(sensor, console), Outcome::kept) << console.said;
+  EXPECT_THAT(console.said, HasSubstr("doubtful: a grey level is 0.3 um"));
+  EXPECT_TRUE(has("calibration"));
+}
+
 TEST_F(GuidedSession, GoesOnAfterQuit) {
   {
     FakeSensor sensor(kEnough);

@@ -86,6 +86,31 @@ TEST_F(Offline, CalibratesAndSaysWhatItFound) {
   EXPECT_EQ(made.origin.created.size(), 20U);
 }
 
+TEST_F(Offline, RefusesADoubtfulCalibrationUnlessForced) {
+  std::vector<std::string> arguments = calibrate();
+  arguments[9] = "0.005";
+  EXPECT_THAT([&] { run(arguments); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("a grey level is 0.3 um"), HasSubstr("--mm-per-px"),
+                        HasSubstr("--radius-mm"), HasSubstr("--force"))));
+  EXPECT_FALSE(fs::exists(at("cal")));
+  EXPECT_THAT(run(with(arguments, "--force")),
+              AllOf(HasSubstr("doubtful: a grey level is 0.3 um"), HasSubstr("method list")));
+  EXPECT_EQ(calibration::load(at("cal")).model->mm_per_px, 0.005);
+  // One press or several, ours or not.
+  EXPECT_THAT([&] { run(with(arguments, "--method", "published")); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("a grey level is")));
+  write("light.png", Ball{.depth_mm = 0.5}.frame());
+  const std::vector<std::string> several{
+      "calibrate",   "depth",        "--reference", at("reference.png"),
+      "--press",     at("ball.png"), "--press",     at("light.png"),
+      "--radius-mm", "4.0",          "--mm-per-px", "0.005",
+      "-o",          at("cal2")};
+  EXPECT_THAT([&] { run(several); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("a grey level is")));
+  EXPECT_FALSE(fs::exists(at("cal2")));
+}
+
 TEST_F(Offline, CropIsAboutTheCentre) {
   run(with(calibrate(), "--centre", "115,125", "--crop", "200,180"));
   const calibration::Calibration made = calibration::load(at("cal"));
