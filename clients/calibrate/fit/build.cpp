@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/list_fit.hpp"
+#include "clients/calibrate/fit/list_worth.hpp"
 #include "clients/calibrate/fit/published.hpp"
 #include "daemon/calibration/map_table.hpp"
 
@@ -174,6 +175,7 @@ Calibration build(const BallPress& press) {
   model->list = press.method == recon::Method::list
                     ? fit_list(settled.map, settled.contact)
                     : fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
+  model->uncertainty = uncertainty_by_zero(model->list, std::span(&settled, 1));
   calibration.model = std::move(model);
   return calibration;
 }

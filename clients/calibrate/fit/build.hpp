@@ -67,9 +67,9 @@ struct BallPress {
 /// that was not fitted falls by less than 1 µm a pixel from there on.
 inline constexpr double kSmoothingMm = 0.1;
 
-/// Builds a calibration from images alone. `origin` is left for the caller to fill. Throws
-/// std::runtime_error saying what is wrong with the images and what to do, std::invalid_argument
-/// when sizes or numbers cannot be.
+/// Builds a calibration from images alone, with what it is worth (uncertainty_by_zero()). `origin`
+/// is left for the caller to fill. Throws std::runtime_error saying what is wrong with the images
+/// and what to do, std::invalid_argument when sizes or numbers cannot be.
 [[nodiscard]] Calibration build(const BallPress& press);
 
 }  // namespace dtact::calibration

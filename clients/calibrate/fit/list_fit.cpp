@@ -19,12 +19,6 @@ double sag(double ball_radius, double r) {
   return ball_radius - std::sqrt(std::max(0.0, ball_radius * ball_radius - r * r));
 }
 
-/// sag = depth − slope · level.
-struct Line {
-  double depth_mm = 0;
-  double slope = 0;  ///< Millimetres a grey level.
-};
-
 /// Means of (level, sag) over pixels within `reach_mm` of the centre, `per_level` bins a level.
 std::vector<Knot> sag_by_level(const DifferenceMap& map, const Contact& contact,
                                const PixelFilter& use, double reach_mm, double per_level) {
@@ -48,8 +42,7 @@ std::vector<Knot> sag_by_level(const DifferenceMap& map, const Contact& contact,
   return bins;
 }
 
-/// Step 1.
-Line fit_line(const std::vector<Knot>& bins) {
+SagLine fit_line(const std::vector<Knot>& bins) {
   double n = 0;
   double x = 0;
   double y = 0;
@@ -111,10 +104,14 @@ double hand_over(std::vector<Knot>& knots, double sure_level, double line_slope)
 
 }  // namespace
 
+SagLine fit_sag_line(const DifferenceMap& map, const Contact& contact, const PixelFilter& use) {
+  return fit_line(sag_by_level(map, contact, use, kSure * contact.radius_mm, 1));
+}
+
 recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
                           const PixelFilter& use) {
   const double sure_mm = kSure * contact.radius_mm;
-  const Line line = fit_line(sag_by_level(map, contact, use, sure_mm, 1));
+  const SagLine line = fit_sag_line(map, contact, use);
   std::vector<Knot> knots = sag_by_level(map, contact, use, contact.radius_mm, kBinsPerLevel);
   for (Knot& knot : knots) knot.depth_mm = line.depth_mm - knot.depth_mm;
   make_monotone(knots);

@@ -10,6 +10,16 @@ namespace dtact::calibration {
 /// Which pixels of the depth map a fit may use; empty: all.
 using PixelFilter = std::function<bool(int x, int y)>;
 
+/// What the sure part of a press's contact says: sag = depth − slope · darkening.
+struct SagLine {
+  double depth_mm = 0;  ///< Of the lowest point, if no darkening is no depth.
+  double slope = 0;     ///< Millimetres a grey level.
+};
+
+/// Step 1 of fit_list(). Throws as it.
+[[nodiscard]] SagLine fit_sag_line(const DifferenceMap& map, const Contact& contact,
+                                   const PixelFilter& use = {});
+
 /// The list of one press of a ball, from its image alone.
 ///
 /// Inside the contact the surface is the ball: its indentation is g − sag(r) with

@@ -66,7 +66,8 @@ struct PressReport {
 /// each press's published circle, zero on the circle; each pixel gets a slope, by least squares
 /// over the presses whose circle holds it; a line is fitted through the slopes against the
 /// distance. What is brighter than untouched is 0, and the two 7×7 Gaussian filters that follow
-/// become one smoothing of the difference: everything in between is linear.
+/// become one smoothing of the difference: everything in between is linear. What it is worth is
+/// said as for one press (uncertainty_by_zero()).
 [[nodiscard]] Calibration build_regression(const BallPresses& set, double centre_x_mm = 0,
                                            double centre_y_mm = 0);
 

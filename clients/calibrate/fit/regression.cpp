@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/calibrate/fit/list_worth.hpp"
 #include "clients/calibrate/fit/press_set.hpp"
 #include "clients/calibrate/fit/published.hpp"
 
@@ -78,6 +79,19 @@ void add_press(const image::Grey8& reference, const image::Grey8& ball, const st
   }
 }
 
+/// The presses in which find_contact() finds one; the published circle is content with less.
+std::vector<SettledPress> settle_all(const recon::Model& model, const BallPresses& set) {
+  std::vector<SettledPress> presses;
+  for (const BallPresses::Press& press : set.presses) {
+    try {
+      presses.push_back(settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm));
+    } catch (const std::runtime_error&) {
+      continue;
+    }
+  }
+  return presses;
+}
+
 }  // namespace
 
 Calibration build_regression(const BallPresses& set, double centre_x_mm, double centre_y_mm) {
@@ -119,6 +133,7 @@ Calibration build_regression(const BallPresses& set, double centre_x_mm, double 
         std::min(16383L, std::lround(1000 * b * q6 / recon::kEntriesPerLevel))));
   }
   model->list.covered_to_q6 = kLastLevel * recon::kEntriesPerLevel;
+  model->uncertainty = uncertainty_by_zero(model->list, settle_all(*model, set));
   calibration.model = std::move(model);
   return calibration;
 }

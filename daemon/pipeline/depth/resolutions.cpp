@@ -43,7 +43,12 @@ void Resolutions::set_light(double factor) noexcept {
 
 double Resolutions::list_um(double depth_mm) const noexcept {
   const auto& rows = model_->uncertainty;
-  if (rows.empty()) return kUnstatedListUm;
+  if (rows.empty()) {
+    // The radial gain is the published regression's alone.
+    const bool published = model_->method == recon::Method::published ||
+                           model_->gain.shape == recon::GainShape::radial;
+    return published ? kUnstatedPublishedUm : kUnstatedListUm;
+  }
   const auto above =
       std::ranges::lower_bound(rows, depth_mm, {}, &recon::Model::Uncertainty::depth_mm);
   if (above == rows.begin()) return rows.front().error_um;

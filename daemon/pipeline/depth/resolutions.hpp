@@ -38,7 +38,7 @@ class Resolutions {
   void set_light(double factor) noexcept;
 
   /// What the list is uncertain by at an indentation, micrometres: as the calibration says, else
-  /// kUnstatedListUm.
+  /// kUnstatedListUm or, of a published method, kUnstatedPublishedUm.
   [[nodiscard]] double list_um(double depth_mm) const noexcept;
   /// What a light that differs from the reference's by `share` adds to or takes off every
   /// indentation, micrometres.

@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <vector>
 
+#include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/strip_sums.hpp"
+#include "tests/fakes/toy_sensor.hpp"
 
 namespace dtact::pipeline {
 namespace {
@@ -76,6 +79,35 @@ TEST(Uncertainty, AddsListAndBlurInSquares) {
   EXPECT_DOUBLE_EQ(uncertainty_um(28, 3), 35);  // √(28² + 21²)
   EXPECT_DOUBLE_EQ(uncertainty_at_um(30, 0, 4), 30);
   EXPECT_DOUBLE_EQ(uncertainty_at_um(28, 3, 4), 35.93);
+}
+
+/// What a list is uncertain by at 0.5 mm after a change to its model.
+template <typename Change>
+double list_um(Change change) {
+  const auto calibration = fakes::toy_calibration();
+  recon::Model model = *calibration->model;
+  change(model);
+  calibration->model = std::make_shared<const recon::Model>(std::move(model));
+  hal::CameraInfo camera;
+  camera.width = fakes::kToyWidth;
+  camera.height = fakes::kToyHeight;
+  return activate(calibration, camera, {})->list_um(0.5);
+}
+
+TEST(ListUncertainty, IsTheCalibrationsBetweenItsRows) {
+  EXPECT_DOUBLE_EQ(
+      list_um([](recon::Model& m) { m.uncertainty = {{.depth_mm = 0.4, .error_um = 30}}; }), 30);
+  EXPECT_DOUBLE_EQ(list_um([](recon::Model& m) {
+                     m.uncertainty = {{.depth_mm = 0.4, .error_um = 30},
+                                      {.depth_mm = 0.8, .error_um = 70}};
+                   }),
+                   40);
+}
+
+TEST(ListUncertainty, OfACalibrationThatDoesNotSayIsWhatTheTableMeasured) {
+  EXPECT_EQ(list_um([](recon::Model&) {}), 50);
+  EXPECT_EQ(list_um([](recon::Model& m) { m.method = recon::Method::published; }), 118);
+  EXPECT_EQ(list_um([](recon::Model& m) { m.gain.shape = recon::GainShape::radial; }), 118);
 }
 
 TEST(ResolutionChooser, GoesFinerAtOnceAndCoarserWithPatience) {

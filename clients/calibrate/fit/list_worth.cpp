@@ -1,0 +1,85 @@
+#include "clients/calibrate/fit/list_worth.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "clients/calibrate/fit/list_fit.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+constexpr double kDepthBinMm = 0.2;
+constexpr double kZeroLevels = 1;    // grey levels
+constexpr double kRingShare = 0.15;  // of the ring's level, scattered into the contact
+
+double look_up_mm(const recon::DepthList& list, double level) {
+  const long entry = std::lround(level * recon::kEntriesPerLevel) - list.first_q6;
+  const long last = static_cast<long>(list.um.size()) - 1;
+  return 0.001 * list.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))];
+}
+
+/// None where the press doesn't darken steadily.
+std::optional<SagLine> line_of(const SettledPress& press) {
+  try {
+    return fit_sag_line(press.map, press.contact);
+  } catch (const std::runtime_error&) {
+    return std::nullopt;
+  }
+}
+
+/// Of the zero of a press's line, millimetres.
+double zero_mm(const SettledPress& press, const SagLine& line) {
+  const RadialProfile profile =
+      radial_profile(press.map, press.contact, kFarField * press.contact.ball_radius_mm);
+  double ring = 0;
+  for (const double level : profile.levels) {
+    if (!std::isnan(level)) ring = std::min(ring, level);
+  }
+  return line.slope * std::hypot(kZeroLevels, kRingShare * ring);
+}
+
+}  // namespace
+
+std::vector<recon::Model::Uncertainty> uncertainty_by_zero(const recon::DepthList& list,
+                                                           std::span<const SettledPress> presses) {
+  struct Bin {
+    double depth = 0;
+    double error = 0;
+    double zero = 0;
+    double pixels = 0;
+  };
+  std::vector<Bin> bins;
+  for (const SettledPress& press : presses) {
+    const std::optional<SagLine> line = line_of(press);
+    if (!line) continue;
+    const double zero = zero_mm(press, *line);
+    const double ball = press.contact.ball_radius_mm;
+    for (int y = 0; y < press.map.height; ++y) {
+      for (int x = 0; x < press.map.width; ++x) {
+        const double r = distance_mm(press.map, press.contact, x, y);
+        const double level = press.map.at(x, y);
+        if (!(r < press.contact.radius_mm) || std::isnan(level)) continue;
+        const double read = look_up_mm(list, level);
+        const double sag = ball - std::sqrt(ball * ball - r * r);
+        const auto at = static_cast<std::size_t>(std::max(0.0, read) / kDepthBinMm);
+        if (at >= bins.size()) bins.resize(at + 1);
+        bins[at].depth += read;
+        bins[at].error += std::abs(read - (line->depth_mm - sag));
+        bins[at].zero += zero;
+        bins[at].pixels += 1;
+      }
+    }
+  }
+  std::vector<recon::Model::Uncertainty> rows;
+  for (const Bin& bin : bins) {
+    if (bin.pixels == 0) continue;
+    const double depth_mm = std::max(0.0, bin.depth / bin.pixels);
+    const double error_mm = std::hypot(bin.error, bin.zero) / bin.pixels;
+    rows.push_back({std::round(1000 * depth_mm) / 1000, std::round(10000 * error_mm) / 10});
+  }
+  return rows;
+}
+
+}  // namespace dtact::calibration
