@@ -91,7 +91,7 @@ double list_um(Change change) {
   hal::CameraInfo camera;
   camera.width = fakes::kToyWidth;
   camera.height = fakes::kToyHeight;
-  return activate(calibration, camera, {})->list_um(0.5);
+  return activate(calibration, camera, {})->maps.list_um(0.5);
 }
 
 TEST(ListUncertainty, IsTheCalibrationsBetweenItsRows) {
