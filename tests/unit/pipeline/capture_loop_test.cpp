@@ -59,13 +59,16 @@ TEST(CaptureLoop, StatesWhatOfTheLightItDoesNotFollow) {
 }
 
 TEST(CaptureLoop, AStaleReferenceIsInTheUncertainty) {
-  SteppedLoop loop;
-  loop.camera.scene.press_mm = 1;
-  loop.begin(toy_calibration());
-  ASSERT_TRUE(loop.until([&] { return loop.frame != nullptr && loop.frame->has_depth; }));
-  EXPECT_TRUE(loop.frame->health.has(Health::reference_stale));
-  // 30 µm for the reference and 20 for a list that says nothing of itself, without the bend.
-  EXPECT_GT(loop.frame->uncertainty_um, 36);
+  const auto stated_um = [](bool restored) {
+    SteppedLoop loop;
+    loop.camera.scene.press_mm = 1;
+    loop.begin(toy_calibration());
+    if (restored) loop.loop->restore(fakes::toy_reference_q8(), loop.config.light);
+    EXPECT_TRUE(loop.until([&] { return loop.frame != nullptr && loop.frame->has_depth; }));
+    EXPECT_NE(loop.frame->health.has(Health::reference_stale), restored);
+    return loop.frame->uncertainty_um;
+  };
+  EXPECT_NEAR(stated_um(false), std::hypot(stated_um(true), 30), 1);
 }
 
 TEST(CaptureLoop, AReferenceFromAnotherBrightnessIsNotTheLastGoodOne) {
