@@ -7,8 +7,7 @@
 #include <utility>
 
 #include "clients/cpp/connection.hpp"
-#include "clients/cpp/convert.hpp"
-#include "proto/dtact.pb.h"
+#include "proto/framing.hpp"
 
 namespace dtact::client {
 namespace {
@@ -33,7 +32,7 @@ struct Client::Impl {
 
   Options options;
   Connection connection;
-  ServerInfo server;
+  v1::HelloReply server;
   std::uint64_t next_id = 1;
   std::deque<v1::ServerMessage> inbox;
 };
@@ -64,8 +63,9 @@ v1::Reply Client::Impl::request(v1::ClientMessage& message, std::chrono::millise
   const std::uint64_t id = next_id++;
   message.set_id(id);
   if (message.ByteSizeLong() > wire::kMaxMessage) {
-    throw Refused(Code::too_large, fmt::format("the request has {} bytes, at most {} can be sent",
-                                               message.ByteSizeLong(), wire::kMaxMessage));
+    throw Refused(v1::ERROR_TOO_LARGE,
+                  fmt::format("the request has {} bytes, at most {} can be sent",
+                              message.ByteSizeLong(), wire::kMaxMessage));
   }
   connection.write(message.SerializeAsString(), deadline);
   for (;;) {
@@ -82,11 +82,17 @@ v1::Reply Client::Impl::request(v1::ClientMessage& message, std::chrono::millise
     // Id 0: the daemon says why it ends the connection.
     if (reply.id() != id && reply.id() != 0) continue;
     if (!reply.has_error()) return std::move(reply);
-    const auto code = static_cast<Code>(reply.error().code());
-    if (code == Code::version) throw ProtocolError(reply.error().message());
+    const v1::ErrorCode code = reply.error().code();
+    if (code == v1::ERROR_VERSION) throw ProtocolError(reply.error().message());
     if (reply.id() == 0) throw ConnectionError(reply.error().message());
     throw Refused(code, reply.error().message());
   }
+}
+
+v1::Subscribe depth_stream() {
+  v1::Subscribe subscription;
+  subscription.set_depth(v1::DEPTH_INT16);
+  return subscription;
 }
 
 Client::Client(const Options& options) : impl_(std::make_unique<Impl>(options)) {
@@ -95,43 +101,26 @@ Client::Client(const Options& options) : impl_(std::make_unique<Impl>(options)) 
   hello.set_major(wire::kMajor);
   hello.set_minor(wire::kMinor);
   hello.set_program(options.program.substr(0, wire::kMaxProgramName));
-  const auto reply = impl_->request(message, options.timeout);
-  impl_->server = {reply.hello().program(), reply.hello().major(), reply.hello().minor(),
-                   reply.hello().surface_frame().frame_id()};
+  impl_->server = impl_->request(message, options.timeout).hello();
 }
 
 Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 
-const ServerInfo& Client::server() const noexcept { return impl_->server; }
+const v1::HelloReply& Client::server() const noexcept { return impl_->server; }
 bool Client::same_machine() const noexcept { return impl_->connection.local(); }
 
-void Client::subscribe(const Subscription& subscription) {
+void Client::subscribe(const v1::Subscribe& subscription) {
   v1::ClientMessage message;
-  auto& request = *message.mutable_subscribe();
-  request.set_depth(static_cast<v1::DepthEncoding>(subscription.depth));
-  request.set_luma(static_cast<v1::LumaEncoding>(subscription.luma));
-  request.set_every(subscription.every);
-  request.set_summary(subscription.summary);
+  *message.mutable_subscribe() = subscription;
   (void)impl_->request(message, impl_->options.timeout);
 }
 
-Light Client::set_light(const LightChange& change) {
+v1::LightState Client::set_light(const v1::SetLight& change) {
   v1::ClientMessage message;
-  auto& request = *message.mutable_set_light();
-  if (change.brightness.has_value()) {
-    // A negative one becomes far too large, and the daemon says what is allowed.
-    request.set_brightness(static_cast<std::uint32_t>(*change.brightness));
-  }
-  if (change.scheme.has_value()) request.set_scheme(*change.scheme);
-  for (const auto& led : change.leds) {
-    auto& to = *request.add_leds();
-    to.set_r(led.r);
-    to.set_g(led.g);
-    to.set_b(led.b);
-  }
-  return to_light(impl_->request(message, impl_->options.timeout).light());
+  *message.mutable_set_light() = change;
+  return impl_->request(message, impl_->options.timeout).light();
 }
 
 void Client::rezero(bool force) {
@@ -140,44 +129,39 @@ void Client::rezero(bool force) {
   (void)impl_->request(message, impl_->options.timeout);
 }
 
-Status Client::status() {
+v1::Status Client::status() {
   v1::ClientMessage message;
   message.mutable_get_status();
-  return to_status(impl_->request(message, impl_->options.timeout).status());
+  return impl_->request(message, impl_->options.timeout).status();
 }
 
-CalibrationFiles Client::calibration(std::optional<std::uint64_t> number) {
+v1::CalibrationFiles Client::calibration(std::optional<std::uint64_t> number) {
   v1::ClientMessage message;
   auto& request = *message.mutable_get_calibration();
   if (number.has_value()) request.set_number(*number);
-  const auto reply = impl_->request(message, impl_->options.timeout);
-  const auto& files = reply.calibration();
-  CalibrationFiles read{files.name(), files.calibration_toml(), files.reference_png()};
-  if (files.has_number()) read.number = files.number();
-  if (number.has_value() && read.number != number) {
-    throw Refused(Code::invalid,
+  v1::Reply reply = impl_->request(message, impl_->options.timeout);
+  v1::CalibrationFiles& files = *reply.mutable_calibration();
+  if (number.has_value() && (!files.has_number() || files.number() != *number)) {
+    throw Refused(v1::ERROR_INVALID,
                   "this daemon is older and knows only its current calibration: update dtactd");
   }
-  return read;
+  return std::move(files);
 }
 
-std::vector<StoredCalibration> Client::calibrations() {
+std::vector<v1::StoredCalibration> Client::calibrations() {
   v1::ClientMessage message;
   message.mutable_list_calibrations();
-  const auto reply = impl_->request(message, impl_->parse_timeout());
-  std::vector<StoredCalibration> calibrations;
-  for (const auto& stored : reply.calibrations().calibrations()) {
-    calibrations.push_back(to_stored(stored));
+  v1::Reply reply = impl_->request(message, impl_->parse_timeout());
+  auto& calibrations = *reply.mutable_calibrations()->mutable_calibrations();
+  for (v1::StoredCalibration& stored : calibrations) {
+    if (!stored.has_in_use()) stored.set_in_use(stored.current());
   }
-  return calibrations;
+  return {calibrations.begin(), calibrations.end()};
 }
 
-std::optional<std::uint64_t> Client::upload_calibration(const CalibrationFiles& files) {
+std::optional<std::uint64_t> Client::upload_calibration(const v1::UploadCalibration& files) {
   v1::ClientMessage message;
-  auto& request = *message.mutable_upload_calibration();
-  request.set_name(files.name);
-  request.set_calibration_toml(files.toml);
-  request.set_reference_png(files.png);
+  *message.mutable_upload_calibration() = files;
   const auto reply = impl_->request(message, impl_->parse_timeout());
   if (!reply.done().has_calibration()) return std::nullopt;
   return reply.done().calibration();
@@ -189,7 +173,7 @@ void Client::activate_calibration(std::uint64_t number) {
   (void)impl_->request(message, impl_->parse_timeout());
 }
 
-std::optional<std::variant<Frame, Event>> Client::next(std::chrono::milliseconds timeout) {
+std::optional<std::variant<v1::Frame, v1::Event>> Client::next(std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
   for (;;) {
     std::optional<v1::ServerMessage> message;
@@ -200,9 +184,10 @@ std::optional<std::variant<Frame, Event>> Client::next(std::chrono::milliseconds
       message = impl_->receive(deadline);
       if (!message.has_value()) return std::nullopt;
     }
-    if (message->has_frame()) return to_frame(message->frame());
-    if (message->has_event()) {
-      if (auto event = to_event(message->event())) return *std::move(event);
+    if (message->has_frame()) return std::move(*message->mutable_frame());
+    // Not a kind of event that this library does not know.
+    if (message->has_event() && message->event().what_case() != v1::Event::WHAT_NOT_SET) {
+      return std::move(*message->mutable_event());
     }
     if (message->has_reply() && message->reply().id() == 0 && message->reply().has_error()) {
       throw ConnectionError(message->reply().error().message());

@@ -9,28 +9,16 @@
 #include <vector>
 
 #include "clients/cpp/errors.hpp"
-#include "clients/cpp/types.hpp"
 #include "proto/defaults.hpp"
+#include "proto/dtact.pb.h"
 
 namespace dtact::client {
 
-enum class Depth { none = 0, int16 = 1, delta_zstd = 2 };  ///< The wire's DepthEncoding.
-enum class Luma { none = 0, grey8 = 1 };                   ///< The wire's LumaEncoding.
+/// The number of the calibration that the daemon's configuration names. Uploaded ones count from 1.
+inline constexpr std::uint64_t kConfiguredCalibration = 0;
 
-/// What frames are to hold. Neither map and no summary: no frames.
-struct Subscription {
-  Depth depth = Depth::int16;
-  Luma luma = Luma::none;
-  std::uint32_t every = 1;  ///< Every n-th frame.
-  bool summary = false;     ///< Contact, health and times only, whatever the maps say.
-};
-
-/// What is empty stays as it is.
-struct LightChange {
-  std::optional<int> brightness;      ///< 0 … 255
-  std::optional<std::string> scheme;  ///< "all", "scheme1" … "scheme4"
-  std::vector<Rgb> leds;              ///< Eight, or empty. After `scheme`.
-};
+/// Depth as it is, of every frame.
+[[nodiscard]] v1::Subscribe depth_stream();
 
 struct Options {
   std::string host = wire::kDefaultAddress;  ///< Name or address.
@@ -39,8 +27,10 @@ struct Options {
   std::chrono::milliseconds timeout{5000};   ///< Of the connection and of each request.
 };
 
-/// A connection to dtactd. Calls wait; one thread at a time. After a ConnectionError the object is
-/// of no further use: whoever wants to go on makes another one.
+/// A connection to dtactd. What it takes and gives are the messages of dtact.proto, where their
+/// fields are explained; maps.hpp reads the pixels of the maps. Calls wait; one thread at a time.
+/// After a ConnectionError the object is of no further use: whoever wants to go on makes another
+/// one.
 class Client {
  public:
   /// Connects and agrees on the version. Throws ConnectionError or ProtocolError.
@@ -49,7 +39,8 @@ class Client {
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
 
-  [[nodiscard]] const ServerInfo& server() const noexcept;
+  /// Who answered.
+  [[nodiscard]] const v1::HelloReply& server() const noexcept;
   /// The daemon runs on this machine, so that its CLOCK_MONOTONIC is ours.
   [[nodiscard]] bool same_machine() const noexcept;
 
@@ -57,26 +48,28 @@ class Client {
   // events that arrive meanwhile are kept for next(): every event, and the newest few frames.
 
   /// Replaces the subscription. Events come in any case.
-  void subscribe(const Subscription& subscription);
+  void subscribe(const v1::Subscribe& subscription = depth_stream());
   /// Returns the light once the ring shows it.
-  Light set_light(const LightChange& change);
+  v1::LightState set_light(const v1::SetLight& change);
   /// Takes the present image as untouched; `force`: although something touches.
   void rezero(bool force = false);
-  [[nodiscard]] Status status();
+  [[nodiscard]] v1::Status status();
   /// The files of one calibration; without a number, of the current one.
-  [[nodiscard]] CalibrationFiles calibration(std::optional<std::uint64_t> number = std::nullopt);
+  [[nodiscard]] v1::CalibrationFiles calibration(
+      std::optional<std::uint64_t> number = std::nullopt);
   /// All that the daemon has: the configured one, then the uploaded ones, oldest first. Each is
-  /// read and checked for this; may take a few seconds.
-  [[nodiscard]] std::vector<StoredCalibration> calibrations();
+  /// read and checked for this; may take a few seconds. Of an older daemon, which does not say what
+  /// is in use, the current one is taken to be.
+  [[nodiscard]] std::vector<v1::StoredCalibration> calibrations();
   /// Returns once the daemon uses and has stored it, with its number; nothing from a daemon that is
   /// too old to say it. May take a few seconds.
-  std::optional<std::uint64_t> upload_calibration(const CalibrationFiles& files);
+  std::optional<std::uint64_t> upload_calibration(const v1::UploadCalibration& files);
   /// Makes one of calibrations() current. Returns once the daemon uses it and will start with it.
   void activate_calibration(std::uint64_t number);
 
-  /// The next frame or event; nothing when none came in time. Throws a ConnectionError, also for
-  /// maps that cannot be decoded.
-  [[nodiscard]] std::optional<std::variant<Frame, Event>> next(std::chrono::milliseconds timeout);
+  /// The next frame or event; nothing when none came in time. Throws a ConnectionError.
+  [[nodiscard]] std::optional<std::variant<v1::Frame, v1::Event>> next(
+      std::chrono::milliseconds timeout);
 
  private:
   struct Impl;

@@ -3,6 +3,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "proto/dtact.pb.h"
+
 namespace dtact::client {
 
 /// What all of the library's exceptions are. The text is a sentence for the user and names the
@@ -30,28 +32,14 @@ class ProtocolError : public ConnectionError {
   using ConnectionError::ConnectionError;
 };
 
-/// Documented in dtact.proto, ErrorCode; the values are those of the wire.
-enum class Code {
-  none = 0,
-  bad_message = 1,
-  too_large = 2,
-  version = 3,
-  invalid = 4,
-  contact = 5,
-  device = 6,
-  busy = 7,
-  uncalibrated = 8,
-  storage = 9
-};
-
 /// The daemon refused a request. The connection goes on.
 class Refused : public Error {
  public:
-  Refused(Code code, const std::string& sentence) : Error(sentence), code_(code) {}
-  [[nodiscard]] Code code() const noexcept { return code_; }
+  Refused(v1::ErrorCode code, const std::string& sentence) : Error(sentence), code_(code) {}
+  [[nodiscard]] v1::ErrorCode code() const noexcept { return code_; }
 
  private:
-  Code code_;
+  v1::ErrorCode code_;
 };
 
 }  // namespace dtact::client

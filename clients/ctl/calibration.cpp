@@ -9,8 +9,9 @@
 #include <stdexcept>
 #include <vector>
 
+#include "clients/common/json.hpp"
+#include "clients/common/reports.pb.h"
 #include "clients/ctl/calibration_text.hpp"
-#include "clients/ctl/json/json.hpp"
 #include "clients/ctl/online.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/base/atomic_folder.hpp"
@@ -32,54 +33,51 @@ std::string name_of(const fs::path& folder) {
   return path.filename().string();
 }
 
-void print(const Context& context, Json& json) { context.out << json.close('}').text() << '\n'; }
-
 /// "ball", and its id where the daemon says it.
-std::string title_of(const client::CalibrationFiles& files) {
-  return files.number ? fmt::format("{} ({})", files.name, id_of(*files.number)) : files.name;
+std::string title_of(const std::string& name, const Id& number) {
+  return number ? fmt::format("{} ({})", name, id_of(*number)) : name;
 }
 
-/// An object with id (null when the daemon does not say it) and name, left open.
-Json begin(const client::CalibrationFiles& files) {
-  Json json;
-  json.open('{').key("id");
-  if (files.number) {
-    json.value(id_of(*files.number));
-  } else {
-    json.null();
-  }
-  json.member("name", files.name);
-  return json;
+Id number_of(const v1::CalibrationFiles& files) {
+  return files.has_number() ? Id(files.number()) : Id();
+}
+
+void print_json(const Context& context, const std::string& name, const Id& number,
+                const std::string& folder = {}) {
+  cli::CalibrationReport report;
+  if (number) report.set_number(*number);
+  report.set_name(name);
+  report.set_folder(folder);
+  context.out << cli::json_line(report);
 }
 
 void upload(const Context& context, const fs::path& folder, const std::string& name) {
-  client::CalibrationFiles files;
-  files.name = name.empty() ? name_of(folder) : name;
-  files.toml = base::read_file(folder / kToml);
-  files.png = base::read_file(folder / kPng);
-  files.number = client::Client(context.target).upload_calibration(files);
-  if (context.json) {
-    Json json = begin(files);
-    print(context, json);
-  } else {
-    context.out << fmt::format("the daemon uses calibration {} from now on\n", title_of(files));
-  }
+  v1::UploadCalibration files;
+  files.set_name(name.empty() ? name_of(folder) : name);
+  files.set_calibration_toml(base::read_file(folder / kToml));
+  files.set_reference_png(base::read_file(folder / kPng));
+  const Id number = client::Client(context.target).upload_calibration(files);
+  if (context.json) return print_json(context, files.name(), number);
+  context.out << fmt::format("the daemon uses calibration {} from now on\n",
+                             title_of(files.name(), number));
 }
 
 /// What the table does not say when the calibration in use and the one to start with differ.
-std::string difference_of(const std::vector<client::StoredCalibration>& calibrations,
+std::string difference_of(const std::vector<v1::StoredCalibration>& calibrations,
                           client::Client& client) {
-  using client::StoredCalibration;
+  using v1::StoredCalibration;
   const auto current = std::ranges::find_if(calibrations, &StoredCalibration::current);
   const bool starts = current != calibrations.end();
-  if (starts && current->in_use) return {};
+  if (starts && current->in_use()) return {};
   std::string text;
   if (std::ranges::none_of(calibrations, &StoredCalibration::in_use)) {
-    const auto used = client.status().calibration;
-    text = used ? fmt::format("in use is {}, under no number that the daemon knows\n", used->name)
-                : "none is in use\n";
+    const v1::Status status = client.status();
+    text = status.has_calibration()
+               ? fmt::format("in use is {}, under no number that the daemon knows\n",
+                             status.calibration().name())
+               : "none is in use\n";
   }
-  if (starts) text += fmt::format("the daemon starts with {} (>)\n", id_of(current->number));
+  if (starts) text += fmt::format("the daemon starts with {} (>)\n", id_of(current->number()));
   return text;
 }
 
@@ -87,11 +85,7 @@ void list(const Context& context) {
   client::Client client(context.target);
   const auto calibrations = client.calibrations();
   if (context.json) {
-    for (const auto& stored : calibrations) {
-      Json json;
-      add_stored(stored, json);
-      context.out << json.text() << '\n';
-    }
+    for (const auto& stored : calibrations) context.out << cli::json_line(stored);
   } else if (calibrations.empty()) {
     context.out << "the daemon keeps no calibration: dtactctl calibration upload sends one\n"
                 << difference_of(calibrations, client);
@@ -101,37 +95,31 @@ void list(const Context& context) {
 }
 
 void show(const Context& context, const Id& id) {
-  const auto files = client::Client(context.target).calibration(id);
-  if (context.json) {
-    Json json = begin(files);
-    json.member("calibration_toml", files.toml).member("reference_png_bytes", files.png.size());
-    print(context, json);
-  } else {
-    context.out << "# calibration " << title_of(files) << '\n' << files.toml;
-  }
+  const v1::CalibrationFiles files = client::Client(context.target).calibration(id);
+  context.out << (context.json ? cli::json_line(files)
+                               : "# calibration " + title_of(files.name(), number_of(files)) +
+                                     '\n' + files.calibration_toml());
 }
 
 void activate(const Context& context, const std::string& id) {
-  client::Client(context.target).activate_calibration(parse_id(id));
-  if (context.json) {
-    print(context, Json().open('{').member("id", id));
-  } else {
-    context.out << fmt::format("the daemon uses calibration {} from now on\n", id);
-  }
+  const std::uint64_t number = parse_id(id);
+  client::Client(context.target).activate_calibration(number);
+  if (context.json) return print_json(context, {}, number);
+  context.out << fmt::format("the daemon uses calibration {} from now on\n", id);
 }
 
 void save(const Context& context, const Id& id, const fs::path& folder, bool force) {
   if (!force && fs::exists(fs::symlink_status(folder))) {
     throw std::runtime_error(folder.string() + " exists: name another folder, or add --force");
   }
-  const auto files = client::Client(context.target).calibration(id);
-  base::write_folder_atomically(folder, {{kPng, files.png}, {kToml, files.toml}}, {kToml, kPng},
-                                "a calibration");
-  if (context.json) {
-    print(context, begin(files).member("folder", folder.string()));
-  } else {
-    context.out << fmt::format("{}: calibration {}\n", folder.string(), title_of(files));
-  }
+  const v1::CalibrationFiles files = client::Client(context.target).calibration(id);
+  base::write_folder_atomically(folder,
+                                {{kPng, files.reference_png()}, {kToml, files.calibration_toml()}},
+                                {kToml, kPng}, "a calibration");
+  const Id number = number_of(files);
+  if (context.json) return print_json(context, files.name(), number, folder.string());
+  context.out << fmt::format("{}: calibration {}\n", folder.string(),
+                             title_of(files.name(), number));
 }
 
 std::string check_id(const std::string& text) {

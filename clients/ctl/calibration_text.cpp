@@ -7,8 +7,6 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "clients/ctl/json/json.hpp"
-
 namespace dtact::ctl {
 namespace {
 
@@ -18,27 +16,18 @@ std::string size_text(std::uint32_t width, std::uint32_t height) {
   return fmt::format("{}x{}", width, height);
 }
 
-char mark_of(const client::StoredCalibration& stored) {
-  if (stored.in_use) return '*';
-  return stored.current ? '>' : ' ';
+char mark_of(const v1::StoredCalibration& stored) {
+  if (stored.in_use()) return '*';
+  return stored.current() ? '>' : ' ';
 }
 
 }  // namespace
 
-std::string text_of(const client::CalibrationSummary& summary) {
+std::string text_of(const v1::CalibrationSummary& summary) {
   return fmt::format("{}, method {}, {} of {} at {:.4f} mm/px, covers {:.2f} to {:.2f} mm, {}",
-                     summary.name, summary.method, size_text(summary.width, summary.height),
-                     size_text(summary.frame_width, summary.frame_height), summary.mm_per_px,
-                     summary.covered_from_mm, summary.covered_to_mm, summary.created);
-}
-
-void add_summary(const client::CalibrationSummary& summary, Json& json) {
-  json.open('{').member("name", summary.name).member("method", summary.method);
-  json.member("mm_per_px", summary.mm_per_px).member("width", summary.width);
-  json.member("height", summary.height).member("covered_from_mm", summary.covered_from_mm);
-  json.member("covered_to_mm", summary.covered_to_mm).member("created", summary.created);
-  json.member("frame_width", summary.frame_width).member("frame_height", summary.frame_height);
-  json.close('}');
+                     summary.name(), summary.method(), size_text(summary.width(), summary.height()),
+                     size_text(summary.frame_width(), summary.frame_height()), summary.mm_per_px(),
+                     summary.covered_from_mm(), summary.covered_to_mm(), summary.created());
 }
 
 std::string id_of(std::uint64_t number) {
@@ -58,45 +47,32 @@ std::uint64_t parse_id(const std::string& text) {
   return number;
 }
 
-std::string text_of(const std::vector<client::StoredCalibration>& calibrations) {
+std::string text_of(const std::vector<v1::StoredCalibration>& calibrations) {
   std::size_t id_width = 2;
   std::size_t name_width = 4;
   for (const auto& stored : calibrations) {
-    id_width = std::max(id_width, id_of(stored.number).size());
-    name_width = std::max(name_width, stored.name.size());
+    id_width = std::max(id_width, id_of(stored.number()).size());
+    name_width = std::max(name_width, stored.name().size());
   }
   std::string text =
       fmt::format("  {:>{}}  {:<20}  {:<{}}  {:>9}  {:>9}  {:>7}  {:<9}  range\n", "id", id_width,
                   "uploaded", "name", name_width, "image", "map", "mm/px", "method");
   const auto out = std::back_inserter(text);
   for (const auto& stored : calibrations) {
-    fmt::format_to(out, "{} {:>{}}  {:<20}  {:<{}}  ", mark_of(stored), id_of(stored.number),
-                   id_width, stored.uploaded.empty() ? "-" : stored.uploaded, stored.name,
+    fmt::format_to(out, "{} {:>{}}  {:<20}  {:<{}}  ", mark_of(stored), id_of(stored.number()),
+                   id_width, stored.uploaded().empty() ? "-" : stored.uploaded(), stored.name(),
                    name_width);
-    if (stored.summary.has_value()) {
-      const auto& summary = *stored.summary;
+    if (stored.has_summary()) {
+      const auto& summary = stored.summary();
       fmt::format_to(out, "{:>9}  {:>9}  {:>7.4f}  {:<9}  {:.2f} to {:.2f} mm\n",
-                     size_text(summary.frame_width, summary.frame_height),
-                     size_text(summary.width, summary.height), summary.mm_per_px, summary.method,
-                     summary.covered_from_mm, summary.covered_to_mm);
+                     size_text(summary.frame_width(), summary.frame_height()),
+                     size_text(summary.width(), summary.height()), summary.mm_per_px(),
+                     summary.method(), summary.covered_from_mm(), summary.covered_to_mm());
     } else {
-      fmt::format_to(out, "cannot be read: {}\n", stored.damage);
+      fmt::format_to(out, "cannot be read: {}\n", stored.damage());
     }
   }
   return text;
-}
-
-void add_stored(const client::StoredCalibration& stored, Json& json) {
-  json.open('{').member("id", id_of(stored.number)).member("name", stored.name);
-  json.member("uploaded", stored.uploaded).member("current", stored.current);
-  json.member("in_use", stored.in_use);
-  json.key("summary");
-  if (stored.summary.has_value()) {
-    add_summary(*stored.summary, json);
-  } else {
-    json.null();
-  }
-  json.member("damage", stored.damage).close('}');
 }
 
 }  // namespace dtact::ctl

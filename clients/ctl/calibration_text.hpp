@@ -4,16 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "clients/cpp/types.hpp"
+#include "clients/cpp/client.hpp"
 
 namespace dtact::ctl {
 
-class Json;
-
 /// "ball, method list, 580x580 of 800x600 at 0.0414 mm/px, covers -0.02 to 1.40 mm, 2026-…"
-[[nodiscard]] std::string text_of(const client::CalibrationSummary& summary);
-/// As an object.
-void add_summary(const client::CalibrationSummary& summary, Json& json);
+[[nodiscard]] std::string text_of(const v1::CalibrationSummary& summary);
 
 /// What a calibration goes by on the command line: "17", or "configured".
 [[nodiscard]] std::string id_of(std::uint64_t number);
@@ -22,8 +18,6 @@ void add_summary(const client::CalibrationSummary& summary, Json& json);
 
 /// A table with a line for each; those that cannot be read with the reason. `*` stands before the
 /// one in use, `>` before the one to start with where that is another one.
-[[nodiscard]] std::string text_of(const std::vector<client::StoredCalibration>& calibrations);
-/// As an object.
-void add_stored(const client::StoredCalibration& stored, Json& json);
+[[nodiscard]] std::string text_of(const std::vector<v1::StoredCalibration>& calibrations);
 
 }  // namespace dtact::ctl

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <ostream>
 #include <string>
 
-#include "clients/ctl/json/json.hpp"
+#include "clients/common/json.hpp"
+#include "clients/common/reports.pb.h"
 
 namespace dtact::ctl {
 namespace {
@@ -48,37 +48,48 @@ void print_text(const SurveyedCamera& camera, std::ostream& out) {
   }
 }
 
-void print_json(const SurveyedCamera& camera, Json& json) {
+cli::AttachedCamera report_of(const SurveyedCamera& camera) {
   const hal::v4l2::Attached& who = camera.attached;
-  json.open('{').member("name", who.stable_name()).member("node", who.node);
-  json.member("by_path", who.by_path).member("by_id", who.by_id).member("serial", who.serial);
-  json.member("bus", who.bus).member("card", who.card).member("driver", who.driver);
-  json.member("problem", who.problem).key("modes").open('[');
+  cli::AttachedCamera report;
+  report.set_name(who.stable_name());
+  report.set_node(who.node);
+  report.set_by_path(who.by_path);
+  report.set_by_id(who.by_id);
+  report.set_serial(who.serial);
+  report.set_bus(who.bus);
+  report.set_card(who.card);
+  report.set_driver(who.driver);
+  report.set_problem(who.problem);
   for (const Mode& mode : camera.modes) {
-    json.open('{').member("format", mode.format_name()).member("usable", mode.usable());
-    json.member("width", mode.width).member("height", mode.height);
-    json.member("min_width", mode.min_width).member("min_height", mode.min_height);
-    json.member("fps_is_range", mode.fps_is_range).key("fps").open('[');
-    for (const double fps : mode.fps) json.value(rounded(fps));
-    json.close(']').close('}');
+    cli::CameraMode& to = *report.add_modes();
+    to.set_format(mode.format_name());
+    to.set_usable(mode.usable());
+    to.set_width(mode.width);
+    to.set_height(mode.height);
+    to.set_min_width(mode.min_width);
+    to.set_min_height(mode.min_height);
+    to.set_fps_is_range(mode.fps_is_range);
+    for (const double fps : mode.fps) to.add_fps(rounded(fps));
   }
-  json.close(']').key("controls").open('[');
   for (const OfferedControl& control : camera.controls) {
-    json.open('{').member("name", control.name).member("minimum", control.minimum);
-    json.member("maximum", control.maximum).member("step", control.step);
-    json.member("default", control.initial).member("value", control.value).close('}');
+    cli::OfferedControl& to = *report.add_controls();
+    to.set_name(control.name);
+    to.set_minimum(control.minimum);
+    to.set_maximum(control.maximum);
+    to.set_step(control.step);
+    to.set_default_(control.initial);
+    to.set_value(control.value);
   }
-  json.close(']').close('}');
+  return report;
 }
 
 }  // namespace
 
 void print_cameras(const std::vector<SurveyedCamera>& cameras, bool json, std::ostream& out) {
   if (json) {
-    Json text;
-    text.open('[');
-    for (const SurveyedCamera& camera : cameras) print_json(camera, text);
-    out << text.close(']').text() << '\n';
+    cli::CamerasReport report;
+    for (const SurveyedCamera& camera : cameras) *report.add_cameras() = report_of(camera);
+    out << cli::json_line(report);
     return;
   }
   if (cameras.empty()) out << "no camera is attached\n";

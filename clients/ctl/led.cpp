@@ -1,8 +1,10 @@
-#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
 #include <memory>
+#include <optional>
 #include <ostream>
 
-#include "clients/ctl/json/json.hpp"
+#include "clients/common/json.hpp"
 #include "clients/ctl/light_text.hpp"
 #include "clients/ctl/online.hpp"
 
@@ -10,35 +12,42 @@ namespace dtact::ctl {
 namespace {
 
 struct LedOptions {
-  client::LightChange change;
+  std::optional<std::uint32_t> brightness;
+  std::optional<std::string> scheme;
   std::vector<std::string> leds;
 };
 
-void run_led(const Context& context, LedOptions options) {
+v1::LightState run(const Context& context, const LedOptions& options) {
   client::Client client(context.target);
-  auto& change = options.change;
+  v1::SetLight change;
+  if (options.brightness) change.set_brightness(*options.brightness);
+  if (options.scheme) change.set_scheme(*options.scheme);
   if (!options.leds.empty()) {
     // The wire wants all eight: those that are not named stay as they are, or as the scheme says.
-    if (change.scheme.has_value()) {
-      (void)client.set_light({{}, change.scheme, {}});
-      change.scheme.reset();
+    v1::LightState now = client.status().light();
+    if (options.scheme) {
+      v1::SetLight scheme;
+      scheme.set_scheme(*options.scheme);
+      now = client.set_light(scheme);
+      change.clear_scheme();
     }
-    change.leds = client.status().light.leds;
+    *change.mutable_leds() = now.leds();
     for (const auto& text : options.leds) {
       const auto [index, colour] = parse_led(text);
-      change.leds.at(index) = colour;
+      if (index >= change.leds_size()) {
+        throw std::invalid_argument(
+            fmt::format("--led {}: the ring has {} LEDs", text, change.leds_size()));
+      }
+      *change.mutable_leds(index) = colour;
     }
   }
-  const bool changes =
-      change.brightness.has_value() || change.scheme.has_value() || !change.leds.empty();
-  const auto light = changes ? client.set_light(change) : client.status().light;
-  if (context.json) {
-    Json json;
-    add_light(light, json);
-    context.out << json.text() << '\n';
-  } else {
-    context.out << text_of(light) << '\n';
-  }
+  const bool changes = options.brightness || options.scheme || !options.leds.empty();
+  return changes ? client.set_light(change) : client.status().light();
+}
+
+void run_led(const Context& context, const LedOptions& options) {
+  const v1::LightState light = run(context, options);
+  context.out << (context.json ? cli::json_line(light) : text_of(light) + '\n');
 }
 
 }  // namespace
@@ -46,9 +55,9 @@ void run_led(const Context& context, LedOptions options) {
 void add_led(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("led", "Change the light; without options, show it");
   const auto options = std::make_shared<LedOptions>();
-  command->add_option("--brightness", options->change.brightness, "0 (off) to 255")
+  command->add_option("--brightness", options->brightness, "0 (off) to 255")
       ->check(CLI::Range(0, 255));
-  command->add_option("--scheme", options->change.scheme,
+  command->add_option("--scheme", options->scheme,
                       "White LEDs by name: all, or scheme1 to scheme4, four of the eight");
   command
       ->add_option("--led", options->leds,

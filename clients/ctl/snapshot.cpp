@@ -8,7 +8,10 @@
 #include <stdexcept>
 
 #include "clients/common/depth_file.hpp"
-#include "clients/ctl/json/json.hpp"
+#include "clients/common/json.hpp"
+#include "clients/common/reports.pb.h"
+#include "clients/cpp/maps.hpp"
+#include "clients/cpp/names.hpp"
 #include "clients/ctl/online.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
@@ -46,10 +49,10 @@ std::string encode_grey_png(const cli::DepthImage& depth) {
 }
 
 /// The next frame that holds what is asked for.
-client::Frame fetch(client::Client& client, const SnapshotOptions& options) {
-  client::Subscription subscription;
-  subscription.depth = options.luma ? client::Depth::none : client::Depth::delta_zstd;
-  subscription.luma = options.luma ? client::Luma::grey8 : client::Luma::none;
+v1::Frame fetch(client::Client& client, const SnapshotOptions& options) {
+  v1::Subscribe subscription;
+  subscription.set_depth(options.luma ? v1::DEPTH_NONE : v1::DEPTH_DELTA_ZSTD);
+  subscription.set_luma(options.luma ? v1::LUMA_GREY8 : v1::LUMA_NONE);
   client.subscribe(subscription);
   const auto end = std::chrono::steady_clock::now() +
                    std::chrono::milliseconds(static_cast<std::int64_t>(options.timeout_s * 1e3));
@@ -59,26 +62,28 @@ client::Frame fetch(client::Client& client, const SnapshotOptions& options) {
     if (left.count() <= 0) break;
     auto message = client.next(left);
     if (!message.has_value()) break;
-    auto* frame = std::get_if<client::Frame>(&*message);
+    auto* frame = std::get_if<v1::Frame>(&*message);
     if (frame == nullptr) continue;
-    if (options.luma ? frame->luma.has_value() : frame->depth.has_value()) {
+    if (options.luma ? frame->has_luma() : frame->has_depth()) {
       return std::move(*frame);
     }
   }
   const auto status = client.status();
   throw std::runtime_error(fmt::format("no {} came within {:g} s; the daemon's state is {}. {}",
                                        options.luma ? "image" : "depth", options.timeout_s,
-                                       status.state, status.advice));
+                                       client::name_of(status.state()), status.advice()));
 }
 
-std::string encode(const client::Frame& frame, const SnapshotOptions& options) {
+std::string encode(const v1::Frame& frame, const SnapshotOptions& options) {
   if (options.luma) {
-    return image::encode_png(
-        image::Grey8{frame.luma->width, frame.luma->height, frame.luma->values});
+    return image::encode_png(image::Grey8{static_cast<int>(frame.luma().width()),
+                                          static_cast<int>(frame.luma().height()),
+                                          client::pixels_of(frame.luma())});
   }
-  const auto mm = frame.depth->millimetres();
+  const v1::DepthMap& depth = frame.depth();
+  const auto mm = client::millimetres_of(depth);
   return cli::encoder_for(options.output, encode_grey_png)(
-      {frame.depth->width, frame.depth->height, frame.depth->mm_per_px, mm});
+      {static_cast<int>(depth.width()), static_cast<int>(depth.height()), depth.mm_per_px(), mm});
 }
 
 void run_snapshot(const Context& context, const SnapshotOptions& options) {
@@ -88,20 +93,21 @@ void run_snapshot(const Context& context, const SnapshotOptions& options) {
     throw CLI::ValidationError("-o " + options.output, "with --luma the name must end in .png");
   }
   client::Client client(context.target);
-  const auto frame = fetch(client, options);
+  v1::Frame frame = fetch(client, options);
   base::write_file_atomically(options.output, encode(frame, options));
   if (context.json) {
-    Json json;
-    json.open('{').member("file", options.output).member("sequence", frame.sequence);
-    json.member("monotonic_ns", frame.monotonic_ns).member("wall_ns", frame.wall_ns);
-    json.member("touching", frame.contact.touching).member("area_mm2", frame.contact.area_mm2);
-    json.member("deepest_mm", frame.contact.deepest_mm).member("health", frame.health);
-    context.out << json.close('}').text() << '\n';
+    if (frame.has_depth()) frame.mutable_depth()->clear_data();
+    if (frame.has_luma()) frame.mutable_luma()->clear_data();
+    cli::SnapshotReport report;
+    report.set_file(options.output);
+    *report.mutable_frame() = std::move(frame);
+    context.out << cli::json_line(report);
   } else {
+    const auto conditions = client::names_of(frame.health());
     context.out << fmt::format(
-        "{}: frame {}, deepest {:.3f} mm, contact {:.1f} mm2{}\n", options.output, frame.sequence,
-        frame.contact.deepest_mm, frame.contact.area_mm2,
-        frame.health.empty() ? "" : fmt::format(", {}", fmt::join(frame.health, ", ")));
+        "{}: frame {}, deepest {:.3f} mm, contact {:.1f} mm2{}\n", options.output, frame.sequence(),
+        frame.contact().deepest_mm(), frame.contact().area_mm2(),
+        conditions.empty() ? "" : fmt::format(", {}", fmt::join(conditions, ", ")));
   }
 }
 

@@ -10,7 +10,8 @@
 
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/interruptible.hpp"
-#include "clients/ctl/json/json.hpp"
+#include "clients/common/json.hpp"
+#include "clients/cpp/names.hpp"
 #include "clients/ctl/online.hpp"
 #include "clients/ctl/watch_meter.hpp"
 #include "hal/base/clock.hpp"
@@ -36,8 +37,8 @@ class Watch {
 
   void run() {
     const cli::Interruptible while_watching;
-    client::Subscription subscription;
-    subscription.summary = options_.summary;
+    v1::Subscribe subscription = client::depth_stream();
+    subscription.set_summary(options_.summary);
     client_.subscribe(subscription);
     start_ns_ = now();
     try {
@@ -64,7 +65,7 @@ class Watch {
       auto message = client_.next(
           std::chrono::milliseconds(std::clamp<std::int64_t>(wait_ns / 1'000'000 + 1, 1, 100)));
       if (message.has_value()) {
-        if (auto* frame = std::get_if<client::Frame>(&*message)) take(std::move(*frame));
+        if (auto* frame = std::get_if<v1::Frame>(&*message)) take(std::move(*frame));
       }
       if (now() < next_line_ns) continue;
       show();
@@ -72,42 +73,45 @@ class Watch {
     }
   }
 
-  void take(client::Frame frame) {
+  void take(v1::Frame frame) {
     const std::int64_t now_ns = now();
-    const bool counts = options_.summary || frame.depth.has_value();
+    const bool counts = options_.summary || frame.has_depth();
     for (auto* meter : {&interval_, &all_}) {
       meter->add(frame, now_ns, client_.same_machine(), counts);
     }
     last_ = std::move(frame);
+    if (last_.has_depth()) last_.mutable_depth()->clear_data();
   }
 
   void show() {
     if (interval_.frames() > 0) {
-      line(context_.json ? watch_json(interval_, last_) : watch_line(interval_, last_));
+      line(context_.json ? cli::json_line(watch_report(interval_, last_))
+                         : watch_line(interval_, last_) + '\n');
     } else {
-      const auto status = client_.status();
-      line(context_.json ? Json()
-                               .open('{')
-                               .member("fps", 0)
-                               .member("state", status.state)
-                               .member("health", status.health)
-                               .close('}')
-                               .text()
-                         : fmt::format("no frames: {}  {}", status.state, status.advice));
+      show_status();
     }
     interval_.reset();
+  }
+
+  void show_status() {
+    const v1::Status status = client_.status();
+    cli::WatchReport report;
+    *report.mutable_status() = status;
+    line(context_.json ? cli::json_line(report)
+                       : fmt::format("no frames: {}  {}\n", client::name_of(status.state()),
+                                     status.advice()));
   }
 
   /// A new line, or on a terminal the same one again, cut to its width.
   void line(const std::string& text) {
     if (!terminal_) {
-      context_.out << text << '\n' << std::flush;
+      context_.out << text << std::flush;
       return;
     }
     winsize size{};
     const bool known = ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
     const std::size_t width = known ? std::size_t{size.ws_col} - 1 : 120;
-    context_.out << "\r\x1b[K" << text.substr(0, width) << std::flush;
+    context_.out << "\r\x1b[K" << text.substr(0, std::min(width, text.size() - 1)) << std::flush;
   }
 
   void finish() {
@@ -117,15 +121,10 @@ class Watch {
     const double seconds = static_cast<double>(end_ns - start_ns_) * 1e-9;
     const auto& latency = all_.latency();
     if (context_.json) {
-      Json json;
-      json.open('{').member("summary", true).member("seconds", seconds);
-      json.member("frames", all_.frames()).member("depth_frames", all_.counted());
-      json.member("fps", fps).member("deepest_mm", all_.deepest_mm());
-      json.member("latency_p50_ms", latency.percentile_ms(0.5));
-      json.member("latency_p99_ms", latency.percentile_ms(0.99));
-      json.member("dropped", last_.dropped);
-      json.member("health", std::vector<std::string>(all_.health().begin(), all_.health().end()));
-      context_.out << json.close('}').text() << '\n';
+      cli::WatchReport report = watch_report(all_, last_);
+      report.set_summary(true);
+      report.set_fps(fps);
+      context_.out << cli::json_line(report);
     } else {
       context_.out << fmt::format("watched {:.1f} s: {} frames, {} with depth, {:.1f} fps; ",
                                   seconds, all_.frames(), options_.summary ? 0 : all_.counted(),
@@ -134,9 +133,13 @@ class Watch {
         context_.out << fmt::format("latency p50 {:.1f} ms, p99 {:.1f} ms; ",
                                     latency.percentile_ms(0.5), latency.percentile_ms(0.99));
       }
-      context_.out << fmt::format(
-          "deepest {:.3f} mm; {} dropped; conditions: {}\n", all_.deepest_mm(), last_.dropped,
-          all_.health().empty() ? "none" : fmt::format("{}", fmt::join(all_.health(), ", ")));
+      std::string conditions;
+      for (const v1::Health condition : all_.health()) {
+        conditions += (conditions.empty() ? "" : ", ") + client::name_of(condition);
+      }
+      context_.out << fmt::format("deepest {:.3f} mm; {} dropped; conditions: {}\n",
+                                  all_.deepest_mm(), last_.dropped(),
+                                  conditions.empty() ? "none" : conditions);
     }
     if (fps < options_.min_fps) {
       throw cli::Failure(cli::kNotMet,
@@ -153,7 +156,7 @@ class Watch {
   std::int64_t start_ns_ = 0;
   WatchMeter interval_;
   WatchMeter all_;
-  client::Frame last_;
+  v1::Frame last_;  ///< Without the data of its maps.
 };
 
 }  // namespace

@@ -4,20 +4,19 @@
 
 #include <algorithm>
 
-#include "clients/ctl/json/json.hpp"
+#include "clients/cpp/names.hpp"
 
 namespace dtact::ctl {
 
-void WatchMeter::add(const client::Frame& frame, std::int64_t now_ns, bool same_clock,
-                     bool counts) {
+void WatchMeter::add(const v1::Frame& frame, std::int64_t now_ns, bool same_clock, bool counts) {
   ++frames_;
   if (counts) {
     if (counted_++ == 0) first_ns_ = now_ns;
     last_ns_ = now_ns;
   }
-  if (same_clock) latency_.add(now_ns - frame.monotonic_ns);
-  deepest_mm_ = std::max(deepest_mm_, frame.contact.deepest_mm);
-  health_.insert(frame.health.begin(), frame.health.end());
+  if (same_clock) latency_.add(now_ns - frame.monotonic_ns());
+  deepest_mm_ = std::max(deepest_mm_, frame.contact().deepest_mm());
+  for (const int condition : frame.health()) health_.insert(static_cast<v1::Health>(condition));
 }
 
 void WatchMeter::reset() { *this = WatchMeter(); }
@@ -27,38 +26,36 @@ double WatchMeter::rate_until(std::int64_t end_ns) const noexcept {
   return static_cast<double>(counted_ - 1) * 1e9 / static_cast<double>(end_ns - first_ns_);
 }
 
-std::string watch_line(const WatchMeter& meter, const client::Frame& last) {
+std::string watch_line(const WatchMeter& meter, const v1::Frame& last) {
   const auto& latency = meter.latency();
   const std::string delay =
       latency.count() == 0 ? "-"
                            : fmt::format("p50 {:.1f} p99 {:.1f} ms", latency.percentile_ms(0.5),
                                          latency.percentile_ms(0.99));
   const std::string worth =
-      last.depth ? fmt::format(" +- {:.3f}", last.depth->uncertainty_um / 1000) : "";
+      last.has_depth() ? fmt::format(" +- {:.3f}", last.depth().uncertainty_um() / 1000) : "";
   return fmt::format(
       "{:5.1f} fps  contact {:6.1f} mm2  deepest {:6.3f} mm{}  latency {}  drops {}  {}",
-      meter.fps(), last.contact.area_mm2, last.contact.deepest_mm, worth, delay, last.dropped,
-      last.health.empty() ? "ok" : fmt::format("{}", fmt::join(last.health, ",")));
+      meter.fps(), last.contact().area_mm2(), last.contact().deepest_mm(), worth, delay,
+      last.dropped(),
+      last.health().empty() ? "ok"
+                            : fmt::format("{}", fmt::join(client::names_of(last.health()), ",")));
 }
 
-std::string watch_json(const WatchMeter& meter, const client::Frame& last) {
-  Json json;
-  json.open('{').member("sequence", last.sequence).member("fps", meter.fps());
-  json.member("touching", last.contact.touching).member("area_mm2", last.contact.area_mm2);
-  json.member("deepest_mm", last.contact.deepest_mm);
-  if (last.depth) {
-    json.member("uncertainty_um", last.depth->uncertainty_um);
-    json.member("decimation", last.depth->decimation);
-  }
+cli::WatchReport watch_report(const WatchMeter& meter, const v1::Frame& last) {
+  cli::WatchReport report;
+  report.set_frames(meter.frames());
+  report.set_depth_frames(meter.counted());
+  report.set_fps(meter.fps());
   const auto& latency = meter.latency();
-  if (latency.count() == 0) {
-    json.key("latency_p50_ms").null().key("latency_p99_ms").null();
-  } else {
-    json.member("latency_p50_ms", latency.percentile_ms(0.5));
-    json.member("latency_p99_ms", latency.percentile_ms(0.99));
+  if (latency.count() > 0) {
+    report.set_latency_p50_ms(latency.percentile_ms(0.5));
+    report.set_latency_p99_ms(latency.percentile_ms(0.99));
   }
-  json.member("dropped", last.dropped).member("health", last.health).close('}');
-  return json.text();
+  report.set_deepest_mm(meter.deepest_mm());
+  for (const v1::Health condition : meter.health()) report.add_health(condition);
+  *report.mutable_newest() = last;
+  return report;
 }
 
 }  // namespace dtact::ctl

@@ -4,7 +4,7 @@
 #include <set>
 #include <string>
 
-#include "clients/cpp/types.hpp"
+#include "clients/common/reports.pb.h"
 #include "clients/ctl/latency.hpp"
 
 namespace dtact::ctl {
@@ -15,7 +15,7 @@ class WatchMeter {
   /// `now_ns`: CLOCK_MONOTONIC when the client had the frame. `same_clock`: it is the daemon's
   /// clock too, so that the delay since capture has a meaning. `counts`: the frame holds what was
   /// asked for (depth).
-  void add(const client::Frame& frame, std::int64_t now_ns, bool same_clock, bool counts);
+  void add(const v1::Frame& frame, std::int64_t now_ns, bool same_clock, bool counts);
   void reset();
 
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_; }
@@ -27,7 +27,7 @@ class WatchMeter {
   [[nodiscard]] const LatencyHistogram& latency() const noexcept { return latency_; }
   [[nodiscard]] double deepest_mm() const noexcept { return deepest_mm_; }
   /// Every condition that a frame had.
-  [[nodiscard]] const std::set<std::string>& health() const noexcept { return health_; }
+  [[nodiscard]] const std::set<v1::Health>& health() const noexcept { return health_; }
 
  private:
   std::uint64_t frames_ = 0;
@@ -36,12 +36,12 @@ class WatchMeter {
   std::int64_t last_ns_ = 0;
   double deepest_mm_ = 0;
   LatencyHistogram latency_;
-  std::set<std::string> health_;
+  std::set<v1::Health> health_;
 };
 
 /// One line for people: rate, contact, delay ("-" where the clocks differ), drops, health.
-[[nodiscard]] std::string watch_line(const WatchMeter& meter, const client::Frame& last);
-/// The same as a JSON object.
-[[nodiscard]] std::string watch_json(const WatchMeter& meter, const client::Frame& last);
+[[nodiscard]] std::string watch_line(const WatchMeter& meter, const v1::Frame& last);
+/// The same for --json.
+[[nodiscard]] cli::WatchReport watch_report(const WatchMeter& meter, const v1::Frame& last);
 
 }  // namespace dtact::ctl

@@ -15,9 +15,17 @@ using ::testing::HasSubstr;
 
 bool depth_flows(client::Client& client) {
   return read_until(client, [](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    return frame != nullptr && frame->depth.has_value();
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    return frame != nullptr && frame->has_depth();
   });
+}
+
+v1::UploadCalibration upload_of(const v1::CalibrationFiles& files) {
+  v1::UploadCalibration upload;
+  upload.set_name(files.name());
+  upload.set_calibration_toml(files.calibration_toml());
+  upload.set_reference_png(files.reference_png());
+  return upload;
 }
 
 /// dtactctl against this daemon; its exit status and what it printed.
@@ -30,16 +38,17 @@ int ctl(const Sensor& sensor, std::vector<std::string> arguments, std::string* o
 TEST(Calibration, UncalibratedServesLumaAndSaysHowToCalibrate) {
   const Sensor sensor({}, false);
   client::Client client = sensor.connect();
-  client::Subscription both;
-  both.luma = client::Luma::grey8;
+  v1::Subscribe both = client::depth_stream();
+  both.set_luma(v1::LUMA_GREY8);
   client.subscribe(both);
   ASSERT_TRUE(read_until(client, [](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    return frame != nullptr && frame->luma && !frame->depth && has(frame->health, "uncalibrated");
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    return frame != nullptr && frame->has_luma() && !frame->has_depth() &&
+           has(frame->health(), v1::HEALTH_UNCALIBRATED);
   }));
-  const client::Status status = client.status();
-  EXPECT_EQ(status.state, "uncalibrated");
-  EXPECT_THAT(status.advice, HasSubstr("dtactctl calibrate"));
+  const v1::Status status = client.status();
+  EXPECT_EQ(status.state(), v1::STATE_UNCALIBRATED);
+  EXPECT_THAT(status.advice(), HasSubstr("dtactctl calibrate"));
 }
 
 TEST(Calibration, UploadBringsDepthAndOutlivesARestart) {
@@ -49,49 +58,47 @@ TEST(Calibration, UploadBringsDepthAndOutlivesARestart) {
     ASSERT_EQ(ctl(sensor, {"calibration", "upload", calibration_folder().string()}, &output), 0)
         << output;
     client::Client client = sensor.connect();
-    client.subscribe({});
+    client.subscribe();
     EXPECT_TRUE(depth_flows(client));
   }
   sensor.restart();
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   EXPECT_TRUE(depth_flows(client));
-  ASSERT_TRUE(client.status().calibration.has_value());
+  ASSERT_TRUE(client.status().has_calibration());
 }
 
 TEST(Calibration, BadUploadIsRefusedAndChangesNothing) {
   const Sensor sensor;
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   ASSERT_TRUE(depth_flows(client));
-  const client::CalibrationFiles good = client.calibration();
-  client::CalibrationFiles bad = good;
-  bad.toml = "version = 'seven'\n";
+  const v1::UploadCalibration good = upload_of(client.calibration());
+  v1::UploadCalibration bad = good;
+  bad.set_calibration_toml("version = 'seven'\n");
   EXPECT_THROW(client.upload_calibration(bad), client::Refused);
   bad = good;
-  bad.png.resize(bad.png.size() / 2);
+  bad.mutable_reference_png()->resize(good.reference_png().size() / 2);
   EXPECT_THROW(client.upload_calibration(bad), client::Refused);
   bad = good;
-  bad.name = "../../etc";
+  bad.set_name("../../etc");
   EXPECT_THROW(client.upload_calibration(bad), client::Refused);
   EXPECT_TRUE(depth_flows(client));
-  EXPECT_EQ(client.calibration().toml, good.toml);
+  EXPECT_EQ(client.calibration().calibration_toml(), good.calibration_toml());
 }
 
 /// The next frames with depth have pixels of this size, which tells the calibrations apart.
 bool depth_flows_at(client::Client& client, double mm_per_px) {
   return read_until(client, [mm_per_px](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    return frame != nullptr && frame->depth.has_value() && frame->depth->mm_per_px == mm_per_px;
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    return frame != nullptr && frame->has_depth() && frame->depth().mm_per_px() == mm_per_px;
   });
 }
 
 bool is_told(client::Client& client, const std::string& name) {
   return read_until(client, [&name](const Item& item) {
-    const auto* event = std::get_if<client::Event>(&item);
-    const auto* changed =
-        event == nullptr ? nullptr : std::get_if<client::CalibrationChanged>(event);
-    return changed != nullptr && changed->name == name;
+    const auto* event = std::get_if<v1::Event>(&item);
+    return event != nullptr && event->calibration().name() == name;
   });
 }
 
@@ -104,12 +111,13 @@ class TwoCalibrations : public testing::Test {
 
   TwoCalibrations() {
     client::Client client = sensor_.connect();
-    client::CalibrationFiles files = client.calibration();
+    v1::UploadCalibration files = upload_of(client.calibration());
+    std::string& toml = *files.mutable_calibration_toml();
     const std::string key = "mm_per_px = 0.0413793";
-    const std::size_t at = files.toml.find(key);
+    const std::size_t at = toml.find(key);
     if (at == std::string::npos) throw std::runtime_error("no " + key);
-    files.toml.replace(at, key.size(), "mm_per_px = 0.05");
-    files.name = "other";
+    toml.replace(at, key.size(), "mm_per_px = 0.05");
+    files.set_name("other");
     client.upload_calibration(files);
   }
 
@@ -124,7 +132,7 @@ class TwoCalibrations : public testing::Test {
   }
   [[nodiscard]] bool depth_flows_again_at(double mm_per_px) const {
     client::Client client = sensor_.connect();
-    client.subscribe({});
+    client.subscribe();
     return depth_flows_at(client, mm_per_px);
   }
 
@@ -134,7 +142,7 @@ class TwoCalibrations : public testing::Test {
 TEST_F(TwoCalibrations, SwitchAtOnceAndStaySoAfterARestart) {
   EXPECT_THAT(list(), AllOf(HasSubstr("  configured"), HasSubstr("*          1  20")));
   client::Client watcher = sensor_.connect();
-  watcher.subscribe({});
+  watcher.subscribe();
   ASSERT_TRUE(depth_flows_at(watcher, kOther));
   std::string output;
   ASSERT_EQ(activate("configured", &output), 0) << output;
@@ -165,7 +173,7 @@ TEST_F(TwoCalibrations, ADaemonWhoseUploadedOneIsDamagedStartsAndCanBeMended) {
   const auto file = sensor_.folder.path() / "state/calibrations/1/other/calibration.toml";
   base::write_file_atomically(file, "version = 1\n");
   sensor_.restart();
-  EXPECT_EQ(sensor_.connect().status().state, "uncalibrated");
+  EXPECT_EQ(sensor_.connect().status().state(), v1::STATE_UNCALIBRATED);
   EXPECT_THAT(sensor_.daemon->log(), HasSubstr("dtactctl calibration activate"));
   EXPECT_THAT(list(), AllOf(HasSubstr(">          1  20"), HasSubstr("none is in use")));
   std::string output;
@@ -190,17 +198,17 @@ TEST(Ctl, StatusSnapshotAndLight) {
   const Sensor sensor;
   {
     client::Client client = sensor.connect();
-    client.subscribe({});
+    client.subscribe();
     ASSERT_TRUE(depth_flows(client));
   }
   std::string output;
   EXPECT_EQ(ctl(sensor, {"status", "--json"}, &output), 0) << output;
-  EXPECT_THAT(output, HasSubstr("\"serving\""));
+  EXPECT_THAT(output, HasSubstr("\"STATE_SERVING\""));
   const std::filesystem::path file = sensor.folder.path() / "depth.npy";
   EXPECT_EQ(ctl(sensor, {"snapshot", "-o", file.string()}, &output), 0) << output;
   EXPECT_EQ(base::read_file(file).substr(0, 6), "\x93NUMPY");
   EXPECT_EQ(ctl(sensor, {"led", "--brightness", "77"}, &output), 0) << output;
-  EXPECT_EQ(sensor.connect().status().light.brightness, 77);
+  EXPECT_EQ(sensor.connect().status().light().brightness(), 77U);
   EXPECT_EQ(ctl(sensor, {"watch", "--seconds", "2"}, &output), 0) << output;
 }
 

@@ -48,7 +48,7 @@ std::string talk(std::uint16_t port, const std::string& bytes) {
 int count_frames(client::Client& client, int wanted) {
   int frames = 0;
   (void)read_until(client, [&](const Item& item) {
-    return std::holds_alternative<client::Frame>(item) && ++frames == wanted;
+    return std::holds_alternative<v1::Frame>(item) && ++frames == wanted;
   });
   return frames;
 }
@@ -57,10 +57,10 @@ TEST(Clients, SixteenOfWhichOneNeverReads) {
   const Sensor sensor;
   // Says hello by the library and asks for frames, then never reads again.
   client::Client deaf = sensor.connect("deaf");
-  deaf.subscribe({});
+  deaf.subscribe();
   std::vector<std::unique_ptr<client::Client>> clients;
-  client::Subscription small;  // fifteen full streams would be a gigabyte a second
-  small.summary = true;
+  v1::Subscribe small;  // fifteen full streams would be a gigabyte a second
+  small.set_summary(true);
   for (int i = 0; i < 15; ++i) {
     clients.push_back(std::make_unique<client::Client>(sensor.connect()));
     clients.back()->subscribe(small);
@@ -73,11 +73,11 @@ TEST(Clients, SixteenOfWhichOneNeverReads) {
   for (std::thread& thread : threads) thread.join();
   for (const int n : frames) EXPECT_EQ(n, 180);
   // The daemon answers at once, and knows who did not read.
-  const client::Status status = clients[0]->status();
-  EXPECT_EQ(status.clients.size(), 16U);
-  for (const auto& c : status.clients) {
-    if (c.program == "deaf") {
-      EXPECT_GT(c.dropped, 50U);
+  const v1::Status status = clients[0]->status();
+  EXPECT_EQ(status.clients_size(), 16);
+  for (const auto& c : status.clients()) {
+    if (c.program() == "deaf") {
+      EXPECT_GT(c.dropped(), 50U);
     }
   }
 }
@@ -85,12 +85,12 @@ TEST(Clients, SixteenOfWhichOneNeverReads) {
 TEST(Clients, OneKilledMidStreamDoesNotDisturbTheOthers) {
   const Sensor sensor;
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   const pid_t child = ::fork();
   if (child == 0) {
     try {
       client::Client doomed = sensor.connect("doomed");
-      doomed.subscribe({});
+      doomed.subscribe();
       for (;;) (void)doomed.next(std::chrono::seconds(1));
     } catch (const std::exception&) {
     }
@@ -100,13 +100,13 @@ TEST(Clients, OneKilledMidStreamDoesNotDisturbTheOthers) {
   ::kill(child, SIGKILL);
   ::waitpid(child, nullptr, 0);
   EXPECT_EQ(count_frames(client, 120), 120);
-  EXPECT_EQ(client.status().clients.size(), 1U);
+  EXPECT_EQ(client.status().clients_size(), 1);
 }
 
 TEST(Clients, MalformedAndOversizedMessagesEndOnlyTheirConnection) {
   const Sensor sensor;
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   // A length above the cap; a message that is no protobuf; another protocol; nothing but a length.
   EXPECT_NE(talk(sensor.daemon->port(), std::string("\xff\xff\xff\xff", 4)), "");
   EXPECT_NE(talk(sensor.daemon->port(), std::string("\0\0\0\4\xff\xff\xff\xff", 8)), "");
@@ -121,20 +121,19 @@ TEST(Clients, NewestLightWinsAndEveryClientIsTold) {
   const Sensor sensor;
   client::Client one = sensor.connect("one");
   client::Client two = sensor.connect("two");
-  client::LightChange change;
-  change.brightness = 200;
+  v1::SetLight change;
+  change.set_brightness(200);
   (void)one.set_light(change);
-  change.brightness = 100;
+  change.set_brightness(100);
   (void)two.set_light(change);
-  EXPECT_EQ(one.status().light.brightness, 100);
+  EXPECT_EQ(one.status().light().brightness(), 100U);
   for (client::Client* client : {&one, &two}) {
     EXPECT_TRUE(read_until(*client, [](const Item& item) {
-      const auto* event = std::get_if<client::Event>(&item);
-      const auto* light = event == nullptr ? nullptr : std::get_if<client::LightChanged>(event);
-      return light != nullptr && light->light.brightness == 100;
+      const auto* event = std::get_if<v1::Event>(&item);
+      return event != nullptr && event->light().brightness() == 100;
     }));
   }
-  change.brightness = 300;
+  change.set_brightness(300);
   EXPECT_THROW((void)one.set_light(change), client::Refused);
 }
 

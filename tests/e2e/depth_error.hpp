@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "clients/cpp/types.hpp"
+#include "clients/cpp/maps.hpp"
 #include "hal/sim/truth.hpp"
 #include "tests/e2e/sensor.hpp"
 
@@ -19,13 +19,15 @@ struct DepthError {
   int untrusted = 0;      ///< Of them, those not to be believed.
 };
 
-inline DepthError depth_error(const client::Frame& frame, const hal::sim::Truth& truth) {
-  if (!frame.depth) throw std::invalid_argument("a frame without depth");
+inline DepthError depth_error(const v1::Frame& frame, const hal::sim::Truth& truth) {
+  if (!frame.has_depth()) throw std::invalid_argument("a frame without depth");
   std::vector<float> indentation;
   std::vector<std::uint8_t> contact;
-  truth.indentation_mm(frame.sequence, indentation);
-  truth.contact(frame.sequence, contact);
+  truth.indentation_mm(frame.sequence(), indentation);
+  truth.contact(frame.sequence(), contact);
   const auto width = static_cast<std::size_t>(truth.scene().camera.width);
+
+  const std::vector<float> mm = client::millimetres_of(frame.depth());
 
   DepthError error;
   double inside = 0;
@@ -34,7 +36,7 @@ inline DepthError depth_error(const client::Frame& frame, const hal::sim::Truth&
   for (std::size_t y = 0; y < kCropSide; ++y) {
     for (std::size_t x = 0; x < kCropSide; ++x) {
       const std::size_t at = (y + kCropRow) * width + x + kCropColumn;
-      const float depth = frame.depth->millimetres(y * kCropSide + x);
+      const float depth = mm[y * kCropSide + x];
       const bool touched = contact[at] != 0;
       if (touched) ++error.inside_pixels;
       if (std::isnan(depth)) {

@@ -69,7 +69,7 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
   }
   sensor.restart();
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   const hal::sim::Truth truth(hal::sim::default_scene());
   std::vector<double> inside;
   double worst_untouched = 0;
@@ -78,13 +78,13 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
   ASSERT_TRUE(read_until(
       client,
       [&](const Item& item) {
-        const auto* frame = std::get_if<client::Frame>(&item);
-        if (frame == nullptr || !frame->depth) return false;
-        EXPECT_FALSE(has(frame->health, "camera_mismatch"));
-        EXPECT_FALSE(has(frame->health, "light_mismatch"));
-        const std::uint64_t place = frame->sequence % 720;  // of the scene's loop
-        if (place > 345 || frame->sequence < judged + 10) return false;
-        judged = frame->sequence;
+        const auto* frame = std::get_if<v1::Frame>(&item);
+        if (frame == nullptr || !frame->has_depth()) return false;
+        EXPECT_FALSE(has(frame->health(), v1::HEALTH_CAMERA_MISMATCH));
+        EXPECT_FALSE(has(frame->health(), v1::HEALTH_LIGHT_MISMATCH));
+        const std::uint64_t place = frame->sequence() % 720;  // of the scene's loop
+        if (place > 345 || frame->sequence() < judged + 10) return false;
+        judged = frame->sequence();
         const DepthError error = depth_error(*frame, truth);
         if (error.inside_pixels > 5000) {
           inside.push_back(error.inside_mm);
@@ -151,9 +151,8 @@ TEST(Guided, RefusesACameraThatIsAway) {
   const Sensor away(scene, false);
   client::Client client = away.connect();
   ASSERT_TRUE(read_until(client, [](const Item& item) {
-    const auto* event = std::get_if<client::Event>(&item);
-    const auto* state = event == nullptr ? nullptr : std::get_if<client::StateChanged>(event);
-    return state != nullptr && state->state == "camera_lost";
+    const auto* event = std::get_if<v1::Event>(&item);
+    return event != nullptr && event->state().state() == v1::STATE_CAMERA_LOST;
   }));
   std::string output;
   EXPECT_EQ(guide(away, "\n", &output), kFailed) << output;

@@ -34,15 +34,15 @@ std::filesystem::path write_scene(const TempFolder& folder) {
 /// Waits for a frame with depth in which something touches, or nothing.
 bool wait_contact(client::Client& client, bool touching) {
   return read_until(client, [&](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    return frame != nullptr && frame->depth && frame->contact.touching == touching;
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    return frame != nullptr && frame->has_depth() && frame->contact().touching() == touching;
   });
 }
 
 bool wait_reference(client::Client& client) {
   return read_until(client, [](const Item& item) {
-    const auto* event = std::get_if<client::Event>(&item);
-    return event != nullptr && std::holds_alternative<client::ReferenceTaken>(*event);
+    const auto* event = std::get_if<v1::Event>(&item);
+    return event != nullptr && event->has_reference();
   });
 }
 
@@ -54,19 +54,20 @@ struct Pressed {
 Pressed next_press(client::Client& client, const hal::sim::Truth& truth) {
   Pressed pressed;
   const bool found = read_until(client, [&](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    if (frame == nullptr || !frame->depth) return false;
-    const double t = truth.scene().time_s(frame->sequence);
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    if (frame == nullptr || !frame->has_depth()) return false;
+    const double t = truth.scene().time_s(frame->sequence());
     if (t < 3.5 || t > 4.9) return false;
+    const std::vector<float> mm = client::millimetres_of(frame->depth());
     std::vector<float> indentation;
     std::vector<std::uint8_t> contact;
-    truth.indentation_mm(frame->sequence, indentation);
-    truth.contact(frame->sequence, contact);
+    truth.indentation_mm(frame->sequence(), indentation);
+    truth.contact(frame->sequence(), contact);
     int n = 0;
     for (std::size_t y = 0; y < kCropSide; ++y) {
       for (std::size_t x = 0; x < kCropSide; ++x) {
         const std::size_t at = (y + kCropRow) * 800 + x + kCropColumn;
-        const float depth = frame->depth->millimetres(y * kCropSide + x);
+        const float depth = mm[y * kCropSide + x];
         if (contact[at] == 0 || std::isnan(depth)) continue;
         pressed.depth_mm += static_cast<double>(depth);
         pressed.truth_mm += static_cast<double>(indentation[at]);
@@ -86,24 +87,24 @@ TEST(Reference, HalvedLightKeepsTheMillimetres) {
   const Sensor sensor(write_scene(folder));
   const hal::sim::Truth truth(hal::sim::load_scene(folder.path() / "presses.toml"));
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
 
   const Pressed bright = next_press(client, truth);
   ASSERT_TRUE(wait_contact(client, false));
-  client::LightChange half;
-  half.brightness = 128;
-  EXPECT_EQ(client.set_light(half).brightness, 128);
+  v1::SetLight half;
+  half.set_brightness(128);
+  EXPECT_EQ(client.set_light(half).brightness(), 128U);
 
   bool unsettled = false;
   ASSERT_TRUE(read_until(client, [&](const Item& item) {
-    if (const auto* frame = std::get_if<client::Frame>(&item)) {
-      if (has(frame->health, "light_unsettled")) {
+    if (const auto* frame = std::get_if<v1::Frame>(&item)) {
+      if (has(frame->health(), v1::HEALTH_LIGHT_UNSETTLED)) {
         unsettled = true;
-        EXPECT_FALSE(frame->depth) << "depth while the light changes";
+        EXPECT_FALSE(frame->has_depth()) << "depth while the light changes";
       }
       return false;
     }
-    return std::holds_alternative<client::ReferenceTaken>(std::get<client::Event>(item));
+    return std::get<v1::Event>(item).has_reference();
   }));
   EXPECT_TRUE(unsettled);
   ASSERT_TRUE(wait_contact(client, false));
@@ -120,13 +121,13 @@ TEST(Reference, RezeroIsRefusedUnderContactUnlessForced) {
   const TempFolder folder;
   const Sensor sensor(write_scene(folder));
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   ASSERT_TRUE(wait_contact(client, true));
   try {
     client.rezero();
     ADD_FAILURE() << "re-zeroed under contact";
   } catch (const client::Refused& e) {
-    EXPECT_EQ(e.code(), client::Code::contact);
+    EXPECT_EQ(e.code(), v1::ERROR_CONTACT);
     EXPECT_NE(std::string(e.what()).find("force"), std::string::npos) << e.what();
   }
   ASSERT_TRUE(wait_contact(client, false));
@@ -138,7 +139,7 @@ TEST(Reference, RezeroIsRefusedUnderContactUnlessForced) {
 TEST(Reference, RezeroUntouchedTakesANewReference) {
   const Sensor sensor(scene_file("nothing.toml"));
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   ASSERT_TRUE(wait_contact(client, false));
   client.rezero();
   EXPECT_TRUE(wait_reference(client));
@@ -148,7 +149,7 @@ TEST(Reference, TouchedAtStartServesWithTheLastGoodOneAndSaysSo) {
   Sensor sensor(scene_file("nothing.toml"));
   {
     client::Client client = sensor.connect();
-    client.subscribe({});
+    client.subscribe();
     ASSERT_TRUE(wait_contact(client, false));  // its reference is in the state folder after the end
   }
   sensor.arguments.insert(
@@ -157,36 +158,35 @@ TEST(Reference, TouchedAtStartServesWithTheLastGoodOneAndSaysSo) {
   sensor.restart();
 
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   ASSERT_TRUE(read_until(client, [&](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    return frame != nullptr && frame->depth && frame->contact.touching;
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    return frame != nullptr && frame->has_depth() && frame->contact().touching();
   }));
-  EXPECT_TRUE(has(client.status().health, "reference_restored"));
+  EXPECT_TRUE(has(client.status().health(), v1::HEALTH_REFERENCE_RESTORED));
   // The press is read in millimetres all the same: 1 mm deep.
   ASSERT_TRUE(read_until(client, [&](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    if (frame == nullptr || !frame->depth || !frame->contact.touching) return false;
-    EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.1);
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    if (frame == nullptr || !frame->has_depth() || !frame->contact().touching()) return false;
+    EXPECT_NEAR(frame->contact().deepest_mm(), 1.0, 0.1);
     return true;
   }));
   // The ball leaves after five seconds and a fresh reference is taken.
   EXPECT_TRUE(read_until(client, [](const Item& item) {
-    const auto* event = std::get_if<client::Event>(&item);
-    const auto* taken = event == nullptr ? nullptr : std::get_if<client::ReferenceTaken>(event);
-    return taken != nullptr && !taken->restored;
+    const auto* event = std::get_if<v1::Event>(&item);
+    return event != nullptr && event->has_reference() && !event->reference().restored();
   }));
-  EXPECT_FALSE(has(client.status().health, "reference_restored"));
+  EXPECT_FALSE(has(client.status().health(), v1::HEALTH_REFERENCE_RESTORED));
 }
 
 TEST(Reference, TouchedAtTheVeryFirstStartIsNotTakenForUntouched) {
   const Sensor sensor(scene_file("touched_at_start.toml"));
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   EXPECT_TRUE(read_until(client, [&](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    return frame != nullptr && frame->depth && frame->contact.touching &&
-           has(frame->health, "reference_stale");
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    return frame != nullptr && frame->has_depth() && frame->contact().touching() &&
+           has(frame->health(), v1::HEALTH_REFERENCE_STALE);
   }));
 }
 

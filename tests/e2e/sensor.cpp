@@ -75,8 +75,8 @@ bool read_until(client::Client& client, const std::function<bool(const Item&)>& 
   return false;
 }
 
-bool has(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
+bool has(const google::protobuf::RepeatedField<int>& health, v1::Health condition) {
+  return std::ranges::find(health, condition) != health.end();
 }
 
 }  // namespace dtact::e2e

@@ -42,10 +42,10 @@ struct Sensor {
 };
 
 /// Reads until `done` says so of a frame or event. False when that takes longer than `patience`.
-using Item = std::variant<client::Frame, client::Event>;
+using Item = std::variant<v1::Frame, v1::Event>;
 bool read_until(client::Client& client, const std::function<bool(const Item&)>& done,
                 std::chrono::seconds patience = std::chrono::seconds(30));
 
-bool has(const std::vector<std::string>& names, const std::string& name);
+bool has(const google::protobuf::RepeatedField<int>& health, v1::Health condition);
 
 }  // namespace dtact::e2e

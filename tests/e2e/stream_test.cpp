@@ -16,7 +16,7 @@ namespace {
 TEST(Stream, SixHundredFramesOfTheRightDepth) {
   const Sensor sensor;
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   const hal::sim::Truth truth(hal::sim::default_scene());
 
   int frames = 0;
@@ -28,17 +28,17 @@ TEST(Stream, SixHundredFramesOfTheRightDepth) {
   ASSERT_TRUE(read_until(
       client,
       [&](const Item& item) {
-        const auto* frame = std::get_if<client::Frame>(&item);
-        if (frame == nullptr || !frame->depth) return false;
-        EXPECT_GT(frame->sequence, last);
-        last = frame->sequence;
-        EXPECT_GE(frame->ready_ns, frame->monotonic_ns);
-        EXPECT_GE(frame->published_ns, frame->ready_ns);
+        const auto* frame = std::get_if<v1::Frame>(&item);
+        if (frame == nullptr || !frame->has_depth()) return false;
+        EXPECT_GT(frame->sequence(), last);
+        last = frame->sequence();
+        EXPECT_GE(frame->ready_ns(), frame->monotonic_ns());
+        EXPECT_GE(frame->published_ns(), frame->ready_ns());
         // Every tenth is judged: the truth of a whole frame takes longer than a frame.
         if (frames++ % 10 == 0) {
           ++judged;
           const DepthError error = depth_error(*frame, truth);
-          const bool ball = frame->sequence % 720 < 360;  // the loop's first press
+          const bool ball = frame->sequence() % 720 < 360;  // the loop's first press
           if (error.inside_pixels > 5000 && ball) {
             ++pressed;
             inside.push_back(error.inside_mm);
@@ -66,15 +66,15 @@ TEST(Stream, SixHundredFramesOfTheRightDepth) {
 TEST(Stream, NullCameraReachesAClientAsConstantGrey) {
   const Sensor sensor({}, false, {"camera.backend=null", "ring.backend=null"});
   client::Client client = sensor.connect();
-  client::Subscription luma;
-  luma.depth = client::Depth::none;
-  luma.luma = client::Luma::grey8;
+  v1::Subscribe luma;
+  luma.set_luma(v1::LUMA_GREY8);
   client.subscribe(luma);
   int frames = 0;
   EXPECT_TRUE(read_until(client, [&](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    if (frame == nullptr || !frame->luma) return false;
-    EXPECT_EQ(frame->luma->values, std::vector<std::uint8_t>(480000, hal::null::NullCamera::kGrey));
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    if (frame == nullptr || !frame->has_luma()) return false;
+    EXPECT_EQ(client::pixels_of(frame->luma()),
+              std::vector<std::uint8_t>(480000, hal::null::NullCamera::kGrey));
     return ++frames == 10;
   }));
 }
@@ -83,26 +83,26 @@ TEST(Stream, CompressedDepthIsTheSameDepth) {
   const Sensor sensor;
   client::Client plain = sensor.connect();
   client::Client packed = sensor.connect();
-  plain.subscribe({});
-  client::Subscription subscription;
-  subscription.depth = client::Depth::delta_zstd;
+  plain.subscribe();
+  v1::Subscribe subscription;
+  subscription.set_depth(v1::DEPTH_DELTA_ZSTD);
   packed.subscribe(subscription);
-  std::vector<client::Frame> frames;
+  std::vector<v1::Frame> frames;
   ASSERT_TRUE(read_until(plain, [&](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    if (frame != nullptr && frame->depth) frames.push_back(*frame);
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    if (frame != nullptr && frame->has_depth()) frames.push_back(*frame);
     return frames.size() == 10;
   }));
   bool met = false;
   EXPECT_TRUE(read_until(packed, [&](const Item& item) {
-    const auto* frame = std::get_if<client::Frame>(&item);
-    if (frame == nullptr || !frame->depth) return false;
-    for (const client::Frame& other : frames) {
-      if (other.sequence != frame->sequence) continue;
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    if (frame == nullptr || !frame->has_depth()) return false;
+    for (const v1::Frame& other : frames) {
+      if (other.sequence() != frame->sequence()) continue;
       met = true;
-      EXPECT_EQ(other.depth->values, frame->depth->values);
+      EXPECT_EQ(client::values_of(other.depth()), client::values_of(frame->depth()));
     }
-    return met || frame->sequence > frames.back().sequence;
+    return met || frame->sequence() > frames.back().sequence();
   }));
   EXPECT_TRUE(met);
 }
@@ -110,10 +110,10 @@ TEST(Stream, CompressedDepthIsTheSameDepth) {
 TEST(Stream, EndsCleanlyOnSigtermWhileStreaming) {
   const Sensor sensor;
   client::Client client = sensor.connect();
-  client.subscribe({});
+  client.subscribe();
   int frames = 0;
   ASSERT_TRUE(read_until(client, [&](const Item& item) {
-    return std::holds_alternative<client::Frame>(item) && ++frames == 30;
+    return std::holds_alternative<v1::Frame>(item) && ++frames == 30;
   }));
   EXPECT_EQ(sensor.daemon->stop(SIGTERM), 0) << "not a clean end";
   EXPECT_THROW((void)read_until(client, [](const Item&) { return false; }),

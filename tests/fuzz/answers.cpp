@@ -1,30 +1,33 @@
-// What a daemon may send, read by the client library: it becomes the library's types or a
-// ProtocolError.
-#include "clients/cpp/convert.hpp"
+// What a daemon may send, read by the client library: pixels, or a ProtocolError.
+#include <string>
+
 #include "clients/cpp/errors.hpp"
+#include "clients/cpp/maps.hpp"
+#include "clients/cpp/names.hpp"
 #include "proto/depth_encoding.hpp"
-#include "proto/dtact.pb.h"
 #include "tests/fuzz/fuzz.hpp"
 
 namespace dtact::fuzz {
 namespace {
 
-void read(const v1::Frame& message) {
-  const client::Frame frame = client::to_frame(message);
-  if (!frame.depth) return;
-  const auto pixels =
-      static_cast<std::size_t>(frame.depth->width) * static_cast<std::size_t>(frame.depth->height);
-  require(frame.depth->values.size() == pixels && frame.depth->millimetres().size() == pixels,
+void read(const v1::DepthMap& map) {
+  const std::vector<std::int16_t> values = client::values_of(map);
+  const auto pixels = std::size_t{map.width()} * map.height();
+  require(values.size() == pixels && client::millimetres_of(map).size() == pixels,
           "a depth map has as many values as pixels");
   // What was decoded can be encoded, and comes back.
   wire::DeltaZstdEncoder encoder;
   std::string bytes;
-  encoder.encode(frame.depth->values, static_cast<std::size_t>(frame.depth->width), bytes);
+  encoder.encode(values, map.width(), bytes);
   std::vector<std::int16_t> again;
-  require(
-      wire::decode_delta_zstd(bytes, message.depth().width(), message.depth().height(), again) &&
-          again == frame.depth->values,
-      "a depth map survives its encoding");
+  require(wire::decode_delta_zstd(bytes, map.width(), map.height(), again) && again == values,
+          "a depth map survives its encoding");
+}
+
+template <typename Message>
+void read_names(const Message& message) {
+  (void)client::names_of(message.health());
+  (void)client::name_of(message.state());
 }
 
 }  // namespace
@@ -35,13 +38,11 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   v1::ServerMessage message;
   if (!message.ParseFromArray(data, static_cast<int>(size))) return 0;
   try {
-    if (message.has_frame()) fuzz::read(message.frame());
-    if (message.has_event()) (void)client::to_event(message.event());
-    (void)client::to_light(message.reply().light());
-    (void)client::to_status(message.reply().status());
-    for (const auto& stored : message.reply().calibrations().calibrations()) {
-      (void)client::to_stored(stored);
-    }
+    (void)client::names_of(message.frame().health());
+    fuzz::read_names(message.event().state());
+    fuzz::read_names(message.reply().status());
+    if (message.frame().has_luma()) (void)client::pixels_of(message.frame().luma());
+    if (message.frame().has_depth()) fuzz::read(message.frame().depth());
   } catch (const client::ProtocolError& e) {
     fuzz::require_sentence(e.what());
   }

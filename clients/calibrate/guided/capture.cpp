@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "clients/calibrate/guided/fitness.hpp"
+#include "clients/cpp/maps.hpp"
+#include "clients/cpp/names.hpp"
 
 namespace dtact::ctl::guided {
 namespace {
@@ -80,22 +82,23 @@ Capture::Capture(Sensor& sensor, Console& console, const CellGrid& grid, const R
 const Look* Capture::next() {
   if (console_.interrupted()) throw Ended{Ended::Why::interrupt};
   auto frame = sensor_.next(kFrameWait);
-  if (!frame || !frame->luma || passing_trouble(frame->health)) return nullptr;
-  if (!leds_.empty() && leds_of(frame->light) != leds_) {
+  if (!frame || !frame->has_luma() || passing_trouble(frame->health())) return nullptr;
+  if (!leds_.empty() && leds_of(frame->light()) != leds_) {
     throw std::runtime_error(
         "the light is another than when the reference was taken: set it back with dtactctl led, or "
         "begin again in another --folder");
   }
-  look_.image = {frame->luma->width, frame->luma->height, std::move(frame->luma->values)};
-  look_.time_ns = frame->monotonic_ns;
+  look_.image = {static_cast<int>(frame->luma().width()), static_cast<int>(frame->luma().height()),
+                 client::pixels_of(frame->luma())};
+  look_.time_ns = frame->monotonic_ns();
   look_.cells = grid_.of(look_.image.pixels, look_.image.width);
   return &look_;
 }
 
 std::string Capture::trouble() {
-  const client::Status status = sensor_.status();
-  return fmt::format("no usable frame came; the daemon's state is {}. {}", status.state,
-                     status.advice);
+  const v1::Status status = sensor_.status();
+  return fmt::format("no usable frame came; the daemon's state is {}. {}",
+                     client::name_of(status.state()), status.advice());
 }
 
 bool Capture::line_typed() {

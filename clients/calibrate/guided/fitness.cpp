@@ -6,9 +6,9 @@
 #include <array>
 #include <memory>
 #include <numeric>
-#include <string_view>
 
 #include "clients/calibrate/fit/build.hpp"
+#include "clients/cpp/names.hpp"
 #include "daemon/calibration/mismatch.hpp"
 
 namespace dtact::ctl::guided {
@@ -20,26 +20,29 @@ constexpr double kWhiteShare = 0.01;
 constexpr std::uint8_t kWhite = 254;
 constexpr double kNoise = 2.5;
 
-bool has_any(const std::vector<std::string>& health,
-             std::initializer_list<std::string_view> names) {
-  return std::ranges::any_of(health, [&](const std::string& condition) {
-    return std::ranges::find(names, condition) != names.end();
-  });
+using Conditions = google::protobuf::RepeatedField<int>;
+
+bool has_any(const Conditions& health, std::initializer_list<v1::Health> wanted) {
+  return std::ranges::any_of(
+      health, [&](int condition) { return std::ranges::find(wanted, condition) != wanted.end(); });
 }
 
 }  // namespace
 
-std::string unfit(const client::Status& status) {
-  if (status.state == "camera_lost" ||
-      has_any(status.health, {"camera_trouble", "ring_trouble", "image_saturated", "image_dark",
-                              "light_banded"})) {
-    return status.advice.empty() ? "the daemon's state is " + status.state : status.advice;
+std::string unfit(const v1::Status& status) {
+  if (status.state() == v1::STATE_CAMERA_LOST ||
+      has_any(status.health(),
+              {v1::HEALTH_CAMERA_TROUBLE, v1::HEALTH_RING_TROUBLE, v1::HEALTH_IMAGE_SATURATED,
+               v1::HEALTH_IMAGE_DARK, v1::HEALTH_LIGHT_BANDED})) {
+    return status.advice().empty() ? "the daemon's state is " + client::name_of(status.state())
+                                   : status.advice();
   }
   return {};
 }
 
-bool passing_trouble(const std::vector<std::string>& health) {
-  return has_any(health, {"starting", "light_unsettled", "image_repeated", "camera_trouble"});
+bool passing_trouble(const Conditions& health) {
+  return has_any(health, {v1::HEALTH_STARTING, v1::HEALTH_LIGHT_UNSETTLED,
+                          v1::HEALTH_IMAGE_REPEATED, v1::HEALTH_CAMERA_TROUBLE});
 }
 
 std::string fault_of(const Still& still, const recon::RectifyTable& table) {
@@ -69,29 +72,29 @@ std::string fault_of(const Still& still, const recon::RectifyTable& table) {
   return {};
 }
 
-calibration::Origin origin_of(const client::Status& status) {
+calibration::Origin origin_of(const v1::Status& status) {
   calibration::Origin origin;
-  origin.camera = status.camera.identity;
-  origin.pixel_format = status.camera.pixel_format;
-  origin.fps = status.camera.fps;
-  for (const auto& control : status.camera.controls) {
-    origin.controls.push_back({control.name, control.value});
+  origin.camera = status.camera().identity();
+  origin.pixel_format = status.camera().pixel_format();
+  origin.fps = status.camera().fps();
+  for (const auto& control : status.camera().controls()) {
+    origin.controls.push_back({control.name(), control.value()});
   }
-  origin.leds = leds_of(status.light);
+  origin.leds = leds_of(status.light());
   return origin;
 }
 
-std::vector<std::uint8_t> leds_of(const client::Light& light) {
+std::vector<std::uint8_t> leds_of(const v1::LightState& light) {
   std::vector<std::uint8_t> leds;
-  for (const client::Rgb& led : light.leds) {
-    for (const std::uint8_t channel : {led.r, led.g, led.b}) {
-      leds.push_back(static_cast<std::uint8_t>((channel * light.brightness + 127) / 255));
+  for (const v1::Rgb& led : light.leds()) {
+    for (const std::uint32_t channel : {led.r(), led.g(), led.b()}) {
+      leds.push_back(static_cast<std::uint8_t>((channel * light.brightness() + 127) / 255));
     }
   }
   return leds;
 }
 
-std::vector<std::string> differences(const calibration::Origin& then, const client::Status& now,
+std::vector<std::string> differences(const calibration::Origin& then, const v1::Status& now,
                                      int frame_width, int frame_height) {
   auto model = std::make_shared<recon::Model>();
   model->rectify.frame_width = frame_width;
@@ -103,8 +106,8 @@ std::vector<std::string> differences(const calibration::Origin& then, const clie
   std::vector<std::string> found =
       calibration::camera_mismatches(taken, {.identity = origin.camera,
                                              .pixel_format = origin.pixel_format,
-                                             .width = static_cast<int>(now.camera.width),
-                                             .height = static_cast<int>(now.camera.height),
+                                             .width = static_cast<int>(now.camera().width()),
+                                             .height = static_cast<int>(now.camera().height()),
                                              .fps = origin.fps,
                                              .controls = origin.controls});
   const std::vector<std::string> light = calibration::light_mismatches(taken, origin.leds);

@@ -5,13 +5,12 @@
 namespace dtact::ctl::guided {
 
 LiveSensor::LiveSensor(const client::Options& target) : client_(target) {
-  client::Subscription luma;
-  luma.depth = client::Depth::none;
-  luma.luma = client::Luma::grey8;
+  v1::Subscribe luma;
+  luma.set_luma(v1::LUMA_GREY8);
   client_.subscribe(luma);
 }
 
-std::optional<client::Frame> LiveSensor::next(std::chrono::milliseconds timeout) {
+std::optional<v1::Frame> LiveSensor::next(std::chrono::milliseconds timeout) {
   const auto end = std::chrono::steady_clock::now() + timeout;
   for (;;) {
     const auto left =
@@ -19,8 +18,8 @@ std::optional<client::Frame> LiveSensor::next(std::chrono::milliseconds timeout)
     if (left.count() <= 0) return std::nullopt;
     auto message = client_.next(left);
     if (!message.has_value()) return std::nullopt;
-    auto* frame = std::get_if<client::Frame>(&*message);
-    if (frame != nullptr && frame->luma.has_value()) return std::move(*frame);
+    auto* frame = std::get_if<v1::Frame>(&*message);
+    if (frame != nullptr && frame->has_luma()) return std::move(*frame);
   }
 }
 

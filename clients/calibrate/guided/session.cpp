@@ -65,17 +65,17 @@ Outcome Session::guide() {
 }
 
 void Session::greet() {
-  const client::Status status = steady_status();
-  const auto lit = std::ranges::count_if(status.light.leds, [](const client::Rgb& led) {
-    return led.r > 0 || led.g > 0 || led.b > 0;
+  const v1::Status status = steady_status();
+  const auto lit = std::ranges::count_if(status.light().leds(), [](const v1::Rgb& led) {
+    return led.r() > 0 || led.g() > 0 || led.b() > 0;
   });
   console_.say(
       fmt::format("{}: camera {}, {}x{} {} at {:g} fps; light {} of 255, {} of {} LEDs lit; {}",
-                  sensor_.program(), status.camera.identity, status.camera.width,
-                  status.camera.height, status.camera.pixel_format, status.camera.fps,
-                  status.light.brightness, lit, status.light.leds.size(),
-                  status.calibration ? "calibration in use: " + status.calibration->name
-                                     : std::string("no calibration yet")));
+                  sensor_.program(), status.camera().identity(), status.camera().width(),
+                  status.camera().height(), status.camera().pixel_format(), status.camera().fps(),
+                  status.light().brightness(), lit, status.light().leds_size(),
+                  status.has_calibration() ? "calibration in use: " + status.calibration().name()
+                                           : std::string("no calibration yet")));
   const std::string wrong = unfit(status);
   if (!wrong.empty()) {
     throw std::runtime_error("the sensor is not fit to be calibrated: " + wrong);
@@ -83,9 +83,9 @@ void Session::greet() {
   prepare_map(status);
 }
 
-void Session::prepare_map(const client::Status& status) {
-  const auto width = static_cast<int>(status.camera.width);
-  const auto height = static_cast<int>(status.camera.height);
+void Session::prepare_map(const v1::Status& status) {
+  const auto width = static_cast<int>(status.camera().width());
+  const auto height = static_cast<int>(status.camera().height());
   const MapChoice map = choose_map(plan_.map, width, height);
   image::Grey16 black{width, height, {}};
   black.pixels.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -118,9 +118,9 @@ void Session::resume() {
   (void)ask("[Enter] go on   [q] quit");
 }
 
-client::Status Session::steady_status() {
+v1::Status Session::steady_status() {
   constexpr int kPatience = 50;  // frames, or five seconds without one
-  client::Status status = sensor_.status();
+  v1::Status status = sensor_.status();
   for (int i = 0; i < kPatience && !unfit(status).empty(); ++i) {
     (void)sensor_.next(std::chrono::milliseconds(100));
     status = sensor_.status();
@@ -129,7 +129,7 @@ client::Status Session::steady_status() {
 }
 
 void Session::require_same_sensor() {
-  const client::Status status = steady_status();
+  const v1::Status status = steady_status();
   const std::string wrong = unfit(status);
   if (!wrong.empty()) throw std::runtime_error(wrong);
   const image::Grey16& reference = images_.set.reference_q8;
@@ -174,7 +174,7 @@ void Session::reference_step() {
       const Still still = capture_->untouched(plan_.reference_frames);
       const std::string fault = fault_of(still, empty_.model->rectify);
       if (!fault.empty()) throw NotTaken("not taken: " + fault);
-      const client::Status status = steady_status();
+      const v1::Status status = steady_status();
       const std::string wrong = unfit(status);
       if (!wrong.empty()) throw NotTaken("not taken: " + wrong);
       folder_.save_reference(still.frames, origin_of(status));
@@ -210,17 +210,20 @@ Outcome Session::finish() {
 
 void Session::upload() {
   const fs::path made = folder_.path() / kCalibration;
-  sensor_.upload({folder_.calibration_name(), base::read_file(made / calibration::kTomlName),
-                  base::read_file(made / calibration::kReferenceName)});
-  const client::Status status = sensor_.status();
-  if (!status.calibration || status.calibration->created != coverage_.made->origin.created) {
+  v1::UploadCalibration files;
+  files.set_name(folder_.calibration_name());
+  files.set_calibration_toml(base::read_file(made / calibration::kTomlName));
+  files.set_reference_png(base::read_file(made / calibration::kReferenceName));
+  sensor_.upload(files);
+  const v1::Status status = sensor_.status();
+  if (status.calibration().created() != coverage_.made->origin.created) {
     throw std::runtime_error(
         "the daemon took the calibration but uses another: see dtactctl status");
   }
   console_.say(
       fmt::format("the daemon uses calibration {} from now on; take the ball away, so that "
                   "it sees the untouched surface",
-                  status.calibration->name));
+                  status.calibration().name()));
 }
 
 }  // namespace dtact::ctl::guided

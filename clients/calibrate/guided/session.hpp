@@ -46,11 +46,11 @@ class Session {
  private:
   [[nodiscard]] Outcome guide();
   void greet();
-  void prepare_map(const client::Status& status);
+  void prepare_map(const v1::Status& status);
   void resume();
   /// The daemon's state, after a while where it is unfit: a camera that stumbles comes back by
   /// itself.
-  [[nodiscard]] client::Status steady_status();
+  [[nodiscard]] v1::Status steady_status();
   /// Throws unless camera and light are those of the reference.
   void require_same_sensor();
   void load();

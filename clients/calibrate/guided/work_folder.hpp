@@ -9,7 +9,7 @@
 
 namespace dtact::ctl::guided {
 
-/// What a session has taken, so that another one can go on and `dtactctl calibrate depth` can read
+/// What a session has taken, so that another one can go on and `dtact-calibrate depth` can read
 /// it:
 ///
 ///     FOLDER/reference/00.png … sensor.toml     the untouched surface, camera and light

@@ -9,7 +9,8 @@
 #include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
-#include "clients/ctl/json/json.hpp"
+#include "clients/common/json.hpp"
+#include "clients/common/reports.pb.h"
 
 namespace dtact::ctl {
 namespace {
@@ -24,66 +25,59 @@ struct Options {
   std::string page;
 };
 
-void add_optional(Json& json, const char* name, std::optional<double> value) {
-  value ? json.member(name, *value) : json.key(name).null();
+cli::BallReport report_of(const calibration::Evaluation& e) {
+  cli::BallReport report;
+  report.set_centre_row(e.contact.row);
+  report.set_centre_col(e.contact.col);
+  report.set_contact_radius_mm(e.contact.radius_mm);
+  report.set_peak_levels(e.contact.peak_levels);
+  report.set_drift_levels(e.drift_levels);
+  report.set_offset_mm(e.offset_mm);
+  report.set_mae_mm(e.mae_mm);
+  report.set_mae_with_offset_mm(e.raw_mae_mm);
+  if (e.half_mae_mm) report.set_half_mae_mm(*e.half_mae_mm);
+  if (e.half_worst_mm) report.set_half_worst_mm(*e.half_worst_mm);
+  report.set_contact_pixels(e.pixels);
+  report.set_untrusted_pixels(e.untrusted);
+  return report;
 }
 
-/// The members of a press's evaluation.
-void add_press(Json& json, const calibration::Evaluation& e) {
-  json.member("centre_row", e.contact.row)
-      .member("centre_col", e.contact.col)
-      .member("contact_radius_mm", e.contact.radius_mm)
-      .member("peak_levels", e.contact.peak_levels)
-      .member("drift_levels", e.drift_levels)
-      .member("offset_mm", e.offset_mm)
-      .member("mae_mm", e.mae_mm)
-      .member("mae_with_offset_mm", e.raw_mae_mm);
-  add_optional(json, "half_mae_mm", e.half_mae_mm);
-  add_optional(json, "half_worst_mm", e.half_worst_mm);
-  json.member("contact_pixels", e.pixels).member("untrusted_pixels", e.untrusted);
+cli::LensReport report_of(const PinPress& pins) {
+  cli::LensReport report;
+  report.set_pins(pins.marks.size());
+  for (const std::string& missing : pins.missing) report.add_missing(missing);
+  report.set_rows(pins.rows);
+  report.set_cols(pins.cols);
+  report.set_rms_mm(rms(pins.lens.in_sample));
+  report.set_left_out_rms_mm(rms(pins.lens.left_out));
+  report.set_parameters(parameters(pins.lens.model));
+  report.set_mm_per_px(recon::central_mm_per_px(pins.lens.lens));
+  return report;
 }
 
-void print_json(const calibration::Evaluation& e) {
-  Json json;
-  json.open('{');
-  add_press(json, e);
-  fmt::print("{}\n", json.close('}').text());
+cli::PinDepthsReport report_of(const PinDepths& depths) {
+  cli::PinDepthsReport report;
+  report.set_pins(depths.mm.size());
+  report.set_mean_mm(depths.mean_mm);
+  report.set_spread(depths.spread);
+  report.set_tilt_x_um_per_mm(depths.tilt_x_um_per_mm);
+  report.set_tilt_y_um_per_mm(depths.tilt_y_um_per_mm);
+  return report;
 }
 
-/// What was skipped is an object with its reason.
-void print_json(const FolderEvaluation& e) {
-  Json json;
-  json.open('{').key("lens").open('{');
-  if (e.pins) {
-    const ChosenLens& lens = e.pins->lens;
-    json.member("pins", e.pins->marks.size())
-        .member("missing", e.pins->missing)
-        .member("rows", e.pins->rows)
-        .member("cols", e.pins->cols)
-        .member("rms_mm", rms(lens.in_sample))
-        .member("left_out_rms_mm", rms(lens.left_out))
-        .member("parameters", parameters(lens.model))
-        .member("mm_per_px", recon::central_mm_per_px(lens.lens));
-  } else {
-    json.member("skipped", e.no_pins);
-  }
-  json.close('}').key("ball").open('{');
-  if (e.ball) {
-    add_press(json, *e.ball);
-  } else {
-    json.member("skipped", e.no_ball);
-  }
-  json.close('}').key("pin_depths").open('{');
-  if (e.pin_depths) {
-    json.member("pins", e.pin_depths->mm.size())
-        .member("mean_mm", e.pin_depths->mean_mm)
-        .member("spread", e.pin_depths->spread)
-        .member("tilt_x_um_per_mm", e.pin_depths->tilt_x_um_per_mm)
-        .member("tilt_y_um_per_mm", e.pin_depths->tilt_y_um_per_mm);
-  } else {
-    json.member("skipped", e.no_pin_depths);
-  }
-  fmt::print("{}\n", json.close('}').close('}').text());
+cli::FolderReport report_of(const FolderEvaluation& e) {
+  cli::FolderReport report;
+  report.set_lens_skipped(e.no_pins);
+  if (e.pins) *report.mutable_lens() = report_of(*e.pins);
+  report.set_ball_skipped(e.no_ball);
+  if (e.ball) *report.mutable_ball() = report_of(*e.ball);
+  report.set_pin_depths_skipped(e.no_pin_depths);
+  if (e.pin_depths) *report.mutable_pin_depths() = report_of(*e.pin_depths);
+  return report;
+}
+
+void print_json(const google::protobuf::Message& report) {
+  fmt::print("{}", cli::json_line(report));
 }
 
 void print_text(const calibration::Evaluation& e) {
@@ -113,7 +107,7 @@ void run_folder(const Options& options, bool json) {
   const FolderEvaluation e = evaluate_folder(
       folder, options.board, options.radius_mm > 0 ? options.radius_mm : kUsualRadius);
   if (!options.page.empty()) write_page(e, folder.filename().string(), options.page);
-  if (json) return print_json(e);
+  if (json) return print_json(report_of(e));
   for (const std::string& line : lines_of(e)) fmt::print("{}\n", line);
   if (options.page.empty()) return;
   fmt::print("page: {}\n", (std::filesystem::path(options.page) / "index.html").string());
@@ -132,7 +126,7 @@ void run(const Options& options, bool json) {
   require_same_size(reference, "--reference", ball, "--ball");
   const calibration::Evaluation evaluation = calibration::evaluate(
       calibration, reference.mean_q8().pixels, ball.frames(), options.radius_mm);
-  json ? print_json(evaluation) : print_text(evaluation);
+  json ? print_json(report_of(evaluation)) : print_text(evaluation);
 }
 
 }  // namespace

@@ -101,11 +101,14 @@ class Daemon:
     def status(self):
         done = subprocess.run([self.programs.dtactctl, "--port", str(self.port), "--json", "status"],
                               check=True, capture_output=True, text=True)
-        return json.loads(done.stdout)
+        # Protobuf's JSON writes 64-bit integers as strings.
+        return json.loads(done.stdout, object_hook=lambda item: {
+            key: int(value) if isinstance(value, str) and value.isdigit() else value
+            for key, value in item.items()})
 
     def wait_serving(self):
         for _ in range(300):
-            if self.status()["state"] == "serving":
+            if self.status()["state"] == "STATE_SERVING":
                 return
             time.sleep(0.1)
         raise SystemExit("bench: the daemon does not serve depth: " + str(self.status()["health"]))

@@ -124,7 +124,7 @@ def print_table(results, tables):
               if not result["refused"] else "  client " + "; ".join(result["refused"]))
     print("\nstages with one client, idle, FIFO, us:")
     for stage in results[0]["stages"]:
-        print(f"  {stage['name']:9} p50 {stage['p50_us']:7.1f}  p99 {stage['p99_us']:7.1f}  "
+        print(f"  {stage['stage']:9} p50 {stage['p50_us']:7.1f}  p99 {stage['p99_us']:7.1f}  "
               f"max {stage['max_us']:7.1f}")
 
 

@@ -113,7 +113,7 @@ def measure(programs, folder, recordings, out, label, seconds):
           f"  (a client got {encoded:.0f} of them a second: the newest wins); resident "
           f"{rss[-1] / 1024:.1f} MiB, grown {growth} KiB over {len(rss)} s")
     for stage in status["stages"]:
-        print(f"  {stage['name']:9} p50 {stage['p50_us']:7.1f}  p99 {stage['p99_us']:7.1f} us")
+        print(f"  {stage['stage']:9} p50 {stage['p50_us']:7.1f}  p99 {stage['p99_us']:7.1f} us")
 
     points = []
     for rate in RATES:

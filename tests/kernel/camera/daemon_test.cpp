@@ -6,7 +6,6 @@
 #include <atomic>
 #include <filesystem>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <thread>
 
@@ -17,16 +16,12 @@
 namespace dtact::kernel_test {
 namespace {
 
-using client::ContactChanged;
-using client::Frame;
-using client::StateChanged;
-
 /// A client that watches until it is told to stop. It never connects again.
 class Watcher {
  public:
   explicit Watcher(std::uint16_t port)
       : client_(client::Options{.host = "127.0.0.1", .port = port}) {
-    client_.subscribe({});
+    client_.subscribe();
     thread_ = std::thread([this] { run(); });
   }
   Watcher(const Watcher&) = delete;
@@ -42,10 +37,7 @@ class Watcher {
   /// The deepest point of any contact so far.
   [[nodiscard]] double deepest_mm() const { return deepest_mm_; }
   [[nodiscard]] bool broken() const { return broken_; }
-  [[nodiscard]] std::string state() const {
-    const std::lock_guard guard(mutex_);
-    return state_;
-  }
+  [[nodiscard]] v1::State state() const { return state_; }
 
  private:
   void run() {
@@ -53,19 +45,16 @@ class Watcher {
       while (!stop_) {
         const auto item = client_.next(std::chrono::milliseconds(100));
         if (!item) continue;
-        if (const auto* frame = std::get_if<Frame>(&*item)) {
+        if (const auto* frame = std::get_if<v1::Frame>(&*item)) {
           ++frames_;
-          if (frame->depth) ++with_depth_;
-          if (frame->contact.deepest_mm > deepest_mm_) deepest_mm_ = frame->contact.deepest_mm;
+          if (frame->has_depth()) ++with_depth_;
+          if (frame->contact().deepest_mm() > deepest_mm_)
+            deepest_mm_ = frame->contact().deepest_mm();
           continue;
         }
-        const auto& event = std::get<client::Event>(*item);
-        if (const auto* state = std::get_if<StateChanged>(&event)) {
-          const std::lock_guard guard(mutex_);
-          state_ = state->state;
-        } else if (const auto* contact = std::get_if<ContactChanged>(&event)) {
-          if (contact->contact.touching) ++contacts_;
-        }
+        const auto& event = std::get<v1::Event>(*item);
+        if (event.has_state()) state_ = event.state().state();
+        if (event.contact().contact().touching()) ++contacts_;
       }
     } catch (const client::Error&) {
       broken_ = true;
@@ -79,8 +68,7 @@ class Watcher {
   std::atomic<int> with_depth_{0};
   std::atomic<int> contacts_{0};
   std::atomic<double> deepest_mm_{0};
-  mutable std::mutex mutex_;
-  std::string state_;
+  std::atomic<v1::State> state_{v1::STATE_UNSPECIFIED};
   std::thread thread_;
 };
 
@@ -128,7 +116,7 @@ class Daemon : public GuestCamera {
     daemon_ = std::make_unique<e2e::DaemonProcess>(arguments);
   }
 
-  [[nodiscard]] client::Status status() const {
+  [[nodiscard]] v1::Status status() const {
     client::Client asking(client::Options{.host = "127.0.0.1", .port = daemon_->port()});
     return asking.status();
   }
@@ -140,15 +128,15 @@ class Daemon : public GuestCamera {
 TEST_F(Daemon, ComesUpWithoutACameraAndServesItOncePlugged) {
   wait_for_no_camera();
   start();
-  client::Status s = status();
-  EXPECT_EQ(s.camera.condition, "unplugged");
-  EXPECT_NE(s.camera.remedy.find("plug it in"), std::string::npos) << s.camera.remedy;
+  v1::Status s = status();
+  EXPECT_EQ(s.camera().condition(), "unplugged");
+  EXPECT_NE(s.camera().remedy().find("plug it in"), std::string::npos) << s.camera().remedy();
   const UsbCamera usb({folder()});
-  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera.condition == "streaming"; }));
+  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "streaming"; }));
   s = status();
-  EXPECT_EQ(s.camera.pixel_format, "MJPEG");
-  EXPECT_EQ(s.camera.identity, "serial:0001");
-  EXPECT_FALSE(s.camera.controls.empty());
+  EXPECT_EQ(s.camera().pixel_format(), "MJPEG");
+  EXPECT_EQ(s.camera().identity(), "serial:0001");
+  EXPECT_FALSE(s.camera().controls().empty());
   EXPECT_EQ(daemon_->stop(SIGTERM), 0);
 }
 
@@ -168,9 +156,9 @@ TEST_F(Daemon, FourClientsWatchThroughAnUnplug) {
   for (int cycle = 0; cycle < 3; ++cycle) {
     double begin = now_s();
     usb.reset();
-    ASSERT_TRUE(all([](const auto& w) { return w->state() == "camera_lost"; }));
+    ASSERT_TRUE(all([](const auto& w) { return w->state() == v1::STATE_CAMERA_LOST; }));
     measured("unplug to camera_lost at four clients", now_s() - begin, "s");
-    EXPECT_EQ(status().camera.condition, "unplugged");
+    EXPECT_EQ(status().camera().condition(), "unplugged");
     std::vector<int> before;
     before.reserve(watchers.size());
     for (const auto& w : watchers) before.push_back(w->frames());
@@ -184,14 +172,14 @@ TEST_F(Daemon, FourClientsWatchThroughAnUnplug) {
       return true;
     }));
     measured("re-plug to frames at four clients", now_s() - begin, "s");
-    ASSERT_TRUE(all([](const auto& w) { return w->state() != "camera_lost"; }));
-    const client::Status s = status();
-    EXPECT_EQ(s.camera.condition, "streaming");
-    EXPECT_EQ(s.camera.disconnects, static_cast<std::uint64_t>(cycle + 1));
-    for (const auto& control : s.camera.controls) {
-      EXPECT_TRUE(control.locked) << control.name << ": " << control.note;
-      if (control.name == "gain") {
-        EXPECT_EQ(control.value, 20);
+    ASSERT_TRUE(all([](const auto& w) { return w->state() != v1::STATE_CAMERA_LOST; }));
+    const v1::Status s = status();
+    EXPECT_EQ(s.camera().condition(), "streaming");
+    EXPECT_EQ(s.camera().disconnects(), static_cast<std::uint64_t>(cycle + 1));
+    for (const auto& control : s.camera().controls()) {
+      EXPECT_TRUE(control.locked()) << control.name() << ": " << control.note();
+      if (control.name() == "gain") {
+        EXPECT_EQ(control.value(), 20);
       }
     }
   }
@@ -220,19 +208,20 @@ TEST_F(Daemon, StreamsDepthThroughAnUnplug) {
       return watcher.frames_with_depth() > depth + 10 && watcher.contacts() > contacts;
     });
   };
-  ASSERT_TRUE(depth_and_contact()) << status().state << ": " << status().advice;
+  ASSERT_TRUE(depth_and_contact()) << status().state() << ": " << status().advice();
   const int first = watcher.frames_with_depth();
   double begin = now_s();
   std::this_thread::sleep_for(std::chrono::seconds(4));
   const double rate = (watcher.frames_with_depth() - first) / (now_s() - begin);
   measured("depth at a client", rate, "frames/s");
-  const client::Status serving = status();
-  measured("frames published by the daemon", serving.fps, "frames/s");
-  for (const auto& stage : serving.stages) measured(stage.name + ", p50", stage.p50_us, "us");
+  const v1::Status serving = status();
+  measured("frames published by the daemon", serving.fps(), "frames/s");
+  for (const auto& stage : serving.stages())
+    measured(stage.stage() + ", p50", stage.p50_us(), "us");
   EXPECT_GT(rate, 20);
 
   usb.reset();
-  ASSERT_TRUE(eventually(kPatience, [&] { return watcher.state() == "camera_lost"; }));
+  ASSERT_TRUE(eventually(kPatience, [&] { return watcher.state() == v1::STATE_CAMERA_LOST; }));
   wait_for_no_camera();
   begin = now_s();
   const int before = watcher.frames();
@@ -242,7 +231,7 @@ TEST_F(Daemon, StreamsDepthThroughAnUnplug) {
   measured("re-plug to the first frame at a client", now_s() - begin, "s");
   ASSERT_TRUE(eventually(kPatience, [&] { return watcher.frames_with_depth() > depth_before; }));
   measured("re-plug to the first depth at a client", now_s() - begin, "s");
-  ASSERT_TRUE(depth_and_contact()) << status().state << ": " << status().advice;
+  ASSERT_TRUE(depth_and_contact()) << status().state() << ": " << status().advice();
   // A ball of 4 mm radius, pressed as in config/scenes/calibrate_ball.toml.
   EXPECT_GT(watcher.deepest_mm(), 0.5);
   EXPECT_LT(watcher.deepest_mm(), 2.0);
@@ -255,15 +244,18 @@ TEST_F(Daemon, TellsAFreezeAndAMovedControl) {
   wait_for_camera();
   start();
   const Watcher watcher(daemon_->port());
-  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera.condition == "streaming"; }));
+  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "streaming"; }));
   usb.toggle_freeze();
-  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera.condition == "stalled"; }));
-  EXPECT_TRUE(eventually(kPatience, [&] { return e2e::has(status().health, "camera_trouble"); }));
+  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "stalled"; }));
+  EXPECT_TRUE(eventually(kPatience,
+                         [&] { return e2e::has(status().health(), v1::HEALTH_CAMERA_TROUBLE); }));
   usb.toggle_freeze();
-  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera.condition == "streaming"; }));
+  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "streaming"; }));
   usb.drift();
-  ASSERT_TRUE(eventually(kPatience, [&] { return e2e::has(status().health, "camera_mismatch"); }));
-  ASSERT_TRUE(eventually(kPatience, [&] { return !e2e::has(status().health, "camera_mismatch"); }));
+  ASSERT_TRUE(eventually(kPatience,
+                         [&] { return e2e::has(status().health(), v1::HEALTH_CAMERA_MISMATCH); }));
+  ASSERT_TRUE(eventually(kPatience,
+                         [&] { return !e2e::has(status().health(), v1::HEALTH_CAMERA_MISMATCH); }));
   EXPECT_EQ(daemon_->stop(SIGTERM), 0);
 }
 

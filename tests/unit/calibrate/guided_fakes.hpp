@@ -27,9 +27,11 @@ struct Scene {
 inline constexpr int kWidth = 320;
 inline constexpr int kHeight = 300;
 
-inline client::LumaMap picture(const Scene& scene, double depth_mm, std::uint32_t seed) {
-  client::LumaMap map{kWidth, kHeight, {}};
-  map.values.reserve(std::size_t{kWidth} * kHeight);
+inline v1::LumaMap picture(const Scene& scene, double depth_mm, std::uint32_t seed) {
+  v1::LumaMap map;
+  map.set_encoding(v1::LUMA_GREY8);
+  map.set_width(kWidth);
+  map.set_height(kHeight);
   std::uint32_t noise = seed * 2654435761U + 1;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
@@ -38,7 +40,7 @@ inline client::LumaMap picture(const Scene& scene, double depth_mm, std::uint32_
       const double dark = 30 * std::max(0.0, depth_mm - sag);
       noise = noise * 1664525U + 1013904223U;
       const int grain = static_cast<int>(noise >> 30U) - 1;  // −1 … 2
-      map.values.push_back(static_cast<std::uint8_t>(std::lround(200 - dark) + grain));
+      map.mutable_data()->push_back(static_cast<char>(std::lround(200 - dark) + grain));
     }
   }
   return map;
@@ -48,24 +50,33 @@ inline client::LumaMap picture(const Scene& scene, double depth_mm, std::uint32_
 class FakeSensor : public Sensor {
  public:
   explicit FakeSensor(std::vector<Scene> scenes) : scenes_(std::move(scenes)) {
-    now.state = "uncalibrated";
-    now.health = {"uncalibrated"};
-    now.camera.identity = "fake:1";
-    now.camera.pixel_format = "mjpeg";
-    now.camera.width = kWidth;
-    now.camera.height = kHeight;
-    now.camera.fps = 60;
-    now.camera.controls = {{"exposure", 100, true, ""}};
-    now.light.brightness = 255;
-    now.light.leds.assign(8, client::Rgb{255, 255, 255});
+    now.set_state(v1::STATE_UNCALIBRATED);
+    now.add_health(v1::HEALTH_UNCALIBRATED);
+    v1::CameraStatus& camera = *now.mutable_camera();
+    camera.set_identity("fake:1");
+    camera.set_pixel_format("mjpeg");
+    camera.set_width(kWidth);
+    camera.set_height(kHeight);
+    camera.set_fps(60);
+    v1::CameraControl& exposure = *camera.add_controls();
+    exposure.set_name("exposure");
+    exposure.set_value(100);
+    exposure.set_locked(true);
+    now.mutable_light()->set_brightness(255);
+    for (int i = 0; i < 8; ++i) {
+      v1::Rgb& led = *now.mutable_light()->add_leds();
+      led.set_r(255);
+      led.set_g(255);
+      led.set_b(255);
+    }
   }
 
   [[nodiscard]] std::string program() const override { return "fake 1.0"; }
-  [[nodiscard]] client::Status status() override {
+  [[nodiscard]] v1::Status status() override {
     if (on_status) on_status(now);
     return now;
   }
-  [[nodiscard]] std::optional<client::Frame> next(std::chrono::milliseconds) override {
+  [[nodiscard]] std::optional<v1::Frame> next(std::chrono::milliseconds) override {
     if (frames_until_gone == 0) throw client::ConnectionError("the daemon ended the connection");
     if (frames_until_gone > 0) --frames_until_gone;
     if (silent) return std::nullopt;
@@ -74,28 +85,27 @@ class FakeSensor : public Sensor {
       in_scene_ = 0;
     }
     const Scene& scene = scenes_[scene_];
-    client::Frame frame;
-    frame.sequence = ++sequence_;
-    frame.monotonic_ns = static_cast<std::int64_t>(sequence_) * 16'666'667;
-    frame.health = now.health;
-    frame.light = now.light;
-    frame.luma = picture(scene, scene.depth_mm + in_scene_ * scene.step_mm,
-                         static_cast<std::uint32_t>(sequence_));
+    v1::Frame frame;
+    frame.set_sequence(++sequence_);
+    frame.set_monotonic_ns(static_cast<std::int64_t>(sequence_) * 16'666'667);
+    *frame.mutable_health() = now.health();
+    *frame.mutable_light() = now.light();
+    *frame.mutable_luma() = picture(scene, scene.depth_mm + in_scene_ * scene.step_mm,
+                                    static_cast<std::uint32_t>(sequence_));
     ++in_scene_;
     return frame;
   }
-  void upload(const client::CalibrationFiles& files) override {
+  void upload(const v1::UploadCalibration& files) override {
     uploaded = files;
-    client::CalibrationSummary calibration;
-    calibration.name = files.name;
-    const std::size_t at = files.toml.find("created = \"") + 11;
-    calibration.created = files.toml.substr(at, 20);
-    now.calibration = calibration;
+    const std::string& toml = files.calibration_toml();
+    v1::CalibrationSummary& calibration = *now.mutable_calibration();
+    calibration.set_name(files.name());
+    calibration.set_created(toml.substr(toml.find("created = \"") + 11, 20));
   }
 
-  client::Status now;
-  std::function<void(client::Status&)> on_status;
-  std::optional<client::CalibrationFiles> uploaded;
+  v1::Status now;
+  std::function<void(v1::Status&)> on_status;
+  std::optional<v1::UploadCalibration> uploaded;
   bool silent = false;
   int frames_until_gone = -1;  ///< Negative: never.
 

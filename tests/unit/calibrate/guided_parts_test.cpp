@@ -124,21 +124,31 @@ TEST(Covered, IsTheDepthWhereTheListsCoverageEnds) {
 }
 
 TEST(Fitness, NamesWhatKeepsFromCalibrating) {
-  client::Status status;
-  status.state = "uncalibrated";
-  status.health = {"uncalibrated", "not_realtime", "reference_stale"};
+  v1::Status status;
+  status.set_state(v1::STATE_UNCALIBRATED);
+  status.add_health(v1::HEALTH_UNCALIBRATED);
+  status.add_health(v1::HEALTH_NOT_REALTIME);
+  status.add_health(v1::HEALTH_REFERENCE_STALE);
   EXPECT_EQ(unfit(status), "");
-  status.health = {"image_saturated"};
-  status.advice = "Much of the picture is white.";
+  EXPECT_FALSE(passing_trouble(status.health()));
+  status.add_health(v1::HEALTH_IMAGE_SATURATED);
+  status.set_advice("Much of the picture is white.");
   EXPECT_EQ(unfit(status), "Much of the picture is white.");
-  status.health = {};
-  status.advice = "";
-  status.state = "camera_lost";
+  status.Clear();
+  status.set_state(v1::STATE_CAMERA_LOST);
   EXPECT_THAT(unfit(status), HasSubstr("camera_lost"));
-  for (const char* passing : {"starting", "light_unsettled", "image_repeated", "camera_trouble"}) {
-    EXPECT_TRUE(passing_trouble({"light_drifted", passing})) << passing;
+  for (const v1::Health passing : {v1::HEALTH_STARTING, v1::HEALTH_LIGHT_UNSETTLED,
+                                   v1::HEALTH_IMAGE_REPEATED, v1::HEALTH_CAMERA_TROUBLE}) {
+    status.clear_health();
+    status.add_health(v1::HEALTH_LIGHT_DRIFTED);
+    EXPECT_FALSE(passing_trouble(status.health()));
+    status.add_health(passing);
+    EXPECT_TRUE(passing_trouble(status.health())) << v1::Health_Name(passing);
   }
-  EXPECT_FALSE(passing_trouble({"light_drifted", "frames_lost"}));
+  status.clear_health();
+  status.add_health(v1::HEALTH_LIGHT_DRIFTED);
+  status.add_health(v1::HEALTH_FRAMES_LOST);
+  EXPECT_FALSE(passing_trouble(status.health()));
 }
 
 TEST(Fault, OfAnUntouchedPicture) {

@@ -65,7 +65,7 @@ TEST_F(GuidedSession, GoesFromNothingToAnUpload) {
   FakeSensor sensor(kEnough);
   FakeConsole console({"", "", "", "", "", ""});
   EXPECT_EQ(run(sensor, console), Outcome::uploaded) << console.said;
-  EXPECT_EQ(sensor.uploaded.value_or(client::CalibrationFiles{}).name, "ball");
+  EXPECT_EQ(sensor.uploaded.value_or(v1::UploadCalibration{}).name(), "ball");
   EXPECT_THAT(console.said,
               AllOf(HasSubstr("fake 1.0: camera fake:1, 320x300 mjpeg at 60 fps"),
                     HasSubstr("reference taken: 8 frames"), HasSubstr("press-04 taken"),
@@ -149,9 +149,7 @@ TEST_F(GuidedSession, InputThatEndsLosesNothing) {
 TEST_F(GuidedSession, CtrlCLosesNothing) {
   FakeSensor sensor(kEnough);
   FakeConsole console({"", ""});
-  sensor.on_status = [&](client::Status&) {
-    console.ctrl_c = fs::exists(plan_.folder / "press-01");
-  };
+  sensor.on_status = [&](v1::Status&) { console.ctrl_c = fs::exists(plan_.folder / "press-01"); };
   FakeConsole* seen = &console;
   EXPECT_EQ(run(sensor, *seen), Outcome::unfinished);
   EXPECT_TRUE(has("reference/00.png"));
@@ -233,9 +231,9 @@ TEST_F(GuidedSession, AReferenceUnderTouchIsTakenAgain) {
 
 TEST_F(GuidedSession, RefusesAnUnfitDaemon) {
   FakeSensor sensor(kEnough);
-  sensor.now.state = "camera_lost";
-  sensor.now.health = {"camera_trouble"};
-  sensor.now.advice = "The camera gives no frames. Plug it in.";
+  sensor.now.set_state(v1::STATE_CAMERA_LOST);
+  sensor.now.add_health(v1::HEALTH_CAMERA_TROUBLE);
+  sensor.now.set_advice("The camera gives no frames. Plug it in.");
   FakeConsole console({""});
   EXPECT_THAT([&] { (void)run(sensor, console); },
               ThrowsMessage<std::runtime_error>(HasSubstr("Plug it in")));
@@ -244,9 +242,9 @@ TEST_F(GuidedSession, RefusesAnUnfitDaemon) {
 TEST_F(GuidedSession, WaitsForACameraThatStumbles) {
   FakeSensor sensor(kEnough);
   int asked = 0;
-  sensor.on_status = [&](client::Status& now) {
-    now.health = {"uncalibrated"};
-    if (++asked % 6 != 0) now.health.emplace_back("camera_trouble");
+  sensor.on_status = [&](v1::Status& now) {
+    now.clear_health();
+    if (++asked % 6 != 0) now.add_health(v1::HEALTH_CAMERA_TROUBLE);
   };
   FakeConsole console({"", "", "", "", "", "", "", ""});
   EXPECT_EQ(run(sensor, console), Outcome::uploaded) << console.said;
@@ -255,7 +253,7 @@ TEST_F(GuidedSession, WaitsForACameraThatStumbles) {
 TEST_F(GuidedSession, SaysWhyNothingComes) {
   FakeSensor sensor(kEnough);
   sensor.silent = true;
-  sensor.now.advice = "Look at the cable.";
+  sensor.now.set_advice("Look at the cable.");
   FakeConsole console({""});
   EXPECT_THAT([&] { (void)run(sensor, console); },
               ThrowsMessage<NotTaken>(HasSubstr("Look at the cable.")));
@@ -268,14 +266,14 @@ TEST_F(GuidedSession, AnotherLightIsRefused) {
     EXPECT_EQ(run(sensor, console), Outcome::unfinished);
   }
   FakeSensor sensor(kEnough);
-  sensor.now.light.brightness = 128;
+  sensor.now.mutable_light()->set_brightness(128);
   FakeConsole console({"", ""});
   EXPECT_THAT([&] { (void)run(sensor, console); },
               ThrowsMessage<std::runtime_error>(
                   AllOf(HasSubstr("LED 0 shows 128 128 128 but showed 255 255 255"),
                         HasSubstr("dtactctl led"), HasSubstr("another --folder"))));
-  sensor.now.light.brightness = 255;
-  sensor.now.camera.controls[0].value = 50;
+  sensor.now.mutable_light()->set_brightness(255);
+  sensor.now.mutable_camera()->mutable_controls(0)->set_value(50);
   EXPECT_THAT(
       [&] { (void)run(sensor, console); },
       ThrowsMessage<std::runtime_error>(HasSubstr("the control exposure is 50 but was 100")));

@@ -24,6 +24,7 @@ namespace fs = std::filesystem;
 using calibration::Ball;
 using testing::AllOf;
 using testing::HasSubstr;
+using testing::Not;
 using testing::ThrowsMessage;
 
 class Offline : public testing::Test {
@@ -165,10 +166,11 @@ TEST_F(Offline, EvaluatesInSentencesAndJson) {
                                           at("ball.png"), "--radius-mm",       "4.0"};
   EXPECT_THAT(run(evaluate), AllOf(HasSubstr("mean absolute error"), HasSubstr("untrusted: 0 of")));
   const std::string json = run(with(evaluate, "--json"));
-  EXPECT_THAT(json, AllOf(HasSubstr("{\"centre_row\":110.5"), HasSubstr("\"mae_mm\":0.00"),
-                          HasSubstr("\"untrusted_pixels\":0}")));
+  EXPECT_THAT(json,
+              AllOf(HasSubstr("{\"centre_row\":110.5"), HasSubstr("\"mae_mm\":0.00"),
+                    HasSubstr("\"half_mae_mm\":0.0"), HasSubstr("\"untrusted_pixels\":\"0\"")));
   run(with(calibrate(), "--method", "published"));
-  EXPECT_THAT(run(with(evaluate, "--json")), HasSubstr("\"half_mae_mm\":null"));
+  EXPECT_THAT(run(with(evaluate, "--json")), Not(HasSubstr("half_mae_mm")));
 }
 
 TEST_F(Offline, SaysWhyItSkipsWhatAFolderLacks) {
@@ -176,7 +178,7 @@ TEST_F(Offline, SaysWhyItSkipsWhatAFolderLacks) {
   const std::string folder = std::filesystem::path(at("ball.png")).parent_path().string();
   EXPECT_THAT(run({"evaluate", "--folder", folder}), HasSubstr("lens: skipped: " + reason));
   EXPECT_THAT(run({"evaluate", "--folder", folder, "--json"}),
-              HasSubstr("{\"lens\":{\"skipped\":\"" + reason + "\"}"));
+              HasSubstr("{\"lens_skipped\":\"" + reason + "\""));
 }
 
 TEST_F(Offline, ReconstructsToNpy) {

@@ -46,20 +46,20 @@ TEST(Cameras, AreListedWithNamesModesAndControls) {
             "    gain                        0 to 100, step 1, default 5, now 10\n");
   EXPECT_EQ(
       printed({camera()}, true),
-      R"([{"name":"/dev/v4l/by-path/usb-0:1-video-index0","node":"/dev/video2",)"
+      R"({"cameras":[{"name":"/dev/v4l/by-path/usb-0:1-video-index0","node":"/dev/video2",)"
       R"("by_path":"/dev/v4l/by-path/usb-0:1-video-index0","by_id":"","serial":"4711",)"
       R"("bus":"usb-1","card":"Finger","driver":"uvcvideo","problem":"",)"
       R"("modes":[{"format":"MJPEG","usable":true,"width":800,"height":600,"min_width":800,)"
       R"("min_height":600,"fps_is_range":false,"fps":[60,30]},{"format":"H264","usable":false,)"
       R"("width":800,"height":600,"min_width":800,"min_height":600,"fps_is_range":false,)"
-      R"("fps":[60,30]}],"controls":[{"name":"gain","minimum":0,"maximum":100,"step":1,)"
-      R"("default":5,"value":10}]}])"
+      R"("fps":[60,30]}],"controls":[{"name":"gain","minimum":"0","maximum":"100","step":"1",)"
+      R"("default":"5","value":"10"}]}]})"
       "\n");
 }
 
 TEST(Cameras, NoneAndForbiddenOnes) {
   EXPECT_EQ(printed({}, false), "no camera is attached\n");
-  EXPECT_EQ(printed({}, true), "[]\n");
+  EXPECT_EQ(printed({}, true), "{\"cameras\":[]}\n");
   hal::v4l2::SurveyedCamera forbidden;
   forbidden.attached.node = "/dev/video0";
   forbidden.attached.problem = "no permission to open /dev/video0: join the group";

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <thread>
 
+#include "clients/cpp/maps.hpp"
+#include "clients/cpp/names.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/rig.hpp"
 
@@ -27,6 +29,14 @@ Options options(const Rig& rig) {
   return o;
 }
 
+v1::UploadCalibration upload(const std::string& name, const std::string& toml) {
+  v1::UploadCalibration files;
+  files.set_name(name);
+  files.set_calibration_toml(toml);
+  files.set_reference_png("png");
+  return files;
+}
+
 template <typename T>
 T next(Client& client) {
   for (;;) {
@@ -39,9 +49,9 @@ T next(Client& client) {
 TEST(ClientLibrary, ConnectsAndKnowsTheDaemon) {
   Rig rig;
   const Client client(options(rig));
-  EXPECT_EQ(client.server().program, "dtactd 9.8.7");
-  EXPECT_EQ(client.server().major, 1U);
-  EXPECT_EQ(client.server().frame_id, "dtact_surface");
+  EXPECT_EQ(client.server().program(), "dtactd 9.8.7");
+  EXPECT_EQ(client.server().major(), 1U);
+  EXPECT_EQ(client.server().surface_frame().frame_id(), "dtact_surface");
   EXPECT_TRUE(client.same_machine());
 }
 
@@ -69,27 +79,37 @@ TEST(ClientLibrary, SaysWhatToDoWhenTheHostIsUnknown) {
 TEST(ClientLibrary, StreamsBothEncodings) {
   Rig rig;
   Client client(options(rig));
-  for (const auto encoding : {client::Depth::int16, client::Depth::delta_zstd}) {
-    client.subscribe({encoding, client::Luma::grey8});
+  for (const auto encoding : {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD}) {
+    v1::Subscribe both;
+    both.set_depth(encoding);
+    both.set_luma(v1::LUMA_GREY8);
+    client.subscribe(both);
     auto published = make_frame(1500, 6, 2);
     published.depth_um[3] = INT16_MIN;
     published.light.brightness = 99;
     published.health.set(pipeline::Health::light_unsettled);
     rig.port.publish(published);
-    const auto frame = next<client::Frame>(client);
-    EXPECT_EQ(frame.sequence, 1500U);
-    EXPECT_EQ(frame.meaning, "arrival");
-    EXPECT_EQ(frame.light.brightness, 99);
-    EXPECT_THAT(frame.health, ElementsAre("light_unsettled"));
-    ASSERT_TRUE(frame.depth.has_value());
-    EXPECT_EQ(frame.depth->width, 6);
-    EXPECT_EQ(frame.depth->height, 2);
-    EXPECT_EQ(frame.depth->values[0], 1500);
-    const auto mm = frame.depth->millimetres();
+    auto frame = next<v1::Frame>(client);
+    EXPECT_EQ(frame.sequence(), 1500U);
+    EXPECT_EQ(frame.meaning(), v1::TIMESTAMP_ARRIVAL);
+    EXPECT_EQ(frame.light().brightness(), 99U);
+    EXPECT_THAT(client::names_of(frame.health()), ElementsAre("light_unsettled"));
+    ASSERT_TRUE(frame.has_depth());
+    EXPECT_EQ(frame.depth().width(), 6U);
+    EXPECT_EQ(frame.depth().height(), 2U);
+    EXPECT_EQ(client::values_of(frame.depth())[0], 1500);
+    const auto mm = client::millimetres_of(frame.depth());
     EXPECT_FLOAT_EQ(mm[0], 1.5F);
     EXPECT_TRUE(std::isnan(mm[3]));
-    ASSERT_TRUE(frame.luma.has_value());
-    EXPECT_THAT(frame.luma->values, Each(1500 % 256));
+    ASSERT_TRUE(frame.has_luma());
+    EXPECT_THAT(client::pixels_of(frame.luma()), Each(1500 % 256));
+    // Damaged maps and encodings of a newer daemon.
+    frame.mutable_luma()->mutable_data()->pop_back();
+    EXPECT_THROW((void)client::pixels_of(frame.luma()), client::ProtocolError);
+    frame.mutable_depth()->mutable_data()->pop_back();
+    EXPECT_THROW((void)client::values_of(frame.depth()), client::ProtocolError);
+    frame.mutable_depth()->set_encoding(static_cast<v1::DepthEncoding>(9));
+    EXPECT_THROW((void)client::values_of(frame.depth()), client::ProtocolError);
   }
 }
 
@@ -104,7 +124,7 @@ TEST(ClientLibrary, KeepsEventsAndTheNewestFramesWhileItWaitsForAnAnswer) {
   Rig rig;
   Client client(options(rig));
   RawClient other(rig.tcp_port());
-  client.subscribe({});
+  client.subscribe();
   other.hello();
   other.subscribe(v1::DEPTH_INT16);
   for (std::uint64_t sequence = 1; sequence <= 6; ++sequence) {
@@ -115,10 +135,9 @@ TEST(ClientLibrary, KeepsEventsAndTheNewestFramesWhileItWaitsForAnAnswer) {
   (void)other.event();
   (void)client.status();
   for (std::uint64_t sequence = 3; sequence <= 6; ++sequence) {
-    EXPECT_EQ(next<client::Frame>(client).sequence, sequence);
+    EXPECT_EQ(next<v1::Frame>(client).sequence(), sequence);
   }
-  const auto event = next<client::Event>(client);
-  EXPECT_EQ(std::get<client::ReferenceTaken>(event).sequence, 42U);
+  EXPECT_EQ(next<v1::Event>(client).reference().sequence(), 42U);
 }
 
 TEST(ClientLibrary, CommandsAndRefusals) {
@@ -131,22 +150,26 @@ TEST(ClientLibrary, CommandsAndRefusals) {
     });
   });
   Client client(options(rig));
-  const auto light = client.set_light({50, "scheme1", {}});
-  EXPECT_EQ(light.brightness, 50);
-  EXPECT_EQ(light.leds[1], (client::Rgb{255, 255, 255}));
-  EXPECT_EQ(light.leds[2], client::Rgb{});
+  v1::SetLight change;
+  change.set_brightness(50);
+  change.set_scheme("scheme1");
+  const auto light = client.set_light(change);
+  EXPECT_EQ(light.brightness(), 50U);
+  EXPECT_EQ(light.leds(1).g(), 255U);
+  EXPECT_EQ(light.leds(2).g(), 0U);
   try {
     client.rezero();
     FAIL() << "not refused";
   } catch (const client::Refused& e) {
-    EXPECT_EQ(e.code(), client::Code::contact);
+    EXPECT_EQ(e.code(), v1::ERROR_CONTACT);
     EXPECT_STREQ(e.what(), "free it");
   }
-  EXPECT_THROW((void)client.set_light({-1, {}, {}}), client::Refused);
-  EXPECT_EQ(client.upload_calibration({"ball", "good", "png"}), 4U);
-  EXPECT_EQ(std::get<client::CalibrationChanged>(next<client::Event>(client)).name, "ball");
+  change.set_brightness(256);
+  EXPECT_THROW((void)client.set_light(change), client::Refused);
+  EXPECT_EQ(client.upload_calibration(upload("ball", "good")), 4U);
+  EXPECT_EQ(next<v1::Event>(client).calibration().name(), "ball");
   EXPECT_THROW((void)client.calibration(), client::Refused);
-  EXPECT_EQ(client.status().clients.size(), 1U);
+  EXPECT_EQ(client.status().clients_size(), 1);
 }
 
 TEST(ClientLibrary, ListsReadsAndActivatesCalibrations) {
@@ -154,27 +177,27 @@ TEST(ClientLibrary, ListsReadsAndActivatesCalibrations) {
   Client client(options(rig));
   const auto all = client.calibrations();
   ASSERT_EQ(all.size(), 4U);
-  EXPECT_EQ(all[0].number, client::kConfiguredCalibration);
-  EXPECT_EQ(all[1].name, "first");
-  EXPECT_EQ(all[1].uploaded, "2026-01-31T12:00:00Z");
-  EXPECT_TRUE(all[1].current);
-  EXPECT_FALSE(all[1].in_use);  // the pipeline has none
-  ASSERT_TRUE(all[1].summary.has_value());
-  EXPECT_EQ(all[1].summary->mm_per_px, 0.0414);
-  EXPECT_EQ(all[1].summary->frame_width, 800U);
-  EXPECT_FALSE(all[2].summary.has_value());
-  EXPECT_EQ(all[2].damage, "calibration.toml:3: scale missing");
+  EXPECT_EQ(all[0].number(), client::kConfiguredCalibration);
+  EXPECT_EQ(all[1].name(), "first");
+  EXPECT_EQ(all[1].uploaded(), "2026-01-31T12:00:00Z");
+  EXPECT_TRUE(all[1].current());
+  EXPECT_FALSE(all[1].in_use());  // the pipeline has none
+  ASSERT_TRUE(all[1].has_summary());
+  EXPECT_EQ(all[1].summary().mm_per_px(), 0.0414);
+  EXPECT_EQ(all[1].summary().frame_width(), 800U);
+  EXPECT_FALSE(all[2].has_summary());
+  EXPECT_EQ(all[2].damage(), "calibration.toml:3: scale missing");
   const auto files = client.calibration(0);
-  EXPECT_EQ(files.name, "factory");
-  EXPECT_EQ(files.number, client::kConfiguredCalibration);
+  EXPECT_EQ(files.name(), "factory");
+  EXPECT_EQ(files.number(), client::kConfiguredCalibration);
   client.activate_calibration(0);
-  EXPECT_EQ(std::get<client::CalibrationChanged>(next<client::Event>(client)).name, "factory");
-  EXPECT_TRUE(client.calibrations()[0].current);
+  EXPECT_EQ(next<v1::Event>(client).calibration().name(), "factory");
+  EXPECT_TRUE(client.calibrations()[0].current());
   try {
     client.activate_calibration(2);
     FAIL() << "not refused";
   } catch (const client::Refused& e) {
-    EXPECT_EQ(e.code(), client::Code::invalid);
+    EXPECT_EQ(e.code(), v1::ERROR_INVALID);
   }
   EXPECT_THROW((void)client.calibration(9), client::Refused);
 }
@@ -182,9 +205,9 @@ TEST(ClientLibrary, ListsReadsAndActivatesCalibrations) {
 TEST(ClientLibrary, RefusesToSendWhatIsTooLarge) {
   Rig rig;
   Client client(options(rig));
-  EXPECT_THROW(client.upload_calibration({"ball", "x", std::string(17U << 20U, 'x')}),
+  EXPECT_THROW(client.upload_calibration(upload("ball", std::string(17U << 20U, 'x'))),
                client::Refused);
-  EXPECT_EQ(client.status().version, "9.8.7");  // and the connection goes on
+  EXPECT_EQ(client.status().version(), "9.8.7");  // and the connection goes on
 }
 
 TEST(ClientLibrary, SaysWhenTheDaemonEnds) {
@@ -258,7 +281,7 @@ TEST(ClientLibrary, Moves) {
   Rig rig;
   Client first(options(rig));
   Client second(std::move(first));
-  EXPECT_EQ(second.status().version, "9.8.7");
+  EXPECT_EQ(second.status().version(), "9.8.7");
 }
 
 }  // namespace

@@ -35,15 +35,14 @@ ROOMS = {
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
-    "clients/ctl/json": [],
-    "clients/common": ["clients/cpp"],
+    "clients/common": ["proto", "clients/cpp"],
     "clients/calibrate/fit": ["hal/image", "daemon/recon", "daemon/calibration"],
     "clients/calibrate/lens": ["daemon/recon"],
-    "clients/calibrate/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/lens", "clients/ctl/json"],
-    "clients/calibrate/guided": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
+    "clients/calibrate/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/lens"],
+    "clients/calibrate/guided": ["hal/base", "hal/image", "proto", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
     "clients/calibrate": ["clients/common", "clients/cpp", "clients/calibrate/guided", "clients/calibrate/offline"],
     # A daemon's administration: neither a fit nor OpenCV.
-    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/ctl/json"],
+    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/common", "clients/cpp"],
 }
 # Only standard headers and Highway may stand in angle brackets here.
 STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}

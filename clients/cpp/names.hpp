@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "proto/dtact.pb.h"
+
+namespace dtact::client {
+
+/// STATE_SERVING → "serving"; a value of a newer daemon → "13".
+[[nodiscard]] std::string name_of(v1::State state);
+/// HEALTH_LIGHT_UNSETTLED → "light_unsettled".
+[[nodiscard]] std::string name_of(v1::Health condition);
+/// The `health` of a frame, an event or the status.
+[[nodiscard]] std::vector<std::string> names_of(const google::protobuf::RepeatedField<int>& health);
+
+}  // namespace dtact::client
