@@ -8,7 +8,8 @@ namespace dtact::recon {
 /// Entries of a list for one grey level.
 inline constexpr int kEntriesPerLevel = 64;
 
-/// Darkening → indentation, 64 entries a grey level, so that a look-up needs no interpolation.
+/// Darkening → indentation, 64 entries a grey level, so that a look-up needs no interpolation (what
+/// is looked up may be straight lines that follow the entries: list_table.hpp).
 /// Entry i belongs to the Q6 darkening first_q6 + i. Below first_q6 the first entry stands (a bulge
 /// brighter than the list reaches is still a bulge); above covered_to_q6 the method `list` marks
 /// pixels untrusted (pressed deeper than was calibrated) and `published` holds the end value.

@@ -15,9 +15,9 @@ namespace dtact::recon {
 class ListTable {
  public:
   /// Straight lines stand for a list that they follow within this, root mean square over the
-  /// covered range, micrometres: the last place of a depth, while lists are right within ten or
-  /// more. Other lists are looked up entry by entry.
-  static constexpr double kKnotsWithinUm = 1;
+  /// covered range, micrometres: less than the last place of a depth, while lists are right within
+  /// ten or more. Other lists are looked up entry by entry.
+  static constexpr double kKnotsWithinUm = 0.6;
 
   explicit ListTable(const Model& model);
 
