@@ -1,10 +1,12 @@
 #include "daemon/recon/vector_kernels.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 
 #include <algorithm>
 #include <limits>
 #include <random>
+#include <span>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -44,15 +46,27 @@ class VectorRectify : public VectorKernels {
  protected:
   static constexpr int kFrameWidth = 150;
   static constexpr int kFrameHeight = 40;
+  static constexpr std::size_t kPage = 65536;  // of any processor
 
   void SetUp() override {
     VectorKernels::SetUp();
-    // 64 readable bytes after the last pixel, and any alignment before the first.
-    luma_.resize(3 + std::size_t{kFrameWidth + 5} * kFrameHeight + 64);
+    // 64 readable bytes after the last pixel and not one more.
+    constexpr std::size_t kUsed = std::size_t{kFrameWidth + 5} * kFrameHeight + 64;
+    static_assert(kUsed <= kPage);
+    void* const pages =
+        ::mmap(nullptr, 2 * kPage, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    ASSERT_NE(pages, MAP_FAILED);
+    pages_ = static_cast<std::uint8_t*>(pages);
+    ASSERT_EQ(::mprotect(pages_ + kPage, kPage, PROT_NONE), 0);
+    luma_ = {pages_ + kPage - kUsed, kUsed};
     for (std::uint8_t& v : luma_) {
       const int dice = uniform(0, 3);
       v = static_cast<std::uint8_t>(dice == 0 ? 0 : dice == 1 ? 255 : uniform(0, 255));
     }
+  }
+  void TearDown() override {
+    ::munmap(pages_, 2 * kPage);
+    VectorKernels::TearDown();
   }
   /// One row of a map, in full and in every part, against the scalar kernel.
   void check(const std::vector<Entry>& entries) {
@@ -61,7 +75,9 @@ class VectorRectify : public VectorKernels {
     RectifyPlan plan(table);
     const std::vector<std::int16_t> reference = values(padded(width), 0, 16320);
     const std::ptrdiff_t stride = kFrameWidth + uniform(0, 5);
-    const std::uint8_t* luma = luma_.data() + uniform(0, 3);
+    // As far back as the frame's last pixel allows.
+    const std::uint8_t* luma =
+        luma_.data() + luma_.size() - 64 - kFrameWidth - stride * (kFrameHeight - 1);
     std::vector<std::int16_t> should(entries.size());
     kernels::rectify_difference_row(luma, stride, entries.data(), reference.data(), width,
                                     should.data());
@@ -116,7 +132,8 @@ class VectorRectify : public VectorKernels {
   }
 
  private:
-  std::vector<std::uint8_t> luma_;
+  std::uint8_t* pages_ = nullptr;
+  std::span<std::uint8_t> luma_;
 };
 
 TEST_P(VectorRectify, LinesOfEverySlopeScaleAndLength) {
