@@ -34,6 +34,7 @@ class Watcher {
   [[nodiscard]] int frames() const { return frames_; }
   [[nodiscard]] int frames_with_depth() const { return with_depth_; }
   [[nodiscard]] int contacts() const { return contacts_; }
+  [[nodiscard]] int references() const { return references_; }
   /// The deepest point of any contact so far.
   [[nodiscard]] double deepest_mm() const { return deepest_mm_; }
   [[nodiscard]] bool broken() const { return broken_; }
@@ -55,6 +56,7 @@ class Watcher {
         const auto& event = std::get<v1::Event>(*item);
         if (event.has_state()) state_ = event.state().state();
         if (event.contact().contact().touching()) ++contacts_;
+        if (event.has_reference()) ++references_;
       }
     } catch (const client::Error&) {
       broken_ = true;
@@ -67,6 +69,7 @@ class Watcher {
   std::atomic<int> frames_{0};
   std::atomic<int> with_depth_{0};
   std::atomic<int> contacts_{0};
+  std::atomic<int> references_{0};
   std::atomic<double> deepest_mm_{0};
   std::atomic<v1::State> state_{v1::STATE_UNSPECIFIED};
   std::thread thread_;
@@ -236,6 +239,29 @@ TEST_F(Daemon, StreamsDepthThroughAnUnplug) {
   EXPECT_GT(watcher.deepest_mm(), 0.5);
   EXPECT_LT(watcher.deepest_mm(), 2.0);
   EXPECT_FALSE(watcher.broken());
+  EXPECT_EQ(daemon_->stop(SIGTERM), 0);
+}
+
+// Frozen for so long that it is closed and opened anew, though it was never away: its controls are
+// set anew, so the reference is taken anew, and depth is right against that.
+TEST_F(Daemon, MeasuresDepthAgainstANewReferenceAfterAFreeze) {
+  const UsbCamera usb({"-i", sensor_pictures()});
+  wait_for_camera();
+  start({"calibration=" + e2e::calibration_folder().string()});
+  const Watcher before(daemon_->port());
+  ASSERT_TRUE(eventually(kPatience, [&] { return before.contacts() > 0; })) << status().advice();
+  const int references = before.references();
+  usb.toggle_freeze();
+  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "stalled"; }));
+  std::this_thread::sleep_for(std::chrono::seconds(4));
+  usb.toggle_freeze();
+  ASSERT_TRUE(eventually(kPatience, [&] { return before.references() > references; }));
+  EXPECT_EQ(status().camera().disconnects(), 0U);
+  const Watcher after(daemon_->port());
+  ASSERT_TRUE(eventually(kPatience, [&] { return after.contacts() > 0; })) << status().advice();
+  // A ball of 4 mm radius, pressed as in config/scenes/calibrate_ball.toml.
+  EXPECT_GT(after.deepest_mm(), 0.5);
+  EXPECT_LT(after.deepest_mm(), 2.0);
   EXPECT_EQ(daemon_->stop(SIGTERM), 0);
 }
 
