@@ -29,18 +29,17 @@ std::optional<SagLine> line_of(const SettledPress& press) {
   }
 }
 
-/// Of the zero of a press's line, millimetres.
-double zero_mm(const SettledPress& press, const SagLine& line) {
+}  // namespace
+
+double ring_doubt_mm(const SettledPress& press, double slope) {
   const RadialProfile profile =
       radial_profile(press.map, press.contact, kFarField * press.contact.ball_radius_mm);
   double ring = 0;
   for (const double level : profile.levels) {
     if (!std::isnan(level)) ring = std::min(ring, level);
   }
-  return line.slope * std::hypot(kZeroLevels, kRingShare * ring);
+  return -kRingShare * ring * slope;
 }
-
-}  // namespace
 
 std::vector<recon::Model::Uncertainty> uncertainty_by_zero(const recon::DepthList& list,
                                                            std::span<const SettledPress> presses) {
@@ -54,7 +53,7 @@ std::vector<recon::Model::Uncertainty> uncertainty_by_zero(const recon::DepthLis
   for (const SettledPress& press : presses) {
     const std::optional<SagLine> line = line_of(press);
     if (!line) continue;
-    const double zero = zero_mm(press, *line);
+    const double zero = std::hypot(kZeroLevels * line->slope, ring_doubt_mm(press, line->slope));
     const double ball = press.contact.ball_radius_mm;
     for (int y = 0; y < press.map.height; ++y) {
       for (int x = 0; x < press.map.width; ++x) {

@@ -26,4 +26,8 @@ namespace dtact::calibration {
 [[nodiscard]] std::vector<recon::Model::Uncertainty> uncertainty_by_zero(
     const recon::DepthList& list, std::span<const SettledPress> presses);
 
+/// The ring's part of the second alone, millimetres: what its scattered light may make of the
+/// press's zero on a list of so many millimetres a grey level.
+[[nodiscard]] double ring_doubt_mm(const SettledPress& press, double slope);
+
 }  // namespace dtact::calibration

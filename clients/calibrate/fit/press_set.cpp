@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/calibrate/fit/list_worth.hpp"
 #include "clients/calibrate/fit/press_chain.hpp"
 
 namespace dtact::calibration {
@@ -176,9 +177,21 @@ double jackknife_mm(const LeftOut& left_out, double depth_mm) {
   return std::sqrt(std::max(0.0, (n - 1) / n * (squares - sum * sum / n)));
 }
 
+/// What the ring's scattered light may make of the list, the mean over the presses: presses of one
+/// ball agree whatever it does.
+double ring_doubt_mm(const Trial& trial) {
+  const Knot& deepest = trial.fit.knots.back();
+  double sum = 0;
+  for (const SettledPress& press : *trial.presses) {
+    sum += ring_doubt_mm(press, deepest.depth_mm / deepest.level);
+  }
+  return sum / static_cast<double>(trial.presses->size());
+}
+
 /// At each indentation bin: how far left-out presses are from the known shape, how much the list
-/// moves with the presses that make it, and what another shape would read otherwise.
-std::vector<recon::Model::Uncertainty> uncertainty_of(const LeftOut& left_out) {
+/// moves with the presses that make it, what another shape would read otherwise, and what the ring
+/// may have done.
+std::vector<recon::Model::Uncertainty> uncertainty_of(const LeftOut& left_out, double ring_mm) {
   struct Bin {
     double depth = 0;
     double error = 0;
@@ -198,8 +211,10 @@ std::vector<recon::Model::Uncertainty> uncertainty_of(const LeftOut& left_out) {
   for (const Bin& bin : bins) {
     if (bin.weight > 0) {
       const double depth_mm = std::max(0.0, bin.depth / bin.weight);
-      const double error_mm = std::hypot(bin.error / bin.weight, jackknife_mm(left_out, depth_mm),
-                                         kOtherShape * depth_mm);
+      const double error_mm =
+          std::hypot(std::hypot(bin.error / bin.weight, jackknife_mm(left_out, depth_mm),
+                                kOtherShape * depth_mm),
+                     ring_mm);
       rows.push_back({std::round(1000 * depth_mm) / 1000, std::round(10000 * error_mm) / 10});
     }
   }
@@ -264,7 +279,7 @@ Calibration build(const BallPresses& presses, PressReport* report) {
   const double beyond =
       (knots[last].depth_mm - knots[before].depth_mm) / (knots[last].level - knots[before].level);
   model->list = make_list(knots, knots.front().depth_mm / knots.front().level, beyond, profile);
-  model->uncertainty = uncertainty_of(chosen.left_out);
+  model->uncertainty = uncertainty_of(chosen.left_out, ring_doubt_mm(chosen));
   calibration.model = std::move(model);
   if (report != nullptr) {
     for (std::size_t p = 0; p < set.presses.size(); ++p) {

@@ -51,8 +51,9 @@ struct PressReport {
 /// taken is the simplest within one standard error of the best.
 ///
 /// What the list says of its own uncertainty is that error of the chosen one, how much the list
-/// moves with the presses that make it, and 5 % of the depth for objects of another shape, added in
-/// squares. `origin` is left for the caller to fill.
+/// moves with the presses that make it, 5 % of the depth for objects of another shape, and what the
+/// bright ring's light may do (ring_doubt_mm()), added in squares. `origin` is left for the caller
+/// to fill.
 ///
 /// A press without a contact that can be used (too light, beyond the map) is left out. Throws
 /// std::runtime_error when fewer than two remain, naming those left out, and when the presses leave
