@@ -1,0 +1,112 @@
+// What calibrate says against a calibration, on real ball presses: nothing about healthy ones, and
+// what is wrong where scale, radius, light or picture are.
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "clients/calibrate/offline/folder_evaluation.hpp"
+#include "clients/calibrate/fit/plausibility.hpp"
+#include "tests/accuracy/real/press_images.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using calibration::BallPress;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+BallPress press_of(const PressImages& images, double mm_per_px, double radius_mm = 4) {
+  BallPress press;
+  press.reference_q8 = {images.reference.cols, images.reference.rows, {}};
+  for (const float level : images.reference) {
+    press.reference_q8.pixels.push_back(static_cast<std::uint16_t>(std::lround(256 * level)));
+  }
+  press.frames = {{images.frame.cols, images.frame.rows, {}}};
+  for (const float level : images.frame) {
+    press.frames[0].pixels.push_back(static_cast<std::uint8_t>(std::lround(level)));
+  }
+  press.mm_per_px = mm_per_px;
+  press.ball_radius_mm = radius_mm;
+  return press;
+}
+
+std::vector<std::string> doubts_of(const BallPress& press) {
+  return calibration::doubts_about(calibration::build(press), press);
+}
+
+class PlausiblePress : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    folder_ = sensor_folder(GetParam());
+    if (!folder_) GTEST_SKIP() << "the real images are not beside the repository";
+    images_ = load_pair(*folder_, "ball");
+  }
+  [[nodiscard]] static double scale() {
+    return GetParam() == std::string("sensor_a") ? 0.05102 : 0.05317;
+  }
+  std::optional<std::filesystem::path> folder_;
+  PressImages images_;
+};
+
+TEST_P(PlausiblePress, NothingIsSaidOfHealthyOnes) {
+  for (const PressImages& images :
+       {images_, turned(images_), dark_corners(images_), leaking(images_)}) {
+    EXPECT_THAT(doubts_of(press_of(images, scale())), IsEmpty());
+  }
+  BallPress published = press_of(images_, scale());
+  published.method = recon::Method::published;
+  EXPECT_THAT(doubts_of(published), IsEmpty());
+  // A tenth of the scale less: told by nothing in one press.
+  EXPECT_THAT(doubts_of(press_of(images_, 0.9 * scale())), IsEmpty());
+}
+
+TEST_P(PlausiblePress, NothingIsSaidOfThemThroughTheirLens) {
+  const FolderEvaluation e = evaluate_folder(*folder_, {}, 4.0);
+  ASSERT_TRUE(e.ball && e.calibration);
+  fmt::print("{}: offset {:.3f} mm, shape {:.3f} mm\n", GetParam(), e.ball->offset_mm,
+             e.ball->mae_mm);
+  EXPECT_THAT(calibration::doubts_about(*e.ball), IsEmpty());
+  EXPECT_THAT(calibration::doubts_about(e.calibration->model->list), IsEmpty());
+}
+
+TEST_P(PlausiblePress, ADecimalPointOff) {
+  EXPECT_THAT(doubts_of(press_of(images_, 0.1 * scale())), Contains(HasSubstr("a grey level is")));
+  EXPECT_THAT(doubts_of(press_of(images_, scale(), 40)), Contains(HasSubstr("a grey level is")));
+}
+
+TEST_P(PlausiblePress, APressHalfInTheDark) {
+  // Both images black from a column within the contact on.
+  for (const double part : {0.52, 0.55}) {
+    PressImages dark{images_.reference.clone(), images_.frame.clone()};
+    const int from = static_cast<int>(part * dark.frame.cols);
+    for (cv::Mat1f* image : {&dark.reference, &dark.frame}) {
+      image->colRange(from, image->cols) *= 0.03F;
+    }
+    EXPECT_FALSE(doubts_of(press_of(dark, scale())).empty()) << part;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sensors, PlausiblePress, testing::Values("sensor_a", "sensor_b"),
+                         [](const auto& sensor) { return std::string(sensor.param); });
+
+// The press of sensor_a is 1.9 mm deep, almost half of the radius, where scale and radius show.
+TEST(PlausibleDeepPress, AWrongScaleRadiusOrLight) {
+  const auto folder = sensor_folder("sensor_a");
+  if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
+  const PressImages images = load_pair(*folder, "ball");
+  const auto disagree = Contains(HasSubstr("list and sphere disagree"));
+  EXPECT_THAT(doubts_of(press_of(images, 0.0552)), disagree);
+  EXPECT_THAT(doubts_of(press_of(images, 1.05 * 0.0510)), disagree);
+  EXPECT_THAT(doubts_of(press_of(images, 0.0510, 3.5)), disagree);
+  EXPECT_THAT(doubts_of(press_of(images, 0.0510, 3)), disagree);
+  EXPECT_THAT(doubts_of(press_of(tilted(images), 0.0510)), disagree);
+}
+
+}  // namespace
+}  // namespace dtact::ctl
