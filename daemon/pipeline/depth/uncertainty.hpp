@@ -26,10 +26,11 @@ inline constexpr double kStaleReferenceUm = 30;
 
 /// Mean absolute error to expect inside the contact, micrometres: what the list is uncertain by
 /// (`list_um`) and what the layer's blur hides of edges and texture, added in squares. The blur is
-/// kBlurPerBend × bend. Over 15 kinds of objects in the simulator (config/scenes/all_objects.toml,
-/// pressed 0.2 to 1.2 mm) the true error was 1.0 × this at the median, and at most 1.6 × in 95 % of
-/// frames; deep narrow texture is worst (2.3 ×), for what the layer has blurred away leaves no bend
-/// to be seen. Other thicknesses blur otherwise: uncertainty_test.cpp has the figures.
+/// kBlurPerBend × bend: over 15 kinds of objects in the simulator (config/scenes/all_objects.toml,
+/// pressed 0.2 to 1.2 mm, a list taken for 20 um) the true error was 1.0 × the sum at the median
+/// and at most 1.6 × in 95 % of frames. Deep narrow texture is worst (2.3 ×), for what the layer
+/// has blurred away leaves no bend to be seen, and other layers blur otherwise. How honest the sum
+/// is on scenes that had no part in it says tests/accuracy/chart/honesty_test.cpp.
 [[nodiscard]] double uncertainty_um(double list_um, double bend_um) noexcept;
 inline constexpr double kBlurPerBend = 7.0;
 

@@ -6,7 +6,6 @@
 #include <cstdio>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/depth/uncertainty.hpp"
 #include "hal/sim/renderer.hpp"
@@ -18,10 +17,9 @@ namespace {
 
 /// One frame of the scripted run, worked by every resolution and by the chosen one.
 struct Judged {
-  int chosen = 0;             ///< Decimation.
-  double error_um = 0;        ///< Of the chosen, true.
-  double full_error_um = 0;   ///< Of full resolution, true.
-  double uncertainty_um = 0;  ///< As the frame would carry it.
+  int chosen = 0;            ///< Decimation.
+  double error_um = 0;       ///< Of the chosen, true.
+  double full_error_um = 0;  ///< Of full resolution, true.
 };
 
 calibration::Calibration from_one_press(const image::Grey16& reference) {
@@ -81,10 +79,7 @@ std::vector<Judged> scripted_run(double max_error_um, const image::Grey16& refer
     const double bend = pipeline::bend_um(sums, mm_per_px);
     // As the capture loop has it: half of the deepest is about the mean over a contact.
     const double list_um = maps.list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)));
-    Judged judged{.chosen = decimation,
-                  .error_um = 0,
-                  .full_error_um = 0,
-                  .uncertainty_um = pipeline::uncertainty_at_um(list_um, bend, decimation)};
+    Judged judged{.chosen = decimation, .error_um = 0, .full_error_um = 0};
     maps.use_decimation(chooser.next(list_um, bend));
 
     const Shot shot = truth_of(renderer, sequence);
@@ -127,45 +122,6 @@ TEST(Auto, KeepsTheBoundWhereverFullResolutionDoesAndSavesPixels) {
       EXPECT_GE(inside, 0.95);
     }
   }
-}
-
-/// True error over stated uncertainty at some shares of the frames, printed.
-struct Ratios {
-  double median = 0;
-  double most_of_all = 0;  ///< 95 %.
-  double worst = 0;
-};
-Ratios ratios_of(const std::vector<Judged>& run) {
-  std::vector<double> ratios;
-  ratios.reserve(run.size());
-  for (const Judged& j : run) ratios.push_back(j.error_um / j.uncertainty_um);
-  std::ranges::sort(ratios);
-  const auto at = [&](double part) {
-    return ratios[static_cast<std::size_t>(part * static_cast<double>(ratios.size() - 1))];
-  };
-  std::printf("true error / stated uncertainty: 5 %% %.2f, median %.2f, 95 %% %.2f, most %.2f\n",
-              at(0.05), at(0.5), at(0.95), at(1));
-  return {at(0.5), at(0.95), at(1)};
-}
-
-TEST(Uncertainty, IsHonestOnEveryObject) {
-  const image::Grey16 reference = make_reference();
-  const Ratios ratios = ratios_of(scripted_run(60, reference, from_one_press(reference)));
-  EXPECT_GT(ratios.median, 0.7);
-  EXPECT_LT(ratios.median, 1.3);
-  EXPECT_LT(ratios.most_of_all, 1.7);
-  EXPECT_LT(ratios.worst, 2.5);
-}
-
-// The same with what a list from several presses states of itself.
-TEST(Uncertainty, IsHonestWithAListFromSeveralPresses) {
-  const image::Grey16 reference = make_reference();
-  const Ratios ratios =
-      ratios_of(scripted_run(60, reference, calibration::build(several_presses(reference))));
-  EXPECT_GT(ratios.median, 0.5);
-  EXPECT_LT(ratios.median, 1.3);
-  EXPECT_LT(ratios.most_of_all, 1.7);
-  EXPECT_LT(ratios.worst, 2.5);
 }
 
 }  // namespace
