@@ -77,8 +77,9 @@ const Payload* Device::make_next() noexcept {
 bool Device::make(std::uint64_t sequence, Payload& payload) noexcept {
   const LedLevels light = exposed_light();
   const Fault* const fault = scene().fault_at(sequence);
-  hangs_ = fault != nullptr && fault->kind == FaultKind::hang;
-  if (fault != nullptr && fault->kind == FaultKind::unplug) {
+  const auto struck_by = [&](FaultKind kind) { return fault != nullptr && fault->kind == kind; };
+  hangs_ = struck_by(FaultKind::hang);
+  if (struck_by(FaultKind::unplug)) {
     ++lost_;
     if (state_.exchange(CameraState::unplugged) != CameraState::unplugged) {
       ++disconnects_;
@@ -86,20 +87,18 @@ bool Device::make(std::uint64_t sequence, Payload& payload) noexcept {
     }
     return false;
   }
-  if (hangs_ ||
-      (fault != nullptr && (fault->kind == FaultKind::drop || fault->kind == FaultKind::stall))) {
+  state_ = struck_by(FaultKind::stall) ? CameraState::stalled : CameraState::streaming;
+  if (hangs_ || struck_by(FaultKind::drop) || struck_by(FaultKind::stall)) {
     ++lost_;
-    state_ = fault->kind == FaultKind::stall ? CameraState::stalled : CameraState::streaming;
     return false;
   }
-  state_ = CameraState::streaming;
 
   int rows = image_.height();
-  if (fault != nullptr && fault->kind == FaultKind::torn) rows /= 2;
-  if (fault != nullptr && fault->kind == FaultKind::repeat) rows = 0;
+  if (struck_by(FaultKind::torn)) rows /= 2;
+  if (struck_by(FaultKind::repeat)) rows = 0;
   renderer_.render(sequence, light, image_.data(), image_.stride(), rows);
   payload.bytes = encoder_.encode(image_.view(), payload.buffer);
-  if (fault != nullptr && fault->kind == FaultKind::truncate) payload.bytes /= 2;
+  if (struck_by(FaultKind::truncate)) payload.bytes /= 2;
   payload.sequence = sequence;
   payload.lost_before = lost_;
   return true;

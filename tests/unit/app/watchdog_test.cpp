@@ -20,12 +20,16 @@ using namespace std::chrono_literals;
 class WatchdogTest : public ::testing::Test {
  protected:
   WatchdogTest() { ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1); }
+
+ public:
   ~WatchdogTest() override {
     ::unsetenv("NOTIFY_SOCKET");
     ::unsetenv("WATCHDOG_USEC");
   }
+
+ protected:
   /// How often systemd was told.
-  int told() const {
+  [[nodiscard]] int told() const {
     int count = 0;
     while (const auto message = manager.next(0ms)) {
       EXPECT_EQ(*message, "WATCHDOG=1");
@@ -42,7 +46,7 @@ class WatchdogTest : public ::testing::Test {
 TEST_F(WatchdogTest, IsFedWhileTheHeartMoves) {
   ::setenv("WATCHDOG_USEC", "20000", 1);
   std::uint64_t beats = 0;
-  Watchdog watchdog(io, [&] { return ++beats; });
+  const Watchdog watchdog(io, [&] { return ++beats; });
   for (int i = 0; i < 5; ++i) io.run_one();
   EXPECT_EQ(told(), 5);
 }

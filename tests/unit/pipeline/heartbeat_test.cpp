@@ -126,12 +126,15 @@ class Heartbeat : public ::testing::Test {
         std::make_unique<fakes::FakeRing>(ring), nullptr, config);
     pipeline->start();
   }
+
+ public:
   ~Heartbeat() override {
     driver.opening.open();
     driver.grabbing.open();
     driver.closing.open();
   }
 
+ protected:
   hal::live::Opened open() {
     if (!driver.attached) throw hal::live::DeviceError(hal::CameraState::unplugged, "plug it in");
     return {std::make_shared<DrivenSource>(driver), "driven", "GREY", {}};
