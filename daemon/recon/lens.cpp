@@ -52,14 +52,18 @@ Point project(const Lens& lens, Point mm) {
   const double r2 = (x * x + y * y) / (lens.radius_px * lens.radius_px);
   double stretch = 1;
   double power = r2;
+  double factor = 3;
+  double lowest_slope = 1;  // nowhere on the way from the centre is it lower
   for (const double k : lens.radial) {
     stretch += k * power;
+    lowest_slope += std::min(0.0, factor * k * power);
     power *= r2;
+    factor += 2;
   }
-  // What lies beyond a fold is not seen where the polynomial says; the slope of ρ(1 + k₁ρ² + …) is
-  // looked at on the whole way from the centre.
+  // What lies beyond a fold is not seen where the polynomial says; where there may be one, the
+  // slope of ρ(1 + k₁ρ² + …) is looked at on the whole way from the centre.
   constexpr int kSteps = 32;
-  for (int i = 1; i <= kSteps && !lens.radial.empty(); ++i) {
+  for (int i = 1; i <= kSteps && !(lowest_slope > 0); ++i) {
     const double s2 = r2 * i * i / (kSteps * kSteps);
     double slope = 1;
     double s_power = s2;

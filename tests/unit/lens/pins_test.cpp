@@ -28,6 +28,11 @@ struct Scene {
   std::set<std::pair<int, int>> missing;  ///< Row, column.
 
   Scene() {
+    // Small: what a pin costs to find goes with its pixels.
+    camera.width = 400;
+    camera.height = 300;
+    camera.focal = 350;
+    camera.centre = {200, 150};
     camera.k1 = -0.15;
     camera.tilt_x = 2;
   }
@@ -108,9 +113,9 @@ TEST(Pins, AreFoundWithTheBoardTurned) {
 TEST(Pins, OfABoardOnEdgeHaveRowsAndColumnsSwapped) {
   Scene scene;
   scene.turn = 90;
-  scene.camera.width = 480;
-  scene.camera.height = 640;
-  scene.camera.centre = {240, 320};
+  scene.camera.width = 300;
+  scene.camera.height = 400;
+  scene.camera.centre = {150, 200};
   const PinPress press = scene.find();
   ASSERT_EQ(press.marks.size(), 63U);
   EXPECT_EQ(press.rows, 9);
