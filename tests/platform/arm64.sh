@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # arm64.sh PACKAGE...: cross-builds the whole tree for arm64 on Debian 12, in a chroot so that the
 # other architecture's packages stay out of this machine, and runs the unit tests under qemu-user.
-# Of the Debian packages named, libraries are taken for arm64 and tools for this machine.
+# Of the Debian packages named, libraries are taken for arm64 and tools for this machine; umockdev is
+# both, and the tests load its library.
 #
 # Exit code: 0 passed; 77 such a chroot cannot be had here (the reason is printed); else failed.
 set -euo pipefail
@@ -15,7 +16,7 @@ foreign=()
 for package in "$@"; do
   case $package in
     libcli11-dev) foreign+=("$package") ;;  # has no architecture
-    lib*) foreign+=("$package:arm64") ;;
+    lib* | umockdev) foreign+=("$package:arm64") ;;
     *) foreign+=("$package") ;;
   esac
 done
