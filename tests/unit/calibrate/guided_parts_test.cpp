@@ -115,9 +115,9 @@ TEST(ContactWidth, OfABall) {
 TEST(Covered, IsTheDepthWhereTheListsCoverageEnds) {
   auto model = std::make_shared<recon::Model>();
   model->list = {.first_q6 = -2,
+                 .um = {-9, -4, 0, 30, 70, 1250, 1500},
                  .covered_from_q6 = -1,
-                 .covered_to_q6 = 3,
-                 .um = {-9, -4, 0, 30, 70, 1250, 1500}};
+                 .covered_to_q6 = 3};
   calibration::Calibration made;
   made.model = std::move(model);
   EXPECT_DOUBLE_EQ(covered_mm(made), 1.25);

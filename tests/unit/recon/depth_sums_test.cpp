@@ -257,8 +257,14 @@ TEST_P(VectorSums, AReconstructionAddsUpItsOwnMap) {
       SumRules rules = kRules;
       rules.bend_reach = round;
       DepthSums sums(rules);
-      ActivityReport report;
-      reconstructor.run_active(luma.data(), kWidth + 1, depth, drawn, report, nullptr, &sums);
+      // The press, and the rows of tiles above and below it.
+      TileRows tiles(static_cast<std::size_t>(reconstructor.grid().rows()));
+      for (int row = std::max(0, y0 / TileGrid::kRows - 1);
+           row <= std::min<int>((y0 + 30) / TileGrid::kRows + 1, reconstructor.grid().rows() - 1);
+           ++row) {
+        tiles[static_cast<std::size_t>(row)] = reconstructor.grid().all();
+      }
+      reconstructor.run_active(luma.data(), kWidth + 1, tiles, depth, drawn, nullptr, &sums);
       const DepthSums should = walk(depth, reconstructor.grid(), drawn.tiles, rules);
       ASSERT_GT(should.made, 500);
       ASSERT_EQ(should.bent > 0, round > 0);
