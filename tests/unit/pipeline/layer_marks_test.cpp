@@ -104,6 +104,15 @@ TEST(LayerMarks, AreFoundWhereTheyWent) {
   }
 }
 
+// Marks three pixels wide are one-sided two pixels away by a fraction of a pixel already.
+TEST(LayerMarks, ThatWentAFractionOfAPixelHaveNotMoved) {
+  const LayerMarks before = marks({});
+  for (const double dx : {0.5, -0.6}) {
+    EXPECT_FALSE(before.moved_to(marks({.dx = dx, .noise_seed = 4}))) << dx;
+    EXPECT_FALSE(before.moved_to(marks({.dy = dx, .noise_seed = 4}))) << dx;
+  }
+}
+
 TEST(LayerMarks, MoveBesideMarksOfTheCameraThatDoNot) {
   Picture picture{.layer = {1, 200}, .camera = {2, 400}, .stripes = 0.5};
   const LayerMarks then = marks(picture);
