@@ -5,8 +5,15 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <csignal>
+#include <functional>
+#include <stdexcept>
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "clients/cpp/maps.hpp"
 #include "clients/cpp/names.hpp"
@@ -120,6 +127,27 @@ TEST(ClientLibrary, WaitsForTheNextAndGivesUp) {
   EXPECT_FALSE(client.next(std::chrono::milliseconds(0)).has_value());
 }
 
+// A terminal that is resized, for one.
+TEST(ClientLibrary, ASignalDoesNotEndAWait) {
+  Rig rig;
+  Client client(options(rig));
+  struct sigaction action{};
+  action.sa_handler = [](int) {};
+  struct sigaction before{};
+  ASSERT_EQ(::sigaction(SIGUSR1, &action, &before), 0);
+  std::atomic<bool> over{false};
+  std::thread signals([&over, waiting = ::pthread_self()] {
+    while (!over) {
+      ::pthread_kill(waiting, SIGUSR1);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  });
+  EXPECT_NO_THROW(EXPECT_FALSE(client.next(std::chrono::milliseconds(200)).has_value()));
+  over = true;
+  signals.join();
+  ::sigaction(SIGUSR1, &before, nullptr);
+}
+
 TEST(ClientLibrary, KeepsEventsAndTheNewestFramesWhileItWaitsForAnAnswer) {
   Rig rig;
   Client client(options(rig));
@@ -230,51 +258,114 @@ TEST(ClientLibrary, SaysWhyItWasRefused) {
   }
 }
 
-/// A daemon that greets, says why it ends, and resets the connection.
-std::thread greet_and_reset(int listening, const std::string& reason) {
-  return std::thread([=] {
-    const base::UniqueFd fd(::accept(listening, nullptr, nullptr));
-    const auto send = [&fd](const v1::ServerMessage& message) {
-      const auto length = wire::encode_length(message.ByteSizeLong());
-      std::string bytes(reinterpret_cast<const char*>(length.data()), length.size());
-      message.AppendToString(&bytes);
-      (void)::send(fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
-    };
-    std::array<char, 1024> hello{};
-    (void)::recv(fd.get(), hello.data(), hello.size(), 0);
-    v1::ServerMessage greeting;
-    greeting.mutable_reply()->set_id(1);
-    greeting.mutable_reply()->mutable_hello()->set_major(wire::kMajor);
-    send(greeting);
-    v1::ServerMessage end;
-    end.mutable_reply()->mutable_error()->set_message(reason);
-    send(end);
-    const linger now{1, 0};
-    ::setsockopt(fd.get(), SOL_SOCKET, SO_LINGER, &now, sizeof now);
-  });
-}
+/// A daemon that greets its one client and then does what a test wants.
+class PlayedDaemon {
+ public:
+  using Send = std::function<bool(const v1::ServerMessage&)>;
+
+  explicit PlayedDaemon(std::function<void(int fd, const Send&)> play)
+      : listening_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    auto* const any = reinterpret_cast<sockaddr*>(&address);
+    if (::bind(listening_.get(), any, size) != 0 || ::listen(listening_.get(), 1) != 0 ||
+        ::getsockname(listening_.get(), any, &size) != 0) {
+      throw std::runtime_error("cannot listen");
+    }
+    options.port = ntohs(address.sin_port);
+    options.timeout = kPatience;
+    thread_ = std::thread([this, play = std::move(play)] {
+      const base::UniqueFd fd(::accept(listening_.get(), nullptr, nullptr));
+      const Send send = [&fd](const v1::ServerMessage& message) {
+        const auto length = wire::encode_length(message.ByteSizeLong());
+        std::string bytes(reinterpret_cast<const char*>(length.data()), length.size());
+        message.AppendToString(&bytes);
+        return ::send(fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) > 0;
+      };
+      std::array<char, 1024> hello{};
+      (void)::recv(fd.get(), hello.data(), hello.size(), 0);
+      v1::ServerMessage greeting;
+      greeting.mutable_reply()->set_id(1);
+      greeting.mutable_reply()->mutable_hello()->set_major(wire::kMajor);
+      (void)send(greeting);
+      play(fd.get(), send);
+    });
+  }
+  ~PlayedDaemon() { finish(); }
+  PlayedDaemon(const PlayedDaemon&) = delete;
+  PlayedDaemon& operator=(const PlayedDaemon&) = delete;
+
+  /// Waits until its play is over and the connection closed.
+  void finish() {
+    if (thread_.joinable()) thread_.join();
+  }
+
+  Options options;
+
+ private:
+  base::UniqueFd listening_;
+  std::thread thread_;
+};
 
 TEST(ClientLibrary, SaysTheReasonThatCameBeforeAReset) {
-  const base::UniqueFd listening(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  ASSERT_EQ(::bind(listening.get(), reinterpret_cast<sockaddr*>(&address), size), 0);
-  ASSERT_EQ(::listen(listening.get(), 1), 0);
-  ASSERT_EQ(::getsockname(listening.get(), reinterpret_cast<sockaddr*>(&address), &size), 0);
-  std::thread daemon = greet_and_reset(listening.get(), "too many answers lay unread");
-  Options o;
-  o.port = ntohs(address.sin_port);
-  o.timeout = kPatience;
-  Client client(o);
-  daemon.join();
+  PlayedDaemon daemon([](int fd, const PlayedDaemon::Send& send) {
+    v1::ServerMessage end;
+    end.mutable_reply()->mutable_error()->set_message("too many answers lay unread");
+    (void)send(end);
+    const linger now{1, 0};
+    ::setsockopt(fd, SOL_SOCKET, SO_LINGER, &now, sizeof now);
+  });
+  Client client(daemon.options);
+  daemon.finish();
   try {
     (void)client.status();
     FAIL() << "an answer from nobody";
   } catch (const client::ConnectionError& e) {
     EXPECT_STREQ(e.what(), "too many answers lay unread");
   }
+}
+
+TEST(ClientLibrary, GivesUpOnAnAnswerThoughFramesCome) {
+  PlayedDaemon daemon([](int, const PlayedDaemon::Send& send) {
+    v1::ServerMessage frame;
+    frame.mutable_frame()->set_sequence(1);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (std::chrono::steady_clock::now() < end && send(frame)) {
+    }
+  });
+  daemon.options.timeout = std::chrono::seconds(1);
+  Client client(daemon.options);
+  EXPECT_THROW(client.rezero(), client::TimeoutError);
+}
+
+TEST(ClientLibrary, ALateAnswerIsNoneToTheNextRequest) {
+  Rig rig;
+  Options o = options(rig);
+  o.timeout = std::chrono::seconds(2);
+  Client client(o);
+  EXPECT_THROW(client.rezero(), client::TimeoutError);
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  rig.port.emit(pipeline::CommandDone{command->ticket, pipeline::Outcome::done, ""});
+  EXPECT_EQ(client.status().version, "9.8.7");
+}
+
+// Calibrations are parsed and written before the answer.
+TEST(ClientLibrary, WaitsLongerForCalibrationsThanForTheRest) {
+  Rig rig;
+  Options o = options(rig);
+  o.timeout = std::chrono::seconds(1);
+  Client client(o);
+  std::thread pipeline([&rig] {
+    const auto command = rig.port.wait_command(0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    rig.port.emit(pipeline::CommandDone{command.value_or(pipeline::Command{}).ticket,
+                                        pipeline::Outcome::done, ""});
+  });
+  EXPECT_NO_THROW(client.activate_calibration(1));
+  pipeline.join();
 }
 
 TEST(ClientLibrary, Moves) {
