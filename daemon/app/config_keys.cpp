@@ -9,6 +9,7 @@
 #include "daemon/app/key_kinds.hpp"
 #include "daemon/net/light_schemes.hpp"
 #include "hal/registry.hpp"
+#include "hal/toml/key_reader.hpp"
 
 namespace dtact::app {
 namespace {
@@ -56,7 +57,7 @@ Key scheme(std::string path, std::string& field) {
             field = name;
             return true;
           },
-          [&field] { return toml_string(field); }};
+          [&field] { return tomlfile::quoted(field); }};
 }
 
 }  // namespace

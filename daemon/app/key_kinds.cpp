@@ -4,19 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+
+#include "hal/toml/key_reader.hpp"
 
 namespace dtact::app {
 
 namespace fs = std::filesystem;
-
-std::string toml_string(const std::string& text) {
-  std::ostringstream out;
-  out << toml::toml_formatter(toml::array{text});  // toml++ prints no bare string
-  const std::string array = out.str();
-  const std::size_t first = array.find_first_of("\"'");
-  return array.substr(first, array.find_last_of("\"'") - first + 1);
-}
 
 Key one_of(std::string path, int& field, std::vector<std::int64_t> allowed) {
   const std::string words = fmt::format("one of {}", fmt::join(allowed, ", "));
@@ -61,7 +54,7 @@ Key text(std::string path, std::string& field, const std::string& allowed) {
             if (value) field = *value;
             return value.has_value();
           },
-          [&field] { return toml_string(field); }};
+          [&field] { return tomlfile::quoted(field); }};
 }
 
 Key choice(std::string path, std::string& field, std::vector<std::string> allowed) {
@@ -75,13 +68,13 @@ Key choice(std::string path, std::string& field, std::vector<std::string> allowe
             field = *value;
             return true;
           },
-          [&field] { return toml_string(field); }};
+          [&field] { return tomlfile::quoted(field); }};
 }
 
 Key named(std::string path, int& field, const std::vector<std::pair<std::string, int>>& names) {
   std::vector<std::string> words;
   words.reserve(names.size());
-  for (const auto& [name, value] : names) words.push_back(toml_string(name));
+  for (const auto& [name, value] : names) words.push_back(tomlfile::quoted(name));
   return {std::move(path), fmt::format("one of {}", fmt::join(words, ", ")),
           [&field, names](const toml::node& node, const fs::path&) {
             const auto text = node.value_exact<std::string>();
@@ -92,9 +85,9 @@ Key named(std::string path, int& field, const std::vector<std::pair<std::string,
             return true;
           },
           [&field, names] {
-            return toml_string(std::ranges::find_if(names, [&](const auto& entry) {
-                                 return entry.second == field;
-                               })->first);
+            return tomlfile::quoted(std::ranges::find_if(names, [&](const auto& entry) {
+                                      return entry.second == field;
+                                    })->first);
           }};
 }
 
@@ -106,7 +99,7 @@ Key path(std::string key, fs::path& field, const std::string& allowed) {
             field = value->empty() ? fs::path() : (folder / *value).lexically_normal();
             return true;
           },
-          [&field] { return toml_string(field.string()); }};
+          [&field] { return tomlfile::quoted(field.string()); }};
 }
 
 Key optional_integer(std::string path, std::optional<int>& field, int least, int most,

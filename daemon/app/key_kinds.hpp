@@ -18,9 +18,6 @@
 // shown.
 namespace dtact::app {
 
-/// Quoted as TOML wants it.
-[[nodiscard]] std::string toml_string(const std::string& text);
-
 template <typename Integer>
 [[nodiscard]] Key integer(std::string path, Integer& field, std::int64_t least, std::int64_t most,
                           const std::string& unit) {

@@ -12,6 +12,7 @@
 #include "daemon/calibration/sha256.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
+#include "hal/toml/key_reader.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -80,8 +81,8 @@ Files format(const Calibration& calibration) {
       "created = {}  # UTC\n"
       "mm_per_px = {}  # of the depth map\n"
       "smoothing_px = {}  # standard deviation of the Gaussian on the difference\n\n",
-      kFormatVersion, toml_string(model.method == recon::Method::list ? "list" : "published"),
-      toml_string(calibration.origin.created), model.mm_per_px, model.smoothing_px);
+      kFormatVersion, tomlfile::quoted(model.method == recon::Method::list ? "list" : "published"),
+      tomlfile::quoted(calibration.origin.created), model.mm_per_px, model.smoothing_px);
   t += fmt::format("[frame]\nwidth = {}\nheight = {}\n\n", map.frame_width, map.frame_height);
   t += fmt::format(
       "[crop]  # the depth map in the frame, or in the image that the lens rectifies\ncol = "
@@ -89,11 +90,11 @@ Files format(const Calibration& calibration) {
       "height = {}\n\n",
       calibration.crop_col, calibration.crop_row, map.width, map.height);
   t += fmt::format("[reference]  # {}: 16-bit grey, grey level times 256\nsha256 = {}\n\n",
-                   kReferenceName, toml_string(sha256_hex(files.reference_png)));
+                   kReferenceName, tomlfile::quoted(sha256_hex(files.reference_png)));
   t += format_camera_and_light(calibration.origin);
   for (const Origin::Source& source : calibration.origin.sources) {
-    t += fmt::format("[[source]]\nname = {}\nsha256 = {}\n\n", toml_string(source.name),
-                     toml_string(source.sha256));
+    t += fmt::format("[[source]]\nname = {}\nsha256 = {}\n\n", tomlfile::quoted(source.name),
+                     tomlfile::quoted(source.sha256));
   }
   if (std::ranges::any_of(model.untrusted, [](std::uint8_t mark) { return mark != 0; })) {
     t += fmt::format(

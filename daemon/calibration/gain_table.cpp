@@ -35,7 +35,7 @@ std::string format_gain(const recon::SpatialGain& gain) {
   return text + "\n";
 }
 
-recon::SpatialGain read_gain(KeyReader reader) {
+recon::SpatialGain read_gain(tomlfile::KeyReader reader) {
   recon::SpatialGain gain;
   if (reader.keys().empty()) return gain;
   const std::string shape = reader.text("shape");

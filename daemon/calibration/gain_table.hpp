@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "daemon/calibration/key_reader.hpp"
 #include "daemon/recon/spatial_gain.hpp"
+#include "hal/toml/key_reader.hpp"
 
 namespace dtact::calibration {
 
@@ -13,6 +13,6 @@ namespace dtact::calibration {
 
 /// Takes a `[gain]` table's keys; an empty table is no gain, as in files from before there were
 /// gains. Throws as KeyReader.
-[[nodiscard]] recon::SpatialGain read_gain(KeyReader reader);
+[[nodiscard]] recon::SpatialGain read_gain(tomlfile::KeyReader reader);
 
 }  // namespace dtact::calibration

@@ -27,7 +27,8 @@ std::string format_lens(const recon::Lens& lens) {
       fmt::join(lens.radial, ", "));
 }
 
-std::optional<recon::Lens> read_lens(KeyReader reader, int frame_width, int frame_height) {
+std::optional<recon::Lens> read_lens(tomlfile::KeyReader reader, int frame_width,
+                                     int frame_height) {
   if (reader.keys().empty()) return std::nullopt;
   recon::Lens lens;
   const std::vector<double> homography = reader.numbers("homography", -kReach, kReach);
@@ -72,11 +73,11 @@ LensFile load_lens(const std::filesystem::path& path) {
             {},
             {}};
   }
-  const toml::table document = parse_toml(base::read_file(path), path.string());
-  KeyReader top(document, path.string());
+  const toml::table document = tomlfile::parse(base::read_file(path), path.string());
+  tomlfile::KeyReader top(document, path.string());
   (void)top.integer("version", kFormatVersion, kFormatVersion);
   LensFile file;
-  KeyReader frame = top.table("frame");
+  tomlfile::KeyReader frame = top.table("frame");
   file.frame_width = static_cast<int>(frame.integer("width", 2, kMaxPixels));
   file.frame_height = static_cast<int>(frame.integer("height", 2, kMaxPixels));
   frame.finish();

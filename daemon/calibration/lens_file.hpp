@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/calibration/key_reader.hpp"
 #include "daemon/recon/lens.hpp"
 #include "daemon/recon/spatial_gain.hpp"
+#include "hal/toml/key_reader.hpp"
 
 namespace dtact::calibration {
 
@@ -25,7 +25,7 @@ struct LensFile {
 [[nodiscard]] std::string format_lens(const recon::Lens& lens);
 
 /// Takes a `[lens]` table's keys; an empty table is no lens. Throws as KeyReader.
-[[nodiscard]] std::optional<recon::Lens> read_lens(KeyReader reader, int frame_width,
+[[nodiscard]] std::optional<recon::Lens> read_lens(tomlfile::KeyReader reader, int frame_width,
                                                    int frame_height);
 
 /// The text of a lens file.

@@ -5,13 +5,13 @@
 #include <string_view>
 
 #include "daemon/calibration/gain_table.hpp"
-#include "daemon/calibration/key_reader.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/sensor_file.hpp"
 #include "daemon/calibration/sha256.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
+#include "hal/toml/key_reader.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -19,7 +19,7 @@ namespace {
 constexpr std::int64_t kMostFramePixels = std::int64_t{1} << 26U;  // 8192×8192, any camera's mode
 constexpr std::int64_t kMostMapPixels = std::int64_t{1} << 23U;    // what a message can carry
 
-std::vector<std::uint8_t> mask_of(KeyReader& reader, std::size_t pixels) {
+std::vector<std::uint8_t> mask_of(tomlfile::KeyReader& reader, std::size_t pixels) {
   const auto limit = static_cast<std::int64_t>(pixels);
   const std::vector<std::int64_t> runs = reader.integers("runs", 0, limit);
   if (runs.size() % 2 != 0) reader.fail("runs", "expected pairs of first pixel and count");
@@ -41,7 +41,7 @@ bool is_utc_time(std::string_view text) {
   });
 }
 
-std::string sha256_key(KeyReader& reader) {
+std::string sha256_key(tomlfile::KeyReader& reader) {
   std::string digest = reader.text("sha256");
   if (digest.size() != 64 || digest.find_first_not_of("0123456789abcdef") != std::string::npos) {
     reader.fail("sha256", "expected 64 lower-case hexadecimal digits");
@@ -50,16 +50,16 @@ std::string sha256_key(KeyReader& reader) {
 }
 
 /// Keeps a small file from asking for gigabytes.
-void check_area(const KeyReader& reader, int width, int height, std::int64_t most) {
+void check_area(const tomlfile::KeyReader& reader, int width, int height, std::int64_t most) {
   if (std::int64_t{width} * height <= most) return;
   reader.fail("width", fmt::format("{}x{} pixels are more than {}", width, height, most));
 }
 
-int small(KeyReader& reader, const char* key, int low, int high) {
+int small(tomlfile::KeyReader& reader, const char* key, int low, int high) {
   return static_cast<int>(reader.integer(key, low, high));
 }
 
-void read_list(KeyReader list, bool monotone, recon::DepthList& out) {
+void read_list(tomlfile::KeyReader list, bool monotone, recon::DepthList& out) {
   constexpr int kReach = 255 * recon::kEntriesPerLevel;
   out.first_q6 = small(list, "first_q6", -kReach, kReach);
   out.covered_from_q6 = small(list, "covered_from_q6", -kReach, kReach);
@@ -75,7 +75,7 @@ void read_list(KeyReader list, bool monotone, recon::DepthList& out) {
   }
 }
 
-void read_reference(KeyReader reader, const std::string& png, const std::string& where,
+void read_reference(tomlfile::KeyReader reader, const std::string& png, const std::string& where,
                     recon::Model& model) {
   const std::string expected = sha256_key(reader);
   reader.finish();
@@ -97,7 +97,7 @@ void read_reference(KeyReader reader, const std::string& png, const std::string&
   model.reference_q8 = std::move(image.pixels);
 }
 
-void read_uncertainty(KeyReader reader, std::vector<recon::Model::Uncertainty>& out) {
+void read_uncertainty(tomlfile::KeyReader reader, std::vector<recon::Model::Uncertainty>& out) {
   const std::vector<double> depths = reader.numbers("depth_mm", 0, 16.383);
   const std::vector<double> errors = reader.numbers("error_um", 0, 16383);
   if (depths.size() != errors.size()) reader.fail("error_um", "expected one for each depth_mm");
@@ -107,7 +107,7 @@ void read_uncertainty(KeyReader reader, std::vector<recon::Model::Uncertainty>& 
 }
 
 /// Tables that later versions fill. What this program cannot apply it must not pass over.
-void refuse_reserved(KeyReader& top) {
+void refuse_reserved(tomlfile::KeyReader& top) {
   for (const char* name : {"surface"}) {
     if (top.has(name) && !top.table(name).keys().empty()) {
       top.fail(name,
@@ -121,8 +121,8 @@ void refuse_reserved(KeyReader& top) {
 
 Calibration parse(const std::string& toml, const std::string& reference_png,
                   const std::string& where) {
-  const toml::table document = parse_toml(toml, where);
-  KeyReader top(document, where);
+  const toml::table document = tomlfile::parse(toml, where);
+  tomlfile::KeyReader top(document, where);
   // Before anything else: another version's keys mean something else.
   (void)top.integer("version", kFormatVersion, kFormatVersion);
 
@@ -140,12 +140,12 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   model->mm_per_px = top.number("mm_per_px", 0.0001, 10);
   model->smoothing_px = top.number("smoothing_px", 0, 10);
 
-  KeyReader frame = top.table("frame");
+  tomlfile::KeyReader frame = top.table("frame");
   const int frame_width = small(frame, "width", 2, kMaxPixels);
   const int frame_height = small(frame, "height", 2, kMaxPixels);
   frame.finish();
   check_area(frame, frame_width, frame_height, kMostFramePixels);
-  KeyReader crop = top.table("crop");
+  tomlfile::KeyReader crop = top.table("crop");
   calibration.crop_col = small(crop, "col", 0, frame_width - 1);
   calibration.crop_row = small(crop, "row", 0, frame_height - 1);
   const int width = small(crop, "width", 1, frame_width - calibration.crop_col);
@@ -164,12 +164,12 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   if (top.has("gain")) model->gain = read_gain(top.table("gain"));
   if (top.has("uncertainty")) read_uncertainty(top.table("uncertainty"), model->uncertainty);
   read_camera_and_light(top, calibration.origin);
-  for (KeyReader& source : top.tables("source")) {
+  for (tomlfile::KeyReader& source : top.tables("source")) {
     calibration.origin.sources.push_back({source.text("name"), sha256_key(source)});
     source.finish();
   }
   if (top.has("untrusted")) {
-    KeyReader untrusted = top.table("untrusted");
+    tomlfile::KeyReader untrusted = top.table("untrusted");
     model->untrusted = mask_of(untrusted, model->rectify.entries.size());
     untrusted.finish();
   }

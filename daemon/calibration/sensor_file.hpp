@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "daemon/calibration/calibration.hpp"
-#include "daemon/calibration/key_reader.hpp"
+#include "hal/toml/key_reader.hpp"
 
 namespace dtact::calibration {
 
@@ -13,13 +13,10 @@ namespace dtact::calibration {
 /// calibration made from them records both.
 inline constexpr const char* kSensorName = "sensor.toml";
 
-/// A string as TOML writes it.
-[[nodiscard]] std::string toml_string(std::string_view text);
-
 /// Camera, controls and light as the tables [camera], [camera.controls] and [light].
 [[nodiscard]] std::string format_camera_and_light(const Origin& origin);
 /// Takes those tables. Throws as KeyReader.
-void read_camera_and_light(KeyReader& top, Origin& origin);
+void read_camera_and_light(tomlfile::KeyReader& top, Origin& origin);
 
 /// The text of a sensor file.
 [[nodiscard]] std::string format_sensor(const Origin& origin);

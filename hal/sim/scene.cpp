@@ -9,10 +9,12 @@
 
 #include "hal/base/atomic_file.hpp"
 #include "hal/sim/default_scene.hpp"
-#include "hal/sim/scene_reader.hpp"
+#include "hal/toml/key_reader.hpp"
 
 namespace dtact::hal::sim {
 namespace {
+
+using tomlfile::KeyReader;
 
 // A rigid object deeper than this would have to squeeze the layer to nothing, where a linear law
 // no longer holds.
@@ -24,23 +26,15 @@ const std::vector<std::string> kObjects = {
     "star",      "screw_cap",  "usb_c_plug", "key",         "three_set_screws",
     "height_map"};
 
-Object read_object(SceneReader& press, const std::filesystem::path& folder) {
+Object read_object(KeyReader& press, const std::filesystem::path& folder) {
   press.require("object");
   int index = 0;
-  press.choice("object", index, kObjects);
+  press.choice_if("object", index, kObjects);
   const std::string& kind = kObjects[static_cast<std::size_t>(index)];
-  const auto length = [&](std::string_view key, double lowest, double highest) {
-    press.require(key);
-    double value = 0;
-    press.number(key, value, lowest, highest);
-    return value;
+  const auto length = [&](const char* key, double lowest, double highest) {
+    return press.number(key, lowest, highest);
   };
-  const auto count = [&](std::string_view key) {
-    press.require(key);
-    int value = 0;
-    press.integer(key, value, 1, 50);
-    return value;
-  };
+  const auto count = [&](const char* key) { return static_cast<int>(press.integer(key, 1, 50)); };
   if (kind == "ball") return ball(length("radius_mm", 0.2, 50));
   if (kind == "ball_array") {
     const double radius = length("radius_mm", 0.2, 10);
@@ -70,7 +64,7 @@ Object read_object(SceneReader& press, const std::filesystem::path& folder) {
   if (kind == "key") return key();
   press.require("image");
   std::string image;
-  press.text("image", image);
+  press.text_if("image", image);
   const double mm_per_px = length("mm_per_px", 0.001, 1);
   const double relief = length("relief_mm", 0.01, 20);
   try {
@@ -80,22 +74,22 @@ Object read_object(SceneReader& press, const std::filesystem::path& folder) {
   }
 }
 
-Press read_press(SceneReader& table, const std::filesystem::path& folder, double thickness_mm) {
+Press read_press(KeyReader& table, const std::filesystem::path& folder, double thickness_mm) {
   Press press;
   press.object = read_object(table, folder);
   table.require("keys");
   PressKey key;  // what a key leaves out is as in the one before
-  for (SceneReader& entry : table.tables("keys")) {
+  for (KeyReader& entry : table.tables("keys")) {
     entry.require("t");
     const double last = key.time_s;
-    entry.number("t", key.time_s, 0, 1e5);
+    entry.number_if("t", key.time_s, 0, 1e5);
     if (!press.keys.empty() && key.time_s <= last) {
       entry.fail("t", "must be later than in the key before");
     }
-    entry.number("x", key.x_mm, -100, 100);
-    entry.number("y", key.y_mm, -100, 100);
-    entry.number("depth", key.depth_mm, -10, kDeepest * thickness_mm);
-    entry.number("rotation", key.rotation_deg, -3600, 3600);
+    entry.number_if("x", key.x_mm, -100, 100);
+    entry.number_if("y", key.y_mm, -100, 100);
+    entry.number_if("depth", key.depth_mm, -10, kDeepest * thickness_mm);
+    entry.number_if("rotation", key.rotation_deg, -3600, 3600);
     entry.finish();
     press.keys.push_back(key);
   }
@@ -107,47 +101,47 @@ Press read_press(SceneReader& table, const std::filesystem::path& folder, double
   return press;
 }
 
-Fault read_fault(SceneReader& table) {
+Fault read_fault(KeyReader& table) {
   static const std::vector<std::string> kKinds = {"drop",  "repeat", "torn", "truncate",
                                                   "stall", "unplug", "hang"};
   Fault fault;
   table.require("kind");
   table.require("frame");
   int kind = 0;
-  table.choice("kind", kind, kKinds);
+  table.choice_if("kind", kind, kKinds);
   fault.kind = static_cast<FaultKind>(kind);
   std::int64_t frame = 0;
   std::int64_t frames = 1;
-  table.integer("frame", frame, 0, std::int64_t{1} << 40);
-  table.integer("frames", frames, 1, 1'000'000);
+  table.integer_if("frame", frame, 0, std::int64_t{1} << 40);
+  table.integer_if("frames", frames, 1, 1'000'000);
   fault.frame = static_cast<std::uint64_t>(frame);
   fault.frames = static_cast<std::uint64_t>(frames);
   table.finish();
   return fault;
 }
 
-void read_camera(SceneReader table, CameraModel& camera) {
-  table.integer("width", camera.width, 64, 4096);
-  table.integer("height", camera.height, 64, 4096);
-  table.number("fps", camera.fps, 1, 240);
-  table.number("mm_per_px", camera.mm_per_px, 0.005, 0.5);
-  table.number("barrel", camera.barrel, 0, 0.5);
-  table.number("exposure", camera.exposure, 0.05, 4);
-  table.number("gamma", camera.gamma, 0.5, 3);
-  table.number("read_noise", camera.read_noise, 0, 3);
-  table.number("shot_noise", camera.shot_noise, 0, 3);
-  table.integer("light_delay_frames", camera.light_delay_frames, 2, 8);
+void read_camera(KeyReader table, CameraModel& camera) {
+  table.integer_if("width", camera.width, 64, 4096);
+  table.integer_if("height", camera.height, 64, 4096);
+  table.number_if("fps", camera.fps, 1, 240);
+  table.number_if("mm_per_px", camera.mm_per_px, 0.005, 0.5);
+  table.number_if("barrel", camera.barrel, 0, 0.5);
+  table.number_if("exposure", camera.exposure, 0.05, 4);
+  table.number_if("gamma", camera.gamma, 0.5, 3);
+  table.number_if("read_noise", camera.read_noise, 0, 3);
+  table.number_if("shot_noise", camera.shot_noise, 0, 3);
+  table.integer_if("light_delay_frames", camera.light_delay_frames, 2, 8);
   table.finish();
 }
 
-void read_optics(SceneReader table, OpticsModel& optics, double thickness_mm) {
-  table.number("pressed_slope", optics.pressed_slope, 0.001, 2);
-  table.number("pressed_curve", optics.pressed_curve, -1, 1);
-  table.number("bulged_slope", optics.bulged_slope, 0.001, 4);
-  table.number("bulged_curve", optics.bulged_curve, -4, 4);
-  table.number("narrow_mm", optics.narrow_mm, 0, 3);
-  table.number("wide_mm", optics.wide_mm, 0, 6);
-  table.number("narrow_weight", optics.narrow_weight, 0, 1);
+void read_optics(KeyReader table, OpticsModel& optics, double thickness_mm) {
+  table.number_if("pressed_slope", optics.pressed_slope, 0.001, 2);
+  table.number_if("pressed_curve", optics.pressed_curve, -1, 1);
+  table.number_if("bulged_slope", optics.bulged_slope, 0.001, 4);
+  table.number_if("bulged_curve", optics.bulged_curve, -4, 4);
+  table.number_if("narrow_mm", optics.narrow_mm, 0, 3);
+  table.number_if("wide_mm", optics.wide_mm, 0, 6);
+  table.number_if("narrow_weight", optics.narrow_weight, 0, 1);
   // A response that turns back would give two indentations the same grey. The bulge stays below
   // a fifth of the thickness even for the deepest press.
   if (optics.pressed_slope + 2 * optics.pressed_curve * kDeepest * thickness_mm <= 0) {
@@ -159,56 +153,50 @@ void read_optics(SceneReader table, OpticsModel& optics, double thickness_mm) {
   table.finish();
 }
 
-void read_light(SceneReader table, LightModel& light) {
+void read_light(KeyReader table, LightModel& light) {
   int arrangement = static_cast<int>(light.arrangement);
-  table.choice("arrangement", arrangement, {"ring", "sides"});
+  table.choice_if("arrangement", arrangement, {"ring", "sides"});
   light.arrangement = static_cast<Arrangement>(arrangement);
-  table.number("level", light.level, 1, 255);
-  table.number("led_radius_mm", light.led_radius_mm, 1, 50);
-  table.number("led_distance_mm", light.led_distance_mm, 2, 100);
-  table.number("fill", light.fill, 0, 1);
-  table.number("vignetting", light.vignetting, 0, 0.9);
+  table.number_if("level", light.level, 1, 255);
+  table.number_if("led_radius_mm", light.led_radius_mm, 1, 50);
+  table.number_if("led_distance_mm", light.led_distance_mm, 2, 100);
+  table.number_if("fill", light.fill, 0, 1);
+  table.number_if("vignetting", light.vignetting, 0, 0.9);
   table.finish();
 }
 
 void read_scene(std::string_view toml_text, const std::string& name,
                 const std::filesystem::path& folder, Scene& scene) {
-  toml::table parsed;
-  try {
-    parsed = toml::parse(toml_text, name);
-  } catch (const toml::parse_error& error) {
-    throw std::runtime_error(
-        fmt::format("{}:{}: {}", name, error.source().begin.line, error.description()));
-  }
-  SceneReader root(parsed, name, "");
-  root.text("sensor", scene.sensor);
-  read_camera(root.table("camera"), scene.camera);
+  const toml::table parsed = tomlfile::parse(toml_text, name);
+  KeyReader root(parsed, name);
+  root.text_if("sensor", scene.sensor);
+  read_camera(root.table_if("camera"), scene.camera);
 
-  SceneReader layer = root.table("layer");
-  layer.number("thickness_mm", scene.layer.thickness_mm, 0.5, 5);
-  layer.number("grid_mm", scene.layer.grid_mm, 0.05, 0.5);
-  layer.number("solve_step_mm", scene.layer.solve_step_mm, 0.02, 5);
-  layer.number("taper_x", scene.layer.taper_x, -0.02, 0.02);
-  layer.number("taper_y", scene.layer.taper_y, -0.02, 0.02);
-  layer.number("texture", scene.layer.texture, 0, 0.02);
-  layer.number("texture_mm", scene.layer.texture_mm, 0.05, 5);
+  KeyReader layer = root.table_if("layer");
+  layer.number_if("thickness_mm", scene.layer.thickness_mm, 0.5, 5);
+  layer.number_if("grid_mm", scene.layer.grid_mm, 0.05, 0.5);
+  layer.number_if("solve_step_mm", scene.layer.solve_step_mm, 0.02, 5);
+  layer.number_if("taper_x", scene.layer.taper_x, -0.02, 0.02);
+  layer.number_if("taper_y", scene.layer.taper_y, -0.02, 0.02);
+  layer.number_if("texture", scene.layer.texture, 0, 0.02);
+  layer.number_if("texture_mm", scene.layer.texture_mm, 0.05, 5);
   layer.finish();
 
-  read_optics(root.table("optics"), scene.optics, scene.layer.thickness_mm);
-  read_light(root.table("light"), scene.light);
+  read_optics(root.table_if("optics"), scene.optics, scene.layer.thickness_mm);
+  read_light(root.table_if("light"), scene.light);
 
-  SceneReader loop = root.table("loop");
-  loop.number("from_s", scene.loop_from_s, 0, 1e5);
-  loop.number("to_s", scene.loop_to_s, 0, 1e5);
+  KeyReader loop = root.table_if("loop");
+  loop.number_if("from_s", scene.loop_from_s, 0, 1e5);
+  loop.number_if("to_s", scene.loop_to_s, 0, 1e5);
   if (scene.loop_to_s != 0 && scene.loop_to_s <= scene.loop_from_s) {
     loop.fail("to_s", "must be later than from_s");
   }
   loop.finish();
 
-  for (SceneReader& press : root.tables("press")) {
+  for (KeyReader& press : root.tables("press")) {
     scene.presses.push_back(read_press(press, folder, scene.layer.thickness_mm));
   }
-  for (SceneReader& fault : root.tables("fault")) scene.faults.push_back(read_fault(fault));
+  for (KeyReader& fault : root.tables("fault")) scene.faults.push_back(read_fault(fault));
   root.finish();
 }
 

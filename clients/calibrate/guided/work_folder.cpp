@@ -6,10 +6,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "daemon/calibration/key_reader.hpp"
 #include "daemon/calibration/sensor_file.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/base/atomic_folder.hpp"
+#include "hal/toml/key_reader.hpp"
 
 namespace dtact::ctl::guided {
 namespace {
@@ -74,8 +74,8 @@ void WorkFolder::require_ball(double radius_mm) const {
   constexpr const char* kRadius = "radius_mm";
   const fs::path file = path_ / "ball.toml";
   if (fs::exists(file) && !presses().empty()) {
-    const toml::table document = calibration::parse_toml(base::read_file(file), file.string());
-    calibration::KeyReader reader(document, file.string());
+    const toml::table document = tomlfile::parse(base::read_file(file), file.string());
+    tomlfile::KeyReader reader(document, file.string());
     const double there = reader.number(kRadius, 0.1, 100);
     reader.finish();
     if (there == radius_mm) return;

@@ -69,7 +69,7 @@ TEST(ParseCalibration, RefusesImpossibleValues) {
   expect_refused(with("-20, -10, 0", "-20, -10, -11"), "list", "entry 3");
   expect_refused(with("-20, -10, 0", "-20, 1.5, 0"), "list.um", "entry 2");
   expect_refused(with("\"gain\" = -3", "\"gain\" = \"low\""), "camera.controls.gain", "wrong type");
-  expect_refused(with("sha256 = \"aaaa", "sha256 = \"AAAA"), "source.sha256", "hexadecimal");
+  expect_refused(with("sha256 = \"aaaa", "sha256 = \"AAAA"), "source[0].sha256", "hexadecimal");
   expect_refused(with("  0, 1, 7, 2, 29, 1,", "  0, 1, 7, 2, 29, 2,"), "untrusted.runs", "pair 3");
   expect_refused(with("  0, 1, 7, 2, 29, 1,", "  0, 1, 7,"), "untrusted.runs", "pairs");
 }
