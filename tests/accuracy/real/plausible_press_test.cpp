@@ -9,8 +9,8 @@
 #include <cmath>
 #include <string>
 
-#include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "clients/calibrate/fit/plausibility.hpp"
+#include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "tests/accuracy/real/press_images.hpp"
 
 namespace dtact::ctl {

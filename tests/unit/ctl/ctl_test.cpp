@@ -391,7 +391,7 @@ TEST(Watch, ReturnsFourWhenDepthIsTooSlow) {
 TEST(Watch, ReturnsThreeWhenTheDaemonEnds) {
   Rig rig;
   std::thread end([&rig] {
-    (void)rig.port.wait_wanted(true, false);
+    (void)rig.port.wait_wanted({.contact = true, .depth = true});
     rig.stop();
   });
   const auto result = ctl(rig, {"watch"});

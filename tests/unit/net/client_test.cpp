@@ -349,7 +349,7 @@ TEST(ClientLibrary, ALateAnswerIsNoneToTheNextRequest) {
   const auto command = rig.port.wait_command(0);
   ASSERT_TRUE(command.has_value());
   rig.port.emit(pipeline::CommandDone{command->ticket, pipeline::Outcome::done, ""});
-  EXPECT_EQ(client.status().version, "9.8.7");
+  EXPECT_EQ(client.status().version(), "9.8.7");
 }
 
 // Calibrations are parsed and written before the answer.

@@ -30,7 +30,8 @@ double toy_mark(int x, int y) {
 }
 
 /// Of a toy sensor's layer with such marks.
-std::shared_ptr<const LayerMarks> calibrated() {
+std::shared_ptr<const LayerMarks> calibrated(const recon::FrameRegion& part = {
+                                                 0, 0, fakes::kToyWidth, fakes::kToyHeight}) {
   std::vector<std::uint16_t> reference_q8 = fakes::toy_reference_q8();
   for (int y = 0; y < fakes::kToyHeight; ++y) {
     for (int x = 0; x < fakes::kToyWidth; ++x) {
@@ -38,9 +39,7 @@ std::shared_ptr<const LayerMarks> calibrated() {
       q8 = static_cast<std::uint16_t>(std::lround(q8 + 256 * toy_mark(x, y)));
     }
   }
-  return std::make_shared<const LayerMarks>(
-      reference_q8, fakes::kToyWidth,
-      recon::FrameRegion{0, 0, fakes::kToyWidth, fakes::kToyHeight});
+  return std::make_shared<const LayerMarks>(reference_q8, fakes::kToyWidth, part);
 }
 
 class PlaceWatchTest : public ::testing::Test {
@@ -84,7 +83,7 @@ TEST_F(PlaceWatchTest, TellsAMovedCameraAndHowFar) {
 }
 
 TEST_F(PlaceWatchTest, AveragesNothingFromBeforeANewReference) {
-  watch.use_calibration(calibrated(), kAll);
+  watch.use_marks(calibrated());
   show(kFrames - 1, 4);
   watch.hurry();
   show(1, 0);
@@ -95,10 +94,10 @@ TEST_F(PlaceWatchTest, AveragesNothingFromBeforeANewReference) {
 
 TEST_F(PlaceWatchTest, LooksOnlyWhereTheMapIs) {
   still_columns = fakes::kToyWidth / 2;
-  watch.use_calibration(calibrated(), {0, 0, kGridWidth / 2, kGridHeight});
+  watch.use_marks(calibrated({0, 0, fakes::kToyWidth / 2, fakes::kToyHeight}));
   show(kFrames, 4);
   EXPECT_FALSE(watch.moved());
-  watch.use_calibration(calibrated(), {kGridWidth / 2, 0, kGridWidth, kGridHeight});
+  watch.use_marks(calibrated({fakes::kToyWidth / 2, 0, fakes::kToyWidth / 2, fakes::kToyHeight}));
   show(kFrames, 4);
   EXPECT_TRUE(watch.moved());
 }
