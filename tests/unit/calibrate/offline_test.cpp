@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <bit>
 #include <filesystem>
 #include <limits>
@@ -89,7 +90,7 @@ TEST_F(Offline, CalibratesAndSaysWhatItFound) {
 
 TEST_F(Offline, RefusesADoubtfulCalibrationUnlessForced) {
   std::vector<std::string> arguments = calibrate();
-  arguments[9] = "0.005";
+  *(std::ranges::find(arguments, "0.05")) = "0.005";
   EXPECT_THAT([&] { run(arguments); },
               ThrowsMessage<std::runtime_error>(
                   AllOf(HasSubstr("a grey level is 0.3 um"), HasSubstr("--mm-per-px"),
@@ -102,11 +103,11 @@ TEST_F(Offline, RefusesADoubtfulCalibrationUnlessForced) {
   EXPECT_THAT([&] { run(with(arguments, "--method", "published")); },
               ThrowsMessage<std::runtime_error>(HasSubstr("a grey level is")));
   write("light.png", Ball{.depth_mm = 0.5}.frame());
-  const std::vector<std::string> several{
-      "calibrate",   "depth",        "--reference", at("reference.png"),
-      "--press",     at("ball.png"), "--press",     at("light.png"),
-      "--radius-mm", "4.0",          "--mm-per-px", "0.005",
-      "-o",          at("cal2")};
+  const std::vector<std::string> several{"depth",         "--reference",  at("reference.png"),
+                                         "--press",       at("ball.png"), "--press",
+                                         at("light.png"), "--radius-mm",  "4.0",
+                                         "--mm-per-px",   "0.005",        "-o",
+                                         at("cal2")};
   EXPECT_THAT([&] { run(several); },
               ThrowsMessage<std::runtime_error>(HasSubstr("a grey level is")));
   EXPECT_FALSE(fs::exists(at("cal2")));
