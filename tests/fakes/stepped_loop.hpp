@@ -15,6 +15,8 @@
 #include "tests/fakes/fake_ring.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
+// begin() makes what the optionals hold.
+// NOLINTBEGIN(bugprone-unchecked-optional-access,clang-analyzer-optin.performance.Padding)
 namespace dtact::fakes {
 
 /// The capture loop before the toy sensor, one frame at a time on the test's own thread and clock.
@@ -144,3 +146,4 @@ class SteppedLoop {
 };
 
 }  // namespace dtact::fakes
+// NOLINTEND(bugprone-unchecked-optional-access,clang-analyzer-optin.performance.Padding)

@@ -8,6 +8,8 @@
 
 #include "tests/fakes/stepped_loop.hpp"
 
+// begin() of the fake makes what the optionals hold.
+// NOLINTBEGIN(bugprone-unchecked-optional-access)
 namespace dtact::pipeline {
 namespace {
 
@@ -173,6 +175,48 @@ TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
   EXPECT_NEAR(loop.all<ContactChanged>()[0].contact.deepest_mm, 1, 0.05);
 }
 
+// Light changes while something touches that nobody listens to: what is active counts as touch.
+TEST(CaptureLoop, TakesNoReferenceUnderATouchThatNobodyHears) {
+  SteppedLoop loop;
+  loop.exchange.want_contact = loop.exchange.want_depth = false;
+  loop.begin(toy_calibration());
+  loop.light->start();
+  loop.step(100);
+  ASSERT_EQ(loop.exchange.state, State::serving);
+  // 3.4 % of the light: a touch (2.5 %), but not if the surface had been untouched before (4 %).
+  loop.camera.scene.press_mm = 0.17;
+  loop.step(20);
+  hal::Light dim = loop.config.light;
+  dim.brightness = 128;
+  ASSERT_TRUE(loop.light->submit(1, dim));
+  ASSERT_TRUE(loop.until([&] { return loop.health().has(Health::light_unsettled); }, 100'000));
+  loop.camera.scene.light = 0.5;
+  ASSERT_TRUE(loop.until([&] { return !loop.health().has(Health::light_unsettled); }));
+  EXPECT_TRUE(loop.health().has(Health::reference_stale));
+}
+
+TEST(CaptureLoop, AnotherCalibrationMeasuresAgainstTheReferenceThatStays) {
+  SteppedLoop loop;
+  loop.camera.scene.light = 0.9;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  ASSERT_TRUE(loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration())}));
+  loop.camera.scene.press_mm = 1;
+  loop.step(6);
+  EXPECT_NEAR(loop.frame->contact.deepest_mm, 1, 0.02);
+}
+
+TEST(CaptureLoop, BeyondTheListIsCountedInTheCalibrationsPixels) {
+  SteppedLoop loop;
+  loop.config.reconstruction.decimation = 4;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  // 94 grey levels where the list ends at 70: within 6.5 pixels of the middle, eight coarse ones.
+  loop.camera.scene.press_mm = 3;
+  loop.step(10);
+  EXPECT_TRUE(loop.frame->health.has(Health::beyond_calibration));
+}
+
 TEST(CaptureLoop, LossesAreAConditionForASecond) {
   SteppedLoop loop;
   loop.begin(toy_calibration());
@@ -187,3 +231,4 @@ TEST(CaptureLoop, LossesAreAConditionForASecond) {
 
 }  // namespace
 }  // namespace dtact::pipeline
+// NOLINTEND(bugprone-unchecked-optional-access)
