@@ -54,9 +54,4 @@ void ContactDetector::decide(double made_mm2, double lost_mm2) noexcept {
   }
 }
 
-void ContactDetector::reset() noexcept {
-  touching_ = false;
-  agreeing_ = 0;
-}
-
 }  // namespace dtact::pipeline

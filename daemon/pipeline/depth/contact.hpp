@@ -23,8 +23,6 @@ class ContactDetector {
                                        double mm_per_px) noexcept;
 
   [[nodiscard]] bool touching() const noexcept { return touching_; }
-  /// Nothing touches, whatever was seen before.
-  void reset() noexcept;
 
  private:
   void decide(double made_mm2, double lost_mm2) noexcept;

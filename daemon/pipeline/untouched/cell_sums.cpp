@@ -10,9 +10,6 @@ namespace {
 
 namespace vec = recon::vec;
 
-/// Standard deviation over mean magnitude of a Gaussian's difference of two draws: √(π/2)/√2.
-constexpr double kFromDifference = 0.8862;
-
 /// Root mean square of the second difference of the values that are added one after the other.
 class Ripple {
  public:

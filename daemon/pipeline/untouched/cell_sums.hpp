@@ -9,6 +9,9 @@
 
 namespace dtact::pipeline {
 
+/// Standard deviation over mean magnitude of a Gaussian's difference of two draws: √(π/2)/√2.
+inline constexpr double kFromDifference = 0.8862;
+
 /// What a frame tells by itself and beside the frame before, over the part that the map reads.
 /// Levels of grey.
 struct FrameStatistics {

@@ -11,8 +11,6 @@ namespace vec = recon::vec;
 
 constexpr double kQ16 = 65536;
 constexpr int kCell = vec::kCell;
-/// Standard deviation over mean magnitude of a Gaussian's difference of two draws: √(π/2)/√2.
-constexpr double kFromDifference = 0.8862;
 /// Weight of a new frame in the noise's slow mean.
 constexpr double kNoiseWeight = 1.0 / 64;
 /// At least one cell of so many has to be untouched for the light to be seen beside a press.

@@ -106,15 +106,6 @@ TEST_F(ContactTest, UntrustedPixelsCountForNothing) {
   EXPECT_DOUBLE_EQ(summarise().deepest_mm, -0.02);
 }
 
-TEST_F(ContactTest, ResetForgets) {
-  fill(500, 20);
-  (void)inspect();
-  EXPECT_TRUE(inspect());
-  detector.reset();
-  EXPECT_FALSE(detector.touching());
-  EXPECT_FALSE(inspect());
-}
-
 TEST_F(ContactTest, AMapOfWhichNothingWasComputedIsNoContact) {
   const ContactSummary summary =
       detector.inspect(recon::DepthSums(detector.sum_rules()), 580, 580, kMmPerPx);
