@@ -73,6 +73,7 @@ void DepthMaker::judge(const Trust& trust, double bend, DepthFrame& out) noexcep
   double list_um = maps_->list_um(0.5 * out.contact.deepest_mm);
   if (trust.stale) list_um = std::hypot(list_um, kStaleReferenceUm);
   list_um = std::hypot(list_um, maps_->light_um(trust.light_left));
+  list_um = std::hypot(list_um, maps_->light_um(trust.light_unseen));
   out.uncertainty_um = uncertainty_at_um(list_um, bend, out.decimation);
   if (config_.reconstruction.decimation == 0) {
     maps_->use_decimation(chooser_.next(list_um, bend));

@@ -25,6 +25,7 @@ void LightFollower::restart(bool follows) noexcept {
   before_ns_.reset();
   from_ = LightSeen::From::nothing;
   quiet_ns_ = 0;
+  unseen_ns_ = 0;
 }
 
 std::optional<double> LightFollower::look(const LightSeen& light,
@@ -34,13 +35,15 @@ std::optional<double> LightFollower::look(const LightSeen& light,
   before_ns_ = timestamp_ns;
   const double may_move = allowance_ + rate_ * static_cast<double>(passed_ns) * 1e-9;
   if (light.from == LightSeen::From::nothing) {
-    if (timestamp_ns - seen_ns_ > kUnseenNs) from_ = LightSeen::From::nothing;
+    unseen_ns_ += passed_ns;
+    if (unseen_ns_ > kUnseenNs) from_ = LightSeen::From::nothing;
     if (follows_ && !lost_) allowance_ = std::min(may_move, limit_);
     return std::nullopt;
   }
   quiet_ns_ = light.from == from_ ? quiet_ns_ + timestamp_ns - seen_ns_ : 0;
   from_ = light.from;
   seen_ns_ = timestamp_ns;
+  unseen_ns_ = 0;
   const double gap = applied_ * (1 + light.change) - followed_;
   lost_ = std::abs(gap) > kStep + allowance_;
   tell(light.change);
@@ -54,6 +57,11 @@ std::optional<double> LightFollower::look(const LightSeen& light,
   if (std::abs(followed_ - applied_) < kWorthIt) return std::nullopt;
   applied_ = followed_;
   return applied_;
+}
+
+double LightFollower::unseen() const noexcept {
+  if (unseen_ns_ <= kUnseenNs) return 0;
+  return std::min(rate_ * static_cast<double>(unseen_ns_) * 1e-9, limit_) / 2;
 }
 
 void LightFollower::tell(double left) noexcept {

@@ -37,6 +37,10 @@ class LightFollower {
   [[nodiscard]] double factor() const noexcept { return applied_; }
   /// What of the light is not followed, as last seen: a share of it, positive where it is brighter.
   [[nodiscard]] double left() const noexcept { return left_; }
+  /// How far the light may have moved since it was last seen: a share, 0 while it is in sight. As
+  /// it moves at most at the rate and up to the limit, any amount up to that is as likely as
+  /// another, and half of it is what to expect.
+  [[nodiscard]] double unseen() const noexcept;
   /// left() is beyond kTold and has been for kToldFrames: depth is off by half a grey level.
   [[nodiscard]] bool drifted() const noexcept { return drifted_; }
 
@@ -65,6 +69,7 @@ class LightFollower {
   LightSeen::From from_ = LightSeen::From::nothing;  // as last seen
   std::int64_t seen_ns_ = 0;                         // when
   std::int64_t quiet_ns_ = 0;                        // seen the same way for so long
+  std::int64_t unseen_ns_ = 0;                       // not seen for so long
 };
 
 }  // namespace dtact::pipeline

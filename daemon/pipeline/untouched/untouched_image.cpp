@@ -118,7 +118,9 @@ HealthSet UntouchedImage::conditions() const noexcept {
 }
 
 Trust UntouchedImage::trust() const noexcept {
-  return {.stale = keeper_.footing() == Footing::stale, .light_left = follower_.left()};
+  return {.stale = keeper_.footing() == Footing::stale,
+          .light_left = follower_.left(),
+          .light_unseen = follower_.unseen()};
 }
 
 }  // namespace dtact::pipeline

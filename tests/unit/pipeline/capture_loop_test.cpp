@@ -60,6 +60,19 @@ TEST(CaptureLoop, StatesWhatOfTheLightItDoesNotFollow) {
   EXPECT_NEAR(loop.frame->uncertainty_um, std::hypot(before_um, 45), 3);
 }
 
+// Too much of the field is another for the light to be told from it.
+TEST(CaptureLoop, StatesHowFarTheLightMayHaveMovedOutOfSight) {
+  SteppedLoop loop(10);
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.step(50);
+  loop.camera.scene.tilt = 0.3;
+  loop.step(20);
+  const double before_um = loop.frame->uncertainty_um;
+  loop.step(600);  // 2 % a minute, half of it to be expected: 45 µm
+  EXPECT_NEAR(loop.frame->uncertainty_um, std::hypot(before_um, 45), 3);
+}
+
 TEST(CaptureLoop, AStaleReferenceIsInTheUncertainty) {
   const auto stated_um = [](bool restored) {
     SteppedLoop loop;

@@ -93,6 +93,19 @@ TEST_F(LightFollowerTest, CatchesUpAfterALongPress) {
   EXPECT_NEAR(follower_.factor(), 0.99, 0.0001);
 }
 
+TEST_F(LightFollowerTest, StatesHowFarTheLightMayHaveMovedOutOfSight) {
+  untouched(1, kMinute);
+  EXPECT_EQ(follower_.unseen(), 0);
+  touched(1, 3 * kSecond);
+  EXPECT_EQ(follower_.unseen(), 0) << "between two looks beside a press";
+  touched(1, 27 * kSecond);
+  EXPECT_NEAR(follower_.unseen(), 0.005, 1e-9) << "half of 2 % a minute";
+  touched(1, 5 * kMinute);
+  EXPECT_NEAR(follower_.unseen(), 0.01, 1e-9) << "half of the limit";
+  untouched(1);
+  EXPECT_EQ(follower_.unseen(), 0);
+}
+
 TEST_F(LightFollowerTest, FollowsBesideAPressWhatTheRestShows) {
   untouched(1, kMinute);
   drift(0.994, 2 * kMinute, LightSeen::From::quiet);
