@@ -41,7 +41,9 @@ struct DepthSums {
   /// Pixels deeper than rules.bend_from_um, all four neighbours in the map and trusted, of rows
   /// bend_reach + n · bend_step …
   std::int64_t bent = 0;
-  std::int64_t bend_um = 0;  ///< … and their sum of |four neighbours − 4 × pixel|.
+  /// … and their sum of |four neighbours − 4 × pixel|, of which no pixel adds more than 32767: the
+  /// sums of two opposite neighbours and the sum of those two are int16, saturated.
+  std::int64_t bend_um = 0;
 };
 
 }  // namespace dtact::recon

@@ -29,6 +29,8 @@ std::int16_t pair_sum(std::int16_t a, std::int16_t b) noexcept {
   return static_cast<std::int16_t>(a + b);
 }
 
+int saturate(int value) noexcept { return std::clamp(value, INT16_MIN, INT16_MAX); }
+
 }  // namespace
 
 void rectify_mean_difference_row(const std::uint8_t* luma, std::ptrdiff_t stride,
@@ -173,7 +175,9 @@ void bend_row(const std::int16_t* row_um, std::ptrdiff_t stride, int x0, int x1,
     if (*at <= sums.rules.bend_from_um) continue;
     if (std::min({at[-reach], at[reach], at[-below], at[below]}) == kUntrusted) continue;
     ++sums.bent;
-    sums.bend_um += std::abs(at[-reach] + at[reach] + at[-below] + at[below] - 4 * *at);
+    const int across = saturate(at[-reach] - *at + at[reach] - *at);
+    const int along = saturate(at[-below] - *at + at[below] - *at);
+    sums.bend_um += std::min(std::abs(saturate(across + along)), INT16_MAX);
   }
 }
 

@@ -118,8 +118,8 @@ void BendRow(const int16_t* row_um, std::ptrdiff_t stride, int x0, int x1, Depth
   const std::ptrdiff_t below = reach * stride;
   const V16 from = hn::Set(d16, sums.rules.bend_from_um);
   const V16 one = hn::Set(d16, 1);
-  const V16 minus_two = hn::Set(d16, -2);
-  auto sum = hn::Zero(d32);
+  const V16 zero = hn::Zero(d16);
+  PairSum<decltype(d32)> sum{d32};
   size_t bent = 0;
   ForEachVector(d16, row_um, x0, x1, [&](int x, V16 pixels) HWY_ATTR {
     const auto pressed = hn::Gt(pixels, from);
@@ -132,22 +132,14 @@ void BendRow(const int16_t* row_um, std::ptrdiff_t stride, int x0, int x1, Depth
     const V16 least = hn::Min(hn::Min(left, right), hn::Min(up, down));
     const auto counts = hn::And(pressed, hn::Ne(least, hn::Set(d16, kUntrusted)));
     bent += hn::CountTrue(d16, counts);
-    PairSum<decltype(d32)> low{d32};
-    low.Add(hn::InterleaveLower(d16, left, right), one);
-    low.Add(hn::InterleaveLower(d16, up, down), one);
-    low.Add(hn::InterleaveLower(d16, pixels, pixels), minus_two);
-    PairSum<decltype(d32)> high{d32};
-    high.Add(hn::InterleaveUpper(d16, left, right), one);
-    high.Add(hn::InterleaveUpper(d16, up, down), one);
-    high.Add(hn::InterleaveUpper(d16, pixels, pixels), minus_two);
-    const V16 kept = hn::VecFromMask(d16, counts);
-    const auto kept_low = hn::BitCast(d32, hn::InterleaveLower(d16, kept, kept));
-    const auto kept_high = hn::BitCast(d32, hn::InterleaveUpper(d16, kept, kept));
-    sum = hn::Add(sum, hn::And(hn::Abs(low.Total()), kept_low));
-    sum = hn::Add(sum, hn::And(hn::Abs(high.Total()), kept_high));
+    // Differences of what counts fit: depth lies within ±16383.
+    const V16 across = hn::SaturatedAdd(hn::Sub(left, pixels), hn::Sub(right, pixels));
+    const V16 along = hn::SaturatedAdd(hn::Sub(up, pixels), hn::Sub(down, pixels));
+    const V16 bend = hn::SaturatedAdd(across, along);
+    sum.Add(hn::IfThenElseZero(counts, hn::Max(bend, hn::SaturatedSub(zero, bend))), one);
   });
   sums.bent += static_cast<std::int64_t>(bent);
-  sums.bend_um += hn::GetLane(hn::SumOfLanes(d32, sum));
+  sums.bend_um += hn::GetLane(hn::SumOfLanes(d32, sum.Total()));
 }
 
 #endif  // HWY_TARGET == HWY_SCALAR

@@ -81,6 +81,15 @@ TEST(BendRow, IsTheSecondDifferenceOfPressedAndTrustedPixels) {
   EXPECT_EQ(std::tuple(fewer.bent, fewer.bend_um), std::tuple(1, 1550));
 }
 
+// Far beyond any layer: pixels of 16 mm beside pixels of −16 mm.
+TEST(BendRow, NoPixelAddsMoreThan32Millimetres) {
+  std::vector<std::int16_t> map(9, -16383);
+  map[4] = 16383;
+  DepthSums sums({.bend_reach = 1, .bend_from_um = 80});
+  kernels::bend_row(map.data() + 3, 3, 1, 2, sums);
+  EXPECT_EQ(std::tuple(sums.bent, sums.bend_um), std::tuple(1, 32767));
+}
+
 class VectorSums : public EveryTarget {
  protected:
   int uniform(int low, int high) {
@@ -185,8 +194,11 @@ DepthSums walk(const std::vector<std::int16_t>& map, const TileGrid& grid, const
       const std::vector<int> around{at(x - reach, y), at(x + reach, y), at(x, y - reach),
                                     at(x, y + reach)};
       if (std::ranges::count(around, kUntrusted) > 0) continue;
+      const auto int16 = [](int value) { return std::clamp(value, -32768, 32767); };
+      const int across = int16(around[0] + around[1] - 2 * um);
+      const int along = int16(around[2] + around[3] - 2 * um);
       sums.bent += 1;
-      sums.bend_um += std::abs(around[0] + around[1] + around[2] + around[3] - 4 * um);
+      sums.bend_um += std::min(std::abs(int16(across + along)), 32767);
     }
   }
   return sums;
