@@ -92,7 +92,7 @@ struct GpioLineConfig {
   bool active_low = false;  ///< "on" is the low level.
 };
 
-/// A real ring of WS2812B, on SPI or on a GPIO line.
+/// A real ring of WS2812B.
 struct Ws2812Config {
   /// light = colour × (brightness / 255)^gamma; 2.2: equal steps look equal, 1: proportional.
   double gamma = 2.2;
@@ -107,11 +107,7 @@ struct Ws2812Config {
   int spi_bits = 4;            ///< SPI bits for each WS2812B bit: 3, 4 or 8.
   bool spi_check_rate = true;  ///< Measure the true rate at start and refuse a wrong one.
 
-  GpioLineConfig data;     ///< Data line of the "ws2812_gpio" backend.
-  int gpio_priority = 60;  ///< SCHED_FIFO priority of the thread that clocks it.
-  int gpio_retries = 5;    ///< Times a disturbed write is sent again.
-
-  GpioLineConfig power;      ///< Switches the ring's supply; either backend.
+  GpioLineConfig power;      ///< Switches the ring's supply.
   int power_settle_ms = 50;  ///< From power on to the first write.
 };
 

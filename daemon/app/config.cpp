@@ -32,6 +32,9 @@ class Assembly {
     for (const auto& [name, node] : table) {
       const std::string path = prefix + std::string(name.str());
       const std::string where = place(node.source().begin.line);
+      if (const std::string why = why_gone(path, node); !why.empty()) {
+        throw std::runtime_error(fmt::format("{}: {}: {}", where, path, why));
+      }
       const auto key =
           std::find_if(keys_.begin(), keys_.end(), [&](const Key& k) { return k.path == path; });
       if (key != keys_.end()) {

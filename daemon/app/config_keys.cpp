@@ -100,15 +100,10 @@ std::vector<Key> bind_keys(Config& c) {
       integer("ring.ws2812.spi_hz", ws2812.spi_hz, 1000000, 20000000, "(hertz)"),
       one_of("ring.ws2812.spi_bits", ws2812.spi_bits, {3, 4, 8}),
       boolean("ring.ws2812.spi_check_rate", ws2812.spi_check_rate),
-      integer("ring.ws2812.gpio_priority", ws2812.gpio_priority, 0, 99, "(0 = normal scheduling)"),
-      integer("ring.ws2812.gpio_retries", ws2812.gpio_retries, 0, 100, ""),
       integer("ring.ws2812.power_settle_ms", ws2812.power_settle_ms, 0, 10000, "(milliseconds)"),
       text("ring.ws2812.power.chip", ws2812.power.chip, kChip),
       integer("ring.ws2812.power.line", ws2812.power.line, -1, 4095, "(offset on the chip)"),
       boolean("ring.ws2812.power.active_low", ws2812.power.active_low),
-      text("ring.ws2812.data.chip", ws2812.data.chip, kChip),
-      integer("ring.ws2812.data.line", ws2812.data.line, -1, 4095, "(offset on the chip)"),
-      boolean("ring.ws2812.data.active_low", ws2812.data.active_low),
 
       optional_integer("capture.cpu", p.cpu, 0, 1023, ""),
       integer("capture.fifo_priority", p.fifo_priority, 0, 99, "(0 = normal scheduling)"),
@@ -144,6 +139,19 @@ std::vector<Key> bind_keys(Config& c) {
   keys.insert(keys.end(), std::make_move_iterator(rest.begin()),
               std::make_move_iterator(rest.end()));
   return keys;
+}
+
+std::string why_gone(const std::string& path, const toml::node& value) {
+  if (path == "ring.backend" && value.value_exact<std::string>() == "ws2812_gpio") {
+    return "\"ws2812_gpio\" is gone: a program's pulses on a GPIO line last 13 … 15 µs where the "
+           "LEDs allow 0.2 … 0.4; put the LEDs' data line on an SPI controller's MOSI and set "
+           "ring.backend = \"ws2812_spi\"";
+  }
+  if (path == "ring.ws2812.gpio_priority" || path == "ring.ws2812.gpio_retries" ||
+      path == "ring.ws2812.data") {
+    return "is gone, as ring.backend = \"ws2812_gpio\" is, the only one it was for: remove it";
+  }
+  return {};
 }
 
 }  // namespace dtact::app

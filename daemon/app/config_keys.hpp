@@ -23,4 +23,8 @@ struct Key {
 /// Every key there is, bound to the fields of `config`, in the order of config/dtactd.toml.
 [[nodiscard]] std::vector<Key> bind_keys(Config& config);
 
+/// Why a key or table, or this value of it, that older files have is gone, and what to do; empty
+/// for all others.
+[[nodiscard]] std::string why_gone(const std::string& path, const toml::node& value);
+
 }  // namespace dtact::app

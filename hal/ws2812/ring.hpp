@@ -61,8 +61,7 @@ class Ring final : public LightRing {
   base::RtThread thread_;  // last: it uses all of the above
 };
 
-/// The rings that the registry offers. Throw std::runtime_error naming key, device and remedy.
+/// The ring that the registry offers. Throws std::runtime_error naming key, device and remedy.
 [[nodiscard]] std::unique_ptr<LightRing> open_spi_ring(const Ws2812Config& config);
-[[nodiscard]] std::unique_ptr<LightRing> open_gpio_ring(const Ws2812Config& config);
 
 }  // namespace dtact::hal::ws2812

@@ -176,9 +176,9 @@ Findings check_core_clock(const Machine& machine, const hal::RingConfig& ring) {
 }
 
 Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {
-  const bool data = ring.backend == "ws2812_gpio";
-  const bool power = (data || ring.backend == "ws2812_spi") && !ring.ws2812.power.chip.empty();
-  if (!data && !power) return {{Verdict::good, "no line is configured", ""}};
+  if (ring.backend != "ws2812_spi" || ring.ws2812.power.chip.empty()) {
+    return {{Verdict::good, "no line is configured", ""}};
+  }
   Findings findings;
   for (const std::string& node : machine.list("/dev", "gpiochip")) {
     if (const int error = machine.access(node); error != 0) {
@@ -186,11 +186,8 @@ Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {
                           join_group(machine, node, "gpio")});
     }
   }
-  const auto chips = machine.gpio_chips();
-  if (power) {
-    findings.push_back(check_line(machine, chips, "ring.ws2812.power", ring.ws2812.power));
-  }
-  if (data) findings.push_back(check_line(machine, chips, "ring.ws2812.data", ring.ws2812.data));
+  findings.push_back(
+      check_line(machine, machine.gpio_chips(), "ring.ws2812.power", ring.ws2812.power));
   return findings;
 }
 

@@ -100,6 +100,19 @@ TEST_F(ConfigFile, WrongTypeOrValueNamesWhatIsAllowed) {
   EXPECT_THAT(error("[contact]\nmade_mm = 0.05\nlost_mm = 0.05\n"), HasSubstr("contact.lost_mm"));
 }
 
+TEST_F(ConfigFile, WhatIsGoneSaysWhyAndWhatToDo) {
+  EXPECT_THAT(error("[ring]\nbackend = 'ws2812_gpio'\n"),
+              AllOf(HasSubstr("c.toml:2: ring.backend: \"ws2812_gpio\" is gone"),
+                    HasSubstr("set ring.backend = \"ws2812_spi\"")));
+  EXPECT_THAT(error("", {"ring.backend=ws2812_gpio"}), HasSubstr("--set: ring.backend"));
+  EXPECT_THAT(error("[ring.ws2812]\ngpio_priority = 60\n"),
+              HasSubstr("c.toml:2: ring.ws2812.gpio_priority: is gone"));
+  EXPECT_THAT(error("[ring.ws2812]\ngpio_retries = 5\n"),
+              AllOf(HasSubstr("gpio_retries: is gone"), HasSubstr("remove it")));
+  EXPECT_THAT(error("[ring.ws2812.data]\nchip = ''\n"),
+              HasSubstr("c.toml:1: ring.ws2812.data: is gone"));
+}
+
 TEST_F(ConfigFile, BrokenTomlNamesTheLine) {
   EXPECT_THAT(error("[camera]\nwidth = = 3\n"), HasSubstr("c.toml:2"));
 }

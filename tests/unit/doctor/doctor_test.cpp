@@ -238,13 +238,12 @@ TEST(DoctorGpio, LinesAreFoundByPathNameAndLabel) {
 
 TEST(DoctorGpio, WhatCanBeWrongWithALine) {
   FakeMachine machine;
-  hal::RingConfig ring;
-  ring.backend = "ws2812_gpio";
-  ring.ws2812.data = {"gpiochip4", 17, false};
+  hal::RingConfig ring = spi_ring();
+  ring.ws2812.power = {"gpiochip4", 17, false};
   EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("no such chip"));
-  ring.ws2812.data = {"gpiochip0", 54, false};
+  ring.ws2812.power = {"gpiochip0", 54, false};
   EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("lines 0 … 53"));
-  ring.ws2812.data = {"gpiochip0", 27, false};
+  ring.ws2812.power = {"gpiochip0", 27, false};
   machine.held_line = 27;
   EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("in use by \"lcd-reset\""));
   machine.held_line = -1;

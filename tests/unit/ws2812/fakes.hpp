@@ -5,19 +5,17 @@
 #include <vector>
 
 #include "hal/base/clock.hpp"
-#include "hal/gpiod/lines.hpp"
 #include "hal/ws2812/spi_port.hpp"
 
 namespace dtact::hal::ws2812::test {
 
-/// Time that passes by sleeping, by what the other fakes add, and by reading it.
+/// Time that passes by sleeping and by what the other fakes add.
 class FakeClock final : public base::Clock {
  public:
-  [[nodiscard]] std::int64_t monotonic_ns() const noexcept override { return now += read_cost; }
+  [[nodiscard]] std::int64_t monotonic_ns() const noexcept override { return now; }
   [[nodiscard]] std::int64_t wall_ns() const noexcept override { return now; }
   void sleep_until(std::int64_t deadline_ns) noexcept override { now = std::max(now, deadline_ns); }
-  mutable std::int64_t now = 1000;
-  std::int64_t read_cost = 0;
+  std::int64_t now = 1000;
 };
 
 /// An SPI controller that takes the wire's time at a rate of its own choosing.
@@ -44,39 +42,6 @@ class FakePort final : public SpiPort {
 
  private:
   FakeClock& clock_;
-};
-
-/// A GPIO line whose every call takes `cost_ns`, and which remembers its edges.
-class FakeLine final : public gpiod::OutputLine {
- public:
-  struct Event {
-    bool high;
-    std::int64_t at;
-  };
-  struct State {
-    FakeClock clock;
-    std::int64_t cost_ns = 50;
-    int error = 0;
-    /// Calls after which an interruption of `stall_ns` strikes, once each.
-    std::vector<int> stalls;
-    std::int64_t stall_ns = 20'000;
-    int calls = 0;
-    std::vector<Event> events;
-  };
-  explicit FakeLine(State& state) : state_(state) {}
-  [[nodiscard]] int set(bool active) noexcept override {
-    state_.clock.now += state_.cost_ns;
-    if (std::find(state_.stalls.begin(), state_.stalls.end(), state_.calls++) !=
-        state_.stalls.end()) {
-      state_.clock.now += state_.stall_ns;
-    }
-    if (state_.error != 0) return state_.error;
-    state_.events.push_back({active, state_.clock.now});
-    return 0;
-  }
-
- private:
-  State& state_;
 };
 
 }  // namespace dtact::hal::ws2812::test

@@ -2,31 +2,20 @@
 // has. Runs in the guest.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/stat.h>
 
-#include <array>
-#include <cstdio>
-#include <memory>
 #include <stdexcept>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "hal/gpiod/lines.hpp"
-#include "hal/gpiod/power_switch.hpp"
-#include "hal/ws2812/gpio_wire.hpp"
 #include "hal/ws2812/ring.hpp"
 #include "tests/kernel/ring/guest.hpp"
-#include "tests/unit/ws2812/chain_model.hpp"
 
 namespace dtact::hal {
 namespace {
 
-using gpiod::OutputLine;
 using kernel_test::AsNobody;
 using kernel_test::read_text;
 using kernel_test::write_text;
-using testing::ElementsAreArray;
 using testing::HasSubstr;
 
 /// A simulated chip of eight lines, labelled "dtact-test", for the test program's life.
@@ -121,95 +110,6 @@ TEST(GpioSim, PowerIsOnWhileTheRingLives) {
     EXPECT_TRUE(Chip::level(6));
   }
   EXPECT_FALSE(Chip::level(6));
-}
-
-/// Drives the real line and asks the chip after every call what level it has.
-class Watched final : public OutputLine {
- public:
-  struct Log {
-    std::vector<std::pair<bool, std::int64_t>> levels;
-    int disturb_at = -1;  // the call before which this thread is held up once
-    int calls = 0;
-  };
-  Watched(std::unique_ptr<OutputLine> line, int number, Log& log)
-      : line_(std::move(line)), number_(number), log_(log) {}
-  [[nodiscard]] int set(bool active) noexcept override {
-    if (log_.calls++ == log_.disturb_at) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-    const int error = line_->set(active);
-    log_.levels.emplace_back(Chip::level(number_), base::system_clock().monotonic_ns());
-    return error;
-  }
-
- private:
-  std::unique_ptr<OutputLine> line_;
-  int number_;
-  Log& log_;
-};
-
-// The guest's calls take tens of microseconds, and a busy machine takes its processor away for
-// milliseconds, so that the protocol runs here 50,000 times slower: what is proven is the order and
-// the form of the edges at a real chip, not the speed.
-constexpr int kSlower = 50'000;
-constexpr ws2812::PulseWindow slowed() {
-  const ws2812::PulseWindow w;
-  const auto s = [](std::int64_t ns) { return ns * kSlower; };
-  return {s(w.zero_wait), s(w.zero_high_min), s(w.zero_high_max),
-          s(w.one_wait),  s(w.one_high_min),  s(w.one_high_max),
-          s(w.low_wait),  s(w.low_max),       1'000'000};
-}
-
-constexpr std::array<Rgb, 1> kLeds{Rgb{0xA5, 0x03, 0xFC}};
-constexpr std::size_t kCallsAWrite = 1 + 2 * 24;
-
-/// What LEDs would show after the last write.
-std::vector<Rgb> shown_by(const Watched::Log& log) {
-  ws2812::test::ChainModel chain;
-  for (std::size_t i = log.levels.size() - kCallsAWrite; i + 1 < log.levels.size(); ++i) {
-    const auto ns = log.levels[i + 1].second - log.levels[i].second;
-    chain.level(log.levels[i].first, static_cast<double>(ns) / kSlower);
-  }
-  chain.level(false, 300'000);
-  EXPECT_EQ(chain.odd_pulses(), 0);
-  return chain.shown();
-}
-
-TEST(GpioDataLine, TheChipsEdgesAreTheColours) {
-  Watched::Log log;
-  ws2812::GpioWire wire(
-      std::make_unique<Watched>(gpiod::open_output({"dtact-test", 7, false}, false, "key"), 7, log),
-      "dtact-test line 7", 20, base::system_clock(), slowed());
-  ASSERT_EQ(wire.send(kLeds), "");
-  std::printf("data line at 1/%d speed: %zu levels read at the chip, %llu writes sent again\n",
-              kSlower, log.levels.size(), static_cast<unsigned long long>(wire.resent()));
-  EXPECT_THAT(shown_by(log), ElementsAreArray(kLeds));
-}
-
-TEST(GpioDataLine, ADisturbedWriteIsSentAgain) {
-  Watched::Log log;
-  log.disturb_at = 40;  // while the line is high
-  ws2812::GpioWire wire(
-      std::make_unique<Watched>(gpiod::open_output({"dtact-test", 7, false}, false, "key"), 7, log),
-      "dtact-test line 7", 20, base::system_clock(), slowed());
-  ASSERT_EQ(wire.send(kLeds), "");
-  EXPECT_GE(wire.resent(), 1U);
-  EXPECT_THAT(shown_by(log), ElementsAreArray(kLeds));
-}
-
-TEST(GpioDataLine, AtFullSpeedThisBoardIsRefused) {
-  Ws2812Config config;
-  config.data = {"dtact-test", 1, false};
-  try {
-    (void)ws2812::open_gpio_ring(config);
-    FAIL() << "a guest kernel cannot be this fast";
-  } catch (const std::runtime_error& e) {
-    std::printf("refused: %s\n", e.what());
-    EXPECT_THAT(e.what(), HasSubstr("too slow"));
-    EXPECT_THAT(e.what(), HasSubstr("a 0's high pulse takes"));
-    EXPECT_THAT(e.what(), HasSubstr("ws2812_spi"));
-  }
-  EXPECT_FALSE(Chip::level(1)) << "measured without a pulse";
 }
 
 }  // namespace
