@@ -107,6 +107,8 @@ struct Ws2812Config {
   int spi_bits = 4;            ///< SPI bits for each WS2812B bit: 3, 4 or 8.
   bool spi_check_rate = true;  ///< Measure the true rate at start and refuse a wrong one.
 
+  std::string pio_device = "/dev/leds0";  ///< Of a Raspberry Pi 5's ws2812-pio driver.
+
   GpioLineConfig power;      ///< Switches the ring's supply.
   int power_settle_ms = 50;  ///< From power on to the first write.
 };

@@ -19,7 +19,7 @@ namespace dtact::hal {
 std::vector<std::string> camera_backends() {
   return {"null", "replay", "sim", "v4l2", "libcamera"};
 }
-std::vector<std::string> ring_backends() { return {"null", "sim", "ws2812_spi"}; }
+std::vector<std::string> ring_backends() { return {"null", "sim", "ws2812_pio", "ws2812_spi"}; }
 
 Devices open_devices(const Config& config) {
   // The one thing camera and ring share is the light in the simulated sensor.
@@ -30,6 +30,8 @@ Devices open_devices(const Config& config) {
     devices.ring = std::make_unique<null::NullRing>();
   } else if (config.ring.backend == "sim") {
     devices.ring = std::make_unique<sim::SimRing>(light);
+  } else if (config.ring.backend == "ws2812_pio") {
+    devices.ring = ws2812::open_pio_ring(config.ring.ws2812);
   } else if (config.ring.backend == "ws2812_spi") {
     devices.ring = ws2812::open_spi_ring(config.ring.ws2812);
   } else {

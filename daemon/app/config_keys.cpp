@@ -100,6 +100,7 @@ std::vector<Key> bind_keys(Config& c) {
       integer("ring.ws2812.spi_hz", ws2812.spi_hz, 1000000, 20000000, "(hertz)"),
       one_of("ring.ws2812.spi_bits", ws2812.spi_bits, {3, 4, 8}),
       boolean("ring.ws2812.spi_check_rate", ws2812.spi_check_rate),
+      text("ring.ws2812.pio_device", ws2812.pio_device, "a device such as \"/dev/leds0\""),
       integer("ring.ws2812.power_settle_ms", ws2812.power_settle_ms, 0, 10000, "(milliseconds)"),
       text("ring.ws2812.power.chip", ws2812.power.chip, kChip),
       integer("ring.ws2812.power.line", ws2812.power.line, -1, 4095, "(offset on the chip)"),
@@ -144,8 +145,8 @@ std::vector<Key> bind_keys(Config& c) {
 std::string why_gone(const std::string& path, const toml::node& value) {
   if (path == "ring.backend" && value.value_exact<std::string>() == "ws2812_gpio") {
     return "\"ws2812_gpio\" is gone: a program's pulses on a GPIO line last 13 … 15 µs where the "
-           "LEDs allow 0.2 … 0.4; put the LEDs' data line on an SPI controller's MOSI and set "
-           "ring.backend = \"ws2812_spi\"";
+           "LEDs allow 0.2 … 0.4; use ring.backend = \"ws2812_pio\" on a Raspberry Pi 5, else put "
+           "the data line on an SPI controller's MOSI and set ring.backend = \"ws2812_spi\"";
   }
   if (path == "ring.ws2812.gpio_priority" || path == "ring.ws2812.gpio_retries" ||
       path == "ring.ws2812.data") {

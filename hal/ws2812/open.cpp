@@ -1,5 +1,6 @@
 #include <utility>
 
+#include "hal/ws2812/pio_wire.hpp"
 #include "hal/ws2812/ring.hpp"
 #include "hal/ws2812/spi_wire.hpp"
 
@@ -20,6 +21,11 @@ std::unique_ptr<LightRing> open_spi_ring(const Ws2812Config& config) {
       std::make_unique<Spidev>(config.spi_device, static_cast<std::uint32_t>(config.spi_hz)),
       format, config.spi_check_rate);
   return std::make_unique<Ring>(std::move(wire), power_on(config), config, 0);
+}
+
+std::unique_ptr<LightRing> open_pio_ring(const Ws2812Config& config) {
+  return std::make_unique<Ring>(std::make_unique<PioWire>(config.pio_device), power_on(config),
+                                config, 0);
 }
 
 }  // namespace dtact::hal::ws2812

@@ -61,7 +61,8 @@ class Ring final : public LightRing {
   base::RtThread thread_;  // last: it uses all of the above
 };
 
-/// The ring that the registry offers. Throws std::runtime_error naming key, device and remedy.
+/// The rings that the registry offers. Throw std::runtime_error naming key, device and remedy.
 [[nodiscard]] std::unique_ptr<LightRing> open_spi_ring(const Ws2812Config& config);
+[[nodiscard]] std::unique_ptr<LightRing> open_pio_ring(const Ws2812Config& config);
 
 }  // namespace dtact::hal::ws2812

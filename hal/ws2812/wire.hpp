@@ -17,8 +17,8 @@ class Wire {
   virtual ~Wire() = default;
 
   [[nodiscard]] virtual RingInfo info() const = 0;
-  /// The first call: measures, without a pulse that LEDs would take for data, whether the wire can
-  /// serve a chain of `leds`.
+  /// The first call: finds out, without a colour that LEDs would show, whether the wire can serve a
+  /// chain of `leds`.
   [[nodiscard]] virtual std::string prepare(int leds) = 0;
   /// What prepare() found worth knowing; empty when nothing.
   [[nodiscard]] virtual std::string note() const = 0;

@@ -176,7 +176,7 @@ Findings check_core_clock(const Machine& machine, const hal::RingConfig& ring) {
 }
 
 Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {
-  if (ring.backend != "ws2812_spi" || ring.ws2812.power.chip.empty()) {
+  if (!ring.backend.starts_with("ws2812_") || ring.ws2812.power.chip.empty()) {
     return {{Verdict::good, "no line is configured", ""}};
   }
   Findings findings;

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs in the guest: udevd with config/udev's rules gives real spidev and GPIO nodes to their groups,
+# Runs in the guest: udevd with config/udev's rules gives real spidev, GPIO and LED nodes to their groups,
 # and a user of those groups, and no other, may open them. udev.sh SOURCE_FOLDER
 set -eu
 source=$1
@@ -10,6 +10,7 @@ cp "$source/config/udev/60-dtactd.rules" /etc/udev/rules.d/
 systemd-sysusers
 /lib/systemd/systemd-udevd --daemon
 insmod "$KERNEL_CACHE/modules/spi-mock.ko"
+insmod "$KERNEL_CACHE/modules/ws2812-pio-mock.ko"
 sim=/sys/kernel/config/gpio-sim/udev
 mkdir -p $sim/bank0
 echo 4 > $sim/bank0/num_lines
@@ -31,4 +32,5 @@ expect() { # expect NODE GROUP
 }
 expect /dev/spidev0.0 spi
 expect "/dev/$(cat $sim/bank0/chip_name)" gpio
+expect /dev/leds0 gpio
 exit $failed

@@ -103,7 +103,7 @@ TEST_F(ConfigFile, WrongTypeOrValueNamesWhatIsAllowed) {
 TEST_F(ConfigFile, WhatIsGoneSaysWhyAndWhatToDo) {
   EXPECT_THAT(error("[ring]\nbackend = 'ws2812_gpio'\n"),
               AllOf(HasSubstr("c.toml:2: ring.backend: \"ws2812_gpio\" is gone"),
-                    HasSubstr("set ring.backend = \"ws2812_spi\"")));
+                    HasSubstr("use ring.backend = \"ws2812_pio\" on a Raspberry Pi 5")));
   EXPECT_THAT(error("", {"ring.backend=ws2812_gpio"}), HasSubstr("--set: ring.backend"));
   EXPECT_THAT(error("[ring.ws2812]\ngpio_priority = 60\n"),
               HasSubstr("c.toml:2: ring.ws2812.gpio_priority: is gone"));
