@@ -41,11 +41,13 @@ struct ShowResult {
   bool ok = true;
   std::string message;   ///< When not ok: what failed and the remedy. When dimmed: why.
   double dimmed_to = 1;  ///< What a current limit left of the light asked for; 1 = all of it.
+  bool away = false;     ///< When not ok: there is no ring to write to now; report() tells when.
 };
 
 /// Run-time condition of a ring that writes by itself (a re-send can fail). Any thread may ask.
 struct RingReport {
-  bool ok = true;              ///< The last write worked.
+  bool ok = true;              ///< The ring is there and the last write worked.
+  bool away = false;           ///< It is looked for; once it is there, show() it its light again.
   std::string message;         ///< When not ok: what failed and the remedy.
   std::string note;            ///< Found at start: worth knowing, not wrong. Empty = nothing.
   std::uint64_t writes = 0;    ///< Tried, re-sends included.

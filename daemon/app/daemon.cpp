@@ -92,9 +92,9 @@ void run_daemon(const Config& config) {
   const auto calibration = load_calibration(store.current(), config.calibration);
 
   hal::Devices devices = hal::open_devices(config.hal);
-  if (const std::string note = devices.ring->report().note; !note.empty()) {
-    spdlog::warn("ring: {}", note);
-  }
+  const hal::RingReport ring = devices.ring->report();
+  if (ring.away) spdlog::warn("no LED ring yet, it is looked for: {}", ring.message);
+  if (!ring.note.empty()) spdlog::warn("ring: {}", ring.note);
   pipeline::PipelineConfig settings = config.pipeline;
   settings.state_folder = state;
   if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;

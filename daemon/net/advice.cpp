@@ -17,7 +17,7 @@ struct Remedy {
 // In the order in which one should act: without a camera or a ring nothing else can be mended.
 constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::camera_trouble, "The camera gives no frames."},
-    {Health::ring_trouble, "The last write to the LED ring failed."},
+    {Health::ring_trouble, "The LED ring cannot be written to."},
     {Health::uncalibrated,
      "No calibration: dtactctl calibrate --radius-mm MM --mm-per-px S guides through one with a "
      "ball "

@@ -23,6 +23,7 @@ v1::ErrorCode code_of(pipeline::Outcome outcome) {
       return v1::ERROR_CONTACT;
     case pipeline::Outcome::device_error:
     case pipeline::Outcome::camera_away:
+    case pipeline::Outcome::ring_away:
       return v1::ERROR_DEVICE;
     case pipeline::Outcome::invalid:
       return v1::ERROR_INVALID;
@@ -157,7 +158,8 @@ void Commands::on_done(const pipeline::CommandDone& done) {
   const auto* light = std::get_if<hal::Light>(&pending.what);
   if (light != nullptr) {
     --lights_pending_;
-    if (!ok && lights_pending_ == 0) light_.reset();
+    const bool kept = done.outcome == pipeline::Outcome::ring_away;
+    if (!ok && !kept && lights_pending_ == 0) light_.reset();
   }
   const auto* change = std::get_if<CalibrationChange>(&pending.what);
   if (change != nullptr && ok) return keep_calibration(pending, *change);

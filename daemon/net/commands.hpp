@@ -89,7 +89,7 @@ class Commands : public std::enable_shared_from_this<Commands> {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::map<std::uint64_t, Pending> pending_;  ///< By ticket. The pipeline bounds how many.
   std::uint64_t next_ticket_ = 1;
-  std::optional<hal::Light> light_;  ///< Asked for last; empty: whatever the ring shows.
+  std::optional<hal::Light> light_;  ///< Asked for last; empty: what the ring shows.
   int lights_pending_ = 0;
   /// Of the calibration that the pipeline uses, if it uses one; nothing when that has no number or
   /// the store failed to keep it.

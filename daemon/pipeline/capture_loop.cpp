@@ -72,6 +72,8 @@ void CaptureLoop::take_notes() noexcept {
   LightNote note;
   while (light_.next_note(note)) {
     untouched_.light_changes(note.light);
+    // What was seen under no light, or an unknown one, counts no more than before a start.
+    if (note.returned) untouched_.camera_began();
     if (note.begins) {
       timeline_.change_begins(note.light, note.at_ns);
     } else {

@@ -28,7 +28,7 @@ enum class Health : std::uint8_t {
   beyond_calibration = 7,  ///< Somewhere the image is darker than the calibrated list reaches.
   frames_lost = 8,         ///< The camera lost frames within the last second.
   camera_trouble = 9,      ///< Unplugged, stalled, busy, denied; status has the sentence.
-  ring_trouble = 10,       ///< The last write to the ring failed; status has the sentence.
+  ring_trouble = 10,       ///< The ring is away or refused the last write; status has the sentence.
   not_realtime = 11,       ///< The capture thread runs without real-time scheduling.
   // What the picture itself shows (image_watch.hpp).
   light_drifted = 12,    ///< The light is not the reference's, or most of the field is pressed.

@@ -55,7 +55,10 @@ void LightDriver::serve(const Request& request) {
   const hal::Light before = light();
   const hal::ShowResult result = write(request.light);
   if (!result.ok) {
-    tell(CommandDone{request.ticket, Outcome::device_error, result.message});
+    tell(result.away
+             ? CommandDone{request.ticket, Outcome::ring_away,
+                           result.message + ". The light is kept and shown when the ring is back"}
+             : CommandDone{request.ticket, Outcome::device_error, result.message});
     return;
   }
   tell(CommandDone{request.ticket, Outcome::done, {}});
@@ -64,16 +67,32 @@ void LightDriver::serve(const Request& request) {
 
 void LightDriver::look() {
   const hal::RingReport report = ring_->report();
-  if (report.writes == 0 || report.ok != trouble_) return;
+  if (report.away) {
+    if (!std::exchange(away_, true)) kept_ = light();
+  } else {
+    if (away_) return come_back();
+    if (report.writes == 0 || report.ok != trouble_) return;
+  }
   trouble_ = !report.ok;
   const std::scoped_lock lock(mutex_);
   message_ = report.message;
+}
+
+void LightDriver::come_back() {
+  const hal::Light before = light();
+  if (!write(hal::Light(kept_)).ok) {
+    away_ = true;  // so that it is tried again
+  } else if (kept_ != before) {
+    tell(LightChanged{kept_});
+  }
 }
 
 hal::ShowResult LightDriver::write(const hal::Light& light) {
   note({true, clock_.monotonic_ns(), light});
   hal::ShowResult result = ring_->show(light);
   trouble_ = !result.ok;
+  const bool was_away = std::exchange(away_, result.away);
+  if (away_) kept_ = light;
   hal::Light shown;
   {
     const std::scoped_lock lock(mutex_);
@@ -81,7 +100,7 @@ hal::ShowResult LightDriver::write(const hal::Light& light) {
     shown = light_;
     message_ = result.message;
   }
-  note({false, clock_.monotonic_ns(), shown});
+  note({false, clock_.monotonic_ns(), shown, was_away && result.ok});
   return result;
 }
 

@@ -20,11 +20,15 @@ struct LightNote {
   bool begins = false;     ///< The write is about to begin; else it is over.
   std::int64_t at_ns = 0;  ///< CLOCK_MONOTONIC.
   hal::Light light;        ///< What the ring is to show, or shows.
+  bool returned = false;   ///< The ring was away until this write: what it showed is not known.
 };
 
 /// Owns the ring and the thread that writes to it, since a write blocks for a millisecond and more.
 /// Commands come from the network thread, events go back there, notes go to the capture thread;
 /// each way is a queue of its own and none ever drops (a full one makes this thread wait).
+///
+/// A light that is asked for while the ring is away is an error to who asked, and kept: the ring
+/// shows it when it is back.
 class LightDriver {
  public:
   /// `wake` is signalled after every event.
@@ -59,6 +63,7 @@ class LightDriver {
   void run();
   void serve(const Request& request);
   void look();
+  void come_back();
   hal::ShowResult write(const hal::Light& light);
   void note(const LightNote& note);
   void tell(const Event& event);
@@ -75,6 +80,9 @@ class LightDriver {
   mutable std::mutex mutex_;  // between this thread and the network thread, held for a copy
   hal::Light light_;
   std::string message_;
+  // This thread's own:
+  hal::Light kept_;        // to be shown when the ring is back
+  bool away_ = false;      // when looked at last
   base::RtThread thread_;  // last: it uses all the others
 };
 

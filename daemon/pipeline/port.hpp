@@ -31,7 +31,14 @@ struct Command {
 
 // Events: what the pipeline tells the network. Never lost: when the queue is full the pipeline
 // keeps its state and tells later.
-enum class Outcome : std::uint8_t { done, refused_contact, device_error, camera_away, invalid };
+enum class Outcome : std::uint8_t {
+  done,
+  refused_contact,
+  device_error,
+  camera_away,
+  ring_away,  ///< The light is kept and shown once there is a ring.
+  invalid
+};
 struct CommandDone {
   std::uint64_t ticket = 0;
   Outcome outcome = Outcome::done;

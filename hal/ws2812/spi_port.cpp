@@ -31,6 +31,7 @@ std::string spi_remedy(int error) {
     case ENOENT:
     case ENODEV:
     case ENXIO:
+    case ESHUTDOWN:
       return "turn the SPI controller on (on a Raspberry Pi: dtparam=spi=on in "
              "/boot/firmware/config.txt, then reboot) or name another device in "
              "ring.ws2812.spi_device";

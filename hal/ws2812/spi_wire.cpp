@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -66,11 +66,7 @@ std::string why_rate_refused(const SpiFormat& asked, double measured_hz) {
 
 SpiWire::SpiWire(std::unique_ptr<SpiPort> port, const SpiFormat& format, bool check_rate,
                  base::Clock& clock)
-    : port_(std::move(port)), format_(format), check_rate_(check_rate), clock_(clock) {
-  if (const std::string refused = why_refused(format_); !refused.empty()) {
-    throw std::runtime_error(fmt::format("ring.ws2812.spi_hz: {}", refused));
-  }
-}
+    : port_(std::move(port)), format_(format), check_rate_(check_rate), clock_(clock) {}
 
 RingInfo SpiWire::info() const { return {"ws2812_spi", port_->name()}; }
 
@@ -97,6 +93,8 @@ std::string SpiWire::prepare(int leds) {
 
 std::string SpiWire::send(std::span<const Rgb> leds) {
   const int error = port_->transfer(encode(leds, format_));
+  // What spidev answers once its device has gone, or its controller with it.
+  lost_ = error == ESHUTDOWN || error == ENODEV || error == ENXIO;
   return error == 0 ? std::string() : failed(*port_, error);
 }
 

@@ -28,7 +28,7 @@ struct MeasuredRate {
 /// WS2812B on an SPI controller's data line (MOSI).
 class SpiWire final : public Wire {
  public:
-  /// Throws std::runtime_error when the format's pulses leave the WS2812B's window.
+  /// Needs a format that why_refused() accepts.
   SpiWire(std::unique_ptr<SpiPort> port, const SpiFormat& format, bool check_rate,
           base::Clock& clock = base::system_clock());
 
@@ -36,6 +36,7 @@ class SpiWire final : public Wire {
   [[nodiscard]] std::string prepare(int leds) override;
   [[nodiscard]] std::string note() const override { return note_; }
   [[nodiscard]] std::string send(std::span<const Rgb> leds) override;
+  [[nodiscard]] bool lost() const override { return lost_; }
 
  private:
   std::unique_ptr<SpiPort> port_;
@@ -43,6 +44,7 @@ class SpiWire final : public Wire {
   bool check_rate_;
   base::Clock& clock_;
   std::string note_;
+  bool lost_ = false;
 };
 
 }  // namespace dtact::hal::ws2812

@@ -24,6 +24,9 @@ class Wire {
   [[nodiscard]] virtual std::string note() const = 0;
   /// Sends one colour to each LED, the chain's first LED first, and waits until it is through.
   [[nodiscard]] virtual std::string send(std::span<const Rgb> leds) = 0;
+  /// After a send() that failed: this wire will not work again, or not before it has been prepared
+  /// anew. The ring then closes it and opens another.
+  [[nodiscard]] virtual bool lost() const { return false; }
 };
 
 }  // namespace dtact::hal::ws2812

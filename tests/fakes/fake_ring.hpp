@@ -10,12 +10,13 @@
 
 namespace dtact::fakes {
 
-/// Remembers what it was told to show; fails when told to.
+/// Remembers what it was told to show; fails and is away when told to.
 class FakeRing final : public hal::LightRing {
  public:
   /// What the test keeps hold of while the pipeline owns the ring.
   struct Handle {
     std::atomic<bool> broken{false};
+    std::atomic<bool> away{false};
     std::function<void(const hal::Light&)> on_show;
     mutable std::mutex mutex;
     std::vector<hal::Light> shown;
@@ -34,6 +35,7 @@ class FakeRing final : public hal::LightRing {
 
   [[nodiscard]] hal::RingInfo info() const override { return {"fake", "fake ring"}; }
   [[nodiscard]] hal::ShowResult show(const hal::Light& light) override {
+    if (handle_.away) return {false, kAway, 1, true};
     if (handle_.broken) return {false, "the fake ring is broken: mend it"};
     {
       const std::scoped_lock lock(handle_.mutex);
@@ -44,10 +46,13 @@ class FakeRing final : public hal::LightRing {
   }
   [[nodiscard]] hal::RingReport report() const override {
     const std::scoped_lock lock(handle_.mutex);
+    if (handle_.away) return {.ok = false, .away = true, .message = kAway, .note = {}};
     return handle_.report;
   }
 
  private:
+  static constexpr const char* kAway = "the fake ring is away: plug it in";
+
   Handle& handle_;
 };
 

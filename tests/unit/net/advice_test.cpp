@@ -44,7 +44,7 @@ TEST(Advice, AddsTheDevicesOwnSentenceAndPutsItFirst) {
                          "thread"));
   status.health.set(Health::ring_trouble);
   status.ring_message = "the ring is gone.";
-  EXPECT_THAT(advice(status), HasSubstr("LED ring failed. the ring is gone."));
+  EXPECT_THAT(advice(status), HasSubstr("LED ring cannot be written to. the ring is gone."));
 }
 
 TEST(Advice, SaysHowFarTheCameraHasMovedOnlyWhileItHas) {

@@ -39,6 +39,14 @@ class LightDriverTest : public ::testing::Test {
     }
     return std::nullopt;
   }
+  template <typename Condition>
+  bool eventually(Condition condition) {
+    for (int i = 0; i < 1000 && !condition(); ++i) {
+      take_notes();
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return condition();
+  }
   std::vector<LightNote> notes;
   EventFd wake;
   fakes::FakeRing::Handle ring;
@@ -109,12 +117,6 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
 
 TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
   driver.start();
-  const auto eventually = [](auto condition) {
-    for (int i = 0; i < 1000 && !condition(); ++i) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    return condition();
-  };
   ring.tell({.ok = false, .message = "the wire is cut", .note = {}, .writes = 2, .failures = 1});
   EXPECT_TRUE(eventually([&] { return driver.trouble(); }));
   EXPECT_TRUE(eventually([&] { return driver.message() == "the wire is cut"; }));
@@ -132,6 +134,52 @@ TEST_F(LightDriverTest, ARingThatNeverReSendsHealsByTheNextWriteAlone) {
   std::this_thread::sleep_for(std::chrono::milliseconds(600));  // in which it is looked at twice
   EXPECT_TRUE(driver.trouble());
   EXPECT_EQ(driver.message(), "the fake ring is broken: mend it");
+}
+
+TEST_F(LightDriverTest, ALightAskedForWhileTheRingIsAwayIsShownWhenItComes) {
+  ring.away = true;
+  driver.start();
+  EXPECT_TRUE(driver.trouble());
+  EXPECT_EQ(driver.message(), "the fake ring is away: plug it in");
+  ASSERT_TRUE(driver.submit(6, dimmed(50)));
+  ASSERT_TRUE(next());
+  ASSERT_TRUE(driver.submit(7, dimmed(100)));
+  const auto done = std::get<CommandDone>(next().value());
+  EXPECT_EQ(done.outcome, Outcome::ring_away);
+  EXPECT_EQ(done.message,
+            "the fake ring is away: plug it in. The light is kept and shown when the ring is back");
+  EXPECT_EQ(driver.light().brightness, 200);
+  EXPECT_TRUE(ring.all().empty());
+  ring.away = false;
+  EXPECT_EQ(std::get<LightChanged>(next().value()).light.brightness, 100);
+  ASSERT_EQ(ring.all().size(), 1U);
+  EXPECT_EQ(ring.all()[0].brightness, 100);
+  EXPECT_FALSE(driver.trouble());
+  EXPECT_EQ(driver.message(), "");
+  driver.stop();
+  take_notes();
+  for (std::size_t i = 0; i + 1 < notes.size(); ++i) EXPECT_FALSE(notes[i].returned) << i;
+  EXPECT_TRUE(notes.back().returned);
+  EXPECT_EQ(notes.back().light.brightness, 100);
+}
+
+TEST_F(LightDriverTest, ARingThatWentAndCameShowsItsLightAgain) {
+  driver.start();
+  ring.broken = true;  // a write that fails first, as it does when the ring is on its way out
+  ASSERT_TRUE(driver.submit(6, dimmed(100)));
+  ASSERT_TRUE(next());
+  ring.away = true;
+  EXPECT_TRUE(eventually([&] { return driver.message() == "the fake ring is away: plug it in"; }));
+  ring.away = false;  // it is found and does not work yet
+  EXPECT_TRUE(eventually([&] { return driver.message() == "the fake ring is broken: mend it"; }));
+  ring.broken = false;
+  EXPECT_TRUE(eventually([&] { return !driver.trouble(); }));
+  ASSERT_EQ(ring.all().size(), 2U);
+  EXPECT_EQ(ring.all()[1].brightness, 200);
+  EXPECT_EQ(driver.message(), "");
+  driver.stop();
+  take_notes();
+  EXPECT_TRUE(notes.back().returned);
 }
 
 TEST_F(LightDriverTest, RefusesWhenTooManyWait) {

@@ -201,6 +201,23 @@ TEST_F(PipelineTest, ABrokenRingIsAConditionNotTheEnd) {
   EXPECT_EQ(pipeline->status().ring_message, "the fake ring is broken: mend it");
 }
 
+// What was averaged before it came is no reference for its light, though that is the one asked for.
+TEST_F(PipelineTest, ARingThatComesLaterBeginsTheReferenceAnew) {
+  ring.away = true;
+  camera.light(0.5);  // the room's
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_frame(
+      [](const DepthFrame& f) { return f.has_depth && f.health.has(Health::ring_trouble); }));
+  EXPECT_EQ(all<ReferenceTaken>().size(), 1U);
+  ring.away = false;
+  ASSERT_TRUE(until_fresh());
+  ASSERT_TRUE(until([&] { return all<ReferenceTaken>().size() == 2; }));
+  EXPECT_TRUE(all<LightChanged>().empty());
+  camera.press(1);
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.1);
+}
+
 TEST_F(PipelineTest, WithoutCalibrationThereIsLuma) {
   start(nullptr);
   pipeline->want({.contact = true, .luma = true});

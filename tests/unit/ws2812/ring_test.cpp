@@ -26,10 +26,19 @@ struct Record {
   std::string error;
   std::string refusal;
   std::string note;
+  std::string absence;            // why the wire cannot be opened; empty = it can
+  std::atomic<bool> lost{false};  // what failed will not come back by itself
+  std::atomic<int> opened{0};     // wires, until now
+  std::atomic<int> open{0};       // wires, at the moment
+  std::atomic<int> powered{0};    // times the power was switched on
 
   std::vector<std::vector<Rgb>> all() {
     const std::lock_guard lock(mutex);
     return writes;
+  }
+  void be_absent(std::string sentence) {
+    const std::lock_guard lock(mutex);
+    absence = std::move(sentence);
   }
   void fail_with(std::string sentence) {
     const std::lock_guard lock(mutex);
@@ -39,7 +48,11 @@ struct Record {
 
 class RecordingWire final : public Wire {
  public:
-  explicit RecordingWire(std::shared_ptr<Record> record) : record_(std::move(record)) {}
+  explicit RecordingWire(std::shared_ptr<Record> record) : record_(std::move(record)) {
+    ++record_->opened;
+    ++record_->open;
+  }
+  ~RecordingWire() override { --record_->open; }
   [[nodiscard]] RingInfo info() const override { return {"recording", "here"}; }
   [[nodiscard]] std::string prepare(int /*leds*/) override { return record_->refusal; }
   [[nodiscard]] std::string note() const override { return record_->note; }
@@ -49,9 +62,15 @@ class RecordingWire final : public Wire {
     record_->threads.push_back(std::this_thread::get_id());
     return record_->error;
   }
+  [[nodiscard]] bool lost() const override { return record_->lost; }
 
  private:
   std::shared_ptr<Record> record_;
+};
+
+class IdleLine final : public gpiod::OutputLine {
+ public:
+  [[nodiscard]] int set(bool /*active*/) noexcept override { return 0; }
 };
 
 /// No re-sends unless a test asks for them.
@@ -62,7 +81,16 @@ Ws2812Config quiet() {
 }
 
 std::unique_ptr<Ring> ring(const std::shared_ptr<Record>& record, const Ws2812Config& config) {
-  return std::make_unique<Ring>(std::make_unique<RecordingWire>(record), nullptr, config, 0);
+  const auto open = [record]() -> std::unique_ptr<Wire> {
+    const std::lock_guard lock(record->mutex);
+    if (!record->absence.empty()) throw std::runtime_error(record->absence);
+    return std::make_unique<RecordingWire>(record);
+  };
+  const auto power = [record]() -> std::unique_ptr<gpiod::PowerSwitch> {
+    ++record->powered;
+    return std::make_unique<gpiod::PowerSwitch>(std::make_unique<IdleLine>(), 0);
+  };
+  return std::make_unique<Ring>(RingParts{{"recording", "here"}, open, power}, config);
 }
 
 /// Waits generously for what another thread brings about.
@@ -209,16 +237,82 @@ TEST(Ws2812Ring, CallersAtOnceEachGetAnAnswer) {
   EXPECT_EQ(answered, 400);
 }
 
-TEST(Ws2812Ring, AWireThatRefusesStopsTheStart) {
+TEST(Ws2812Ring, AnAbsentRingIsLookedForAndWorksOnceItIsThere) {
+  const auto record = std::make_shared<Record>();
+  record->absence = "/dev/here: No such file or directory: turn it on";
+  const auto ours = ring(record, quiet());
+  EXPECT_EQ(ours->info().identity, "here");
+  EXPECT_TRUE(ours->report().away);
+  EXPECT_FALSE(ours->report().ok);
+  EXPECT_EQ(ours->report().message, "/dev/here: No such file or directory: turn it on");
+  const ShowResult early = ours->show(kRed);
+  EXPECT_FALSE(early.ok);
+  EXPECT_TRUE(early.away);
+  EXPECT_EQ(early.message, "/dev/here: No such file or directory: turn it on");
+  EXPECT_EQ(record->powered, 0);
+
+  record->be_absent("");
+  ASSERT_TRUE(eventually([&] { return !ours->report().away; }));
+  EXPECT_TRUE(ours->report().ok);
+  EXPECT_EQ(ours->report().message, "");
+  EXPECT_EQ(record->powered, 1);
+  EXPECT_TRUE(record->all().empty()) << "nothing is written before it is asked for";
+  EXPECT_TRUE(ours->show(kRed).ok);
+  EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
+}
+
+TEST(Ws2812Ring, AnAbsentRingStaysUntouchedAtTheEnd) {
+  const auto record = std::make_shared<Record>();
+  record->absence = "not there";
+  (void)ring(record, quiet())->show(kRed);
+  EXPECT_TRUE(record->writes.empty());
+}
+
+TEST(Ws2812Ring, AWireThatIsLostIsClosedAndOpenedAnew) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.resend_ms = 2;
+  const auto ours = ring(record, config);
+  ASSERT_TRUE(ours->show(kRed).ok);
+  record->be_absent("/dev/here is gone");
+  record->lost = true;
+  record->fail_with("shut down");
+  ASSERT_TRUE(eventually([&] { return ours->report().message == "/dev/here is gone"; }));
+  EXPECT_TRUE(ours->report().away);
+  EXPECT_EQ(record->open, 0) << "the device is free for who comes next";
+
+  record->fail_with("");
+  record->be_absent("");
+  ASSERT_TRUE(eventually([&] { return ours->report().ok; }));
+  EXPECT_EQ(record->opened, 2);
+  EXPECT_EQ(record->powered, 1) << "the LEDs kept their power and with it their light";
+  const std::size_t before = record->all().size();
+  ASSERT_TRUE(eventually([&] { return record->all().size() > before; }));
+  EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
+}
+
+TEST(Ws2812Ring, AWireThatFailsIsKept) {
+  const auto record = std::make_shared<Record>();
+  Ws2812Config config = quiet();
+  config.resend_ms = 2;
+  const auto ours = ring(record, config);
+  record->fail_with("a glitch");
+  const ShowResult result = ours->show(kRed);
+  EXPECT_FALSE(result.ok);
+  EXPECT_FALSE(result.away);
+  record->fail_with("");
+  ASSERT_TRUE(eventually([&] { return ours->report().ok; }));
+  EXPECT_EQ(record->opened, 1);
+}
+
+TEST(Ws2812Ring, AWireThatRefusesIsAskedAgain) {
   const auto record = std::make_shared<Record>();
   record->refusal = "too slow: use SPI";
-  try {
-    (void)ring(record, quiet());
-    FAIL() << "started";
-  } catch (const std::runtime_error& e) {
-    EXPECT_STREQ(e.what(), "too slow: use SPI");
-  }
-  EXPECT_TRUE(record->writes.empty());
+  const auto ours = ring(record, quiet());
+  EXPECT_TRUE(ours->report().away);
+  EXPECT_EQ(ours->show(kRed).message, "too slow: use SPI");
+  ASSERT_TRUE(eventually([&] { return record->opened >= 2; }));
+  EXPECT_TRUE(record->all().empty());
 }
 
 TEST(Ws2812Ring, ANoteOfTheWireIsReported) {
