@@ -85,11 +85,15 @@ struct CameraConfig {
   LibcameraConfig libcamera;
 };
 
-/// One line of a GPIO chip.
+/// One line of a GPIO chip, by its offset or by its name; neither chip nor name = no line.
 struct GpioLineConfig {
-  std::string chip;         ///< Path, name or label ("pinctrl-rp1"); empty = no line.
-  int line = -1;            ///< Offset on the chip.
-  bool active_low = false;  ///< "on" is the low level.
+  std::string chip{};          ///< Path, name or label ("pinctrl-rp1").
+  int line = -1;               ///< Offset on the chip.
+  bool active_low = false;     ///< "on" is the low level.
+  std::string name{};          ///< "GPIO17"; needs no chip while one line alone bears it.
+  std::string bias = "as-is";  ///< Or "pull-up", "pull-down", "disabled".
+
+  [[nodiscard]] bool is_set() const { return !chip.empty() || !name.empty(); }
 };
 
 /// A real ring of WS2812B.

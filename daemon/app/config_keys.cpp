@@ -104,7 +104,10 @@ std::vector<Key> bind_keys(Config& c) {
       integer("ring.ws2812.power_settle_ms", ws2812.power_settle_ms, 0, 10000, "(milliseconds)"),
       text("ring.ws2812.power.chip", ws2812.power.chip, kChip),
       integer("ring.ws2812.power.line", ws2812.power.line, -1, 4095, "(offset on the chip)"),
+      text("ring.ws2812.power.name", ws2812.power.name, "a GPIO line's name, or \"\""),
       boolean("ring.ws2812.power.active_low", ws2812.power.active_low),
+      choice("ring.ws2812.power.bias", ws2812.power.bias,
+             {"as-is", "pull-up", "pull-down", "disabled"}),
 
       optional_integer("capture.cpu", p.cpu, 0, 1023, ""),
       integer("capture.fifo_priority", p.fifo_priority, 0, 99, "(0 = normal scheduling)"),

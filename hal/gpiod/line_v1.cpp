@@ -28,25 +28,36 @@ class LineV1 final : public OutputLine {
   gpiod_line* line_;
 };
 
+int flags_of(const GpioLineConfig& line) {
+  const int active_low = line.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
+  if (line.bias == "pull-up") return active_low | GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP;
+  if (line.bias == "pull-down") return active_low | GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
+  if (line.bias == "disabled") return active_low | GPIOD_LINE_REQUEST_FLAG_BIAS_DISABLE;
+  return active_low;
+}
+
 }  // namespace
 
 ChipFacts read_chip(const std::string& path) {
   const ChipPtr chip(::gpiod_chip_open(path.c_str()));
   if (chip == nullptr) return {{}, errno};
-  return {
-      {path, ::gpiod_chip_label(chip.get()), static_cast<int>(::gpiod_chip_num_lines(chip.get()))},
-      0};
+  const unsigned lines = ::gpiod_chip_num_lines(chip.get());
+  ChipFacts facts{{path, ::gpiod_chip_label(chip.get()), static_cast<int>(lines), {}, {}}, 0};
+  for (unsigned offset = 0; offset < lines; ++offset) {
+    gpiod_line* line = ::gpiod_chip_get_line(chip.get(), offset);
+    const char* name = line == nullptr ? nullptr : ::gpiod_line_name(line);
+    facts.chip.names.emplace_back(name == nullptr ? "" : name);
+  }
+  return facts;
 }
 
-std::unique_ptr<OutputLine> request_output(const std::string& path, const GpioLineConfig& line,
-                                           bool active, int& error) {
+std::unique_ptr<OutputLine> request_output(const std::string& path, int offset,
+                                           const GpioLineConfig& line, bool active, int& error) {
   ChipPtr chip(::gpiod_chip_open(path.c_str()));
-  gpiod_line* handle = chip == nullptr
-                           ? nullptr
-                           : ::gpiod_chip_get_line(chip.get(), static_cast<unsigned>(line.line));
-  const int flags = line.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
+  gpiod_line* handle =
+      chip == nullptr ? nullptr : ::gpiod_chip_get_line(chip.get(), static_cast<unsigned>(offset));
   if (handle == nullptr ||
-      ::gpiod_line_request_output_flags(handle, "dtactd", flags, active ? 1 : 0) != 0) {
+      ::gpiod_line_request_output_flags(handle, "dtactd", flags_of(line), active ? 1 : 0) != 0) {
     error = errno;
     return nullptr;
   }
@@ -57,8 +68,9 @@ std::string line_holder(const std::string& path, int line) {
   const ChipPtr chip(::gpiod_chip_open(path.c_str()));
   gpiod_line* handle =
       chip == nullptr ? nullptr : ::gpiod_chip_get_line(chip.get(), static_cast<unsigned>(line));
-  const char* consumer = handle == nullptr ? nullptr : ::gpiod_line_consumer(handle);
-  return consumer == nullptr ? "" : consumer;
+  if (handle == nullptr || !::gpiod_line_is_used(handle)) return {};
+  const char* consumer = ::gpiod_line_consumer(handle);
+  return consumer == nullptr ? kNameless : '"' + std::string(consumer) + '"';
 }
 
 std::string library_version() { return ::gpiod_version_string(); }

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <filesystem>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 namespace dtact::hal::gpiod {
@@ -14,86 +15,120 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> chip_paths() {
-  std::vector<std::string> paths;
+struct Survey {
+  std::vector<Chip> chips;
+  bool denied = false;  // another chip is there, which this user may not open
+};
+
+Survey survey() {
+  std::vector<fs::path> paths;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator("/dev", ignored)) {
     if (entry.path().filename().string().starts_with("gpiochip")) paths.push_back(entry.path());
   }
   std::sort(paths.begin(), paths.end());
-  return paths;
-}
-
-/// The chip's path, or empty. `error` becomes EACCES when a chip might be it but may not be read.
-std::string resolve(const std::string& name, int& error) {
-  error = ENOENT;
-  for (const std::string& path : chip_paths()) {
-    if (path == name || fs::path(path).filename() == name) return path;
-    const ChipFacts facts = read_chip(path);
-    if (facts.error == 0 && facts.chip.label == name) return path;
-    if (facts.error == EACCES || facts.error == EPERM) error = EACCES;
+  Survey survey;
+  for (const fs::path& path : paths) {
+    if (fs::is_symlink(path, ignored)) continue;
+    ChipFacts facts = read_chip(path);
+    if (facts.error == 0) survey.chips.push_back(std::move(facts.chip));
+    if (facts.error == EACCES || facts.error == EPERM) survey.denied = true;
   }
-  return {};
+  // Raspberry Pi OS links gpiochip4 to gpiochip0, for programs from before kernel 6.6.45
+  // (raspberrypi-sys-mods, 60-gpiochip4.rules).
+  for (const fs::path& path : paths) {
+    if (!fs::is_symlink(path, ignored)) continue;
+    const fs::path target = fs::weakly_canonical(path, ignored);
+    for (Chip& chip : survey.chips) {
+      if (target == chip.path) chip.links.push_back(path);
+    }
+  }
+  return survey;
 }
 
-std::string known_chips() {
+bool goes_by(const Chip& chip, const std::string& name) {
+  const auto is = [&](const fs::path& path) { return path == name || path.filename() == name; };
+  return is(chip.path) || chip.label == name ||
+         std::any_of(chip.links.begin(), chip.links.end(), is);
+}
+
+std::string known(const std::vector<Chip>& chips) {
   std::string text;
-  for (const Chip& chip : list_chips()) {
+  for (const Chip& chip : chips) {
     text += fmt::format("{}{} ({}, {} lines)", text.empty() ? "" : ", ", chip.path, chip.label,
                         chip.lines);
   }
   return text.empty() ? "none that this user may open" : text;
 }
 
-std::string remedy(int error, const std::string& path, const GpioLineConfig& line) {
-  switch (error) {
-    case EACCES:
-    case EPERM:
-      return "put the user into the group that owns it (sudo usermod -aG gpio <user>) and install "
-             "config/udev/60-dtactd.rules";
-    case EBUSY: {
-      const std::string holder = line_holder(path, line.line);
-      return fmt::format("it is in use by {}; free it or choose another line",
-                         holder.empty() ? "something that gave no name" : '"' + holder + '"');
-    }
-    default:
-      return fmt::format("chips here: {}", known_chips());
-  }
-}
-
 }  // namespace
 
-std::vector<Chip> list_chips() {
-  std::vector<Chip> chips;
-  for (const std::string& path : chip_paths()) {
-    ChipFacts facts = read_chip(path);
-    if (facts.error == 0) chips.push_back(std::move(facts.chip));
+std::vector<Chip> list_chips() { return survey().chips; }
+
+Place find_line(const std::vector<Chip>& chips, const GpioLineConfig& line,
+                const std::string& key) {
+  if (!line.name.empty() && line.line >= 0) {
+    return {{}, -1, "both line and name are given", fmt::format("set {0}.line = -1", key)};
   }
-  return chips;
+  std::vector<const Chip*> meant;
+  for (const Chip& chip : chips) {
+    if (line.chip.empty() || goes_by(chip, line.chip)) meant.push_back(&chip);
+  }
+  if (meant.empty()) {
+    return {{}, -1, "no such chip that this user may open", "chips here: " + known(chips), true};
+  }
+  if (line.name.empty()) {
+    const Chip& chip = *meant.front();
+    if (line.line >= 0 && line.line < chip.lines) return {chip.path, line.line, {}, {}};
+    return {{},
+            -1,
+            fmt::format("it has lines 0 … {}", chip.lines - 1),
+            fmt::format("gpioinfo {}, then set {}.line or .name", chip.path, key)};
+  }
+  // The kernel lets several lines bear one name.
+  std::vector<Place> found;
+  for (const Chip* chip : meant) {
+    for (std::size_t i = 0; i < chip->names.size(); ++i) {
+      if (chip->names[i] == line.name) found.push_back({chip->path, static_cast<int>(i), {}, {}});
+    }
+  }
+  if (found.empty()) return {{}, -1, "no line has this name", "gpioinfo lists the names", true};
+  if (found.size() == 1) return found.front();
+  return {{},
+          -1,
+          fmt::format("{} line {} has this name and {} line {} has it too", found[0].chip,
+                      found[0].line, found[1].chip, found[1].line),
+          fmt::format("set {0}.chip and {0}.line instead of the name", key)};
+}
+
+std::string describe(const GpioLineConfig& line) {
+  const std::string which =
+      line.name.empty() ? fmt::format("line {}", line.line) : fmt::format("line \"{}\"", line.name);
+  return line.chip.empty() ? which : fmt::format("chip \"{}\" {}", line.chip, which);
 }
 
 std::unique_ptr<OutputLine> open_output(const GpioLineConfig& line, bool active,
                                         const std::string& key) {
-  int error = 0;
-  const auto fail = [&](const std::string& path) {
-    return std::runtime_error(fmt::format("{}: chip \"{}\" line {}: {}: {}", key, line.chip,
-                                          line.line, std::strerror(error),
-                                          remedy(error, path, line)));
+  const auto fail = [&](const std::string& why, const std::string& mend) {
+    return std::runtime_error(fmt::format("{}: {}: {}: {}", key, describe(line), why, mend));
   };
-  const std::string path = resolve(line.chip, error);
-  if (path.empty()) throw fail(line.chip);
-  const ChipFacts facts = read_chip(path);
-  if (facts.error != 0) {
-    error = facts.error;
-    throw fail(path);
+  const Survey here = survey();
+  const Place place = find_line(here.chips, line, key);
+  if (place.unknown && here.denied) {
+    throw fail(std::strerror(EACCES),
+               "put the user into the group that owns it (sudo usermod -aG gpio <user>) and "
+               "install config/udev/60-dtactd.rules");
   }
-  if (line.line < 0 || line.line >= facts.chip.lines) {
-    throw std::runtime_error(fmt::format("{}: line {} of chip \"{}\": it has lines 0 … {}", key,
-                                         line.line, line.chip, facts.chip.lines - 1));
-  }
-  auto output = request_output(path, line, active, error);
-  if (output == nullptr) throw fail(path);
-  return output;
+  if (!place.why.empty()) throw fail(place.why, place.mend);
+  int error = 0;
+  auto output = request_output(place.chip, place.line, line, active, error);
+  if (output != nullptr) return output;
+  if (error != EBUSY) throw fail(std::strerror(error), "gpioinfo " + place.chip + ", dmesg");
+  const std::string holder = line_holder(place.chip, place.line);
+  throw fail(std::strerror(error),
+             fmt::format("it is in use by {}; free it or choose another line: "
+                         "gpioinfo {}",
+                         holder.empty() ? kNameless : holder, place.chip));
 }
 
 }  // namespace dtact::hal::gpiod

@@ -25,6 +25,8 @@ struct Chip {
   std::string path;   ///< "/dev/gpiochip0"
   std::string label;  ///< "pinctrl-bcm2711", ...
   int lines = 0;
+  std::vector<std::string> names;  ///< Of the lines that have one, by offset; else empty.
+  std::vector<std::string> links;  ///< Symbolic links to it: "/dev/gpiochip4" on a Raspberry Pi 5.
 };
 
 /// One chip. `error` is an errno when it could not be read; the other fields are then empty.
@@ -36,20 +38,37 @@ struct ChipFacts {
 /// The chips of this machine that may be opened, by path.
 [[nodiscard]] std::vector<Chip> list_chips();
 
+/// Where a configured line is. When it is nowhere, `why` says so and `mend` how to go on; both name
+/// `key`, the configuration's, where they have to.
+struct Place {
+  std::string chip;  ///< Path.
+  int line = -1;     ///< Offset.
+  std::string why, mend;
+  bool unknown = false;  ///< None of the chips has the chip's or the line's name.
+};
+[[nodiscard]] Place find_line(const std::vector<Chip>& chips, const GpioLineConfig& line,
+                              const std::string& key);
+
+/// The line as messages name it: chip "gpiochip0" line 17, or line "GPIO17".
+[[nodiscard]] std::string describe(const GpioLineConfig& line);
+
 /// Takes the line as output with the given first level. The chip may be named by path
 /// ("/dev/gpiochip0"), name ("gpiochip0") or label. `key` is the configuration's key, for the
-/// error's sentence. Throws std::runtime_error naming key, chip, line and the remedy.
+/// error's sentence. Throws std::runtime_error naming key, line and the remedy.
 [[nodiscard]] std::unique_ptr<OutputLine> open_output(const GpioLineConfig& line, bool active,
                                                       const std::string& key);
 
 // What differs between libgpiod 1.6 and 2: line_v1.cpp or line_v2.cpp, chosen when built.
 
 [[nodiscard]] ChipFacts read_chip(const std::string& path);
-/// Null with errno in `error` when refused.
-[[nodiscard]] std::unique_ptr<OutputLine> request_output(const std::string& path,
+/// Takes the line at `offset`; of `line` only active_low and bias count. Null with errno in `error`
+/// when refused.
+[[nodiscard]] std::unique_ptr<OutputLine> request_output(const std::string& path, int offset,
                                                          const GpioLineConfig& line, bool active,
                                                          int& error);
-/// Who holds the line; empty when nobody, or when the holder gave no name.
+/// A holder without a name: the kernel itself, as for a line that is another function's pin.
+inline constexpr const char* kNameless = "something that gave no name";
+/// Who holds the line, its name in quotes; empty when nobody.
 [[nodiscard]] std::string line_holder(const std::string& path, int line);
 [[nodiscard]] std::string library_version();
 

@@ -16,7 +16,7 @@ namespace {
 RingParts parts_of(const Ws2812Config& config, RingInfo info,
                    std::function<std::unique_ptr<Wire>()> open_wire) {
   RingParts parts{std::move(info), std::move(open_wire), {}};
-  if (!config.power.chip.empty()) {
+  if (config.power.is_set()) {
     parts.switch_on = [power = config.power, settle_ms = config.power_settle_ms] {
       return std::make_unique<gpiod::PowerSwitch>(
           gpiod::open_output(power, false, "ring.ws2812.power"), settle_ms);

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -29,30 +28,16 @@ bool is_raspberry_pi(const Machine& machine) {
   return machine.line("/proc/device-tree/model").value_or("").starts_with("Raspberry Pi");
 }
 
-/// The chip that the configuration names by path, name or label; null when there is none.
-const hal::gpiod::Chip* find_chip(const std::vector<hal::gpiod::Chip>& chips,
-                                  const std::string& name) {
-  const auto found = std::find_if(chips.begin(), chips.end(), [&](const hal::gpiod::Chip& chip) {
-    return chip.path == name || chip.path == "/dev/" + name || chip.label == name;
-  });
-  return found == chips.end() ? nullptr : &*found;
-}
-
-Finding check_line(const Machine& machine, const std::vector<hal::gpiod::Chip>& chips,
-                   const std::string& key, const hal::GpioLineConfig& line) {
-  const std::string what = fmt::format("{}: chip \"{}\" line {}", key, line.chip, line.line);
-  const hal::gpiod::Chip* chip = find_chip(chips, line.chip);
-  if (chip == nullptr) {
-    return {Verdict::wrong, what + ": no such chip that this user may open",
-            fmt::format("gpiodetect, then set {}.chip", key)};
+Finding check_line(const Machine& machine, const std::string& key,
+                   const hal::GpioLineConfig& line) {
+  const std::string what = fmt::format("{}: {}", key, hal::gpiod::describe(line));
+  const hal::gpiod::Place place = hal::gpiod::find_line(machine.gpio_chips(), line, key);
+  if (!place.why.empty()) {
+    return {Verdict::wrong, fmt::format("{}: {}", what, place.why), place.mend};
   }
-  if (line.line < 0 || line.line >= chip->lines) {
-    return {Verdict::wrong, fmt::format("{}: the chip has lines 0 … {}", what, chip->lines - 1),
-            fmt::format("gpioinfo {}, then set {}.line", chip->path, key)};
-  }
-  if (const std::string holder = machine.gpio_holder(chip->path, line.line); !holder.empty()) {
-    return {Verdict::wrong, fmt::format("{}: in use by \"{}\"", what, holder),
-            fmt::format("free it, or choose a free line: gpioinfo {}", chip->path)};
+  if (const std::string holder = machine.gpio_holder(place.chip, place.line); !holder.empty()) {
+    return {Verdict::wrong, fmt::format("{}: in use by {}", what, holder),
+            fmt::format("free it, or choose a free line: gpioinfo {}", place.chip)};
   }
   return {Verdict::good, what + " is free", ""};
 }
@@ -176,7 +161,7 @@ Findings check_core_clock(const Machine& machine, const hal::RingConfig& ring) {
 }
 
 Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {
-  if (!ring.backend.starts_with("ws2812_") || ring.ws2812.power.chip.empty()) {
+  if (!ring.backend.starts_with("ws2812_") || !ring.ws2812.power.is_set()) {
     return {{Verdict::good, "no line is configured", ""}};
   }
   Findings findings;
@@ -186,8 +171,7 @@ Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {
                           join_group(machine, node, "gpio")});
     }
   }
-  findings.push_back(
-      check_line(machine, machine.gpio_chips(), "ring.ws2812.power", ring.ws2812.power));
+  findings.push_back(check_line(machine, "ring.ws2812.power", ring.ws2812.power));
   return findings;
 }
 

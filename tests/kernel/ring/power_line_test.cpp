@@ -1,11 +1,19 @@
 // GPIO lines on the real character device and gpio-sim, whose sysfs files say what level a line
 // has. Runs in the guest.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <linux/gpio.h>
+#include <sys/ioctl.h>
 
+#include <cstdint>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "hal/base/unique_fd.hpp"
 #include "hal/gpiod/lines.hpp"
 #include "hal/ws2812/ring.hpp"
 #include "tests/kernel/ring/guest.hpp"
@@ -26,6 +34,12 @@ class Chip : public testing::Environment {
     std::filesystem::create_directories(config + "/bank0");
     write_text(config + "/bank0/num_lines", "8");
     write_text(config + "/bank0/label", "dtact-test");
+    std::filesystem::create_directories(config + "/bank0/line1");
+    write_text(config + "/bank0/line1/name", "RING_POWER");
+    // A line that the kernel itself holds, as a device tree's hog does.
+    std::filesystem::create_directories(config + "/bank0/line7/hog");
+    write_text(config + "/bank0/line7/hog/name", "lcd-reset");
+    write_text(config + "/bank0/line7/hog/direction", "output-low");
     write_text(config + "/live", "1");
     const auto word = [&](const std::string& file) {
       std::string text = read_text(config + file);
@@ -42,6 +56,14 @@ class Chip : public testing::Environment {
   static std::string& sysfs() {
     static std::string value;
     return value;
+  }
+  /// The kernel's word on a line (GPIO_V2_LINE_FLAG_...), whichever libgpiod asked it.
+  static std::uint64_t flags(unsigned line) {
+    const base::UniqueFd fd(::open(("/dev/" + name()).c_str(), O_RDONLY | O_CLOEXEC));
+    gpio_v2_line_info info{};
+    info.offset = line;
+    if (::ioctl(fd.get(), GPIO_V2_GET_LINEINFO_IOCTL, &info) != 0) ADD_FAILURE();
+    return info.flags;
   }
   static bool level(int line) {
     return read_text(sysfs() + "/sim_gpio" + std::to_string(line) + "/value").front() == '1';
@@ -77,12 +99,53 @@ TEST(GpioSim, ActiveLowTurnsTheLevel) {
   EXPECT_TRUE(Chip::level(5));
 }
 
+TEST(GpioSim, ALineIsFoundByItsName) {
+  const auto line = gpiod::open_output({.name = "RING_POWER"}, true, "key");
+  EXPECT_TRUE(Chip::level(1));
+  EXPECT_THAT(refusal_of({.chip = "dtact-test", .name = "RING_POWER"}), HasSubstr("in use by"));
+  EXPECT_THAT(refusal_of({.name = "RING"}), HasSubstr("line \"RING\": no line has this name"));
+}
+
+TEST(GpioSim, ALinkIsItsChipAndNoSecondOne) {
+  const std::string link = "/dev/gpiochip40";
+  std::filesystem::create_symlink(Chip::name(), link);
+  {
+    const auto line = gpiod::open_output({.chip = "gpiochip40", .line = 2}, true, "key");
+    EXPECT_TRUE(Chip::level(2));
+    const auto named = gpiod::open_output({.name = "RING_POWER"}, false, "key");
+    EXPECT_EQ(gpiod::list_chips().size(), 1U);
+  }
+  std::filesystem::remove(link);
+}
+
+TEST(GpioSim, TheBiasReachesTheKernelAndTheChip) {
+  constexpr std::uint64_t kBias = GPIO_V2_LINE_FLAG_BIAS_PULL_UP |
+                                  GPIO_V2_LINE_FLAG_BIAS_PULL_DOWN |
+                                  GPIO_V2_LINE_FLAG_BIAS_DISABLED;
+  const std::vector<std::pair<std::string, std::uint64_t>> expected{
+      {"as-is", 0},
+      {"pull-up", GPIO_V2_LINE_FLAG_BIAS_PULL_UP},
+      {"pull-down", GPIO_V2_LINE_FLAG_BIAS_PULL_DOWN},
+      {"disabled", GPIO_V2_LINE_FLAG_BIAS_DISABLED}};
+  for (const auto& [bias, flag] : expected) {
+    const auto line =
+        gpiod::open_output({.chip = "dtact-test", .line = 0, .bias = bias}, false, "key");
+    EXPECT_EQ(Chip::flags(0) & kBias, flag) << bias;
+    EXPECT_FALSE(Chip::level(0)) << "driven, whatever pulls";
+    // The simulated chip has the two resistors, and no means to take them away.
+    if (bias.starts_with("pull")) {
+      EXPECT_EQ(read_text(Chip::sysfs() + "/sim_gpio0/pull"), bias + "\n");
+    }
+  }
+}
+
 TEST(GpioSim, TheChipsAreListed) {
   const auto chips = gpiod::list_chips();
   ASSERT_EQ(chips.size(), 1U);
   EXPECT_EQ(chips[0].path, "/dev/" + Chip::name());
   EXPECT_EQ(chips[0].label, "dtact-test");
   EXPECT_EQ(chips[0].lines, 8);
+  EXPECT_THAT(chips[0].names, testing::ElementsAre("", "RING_POWER", "", "", "", "", "", ""));
 }
 
 TEST(GpioSim, RefusalsNameTheReasonAndTheRemedy) {
@@ -90,6 +153,8 @@ TEST(GpioSim, RefusalsNameTheReasonAndTheRemedy) {
   EXPECT_THAT(refusal_of({"gpiochip99", 1, false}), HasSubstr("(dtact-test, 8 lines)"));
   const auto held = gpiod::open_output({"dtact-test", 3, false}, false, "key");
   EXPECT_THAT(refusal_of({"dtact-test", 3, false}), HasSubstr("in use by \"dtactd\""));
+  EXPECT_THAT(refusal_of({"dtact-test", 7, false}), HasSubstr("in use by \"lcd-reset\""));
+  EXPECT_EQ(gpiod::line_holder("/dev/" + Chip::name(), 2), "");
   const AsNobody nobody;
   EXPECT_THAT(refusal_of({"dtact-test", 2, false}), HasSubstr("usermod -aG gpio"));
   EXPECT_THAT(refusal_of({"/dev/" + Chip::name(), 2, false}), HasSubstr("Permission denied"));

@@ -100,6 +100,17 @@ TEST_F(ConfigFile, WrongTypeOrValueNamesWhatIsAllowed) {
   EXPECT_THAT(error("[contact]\nmade_mm = 0.05\nlost_mm = 0.05\n"), HasSubstr("contact.lost_mm"));
 }
 
+TEST_F(ConfigFile, ReadsTheRingsPowerLine) {
+  const hal::GpioLineConfig power =
+      load("[ring.ws2812.power]\nname = 'GPIO17'\nbias = 'pull-down'\n").hal.ring.ws2812.power;
+  EXPECT_EQ(power.name, "GPIO17");
+  EXPECT_EQ(power.bias, "pull-down");
+  EXPECT_TRUE(power.is_set());
+  EXPECT_FALSE(load("").hal.ring.ws2812.power.is_set());
+  EXPECT_THAT(error("[ring.ws2812.power]\nbias = 'up'\n"),
+              AllOf(HasSubstr("ring.ws2812.power.bias"), HasSubstr("\"pull-up\"")));
+}
+
 TEST_F(ConfigFile, WhatIsGoneSaysWhyAndWhatToDo) {
   EXPECT_THAT(error("[ring]\nbackend = 'ws2812_gpio'\n"),
               AllOf(HasSubstr("c.toml:2: ring.backend: \"ws2812_gpio\" is gone"),

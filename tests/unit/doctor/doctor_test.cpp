@@ -50,7 +50,7 @@ class FakeMachine : public Machine {
   }
   [[nodiscard]] std::vector<hal::gpiod::Chip> gpio_chips() const override { return chips; }
   [[nodiscard]] std::string gpio_holder(const std::string& /*chip*/, int line) const override {
-    return line == held_line ? "lcd-reset" : "";
+    return line == held_line ? "\"lcd-reset\"" : "";
   }
 
   std::map<std::string, int> denied;
@@ -60,7 +60,8 @@ class FakeMachine : public Machine {
   rlim_t memlock = RLIM_INFINITY;
   std::map<std::string, Video> videos;
   SpiRate rate{3'200'000, {}};
-  std::vector<hal::gpiod::Chip> chips{{"/dev/gpiochip0", "pinctrl-rp1", 54}};
+  std::vector<hal::gpiod::Chip> chips{
+      {"/dev/gpiochip0", "pinctrl-rp1", 54, {"GPIO0", "GPIO1"}, {}}};
   int held_line = -1;
 
  private:
@@ -234,6 +235,11 @@ TEST(DoctorGpio, LinesAreFoundByPathNameAndLabel) {
     ring.ws2812.power = {chip, 17, false};
     EXPECT_TRUE(all_good(check_gpio(machine, ring))) << chip;
   }
+  ring.backend = "ws2812_pio";
+  ring.ws2812.power = {.name = "GPIO1"};
+  EXPECT_TRUE(all_good(check_gpio(machine, ring)));
+  ring.ws2812.power = {.name = "GPIO2"};
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("no line has this name"));
 }
 
 TEST(DoctorGpio, WhatCanBeWrongWithALine) {
