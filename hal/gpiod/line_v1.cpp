@@ -69,8 +69,7 @@ std::string line_holder(const std::string& path, int line) {
   gpiod_line* handle =
       chip == nullptr ? nullptr : ::gpiod_chip_get_line(chip.get(), static_cast<unsigned>(line));
   if (handle == nullptr || !::gpiod_line_is_used(handle)) return {};
-  const char* consumer = ::gpiod_line_consumer(handle);
-  return consumer == nullptr ? kNameless : '"' + std::string(consumer) + '"';
+  return holder_name(::gpiod_line_consumer(handle));
 }
 
 std::string library_version() { return ::gpiod_version_string(); }

@@ -99,8 +99,7 @@ std::string line_holder(const std::string& path, int line) {
   if (chip == nullptr) return {};
   const LineInfoPtr info(::gpiod_chip_get_line_info(chip.get(), static_cast<unsigned>(line)));
   if (info == nullptr || !::gpiod_line_info_is_used(info.get())) return {};
-  const char* consumer = ::gpiod_line_info_get_consumer(info.get());
-  return consumer == nullptr ? kNameless : '"' + std::string(consumer) + '"';
+  return holder_name(::gpiod_line_info_get_consumer(info.get()));
 }
 
 std::string library_version() { return ::gpiod_api_version(); }

@@ -107,6 +107,11 @@ std::string describe(const GpioLineConfig& line) {
   return line.chip.empty() ? which : fmt::format("chip \"{}\" {}", line.chip, which);
 }
 
+std::string holder_name(const char* consumer) {
+  const std::string name = consumer == nullptr ? "" : consumer;
+  return name.empty() || name == "?" ? "something that gave no name" : '"' + name + '"';
+}
+
 std::unique_ptr<OutputLine> open_output(const GpioLineConfig& line, bool active,
                                         const std::string& key) {
   const auto fail = [&](const std::string& why, const std::string& mend) {
@@ -128,7 +133,7 @@ std::unique_ptr<OutputLine> open_output(const GpioLineConfig& line, bool active,
   throw fail(std::strerror(error),
              fmt::format("it is in use by {}; free it or choose another line: "
                          "gpioinfo {}",
-                         holder.empty() ? kNameless : holder, place.chip));
+                         holder.empty() ? holder_name(nullptr) : holder, place.chip));
 }
 
 }  // namespace dtact::hal::gpiod

@@ -66,8 +66,8 @@ struct Place {
 [[nodiscard]] std::unique_ptr<OutputLine> request_output(const std::string& path, int offset,
                                                          const GpioLineConfig& line, bool active,
                                                          int& error);
-/// A holder without a name: the kernel itself, as for a line that is another function's pin.
-inline constexpr const char* kNameless = "something that gave no name";
+/// A consumer as messages name it. Parts of the kernel hold lines without a name, or as "?".
+[[nodiscard]] std::string holder_name(const char* consumer);
 /// Who holds the line, its name in quotes; empty when nobody.
 [[nodiscard]] std::string line_holder(const std::string& path, int line);
 [[nodiscard]] std::string library_version();

@@ -85,8 +85,8 @@ std::string PioWire::failed(int error) const {
       case ENODEV:
       case ENXIO:
         return "on a Raspberry Pi 5 put dtoverlay=ws2812-pio,gpio=<the data line's GPIO>,"
-               "num_leds=8 into /boot/firmware/config.txt and reboot; other boards have no such "
-               "driver: ring.backend = \"ws2812_spi\"";
+               "num_leds=8 into /boot/firmware/config.txt and reboot (dmesg says why when it is "
+               "there already); other boards have no such driver: ring.backend = \"ws2812_spi\"";
       default:
         return "see the kernel's log (dmesg) for the driver's own words";
     }

@@ -26,13 +26,13 @@ using kernel_test::read_text;
 using kernel_test::write_text;
 using testing::HasSubstr;
 
-/// A simulated chip of eight lines, labelled "dtact-test", for the test program's life.
+/// A simulated chip of nine lines, labelled "dtact-test", for the test program's life.
 class Chip : public testing::Environment {
  public:
   void SetUp() override {
     const std::string config = "/sys/kernel/config/gpio-sim/dtact";
     std::filesystem::create_directories(config + "/bank0");
-    write_text(config + "/bank0/num_lines", "8");
+    write_text(config + "/bank0/num_lines", "9");
     write_text(config + "/bank0/label", "dtact-test");
     std::filesystem::create_directories(config + "/bank0/line1");
     write_text(config + "/bank0/line1/name", "RING_POWER");
@@ -40,6 +40,8 @@ class Chip : public testing::Environment {
     std::filesystem::create_directories(config + "/bank0/line7/hog");
     write_text(config + "/bank0/line7/hog/name", "lcd-reset");
     write_text(config + "/bank0/line7/hog/direction", "output-low");
+    std::filesystem::create_directories(config + "/bank0/line8/hog");
+    write_text(config + "/bank0/line8/hog/direction", "output-low");
     write_text(config + "/live", "1");
     const auto word = [&](const std::string& file) {
       std::string text = read_text(config + file);
@@ -144,17 +146,20 @@ TEST(GpioSim, TheChipsAreListed) {
   ASSERT_EQ(chips.size(), 1U);
   EXPECT_EQ(chips[0].path, "/dev/" + Chip::name());
   EXPECT_EQ(chips[0].label, "dtact-test");
-  EXPECT_EQ(chips[0].lines, 8);
-  EXPECT_THAT(chips[0].names, testing::ElementsAre("", "RING_POWER", "", "", "", "", "", ""));
+  EXPECT_EQ(chips[0].lines, 9);
+  EXPECT_THAT(chips[0].names, testing::ElementsAre("", "RING_POWER", "", "", "", "", "", "", ""));
 }
 
 TEST(GpioSim, RefusalsNameTheReasonAndTheRemedy) {
-  EXPECT_THAT(refusal_of({"dtact-test", 8, false}), HasSubstr("it has lines 0 … 7"));
-  EXPECT_THAT(refusal_of({"gpiochip99", 1, false}), HasSubstr("(dtact-test, 8 lines)"));
+  EXPECT_THAT(refusal_of({"dtact-test", 9, false}), HasSubstr("it has lines 0 … 8"));
+  EXPECT_THAT(refusal_of({"gpiochip99", 1, false}), HasSubstr("(dtact-test, 9 lines)"));
   const auto held = gpiod::open_output({"dtact-test", 3, false}, false, "key");
   EXPECT_THAT(refusal_of({"dtact-test", 3, false}), HasSubstr("in use by \"dtactd\""));
   EXPECT_THAT(refusal_of({"dtact-test", 7, false}), HasSubstr("in use by \"lcd-reset\""));
+  EXPECT_THAT(refusal_of({"dtact-test", 8, false}),
+              HasSubstr("in use by something that gave no name"));
   EXPECT_EQ(gpiod::line_holder("/dev/" + Chip::name(), 2), "");
+  EXPECT_EQ(gpiod::line_holder("/dev/" + Chip::name(), 8), "something that gave no name");
   const AsNobody nobody;
   EXPECT_THAT(refusal_of({"dtact-test", 2, false}), HasSubstr("usermod -aG gpio"));
   EXPECT_THAT(refusal_of({"/dev/" + Chip::name(), 2, false}), HasSubstr("Permission denied"));

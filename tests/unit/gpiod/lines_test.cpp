@@ -59,6 +59,13 @@ TEST(GpioLine, OffsetAndNameTogetherAreRefused) {
             "both line and name are given: set key.line = -1");
 }
 
+TEST(GpioLine, AHolderMayHaveNoName) {
+  EXPECT_EQ(holder_name("lcd-reset"), "\"lcd-reset\"");
+  for (const char* none : {"", "?", static_cast<const char*>(nullptr)}) {
+    EXPECT_EQ(holder_name(none), "something that gave no name");
+  }
+}
+
 TEST(GpioLine, MessagesNameWhatIsConfigured) {
   EXPECT_EQ(describe({.chip = "gpiochip0", .line = 17}), "chip \"gpiochip0\" line 17");
   EXPECT_EQ(describe({.name = "GPIO17"}), "line \"GPIO17\"");
