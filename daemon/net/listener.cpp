@@ -1,8 +1,11 @@
 #include "daemon/net/listener.hpp"
 
 #include <fmt/format.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 #include <boost/asio/ip/v6_only.hpp>
+#include <cerrno>
 #include <stdexcept>
 
 namespace dtact::net {
@@ -31,11 +34,22 @@ const char* remedy_for(const error_code& error) {
   }
   if (error == asio::error::access_denied)
     return "ports below 1024 need a privilege; choose another";
-  if (error.value() == EADDRNOTAVAIL) return "no interface of this machine has that address";
   return "check the configured address and port";
 }
 
-tcp::acceptor listen(asio::io_context& io, const tcp::endpoint& endpoint) {
+/// bind() to an address that no interface has yet (ip(7)); needs no privilege.
+void bind_to_absent(tcp::acceptor& acceptor, const tcp::endpoint& endpoint, error_code& error) {
+  const bool v6 = endpoint.address().is_v6();
+  const int yes = 1;
+  if (::setsockopt(acceptor.native_handle(), v6 ? IPPROTO_IPV6 : IPPROTO_IP,
+                   v6 ? IPV6_FREEBIND : IP_FREEBIND, &yes, sizeof yes) != 0) {
+    error.assign(errno, boost::system::system_category());
+    return;
+  }
+  acceptor.bind(endpoint, error);
+}
+
+tcp::acceptor listen(asio::io_context& io, const tcp::endpoint& endpoint, const Log& log) {
   tcp::acceptor acceptor(io);
   error_code error;
   const auto step = [&](auto call) {
@@ -48,6 +62,19 @@ tcp::acceptor listen(asio::io_context& io, const tcp::endpoint& endpoint) {
     if (endpoint.address().is_v6()) acceptor.set_option(asio::ip::v6_only(false), error);
   });
   step([&] { acceptor.bind(endpoint, error); });
+  if (error.value() == EADDRNOTAVAIL) {
+    // DHCP may bring it any time after the start. The kernel lets clients in from that moment on;
+    // trying again here would only be later, and clients could not be told of it: they come by that
+    // address.
+    error.clear();
+    bind_to_absent(acceptor, endpoint, error);
+    step([&] {
+      log(LogLevel::warning,
+          fmt::format("no interface has the address {} yet: clients can connect as soon as one has "
+                      "(ip address shows what there is)",
+                      endpoint.address().to_string()));
+    });
+  }
   step([&] { acceptor.listen(asio::socket_base::max_listen_connections, error); });
   if (error) {
     throw std::runtime_error(fmt::format("cannot listen on {} port {}: {}; {}",
@@ -61,7 +88,7 @@ tcp::acceptor listen(asio::io_context& io, const tcp::endpoint& endpoint) {
 
 Listener::Listener(asio::io_context& io, const NetConfig& config, OnConnection on_connection)
     : config_(config),
-      acceptor_(listen(io, endpoint_of(config))),
+      acceptor_(listen(io, endpoint_of(config), config.log)),
       timer_(io),
       on_connection_(std::move(on_connection)) {}
 

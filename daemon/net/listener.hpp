@@ -16,7 +16,8 @@ class Listener : public std::enable_shared_from_this<Listener> {
  public:
   using OnConnection = std::function<void(boost::asio::ip::tcp::socket)>;
 
-  /// Binds and listens. Throws std::runtime_error naming address, port and remedy.
+  /// Binds and listens, also on an address that no interface has yet: clients can connect once one
+  /// has. Throws std::runtime_error naming address, port and remedy.
   Listener(boost::asio::io_context& io, const NetConfig& config, OnConnection on_connection);
 
   void start() { accept(); }

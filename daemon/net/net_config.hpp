@@ -18,7 +18,8 @@ using Log = std::function<void(LogLevel, const std::string&)>;
 /// Settings of the network part.
 struct NetConfig {
   /// IPv4 or IPv6 address to listen on. "0.0.0.0" or "::" (which takes IPv4 too) for every
-  /// interface. There is no authentication: whoever can connect can command.
+  /// interface. It may come later than the daemon, as by DHCP. There is no authentication: whoever
+  /// can connect can command.
   std::string address = wire::kDefaultAddress;
   std::uint16_t port = wire::kDefaultPort;        ///< 0: any free one, see Server::port().
   std::size_t max_clients = 32;                   ///< More are refused with a sentence.

@@ -80,12 +80,11 @@ DaemonProcess::DaemonProcess(const std::vector<std::string>& arguments, Environm
 
 void DaemonProcess::wait_until_ready() {
   const auto deadline = Clock::now() + std::chrono::seconds(60);
-  const std::string marker = "listening on 127.0.0.1:";
   while (Clock::now() < deadline) {
     if (const auto message = notify_.next(std::chrono::milliseconds(100))) {
-      const std::size_t at = message->find(marker);
-      if (message->find("READY=1") != std::string::npos && at != std::string::npos) {
-        port_ = static_cast<std::uint16_t>(std::stoi(message->substr(at + marker.size())));
+      if (message->find("READY=1") != std::string::npos &&
+          message->find("listening on ") != std::string::npos) {
+        port_ = static_cast<std::uint16_t>(std::stoi(message->substr(message->rfind(':') + 1)));
         return;
       }
     }

@@ -35,7 +35,7 @@ int run_program(const std::vector<std::string>& arguments, std::string* output =
 /// Variables beside those of this program.
 using Environment = std::vector<std::pair<std::string, std::string>>;
 
-/// A dtactd of the test's own on a loopback port that the system chose. Started the way systemd
+/// A dtactd of the test's own on a port that the system chose. Started the way systemd
 /// starts it: ready when it says READY=1 on its notify socket.
 class DaemonProcess {
  public:

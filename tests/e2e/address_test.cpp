@@ -1,0 +1,98 @@
+// The daemon in a network whose address comes after the daemon, as by DHCP.
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <linux/ipv6.h>
+#include <net/if.h>
+#include <sched.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <functional>
+#include <string>
+
+#include "clients/cpp/client.hpp"
+#include "hal/base/unique_fd.hpp"
+#include "tests/e2e/daemon_process.hpp"
+
+namespace dtact::e2e {
+namespace {
+
+// Of the ranges for documentation (RFC 5737, RFC 3849): nobody's.
+constexpr const char* kIpv4 = "192.0.2.7";
+constexpr const char* kIpv6 = "2001:db8::7";
+
+/// This program and what it starts get a network of their own, in which loopback alone is up.
+class LateAddress : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    // Whoever is not root becomes it in a user namespace, where one may be made.
+    if (::unshare(::geteuid() == 0 ? CLONE_NEWNET : CLONE_NEWUSER | CLONE_NEWNET) != 0) {
+      GTEST_SKIP() << "no network namespace can be made here: " << std::strerror(errno);
+    }
+    v4_ = base::UniqueFd(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    ifreq request = loopback();
+    request.ifr_flags = IFF_UP | IFF_RUNNING;
+    ASSERT_EQ(::ioctl(v4_.get(), SIOCSIFFLAGS, &request), 0) << std::strerror(errno);
+  }
+
+  void bring_ipv4() {
+    // An alias: 127.0.0.1 stays.
+    ifreq request = loopback(":1");
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    ASSERT_EQ(::inet_pton(AF_INET, kIpv4, &address.sin_addr), 1);
+    std::memcpy(&request.ifr_addr, &address, sizeof address);
+    ASSERT_EQ(::ioctl(v4_.get(), SIOCSIFADDR, &request), 0) << std::strerror(errno);
+  }
+  void bring_ipv6() {
+    const base::UniqueFd v6(::socket(AF_INET6, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    in6_ifreq request{};
+    ASSERT_EQ(::inet_pton(AF_INET6, kIpv6, &request.ifr6_addr), 1);
+    request.ifr6_prefixlen = 128;
+    request.ifr6_ifindex = static_cast<int>(::if_nametoindex("lo"));
+    ASSERT_EQ(::ioctl(v6.get(), SIOCSIFADDR, &request), 0) << std::strerror(errno);
+  }
+
+  /// The daemon serves nobody before `bring` and a client after it.
+  void serves_once_it_comes(const std::string& address, const std::function<void()>& bring) {
+    const TempFolder state;
+    DaemonProcess daemon({"--set", "camera.backend=null", "--set", "ring.backend=null", "--set",
+                          "net.address=" + address, "--set", "net.port=0", "--set",
+                          "state_dir=" + state.path().string()});
+    EXPECT_NE(daemon.log().find("no interface has the address " + address + " yet"),
+              std::string::npos)
+        << daemon.log();
+    const client::Options options{.host = address, .port = daemon.port()};
+    EXPECT_THROW(client::Client{options}, client::ConnectionError);
+    bring();
+    const client::Client client(options);
+    EXPECT_EQ(client.server().major(), 1U);
+    EXPECT_EQ(daemon.stop(SIGTERM), 0);
+  }
+
+ private:
+  static ifreq loopback(const std::string& alias = "") {
+    ifreq request{};
+    const std::string name = "lo" + alias;
+    std::copy(name.begin(), name.end(), request.ifr_name);
+    return request;
+  }
+
+  base::UniqueFd v4_;
+};
+
+TEST_F(LateAddress, OfIpv4) {
+  serves_once_it_comes(kIpv4, [this] { bring_ipv4(); });
+}
+
+TEST_F(LateAddress, OfIpv6) {
+  serves_once_it_comes(kIpv6, [this] { bring_ipv6(); });
+}
+
+}  // namespace
+}  // namespace dtact::e2e
