@@ -20,6 +20,10 @@ int main(int argc, char** argv) {
     const LoadedConfig loaded = load_config(options.config, options.settings);
     if (options.print_config) print_config(loaded, std::cout);
     if (options.print_config || options.check_config) return 0;
+    if (options.report) {
+      report(loaded.config.hal, std::cout);
+      return 0;
+    }
     if (options.doctor) return doctor(loaded.config.hal, std::cout);
 
     spdlog::set_level(spdlog::level::from_str(loaded.config.log_level));

@@ -31,9 +31,14 @@ Parsed parse_options(int argc, const char* const* argv) {
                "Check the configuration, say what is wrong, and exit");
   cli.add_flag("--print-config", options.print_config,
                "Print the effective values and where each came from, and exit");
-  cli.add_flag("--doctor", options.doctor,
-               "Check what the configuration needs of this machine, print what is wrong with the\n"
-               "command that mends it, and exit; status 1 when something is wrong");
+  CLI::Option* const doctor = cli.add_flag(
+      "--doctor", options.doctor,
+      "Check what the configuration needs of this machine, print what is wrong with the\n"
+      "command that mends it, and exit; status 1 when something is wrong");
+  cli.add_flag("--report", options.report,
+               "With --doctor: what this machine is and what is wrong, to be sent to others;\n"
+               "no names of users and hosts and no serial numbers")
+      ->needs(doctor);
   cli.footer(
       "Environment: DTACTD_LOG sets the log level; it wins over the file, an option over it.\n"
       "Exit status: 0 after SIGTERM or SIGINT, 1 on an error, 2 on a wrong command line.");

@@ -14,6 +14,7 @@ struct Options {
   bool check_config = false;
   bool print_config = false;
   bool doctor = false;  ///< --doctor: check the machine instead of running.
+  bool report = false;  ///< --report: the same for somebody else to read.
 };
 
 /// Either options to run with, or the exit status after --help, --version or a mistake, whose text

@@ -25,14 +25,26 @@ using Findings = std::vector<Finding>;
 
 /// Nodes of cameras: there, permitted, at least one that captures.
 [[nodiscard]] Findings check_camera(const Machine& machine, const hal::CameraConfig& camera);
+/// How quick the USB port of each camera is, and whether the configured raw format fits into it.
+[[nodiscard]] Findings check_usb_speed(const Machine& machine, const hal::CameraConfig& camera);
+/// A heap of cached memory for libcamera's frames.
+[[nodiscard]] Findings check_dma_heap(const Machine& machine, const hal::CameraConfig& camera);
 /// spidev: there, permitted, a speed inside the WS2812B's window, bufsiz, the true rate.
 [[nodiscard]] Findings check_spi(const Machine& machine, const hal::RingConfig& ring);
-/// What makes the SPI rate of a Raspberry Pi move: config.txt's core clock.
+/// What makes the SPI rate of a Raspberry Pi 3 or 4 move: the core clock.
 [[nodiscard]] Findings check_core_clock(const Machine& machine, const hal::RingConfig& ring);
+/// What a Raspberry Pi's firmware says of under-voltage and heat.
+[[nodiscard]] Findings check_throttling(const Machine& machine);
+/// The groups that systemd/dtactd.service starts the daemon in.
+[[nodiscard]] Findings check_groups(const Machine& machine);
 /// GPIO chips and the configured lines: there, permitted, free.
 [[nodiscard]] Findings check_gpio(const Machine& machine, const hal::RingConfig& ring);
 /// RLIMIT_RTPRIO and RLIMIT_MEMLOCK.
 [[nodiscard]] Findings check_realtime(const Machine& machine);
+/// The share of time that the kernel leaves to all real-time threads together.
+[[nodiscard]] Findings check_realtime_share(const Machine& machine);
+/// Memory that is free for the daemon to lock.
+[[nodiscard]] Findings check_memory(const Machine& machine);
 /// A clock source that is read without a system call.
 [[nodiscard]] Findings check_clock_source(const Machine& machine);
 /// CPU frequency governors.

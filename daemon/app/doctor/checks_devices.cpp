@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 
 #include "daemon/app/doctor/checks.hpp"
@@ -24,9 +25,7 @@ std::string join_group(const Machine& machine, const std::string& path,
                      owner.empty() || owner == "root" ? usual_group : owner, machine.user());
 }
 
-bool is_raspberry_pi(const Machine& machine) {
-  return machine.line("/proc/device-tree/model").value_or("").starts_with("Raspberry Pi");
-}
+bool is_raspberry_pi(const Machine& machine) { return machine.model().starts_with("Raspberry Pi"); }
 
 Finding check_line(const Machine& machine, const std::string& key,
                    const hal::GpioLineConfig& line) {
@@ -77,6 +76,60 @@ Findings check_camera(const Machine& machine, const hal::CameraConfig& camera) {
     findings.push_back({bad, "no video node captures", "v4l2-ctl --list-devices"});
   }
   return findings;
+}
+
+Findings check_usb_speed(const Machine& machine, const hal::CameraConfig& camera) {
+  Findings findings;
+  if (camera.backend != "v4l2") return findings;
+  // What an isochronous endpoint carries at high speed: three packets of 1024 bytes in each of 8000
+  // microframes a second (USB 2.0 specification, 5.6.3 and 5.9.2).
+  constexpr double kHighSpeedBytes = 3 * 1024 * 8000;
+  const double bytes_per_pixel = camera.v4l2.pixel_format == "grey"   ? 1
+                                 : camera.v4l2.pixel_format == "nv12" ? 1.5
+                                 : camera.v4l2.pixel_format == "yuyv" ? 2
+                                                                      : 0;  // "auto", "mjpeg"
+  const double need = camera.fps * camera.width * camera.height * bytes_per_pixel;
+  for (const std::string& node : machine.list("/dev", "video")) {
+    const std::string name = node.substr(node.rfind('/') + 1);
+    // The node's device is an interface of the USB device, which knows the speed.
+    const auto speed = machine.line("/sys/class/video4linux/" + name + "/device/../speed");
+    if (!speed || !machine.video(node).captures) continue;
+    const double megabits = std::strtod(speed->c_str(), nullptr);
+    const std::string what = fmt::format("{} is on a port of {} Mbit/s", node, *speed);
+    if (megabits < 480) {
+      findings.push_back({Verdict::wrong, what + ": too slow for a stream of pictures",
+                          "lsusb -t, then another port or cable, and no hub between"});
+    } else if (megabits < 5000 && need > kHighSpeedBytes) {
+      findings.push_back(
+          {Verdict::note,
+           fmt::format("{}, which carries up to {:.1f} MB/s; {} at {}x{} and {:g} fps needs {:.1f}",
+                       what, kHighSpeedBytes / 1e6, camera.v4l2.pixel_format, camera.width,
+                       camera.height, camera.fps, need / 1e6),
+           "set camera.v4l2.pixel_format = \"mjpeg\", or lsusb -t and a USB 3 port"});
+    } else {
+      findings.push_back({Verdict::good, what, ""});
+    }
+  }
+  return findings;
+}
+
+Findings check_dma_heap(const Machine& machine, const hal::CameraConfig& camera) {
+  if (camera.backend != "libcamera") return {};
+  const std::string folder = "/dev/dma_heap";
+  std::string denied;
+  for (const std::string& heap : machine.list(folder, "")) {
+    if (machine.access(heap) == 0) return {{Verdict::good, heap + " may be opened", ""}};
+    denied = heap;
+  }
+  // Frames that libcamera allocates itself lie in uncached memory on a Raspberry Pi
+  // (raspberrypi/linux issue 5286).
+  const std::string cost = "frames lie in memory that is slow to read";
+  if (!denied.empty()) {
+    return {{Verdict::note, denied + " may not be opened: " + cost,
+             join_group(machine, denied, "video")}};
+  }
+  return {{Verdict::note, fmt::format("no heap in {}: {}", folder, cost),
+           "a kernel with CONFIG_DMABUF_HEAPS (Raspberry Pi OS has it): ls " + folder}};
 }
 
 Findings check_spi(const Machine& machine, const hal::RingConfig& ring) {
@@ -139,25 +192,6 @@ Findings check_spi(const Machine& machine, const hal::RingConfig& ring) {
     findings.push_back({Verdict::good, fmt::format("measured rate {:.3f} MHz", rate.hz / 1e6), ""});
   }
   return findings;
-}
-
-Findings check_core_clock(const Machine& machine, const hal::RingConfig& ring) {
-  const std::string model = machine.line("/proc/device-tree/model").value_or("");
-  // A Raspberry Pi 5's header SPI has a clock of its own.
-  const bool four = model.starts_with("Raspberry Pi 4") || model.find("Module 4") != model.npos;
-  const bool three = model.starts_with("Raspberry Pi 3") || model.find("Module 3") != model.npos;
-  if (ring.backend != "ws2812_spi" || (!four && !three)) return {};
-  const std::string path = "/boot/firmware/config.txt";
-  const std::string config = machine.text(path);
-  const std::string wanted = four ? "core_freq_min=500" : "core_freq=250";
-  const std::string lines = four ? "core_freq=500\\ncore_freq_min=500" : "core_freq=250";
-  if (config.find("\n" + wanted) != std::string::npos || config.starts_with(wanted)) {
-    return {{Verdict::good, fmt::format("{} has {}", path, wanted), ""}};
-  }
-  return {
-      {Verdict::note,
-       fmt::format("{}: the core clock, from which the SPI's is divided, moves with load", model),
-       fmt::format("printf '{}\\n' | sudo tee -a {} && sudo reboot", lines, path)}};
 }
 
 Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <sstream>
 #include <string_view>
 
@@ -41,6 +42,37 @@ Findings check_realtime(const Machine& machine) {
     findings.push_back({Verdict::good, "RLIMIT_MEMLOCK suffices", ""});
   }
   return findings;
+}
+
+Findings check_realtime_share(const Machine& machine) {
+  const auto runtime = machine.line("/proc/sys/kernel/sched_rt_runtime_us");
+  const auto period = machine.line("/proc/sys/kernel/sched_rt_period_us");
+  if (!runtime || !period) return {};
+  const long runtime_us = std::strtol(runtime->c_str(), nullptr, 10);
+  const long period_us = std::strtol(period->c_str(), nullptr, 10);
+  const std::string what = fmt::format("sched_rt_runtime_us = {} of {}", runtime_us, period_us);
+  // -1 is without a limit; 95 % is the kernel's default (Documentation/scheduler/sched-rt-group).
+  if (runtime_us < 0 || 10 * runtime_us >= 9 * period_us) return {{Verdict::good, what, ""}};
+  return {{runtime_us == 0 ? Verdict::wrong : Verdict::note,
+           what + ": real-time threads stand still for the rest",
+           "sudo sysctl kernel.sched_rt_period_us=1000000 kernel.sched_rt_runtime_us=950000"}};
+}
+
+Findings check_memory(const Machine& machine) {
+  std::istringstream info(machine.text("/proc/meminfo"));
+  std::string key;
+  long available_kb = -1;
+  for (std::string line; std::getline(info, line);) {
+    std::istringstream words(line);
+    if (words >> key && key == "MemAvailable:") words >> available_kb;
+  }
+  if (available_kb < 0) return {};
+  const std::string what = fmt::format("{} MiB are available", available_kb / 1024);
+  // Twice what it holds with eight clients (README.md).
+  constexpr long kEnoughKb = 128L * 1024;
+  if (available_kb >= kEnoughKb) return {{Verdict::good, what, ""}};
+  return {{Verdict::note, what + ": too few for a daemon that locks its memory",
+           "ps -eo rss,comm --sort=-rss | head"}};
 }
 
 Findings check_clock_source(const Machine& machine) {

@@ -3,34 +3,65 @@
 #include <fmt/format.h>
 
 #include <ostream>
+#include <vector>
 
 #include "daemon/app/doctor/checks.hpp"
+#include "daemon/app/doctor/facts.hpp"
 
 namespace dtact::app {
+namespace {
 
-int doctor(const hal::Config& config, std::ostream& out) {
-  const Machine machine;
+struct Subject {
+  const char* name;
+  Findings findings;
+};
+
+std::vector<Subject> examine(const Machine& machine, const hal::Config& config) {
+  return {{"camera", check_camera(machine, config.camera)},
+          {"usb", check_usb_speed(machine, config.camera)},
+          {"dma heap", check_dma_heap(machine, config.camera)},
+          {"spi", check_spi(machine, config.ring)},
+          {"core clock", check_core_clock(machine, config.ring)},
+          {"gpio", check_gpio(machine, config.ring)},
+          {"groups", check_groups(machine)},
+          {"power", check_throttling(machine)},
+          {"real time", check_realtime(machine)},
+          {"rt share", check_realtime_share(machine)},
+          {"memory", check_memory(machine)},
+          {"clock source", check_clock_source(machine)},
+          {"governor", check_governor(machine)}};
+}
+
+/// Returns how many are wrong. With `mends`, the command stands under each.
+int print(const std::vector<Subject>& subjects, bool mends, std::ostream& out) {
   int wrong = 0;
-  const auto print = [&](const char* subject, const Findings& findings) {
-    for (const Finding& finding : findings) {
+  for (const Subject& subject : subjects) {
+    for (const Finding& finding : subject.findings) {
       const char* verdict = finding.verdict == Verdict::good   ? "ok"
                             : finding.verdict == Verdict::note ? "note"
                                                                : "WRONG";
       wrong += finding.verdict == Verdict::wrong ? 1 : 0;
-      out << fmt::format("{:<12} {:<6} {}\n", subject, verdict, finding.what);
-      if (!finding.mend.empty()) out << fmt::format("{:<12} {:<6} {}\n", "", "mend:", finding.mend);
+      out << fmt::format("{:<12} {:<6} {}\n", subject.name, verdict, finding.what);
+      if (mends && !finding.mend.empty()) {
+        out << fmt::format("{:<12} {:<6} {}\n", "", "mend:", finding.mend);
+      }
     }
-  };
-  print("camera", check_camera(machine, config.camera));
-  print("spi", check_spi(machine, config.ring));
-  print("core clock", check_core_clock(machine, config.ring));
-  print("gpio", check_gpio(machine, config.ring));
-  print("real time", check_realtime(machine));
-  print("clock source", check_clock_source(machine));
-  print("governor", check_governor(machine));
+  }
   out << (wrong == 0 ? std::string("nothing is wrong\n")
                      : fmt::format("{} {} wrong\n", wrong, wrong == 1 ? "thing is" : "things are"));
-  return wrong == 0 ? 0 : 1;
+  return wrong;
+}
+
+}  // namespace
+
+int doctor(const hal::Config& config, std::ostream& out, const Machine& machine) {
+  return print(examine(machine, config), true, out) == 0 ? 0 : 1;
+}
+
+void report(const hal::Config& config, std::ostream& out, const Machine& machine) {
+  print_facts(machine, config, out);
+  // Without the commands, which name the user.
+  (void)print(examine(machine, config), false, out);
 }
 
 }  // namespace dtact::app

@@ -9,8 +9,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstdio>
 #include <fstream>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 
@@ -108,6 +111,22 @@ std::vector<hal::gpiod::Chip> Machine::gpio_chips() const { return hal::gpiod::l
 
 std::string Machine::gpio_holder(const std::string& chip, int line) const {
   return hal::gpiod::line_holder(chip, line);
+}
+
+std::string Machine::firmware(const std::string& question) const {
+  const auto close = [](std::FILE* pipe) { ::pclose(pipe); };
+  // Only the doctor's own constants get here.
+  std::FILE* const opened = ::popen(("vcgencmd " + question + " 2>/dev/null").c_str(), "re");
+  const std::unique_ptr<std::FILE, decltype(close)> pipe(opened, close);
+  std::array<char, 256> answer{};
+  if (!pipe || std::fgets(answer.data(), answer.size(), pipe.get()) == nullptr) return {};
+  std::string line(answer.data());
+  while (!line.empty() && line.back() == '\n') line.pop_back();
+  return line;
+}
+
+std::vector<hal::v4l2::SurveyedCamera> Machine::cameras() const {
+  return hal::v4l2::survey_cameras();
 }
 
 }  // namespace dtact::app

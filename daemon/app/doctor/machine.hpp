@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hal/gpiod/lines.hpp"
+#include "hal/v4l2/survey.hpp"
 
 namespace dtact::app {
 
@@ -28,6 +29,9 @@ class Machine {
   /// Paths in a folder whose names begin so, sorted.
   [[nodiscard]] std::vector<std::string> list(const std::string& folder,
                                               const std::string& prefix) const;
+
+  /// The board's name of itself, as "Raspberry Pi 5 Model B Rev 1.0"; empty without a device tree.
+  [[nodiscard]] std::string model() const { return line("/proc/device-tree/model").value_or(""); }
 
   /// 0 when this user may read and write it, else an errno.
   [[nodiscard]] virtual int access(const std::string& path) const;
@@ -53,6 +57,11 @@ class Machine {
 
   [[nodiscard]] virtual std::vector<hal::gpiod::Chip> gpio_chips() const;
   [[nodiscard]] virtual std::string gpio_holder(const std::string& chip, int line) const;
+
+  /// What a Raspberry Pi's firmware answers to `vcgencmd QUESTION`, as "throttled=0x0"; empty where
+  /// it cannot be asked.
+  [[nodiscard]] virtual std::string firmware(const std::string& question) const;
+  [[nodiscard]] virtual std::vector<hal::v4l2::SurveyedCamera> cameras() const;
 
  protected:
   [[nodiscard]] std::filesystem::path below_root(const std::string& path) const;

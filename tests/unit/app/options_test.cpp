@@ -28,6 +28,12 @@ TEST(Options, LogLevelIsASetting) {
             std::vector<std::string>{"log_level='debug'"});
 }
 
+TEST(Options, AReportIsTheDoctors) {
+  EXPECT_TRUE(parse({"--doctor", "--report"}).options.report);
+  EXPECT_FALSE(parse({"--doctor"}).options.report);
+  EXPECT_EQ(parse({"--report"}).exit_status, 2);
+}
+
 TEST(Options, HelpAndVersionEndWell) {
   EXPECT_EQ(parse({"--help"}).exit_status, 0);
   EXPECT_EQ(parse({"--version"}).exit_status, 0);

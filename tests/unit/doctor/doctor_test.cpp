@@ -20,6 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using testing::SizeIs;
 
 /// A machine made of a folder of files and of a few answers.
@@ -52,6 +53,24 @@ class FakeMachine : public Machine {
   [[nodiscard]] std::string gpio_holder(const std::string& /*chip*/, int line) const override {
     return line == held_line ? "\"lcd-reset\"" : "";
   }
+  [[nodiscard]] std::string firmware(const std::string& question) const override {
+    const auto found = answers.find(question);
+    return found == answers.end() ? "" : found->second;
+  }
+  [[nodiscard]] std::vector<hal::v4l2::SurveyedCamera> cameras() const override { return attached; }
+
+  /// A camera that captures, as the kernel shows one on a USB port of that many Mbit/s.
+  void usb_camera(const std::string& speed) {
+    const std::string port = "/sys/devices/usb1/1-1";
+    file("/dev/video0");
+    file(port + "/speed", speed + "\n");
+    file(port + "/1-1:1.0/uevent");
+    const std::string node = "/sys/class/video4linux/video0";
+    fs::create_directories(below_root(node));
+    fs::remove(below_root(node + "/device"));
+    fs::create_directory_symlink(below_root(port + "/1-1:1.0"), below_root(node + "/device"));
+    videos = {{"/dev/video0", {true, "Endoscope", 0}}};
+  }
 
   std::map<std::string, int> denied;
   std::string owner = "root";
@@ -63,6 +82,8 @@ class FakeMachine : public Machine {
   std::vector<hal::gpiod::Chip> chips{
       {"/dev/gpiochip0", "pinctrl-rp1", 54, {"GPIO0", "GPIO1"}, {}}};
   int held_line = -1;
+  std::map<std::string, std::string> answers;  ///< Of the firmware.
+  std::vector<hal::v4l2::SurveyedCamera> attached;
 
  private:
   static fs::path make_folder() {
@@ -154,6 +175,59 @@ TEST(DoctorCamera, AForbiddenNodeNamesTheGroup) {
   EXPECT_EQ(only_trouble(check_camera(machine, hal::CameraConfig{})).verdict, Verdict::note);
 }
 
+TEST(DoctorUsb, APortOfUsb1IsTooSlow) {
+  FakeMachine machine;
+  machine.usb_camera("12");
+  const Finding finding = only_trouble(check_usb_speed(machine, v4l2()));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_EQ(finding.what,
+            "/dev/video0 is on a port of 12 Mbit/s: too slow for a stream of pictures");
+  EXPECT_THAT(finding.mend, HasSubstr("lsusb -t"));
+}
+
+TEST(DoctorUsb, RawPicturesHaveToFitIntoUsb2) {
+  FakeMachine machine;
+  machine.usb_camera("480");
+  hal::CameraConfig camera = v4l2();  // 800x600 at 60 fps
+  EXPECT_TRUE(all_good(check_usb_speed(machine, camera)));
+  camera.v4l2.pixel_format = "yuyv";
+  const Finding finding = only_trouble(check_usb_speed(machine, camera));
+  EXPECT_EQ(finding.verdict, Verdict::note);
+  // 800 · 600 pixels of two bytes, 60 times a second; 3 · 1024 bytes, 8000 times a second.
+  EXPECT_THAT(finding.what, HasSubstr("carries up to 24.6 MB/s"));
+  EXPECT_THAT(finding.what, HasSubstr("yuyv at 800x600 and 60 fps needs 57.6"));
+  camera.fps = 25;
+  EXPECT_TRUE(all_good(check_usb_speed(machine, camera)));
+  camera.fps = 60;
+  machine.usb_camera("5000");
+  EXPECT_TRUE(all_good(check_usb_speed(machine, camera)));
+}
+
+TEST(DoctorUsb, OtherCamerasHaveNoPort) {
+  FakeMachine machine;
+  machine.file("/dev/video0");
+  machine.videos = {{"/dev/video0", {true, "vivid", 0}}};
+  EXPECT_THAT(check_usb_speed(machine, v4l2()), IsEmpty());
+  machine.usb_camera("12");
+  EXPECT_THAT(check_usb_speed(machine, hal::CameraConfig{}), IsEmpty());
+}
+
+TEST(DoctorDmaHeap, IsForLibcameraAndMayBeMissing) {
+  FakeMachine machine;
+  EXPECT_THAT(check_dma_heap(machine, v4l2()), IsEmpty());
+  hal::CameraConfig camera;
+  camera.backend = "libcamera";
+  EXPECT_THAT(only_trouble(check_dma_heap(machine, camera)).what,
+              HasSubstr("no heap in /dev/dma_heap"));
+  machine.file("/dev/dma_heap/linux,cma");
+  machine.denied = {{"/dev/dma_heap/linux,cma", EACCES}};
+  const Finding finding = only_trouble(check_dma_heap(machine, camera));
+  EXPECT_EQ(finding.verdict, Verdict::note);
+  EXPECT_THAT(finding.mend, HasSubstr("usermod -aG video anna"));
+  machine.file("/dev/dma_heap/vidbuf_cached");
+  EXPECT_TRUE(all_good(check_dma_heap(machine, camera)));
+}
+
 TEST(DoctorSpi, NotNeededWithoutAnSpiRing) {
   const FakeMachine machine;
   EXPECT_TRUE(all_good(check_spi(machine, hal::RingConfig{})));
@@ -217,10 +291,59 @@ TEST(DoctorCoreClock, IsOfInterestOnARaspberryPi4) {
   const Finding finding = only_trouble(check_core_clock(machine, spi_ring()));
   EXPECT_EQ(finding.verdict, Verdict::note);
   EXPECT_THAT(finding.mend, HasSubstr("core_freq=500\\ncore_freq_min=500"));
-  machine.file("/boot/firmware/config.txt", "core_freq=500\ncore_freq_min=500\n");
-  EXPECT_TRUE(all_good(check_core_clock(machine, spi_ring())));
+  machine.answers = {{"measure_clock core", "frequency(1)=200000992"}};
+  EXPECT_THAT(only_trouble(check_core_clock(machine, spi_ring())).what,
+              HasSubstr("moves with load, now 200 MHz"));
+  for (const char* config : {"core_freq=500\ncore_freq_min=500\n", "force_turbo=1\n"}) {
+    machine.file("/boot/firmware/config.txt", config);
+    EXPECT_TRUE(all_good(check_core_clock(machine, spi_ring()))) << config;
+  }
+  // What only begins so is another setting.
+  machine.file("/boot/firmware/config.txt", "core_freq_min=5000\n");
+  EXPECT_EQ(only_trouble(check_core_clock(machine, spi_ring())).verdict, Verdict::note);
   machine.file("/proc/device-tree/model", "Raspberry Pi 5 Model B Rev 1.0");
   EXPECT_THAT(check_core_clock(machine, spi_ring()), IsEmpty());
+}
+
+class PiMachine : public FakeMachine {
+ public:
+  PiMachine() { file("/proc/device-tree/model", "Raspberry Pi 5 Model B Rev 1.0"); }
+};
+
+TEST(DoctorPower, DecodesTheFirmwaresBits) {
+  PiMachine machine;
+  machine.answers = {{"get_throttled", "throttled=0x0"}};
+  EXPECT_TRUE(all_good(check_throttling(machine)));
+  // Throttled for under-voltage now; the processor's clock was capped before.
+  machine.answers = {{"get_throttled", "throttled=0x70005"}};
+  const Findings findings = check_throttling(machine);
+  ASSERT_THAT(findings, SizeIs(3));
+  EXPECT_EQ(findings[0].verdict, Verdict::wrong);
+  EXPECT_EQ(findings[0].what, "throttled=0x70005: under-voltage now");
+  EXPECT_THAT(findings[0].mend, HasSubstr("vcgencmd get_throttled"));
+  EXPECT_EQ(findings[1].verdict, Verdict::note);
+  EXPECT_EQ(findings[1].what, "throttled=0x70005: processor clock capped since the board started");
+  EXPECT_EQ(findings[2].what, "throttled=0x70005: throttled now");
+  machine.answers = {{"get_throttled", "throttled=0x80008"}};
+  EXPECT_EQ(only_trouble(check_throttling(machine)).what,
+            "throttled=0x80008: soft temperature limit now");
+}
+
+TEST(DoctorPower, IsAskedOfARaspberryPiOnly) {
+  const FakeMachine other;
+  EXPECT_THAT(check_throttling(other), IsEmpty());
+  const PiMachine silent;
+  EXPECT_EQ(only_trouble(check_throttling(silent)).verdict, Verdict::note);
+}
+
+TEST(DoctorGroups, AMissingOneIsNamed) {
+  FakeMachine machine;
+  machine.file("/etc/group", "root:x:0:\nvideo:x:44:anna\nspi:x:999:\nnotgpio:x:986:\n");
+  const Finding finding = only_trouble(check_groups(machine));
+  EXPECT_EQ(finding.what, "missing: gpio; the unit would not start (216/GROUP)");
+  EXPECT_THAT(finding.mend, HasSubstr("systemd-sysusers"));
+  machine.file("/etc/group", "gpio:x:986:\nvideo:x:44:anna\nspi:x:999:\n");
+  EXPECT_TRUE(all_good(check_groups(machine)));
 }
 
 TEST(DoctorGpio, NothingConfiguredNothingWrong) {
@@ -270,6 +393,37 @@ TEST(DoctorRealtime, LimitsOfAnUnprivilegedUser) {
   EXPECT_TRUE(all_good(check_realtime(machine)));
 }
 
+TEST(DoctorRealtime, TheShareOfAllRealTimeThreads) {
+  FakeMachine machine;
+  EXPECT_THAT(check_realtime_share(machine), IsEmpty());
+  const auto set = [&](const char* runtime) {
+    machine.file("/proc/sys/kernel/sched_rt_period_us", "1000000\n");
+    machine.file("/proc/sys/kernel/sched_rt_runtime_us", runtime);
+  };
+  for (const char* good : {"950000\n", "-1\n"}) {
+    set(good);
+    EXPECT_TRUE(all_good(check_realtime_share(machine))) << good;
+  }
+  set("500000\n");
+  EXPECT_EQ(only_trouble(check_realtime_share(machine)).verdict, Verdict::note);
+  set("0\n");
+  const Finding finding = only_trouble(check_realtime_share(machine));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_THAT(finding.what, HasSubstr("sched_rt_runtime_us = 0 of 1000000"));
+  EXPECT_THAT(finding.mend, HasSubstr("sudo sysctl"));
+}
+
+TEST(DoctorMemory, TooLittleIsNoted) {
+  FakeMachine machine;
+  machine.file("/proc/meminfo",
+               "MemTotal:  4000000 kB\nMemFree: 20000 kB\nMemAvailable: 131072 kB\n");
+  EXPECT_TRUE(all_good(check_memory(machine)));
+  machine.file("/proc/meminfo", "MemTotal:  4000000 kB\nMemAvailable: 131071 kB\n");
+  const Finding finding = only_trouble(check_memory(machine));
+  EXPECT_EQ(finding.what, "127 MiB are available: too few for a daemon that locks its memory");
+  EXPECT_THAT(finding.mend, HasSubstr("ps -eo rss"));
+}
+
 TEST(DoctorClock, AQuickSourceIsGood) {
   for (const std::string name : {"tsc", "arch_sys_counter", "kvm-clock"}) {
     FakeMachine machine;
@@ -316,6 +470,67 @@ TEST(Doctor, PrintsAReportAndAnExitStatusThatAgree) {
               HasSubstr("spi          WRONG  /dev/spidev-that-is-not-there is not there"));
   EXPECT_THAT(out.str(), HasSubstr("mend:"));
   EXPECT_THAT(out.str(), HasSubstr("wrong\n"));
+}
+
+/// With what may be told, and with what may not.
+class TellingMachine : public PiMachine {
+ public:
+  TellingMachine() {
+    file("/proc/device-tree/serial-number", "10000000abcdef01");
+    file("/etc/hostname", "annas-gripper\n");
+    file("/etc/machine-id", "0123456789abcdef0123456789abcdef\n");
+    file("/etc/os-release",
+         "NAME=\"Debian GNU/Linux\"\nPRETTY_NAME=\"Debian GNU/Linux 13 (trixie)\"\n");
+    file("/proc/sys/kernel/osrelease", "6.12.47+rpt-rpi-2712\n");
+    file("/proc/sys/kernel/version", "#1 SMP PREEMPT Debian 1:6.12.47-1+rpt1 (2025-09-16)\n");
+    file("/sys/devices/system/cpu/online", "0-3\n");
+    file("/proc/meminfo", "MemTotal:        4147120 kB\nMemAvailable:    3500000 kB\n");
+    file("/dev/video0");
+    denied = {{"/dev/video0", EACCES}};
+    rtprio = 0;  // Its mend names the user.
+    answers = {{"get_throttled", "throttled=0x50000"}};
+    hal::v4l2::SurveyedCamera& camera = attached.emplace_back();
+    camera.attached.card = "USB Endoscope";
+    camera.attached.driver = "uvcvideo";
+    camera.attached.serial = "SN20250917";
+    camera.attached.by_id = "/dev/v4l/by-id/usb-Maker_Endoscope_SN20250917-video-index0";
+    hal::v4l2::Mode& mode = camera.modes.emplace_back();
+    mode.fourcc = 0x47504a4d;  // "MJPG"
+    mode.width = mode.min_width = 800;
+    mode.height = mode.min_height = 600;
+    mode.fps = {60, 30};
+  }
+};
+
+TEST(DoctorReport, SaysWhatTheMachineIsAndWhatIsWrong) {
+  const TellingMachine machine;
+  hal::Config config;
+  config.camera = v4l2();
+  std::ostringstream out;
+  report(config, out, machine);
+  for (const char* line :
+       {"board        Raspberry Pi 5 Model B Rev 1.0\n",
+        "system       Debian GNU/Linux 13 (trixie)\n",
+        "kernel       6.12.47+rpt-rpi-2712 #1 SMP PREEMPT Debian 1:6.12.47-1+rpt1 (2025-09-16) ",
+        "processors   0-3\n", "memory       4147120 kB\n", "libcamera    ", "libgpiod     ",
+        "configured   camera v4l2 800x600 at 60 fps, ring sim\n",
+        "attached     USB Endoscope (uvcvideo): MJPEG 800x600 at 60, 30\n",
+        "camera       WRONG  /dev/video0: Permission denied\n",
+        "power        note   throttled=0x50000: under-voltage since the board started\n"}) {
+    EXPECT_THAT(out.str(), HasSubstr(line));
+  }
+}
+
+TEST(DoctorReport, NamesNobodyAndNoSerialNumber) {
+  const TellingMachine machine;
+  hal::Config config;
+  config.camera = v4l2();
+  std::ostringstream out;
+  report(config, out, machine);
+  for (const char* secret :
+       {"anna", "10000000abcdef01", "0123456789abcdef", "SN20250917", "by-id"}) {
+    EXPECT_THAT(out.str(), Not(HasSubstr(secret)));
+  }
 }
 
 }  // namespace
