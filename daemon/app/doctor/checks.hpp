@@ -37,6 +37,8 @@ using Findings = std::vector<Finding>;
 [[nodiscard]] Findings check_throttling(const Machine& machine);
 /// The groups that systemd/dtactd.service starts the daemon in.
 [[nodiscard]] Findings check_groups(const Machine& machine);
+/// The device of a Raspberry Pi 5's ws2812-pio driver: there, permitted.
+[[nodiscard]] Findings check_pio(const Machine& machine, const hal::RingConfig& ring);
 /// GPIO chips and the configured lines: there, permitted, free.
 [[nodiscard]] Findings check_gpio(const Machine& machine, const hal::RingConfig& ring);
 /// RLIMIT_RTPRIO and RLIMIT_MEMLOCK.

@@ -121,14 +121,16 @@ Findings check_dma_heap(const Machine& machine, const hal::CameraConfig& camera)
     if (machine.access(heap) == 0) return {{Verdict::good, heap + " may be opened", ""}};
     denied = heap;
   }
-  // Frames that libcamera allocates itself lie in uncached memory on a Raspberry Pi
-  // (raspberrypi/linux issue 5286).
-  const std::string cost = "frames lie in memory that is slow to read";
+  // libcamera's PipelineHandlerVc4::platformRegister() returns ENOMEM without a heap; other
+  // pipelines allocate elsewhere, on some machines in uncached memory.
+  const bool needed = is_raspberry_pi(machine);
+  const Verdict bad = needed ? Verdict::wrong : Verdict::note;
+  const std::string cost =
+      needed ? "libcamera opens no camera" : "frames may lie in memory that is slow to read";
   if (!denied.empty()) {
-    return {{Verdict::note, denied + " may not be opened: " + cost,
-             join_group(machine, denied, "video")}};
+    return {{bad, denied + " may not be opened: " + cost, join_group(machine, denied, "video")}};
   }
-  return {{Verdict::note, fmt::format("no heap in {}: {}", folder, cost),
+  return {{bad, fmt::format("no heap in {}: {}", folder, cost),
            "a kernel with CONFIG_DMABUF_HEAPS (Raspberry Pi OS has it): ls " + folder}};
 }
 
@@ -192,6 +194,24 @@ Findings check_spi(const Machine& machine, const hal::RingConfig& ring) {
     findings.push_back({Verdict::good, fmt::format("measured rate {:.3f} MHz", rate.hz / 1e6), ""});
   }
   return findings;
+}
+
+Findings check_pio(const Machine& machine, const hal::RingConfig& ring) {
+  if (ring.backend != "ws2812_pio") return {};
+  const std::string& device = ring.ws2812.pio_device;
+  const int error = machine.access(device);
+  if (error == 0) return {{Verdict::good, device + " may be opened", ""}};
+  if (error != ENOENT) {
+    return {{Verdict::wrong, fmt::format("{}: {}", device, std::strerror(error)),
+             join_group(machine, device, "gpio")}};
+  }
+  // The RP1, whose PIO it is, came with the Raspberry Pi 5.
+  const bool has_pio = machine.model().find("Pi 5") != std::string::npos ||
+                       machine.model().find("Module 5") != std::string::npos;
+  return {{Verdict::wrong, device + " is not there",
+           has_pio ? "echo dtoverlay=ws2812-pio,gpio=18,num_leds=8 | sudo tee -a "
+                     "/boot/firmware/config.txt && sudo reboot (any GPIO of the header)"
+                   : "set ring.backend = \"ws2812_spi\": only a Raspberry Pi 5 has such a PIO"}};
 }
 
 Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {

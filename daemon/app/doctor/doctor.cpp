@@ -22,6 +22,7 @@ std::vector<Subject> examine(const Machine& machine, const hal::Config& config) 
           {"dma heap", check_dma_heap(machine, config.camera)},
           {"spi", check_spi(machine, config.ring)},
           {"core clock", check_core_clock(machine, config.ring)},
+          {"pio", check_pio(machine, config.ring)},
           {"gpio", check_gpio(machine, config.ring)},
           {"groups", check_groups(machine)},
           {"power", check_throttling(machine)},

@@ -1,0 +1,222 @@
+// What the doctor says of cameras, the ring and their nodes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cerrno>
+#include <string>
+
+#include "tests/unit/doctor/fake_machine.hpp"
+
+namespace dtact::app::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+TEST(DoctorCamera, ASimulatedCameraNeedsNoNode) {
+  const FakeMachine machine;
+  EXPECT_TRUE(all_good(check_camera(machine, hal::CameraConfig{})));
+}
+
+TEST(DoctorCamera, NoNodeIsWrongWhenOneIsNeeded) {
+  const FakeMachine machine;
+  const Finding finding = only_trouble(check_camera(machine, v4l2()));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_THAT(finding.mend, HasSubstr("modprobe uvcvideo"));
+}
+
+TEST(DoctorCamera, NamesTheNodeThatCapturesAndPassesOverMetadata) {
+  FakeMachine machine;
+  machine.file("/dev/video0");
+  machine.file("/dev/video1");
+  machine.videos = {{"/dev/video0", {true, "Endoscope", 0}},
+                    {"/dev/video1", {false, "Endoscope", 0}}};
+  const Findings findings = check_camera(machine, v4l2());
+  ASSERT_THAT(findings, SizeIs(1));
+  EXPECT_EQ(findings[0].what, "/dev/video0 \"Endoscope\" captures");
+  EXPECT_TRUE(all_good(findings));
+}
+
+TEST(DoctorCamera, OnlyMetadataIsNoCamera) {
+  FakeMachine machine;
+  machine.file("/dev/video1");
+  machine.videos = {{"/dev/video1", {false, "Endoscope", 0}}};
+  EXPECT_EQ(only_trouble(check_camera(machine, v4l2())).what, "no video node captures");
+}
+
+TEST(DoctorCamera, AForbiddenNodeNamesTheGroup) {
+  FakeMachine machine;
+  machine.file("/dev/video0");
+  machine.denied = {{"/dev/video0", EACCES}};
+  machine.owner = "video";
+  const Finding finding = only_trouble(check_camera(machine, v4l2()));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_EQ(finding.mend, "sudo usermod -aG video anna, then log in again");
+  // Nobody asked for a camera: worth knowing, not wrong.
+  EXPECT_EQ(only_trouble(check_camera(machine, hal::CameraConfig{})).verdict, Verdict::note);
+}
+
+TEST(DoctorUsb, APortOfUsb1IsTooSlow) {
+  FakeMachine machine;
+  machine.usb_camera("12");
+  const Finding finding = only_trouble(check_usb_speed(machine, v4l2()));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_EQ(finding.what,
+            "/dev/video0 is on a port of 12 Mbit/s: too slow for a stream of pictures");
+  EXPECT_THAT(finding.mend, HasSubstr("lsusb -t"));
+}
+
+TEST(DoctorUsb, RawPicturesHaveToFitIntoUsb2) {
+  FakeMachine machine;
+  machine.usb_camera("480");
+  hal::CameraConfig camera = v4l2();  // 800x600 at 60 fps
+  EXPECT_TRUE(all_good(check_usb_speed(machine, camera)));
+  camera.v4l2.pixel_format = "yuyv";
+  const Finding finding = only_trouble(check_usb_speed(machine, camera));
+  EXPECT_EQ(finding.verdict, Verdict::note);
+  // 800 · 600 pixels of two bytes, 60 times a second; 3 · 1024 bytes, 8000 times a second.
+  EXPECT_THAT(finding.what, HasSubstr("carries up to 24.6 MB/s"));
+  EXPECT_THAT(finding.what, HasSubstr("yuyv at 800x600 and 60 fps needs 57.6"));
+  camera.fps = 25;
+  EXPECT_TRUE(all_good(check_usb_speed(machine, camera)));
+  camera.fps = 60;
+  machine.usb_camera("5000");
+  EXPECT_TRUE(all_good(check_usb_speed(machine, camera)));
+}
+
+TEST(DoctorUsb, OtherCamerasHaveNoPort) {
+  FakeMachine machine;
+  machine.file("/dev/video0");
+  machine.videos = {{"/dev/video0", {true, "vivid", 0}}};
+  EXPECT_THAT(check_usb_speed(machine, v4l2()), IsEmpty());
+  machine.usb_camera("12");
+  EXPECT_THAT(check_usb_speed(machine, hal::CameraConfig{}), IsEmpty());
+}
+
+TEST(DoctorDmaHeap, IsForLibcameraAndMayBeMissing) {
+  FakeMachine machine;
+  EXPECT_THAT(check_dma_heap(machine, v4l2()), IsEmpty());
+  hal::CameraConfig camera;
+  camera.backend = "libcamera";
+  EXPECT_THAT(only_trouble(check_dma_heap(machine, camera)).what,
+              HasSubstr("no heap in /dev/dma_heap"));
+  machine.file("/dev/dma_heap/linux,cma");
+  machine.denied = {{"/dev/dma_heap/linux,cma", EACCES}};
+  const Finding finding = only_trouble(check_dma_heap(machine, camera));
+  EXPECT_EQ(finding.verdict, Verdict::note);
+  EXPECT_THAT(finding.mend, HasSubstr("usermod -aG video anna"));
+  machine.file("/proc/device-tree/model", "Raspberry Pi 5 Model B Rev 1.0");
+  EXPECT_EQ(only_trouble(check_dma_heap(machine, camera)).verdict, Verdict::wrong);
+  machine.file("/dev/dma_heap/vidbuf_cached");
+  EXPECT_TRUE(all_good(check_dma_heap(machine, camera)));
+}
+
+TEST(DoctorSpi, NotNeededWithoutAnSpiRing) {
+  const FakeMachine machine;
+  EXPECT_TRUE(all_good(check_spi(machine, hal::RingConfig{})));
+}
+
+TEST(DoctorSpi, AllIsWell) {
+  const SpiMachine machine;
+  EXPECT_TRUE(all_good(check_spi(machine, spi_ring())));
+}
+
+TEST(DoctorSpi, AnAbsentDevice) {
+  FakeMachine machine;
+  EXPECT_THAT(only_trouble(check_spi(machine, spi_ring())).mend, HasSubstr("device tree"));
+  // Device-tree strings end in a zero byte.
+  machine.file("/proc/device-tree/model", std::string("Raspberry Pi 5 Model B Rev 1.0\0", 31));
+  EXPECT_EQ(only_trouble(check_spi(machine, spi_ring())).mend,
+            "sudo raspi-config nonint do_spi 0 && sudo reboot");
+}
+
+TEST(DoctorSpi, AForbiddenDeviceOfRootsNeedsTheRuleAndTheGroup) {
+  SpiMachine machine;
+  machine.denied = {{"/dev/spidev0.0", EACCES}};
+  const Finding finding = only_trouble(check_spi(machine, spi_ring()));
+  EXPECT_THAT(finding.what, HasSubstr("Permission denied"));
+  EXPECT_THAT(finding.mend, HasSubstr("60-dtactd.rules"));
+  EXPECT_THAT(finding.mend, HasSubstr("usermod -aG spi anna"));
+}
+
+TEST(DoctorSpi, ASpeedOutsideTheWindow) {
+  const SpiMachine machine;
+  hal::RingConfig ring = spi_ring();
+  ring.ws2812.spi_bits = 3;
+  ring.ws2812.spi_hz = 2'400'000;
+  const Findings findings = check_spi(machine, ring);
+  ASSERT_FALSE(findings.empty());
+  EXPECT_EQ(findings[0].verdict, Verdict::wrong);
+  EXPECT_THAT(findings[0].what, HasSubstr("use 2.50 … 3.33 MHz"));
+}
+
+TEST(DoctorSpi, ASmallBufsiz) {
+  SpiMachine machine;
+  machine.file("/sys/module/spidev/parameters/bufsiz", "256\n");
+  const Finding finding = only_trouble(check_spi(machine, spi_ring()));
+  EXPECT_EQ(finding.what, "spidev.bufsiz = 256, the ring needs 336");
+  EXPECT_THAT(finding.mend, HasSubstr("spidev.bufsiz=4096"));
+}
+
+TEST(DoctorSpi, AWrongTrueRate) {
+  SpiMachine machine;
+  machine.rate = {2'000'000, {}};
+  const Finding finding = only_trouble(check_spi(machine, spi_ring()));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_THAT(finding.what, HasSubstr("really sends 2.000 MHz"));
+}
+
+TEST(DoctorPio, TheDriversDevice) {
+  hal::RingConfig ring;
+  ring.backend = "ws2812_pio";
+  PiMachine machine;
+  EXPECT_THAT(check_pio(machine, spi_ring()), IsEmpty());
+  const Finding absent = only_trouble(check_pio(machine, ring));
+  EXPECT_EQ(absent.what, "/dev/leds0 is not there");
+  EXPECT_THAT(absent.mend, HasSubstr("dtoverlay=ws2812-pio,gpio=18,num_leds=8"));
+  const FakeMachine other;
+  EXPECT_THAT(only_trouble(check_pio(other, ring)).mend, HasSubstr("ws2812_spi"));
+  machine.file("/dev/leds0");
+  EXPECT_TRUE(all_good(check_pio(machine, ring)));
+  machine.denied = {{"/dev/leds0", EACCES}};
+  EXPECT_THAT(only_trouble(check_pio(machine, ring)).mend, HasSubstr("usermod -aG gpio anna"));
+}
+
+TEST(DoctorGpio, NothingConfiguredNothingWrong) {
+  const FakeMachine machine;
+  EXPECT_TRUE(all_good(check_gpio(machine, spi_ring())));
+}
+
+TEST(DoctorGpio, LinesAreFoundByPathNameAndLabel) {
+  const FakeMachine machine;
+  hal::RingConfig ring = spi_ring();
+  for (const std::string chip : {"/dev/gpiochip0", "gpiochip0", "pinctrl-rp1"}) {
+    ring.ws2812.power = {chip, 17, false};
+    EXPECT_TRUE(all_good(check_gpio(machine, ring))) << chip;
+  }
+  ring.backend = "ws2812_pio";
+  ring.ws2812.power = {.name = "GPIO1"};
+  EXPECT_TRUE(all_good(check_gpio(machine, ring)));
+  ring.ws2812.power = {.name = "GPIO2"};
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("no line has this name"));
+}
+
+TEST(DoctorGpio, WhatCanBeWrongWithALine) {
+  FakeMachine machine;
+  hal::RingConfig ring = spi_ring();
+  ring.ws2812.power = {"gpiochip4", 17, false};
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("no such chip"));
+  ring.ws2812.power = {"gpiochip0", 54, false};
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("lines 0 … 53"));
+  ring.ws2812.power = {"gpiochip0", 27, false};
+  machine.held_line = 27;
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("in use by \"lcd-reset\""));
+  machine.held_line = -1;
+  machine.file("/dev/gpiochip0");
+  machine.denied = {{"/dev/gpiochip0", EACCES}};
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).mend, HasSubstr("usermod -aG gpio anna"));
+}
+
+}  // namespace
+}  // namespace dtact::app::test
