@@ -146,6 +146,13 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
                     "flicker",
                     contact.lost_mm, contact.made_mm));
   }
+  const hal::GpioLineConfig& power = loaded.config.hal.ring.ws2812.power;
+  if (power.is_set() && (power.line >= 0) != power.name.empty()) {
+    throw std::runtime_error(fmt::format(
+        "ring.ws2812.power: line = {} and name = \"{}\": set the one or the other (-1 and \"\" are "
+        "none)",
+        power.line, power.name));
+  }
   loaded.origins = std::move(assembly).origins();
   return loaded;
 }

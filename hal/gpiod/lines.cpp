@@ -67,9 +67,6 @@ std::vector<Chip> list_chips() { return survey().chips; }
 
 Place find_line(const std::vector<Chip>& chips, const GpioLineConfig& line,
                 const std::string& key) {
-  if (!line.name.empty() && line.line >= 0) {
-    return {{}, -1, "both line and name are given", fmt::format("set {0}.line = -1", key)};
-  }
   std::vector<const Chip*> meant;
   for (const Chip& chip : chips) {
     if (line.chip.empty() || goes_by(chip, line.chip)) meant.push_back(&chip);

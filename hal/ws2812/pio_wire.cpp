@@ -22,6 +22,9 @@ constexpr std::int64_t kLedNs = 30'000;  // 24 bits at 800 kHz
 // a write; what is written meanwhile waits with it. A tick more, for the slowest kernel's.
 constexpr std::int64_t kIncompleteNs = 60'000'000;
 
+/// The node went with the driver, or is there without it.
+bool is_gone(int error) { return error == ENOENT || error == ENODEV || error == ENXIO; }
+
 }  // namespace
 
 PioWire::PioWire(std::string device, base::Clock& clock)
@@ -50,14 +53,16 @@ std::string PioWire::prepare(int leds) {
 std::string PioWire::send(std::span<const Rgb> leds) {
   struct stat status{};
   if (::stat(device_.c_str(), &status) == 0 && status.st_ino != node_) {
-    if (std::string refused = prepare(static_cast<int>(leds.size())); !refused.empty()) {
-      return refused;
-    }
+    std::string refused = prepare(static_cast<int>(leds.size()));
+    lost_ = !refused.empty();
+    if (lost_) return refused;
   }
   std::vector<std::uint8_t> bytes;
   bytes.reserve(leds.size() * kPixelBytes);
   for (const Rgb& led : leds) bytes.insert(bytes.end(), {led.r, led.g, led.b, 0});
-  if (const int error = write(bytes); error != 0) return failed(error);
+  const int error = write(bytes);
+  lost_ = is_gone(error);
+  if (error != 0) return failed(error);
   // The driver pauses for 50 µs after a chain, newer LEDs need 280 to take the next for a new one.
   wait(static_cast<std::int64_t>(leds.size()) * kLedNs + static_cast<std::int64_t>(kLatchNs));
   return {};
@@ -75,23 +80,18 @@ int PioWire::write(std::span<const std::uint8_t> bytes) noexcept {
 }
 
 std::string PioWire::failed(int error) const {
-  const auto remedy = [error] {
-    switch (error) {
-      case EACCES:
-      case EPERM:
-        return "put the user into the group that owns it (sudo usermod -aG gpio <user>) and "
-               "install config/udev/60-dtactd.rules";
-      case ENOENT:
-      case ENODEV:
-      case ENXIO:
-        return "on a Raspberry Pi 5 put dtoverlay=ws2812-pio,gpio=<the data line's GPIO>,"
-               "num_leds=8 into /boot/firmware/config.txt and reboot (dmesg says why when it is "
-               "there already); other boards have no such driver: ring.backend = \"ws2812_spi\"";
-      default:
-        return "see the kernel's log (dmesg) for the driver's own words";
-    }
-  };
-  return fmt::format("{}: write failed: {}: {}", device_, std::strerror(error), remedy());
+  const char* remedy = "see the kernel's log (dmesg) for the driver's own words";
+  if (error == EACCES || error == EPERM) {
+    remedy =
+        "put the user into the group that owns it (sudo usermod -aG gpio <user>) and install "
+        "config/udev/60-dtactd.rules";
+  } else if (is_gone(error)) {
+    remedy =
+        "on a Raspberry Pi 5 put dtoverlay=ws2812-pio,gpio=<the data line's GPIO>,num_leds=8 into "
+        "/boot/firmware/config.txt and reboot (dmesg says why when it is there already); other "
+        "boards have no such driver: ring.backend = \"ws2812_spi\"";
+  }
+  return fmt::format("{}: write failed: {}: {}", device_, std::strerror(error), remedy);
 }
 
 }  // namespace dtact::hal::ws2812

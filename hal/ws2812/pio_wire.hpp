@@ -32,6 +32,7 @@ class PioWire final : public Wire {
   [[nodiscard]] std::string note() const override { return {}; }
   /// Prepares anew when the device has been made anew since.
   [[nodiscard]] std::string send(std::span<const Rgb> leds) override;
+  [[nodiscard]] bool lost() const override { return lost_; }
 
  private:
   /// Returns 0 or an errno; EFBIG: the driver has fewer LEDs.
@@ -42,6 +43,7 @@ class PioWire final : public Wire {
   std::string device_;
   base::Clock& clock_;
   ino_t node_ = 0;  // of the last write: another number is another device
+  bool lost_ = false;
 };
 
 }  // namespace dtact::hal::ws2812

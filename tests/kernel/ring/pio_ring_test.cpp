@@ -28,6 +28,9 @@ const std::string kMock = "/sys/kernel/debug/ws2812_pio_mock/";
 const std::string kDriver = "/sys/bus/platform/drivers/ws2812-pio-rp1/";
 constexpr const char* kDark = "000000 000000 000000 000000 000000 000000 000000 000000";
 constexpr const char* kRainbow = "ff0000 00ff00 0000ff 010204 081020 408055 aa0709 ffffff";
+// Offset, bytes and first byte of each write: a byte alone is the brightness, 36 ask for a ninth
+// LED, 32 are the chain, dark and then the rainbow.
+const std::vector<std::string> kFromTheStart{"0 1 00", "0 36 00", "0 32 00", "0 32 ff"};
 
 Light rainbow() {
   Light light;
@@ -101,12 +104,10 @@ TEST_F(PioRing, TheColoursArriveAndTheEndIsDark) {
   }
 }
 
-// Bytes of ws2812_pio_rp1_write(): 1 is a brightness; 36 asks for a ninth LED; 32 is the chain.
 TEST_F(PioRing, TheBrightnessIsSetToZeroFirst) {
   const auto ring = open_ring();
-  EXPECT_EQ(recorded("writes"), (std::vector<std::string>{"0 1 00", "0 36 00", "0 32 00"}));
   ASSERT_TRUE(ring->show(rainbow()).ok);
-  EXPECT_EQ(recorded("writes").back(), "0 32 ff");
+  EXPECT_EQ(recorded("writes"), kFromTheStart);
 }
 
 TEST_F(PioRing, OrderGammaAndBudgetAreTheRings) {
@@ -156,11 +157,21 @@ TEST_F(PioRing, ARemovedDriverIsToldAndOneThatIsBackIsPreparedAnew) {
   const ShowResult gone = ring->show(rainbow());
   EXPECT_FALSE(gone.ok);
   EXPECT_THAT(gone.message, HasSubstr("/dev/leds0: write failed: No such file or directory"));
+  EXPECT_TRUE(ring->report().away);
   write_text(kMock + "sent", "0");
   probe_driver();  // its brightness is 255 again
+  ASSERT_TRUE(eventually([&] { return !ring->report().away; }));
   ASSERT_TRUE(ring->show(rainbow()).ok);
-  EXPECT_EQ(recorded("writes"),
-            (std::vector<std::string>{"0 1 00", "0 36 00", "0 32 00", "0 32 ff"}));
+  EXPECT_EQ(recorded("writes"), kFromTheStart);
+  EXPECT_TRUE(last_sent(kRainbow));
+}
+
+TEST_F(PioRing, ADriverThatCameBackUnseenIsPreparedAnew) {
+  const auto ring = open_ring();
+  reload(8);
+  write_text(kMock + "sent", "0");
+  ASSERT_TRUE(ring->show(rainbow()).ok);
+  EXPECT_EQ(recorded("writes"), kFromTheStart);
   EXPECT_TRUE(last_sent(kRainbow));
 }
 
@@ -170,6 +181,7 @@ TEST_F(PioRing, ADriverThatCameBackWithAnotherCountIsTold) {
   const ShowResult result = ring->show(rainbow());
   EXPECT_FALSE(result.ok);
   EXPECT_THAT(result.message, HasSubstr("more than the ring's 8 LEDs"));
+  EXPECT_TRUE(ring->report().away);
 }
 
 // The driver sends once write() has returned, so that the wire waits: for what the brightness put

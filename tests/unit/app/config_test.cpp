@@ -107,6 +107,10 @@ TEST_F(ConfigFile, ReadsTheRingsPowerLine) {
   EXPECT_EQ(power.bias, "pull-down");
   EXPECT_TRUE(power.is_set());
   EXPECT_FALSE(load("").hal.ring.ws2812.power.is_set());
+  EXPECT_THAT(error("[ring.ws2812.power]\nname = 'GPIO17'\nline = 17\n"),
+              HasSubstr("line = 17 and name = \"GPIO17\": set the one or the other"));
+  EXPECT_THAT(error("[ring.ws2812.power]\nchip = 'gpiochip0'\n"),
+              HasSubstr("line = -1 and name = \"\": set the one or the other"));
   EXPECT_THAT(error("[ring.ws2812.power]\nbias = 'up'\n"),
               AllOf(HasSubstr("ring.ws2812.power.bias"), HasSubstr("\"pull-up\"")));
 }

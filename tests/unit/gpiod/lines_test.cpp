@@ -54,11 +54,6 @@ TEST(GpioLine, ANameThatSeveralBearIsRefused) {
   EXPECT_THAT(place_of({.chip = "gpiochip10", .name = "-"}), HasSubstr("line 1 has this name"));
 }
 
-TEST(GpioLine, OffsetAndNameTogetherAreRefused) {
-  EXPECT_EQ(place_of({.chip = "gpiochip0", .line = 2, .name = "GPIO2"}),
-            "both line and name are given: set key.line = -1");
-}
-
 TEST(GpioLine, AHolderMayHaveNoName) {
   EXPECT_EQ(holder_name("lcd-reset"), "\"lcd-reset\"");
   for (const char* none : {"", "?", static_cast<const char*>(nullptr)}) {
