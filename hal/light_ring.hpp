@@ -49,7 +49,7 @@ struct RingReport {
   bool ok = true;              ///< The ring is there and the last write worked.
   bool away = false;           ///< It is looked for; once it is there, show() it its light again.
   std::string message;         ///< When not ok: what failed and the remedy.
-  std::string note;            ///< Found at start: worth knowing, not wrong. Empty = nothing.
+  std::string note;            ///< Worth knowing, not wrong. Empty = nothing.
   std::uint64_t writes = 0;    ///< Tried, re-sends included.
   std::uint64_t failures = 0;  ///< Of these.
 };

@@ -17,7 +17,8 @@ struct LedOptions {
   std::vector<std::string> leds;
 };
 
-v1::LightState run(const Context& context, const LedOptions& options) {
+/// `remark`: what the ring has to say when it is only looked at.
+v1::LightState run(const Context& context, const LedOptions& options, std::string& remark) {
   client::Client client(context.target);
   v1::SetLight change;
   if (options.brightness) change.set_brightness(*options.brightness);
@@ -42,12 +43,17 @@ v1::LightState run(const Context& context, const LedOptions& options) {
     }
   }
   const bool changes = options.brightness || options.scheme || !options.leds.empty();
-  return changes ? client.set_light(change) : client.status().light();
+  if (changes) return client.set_light(change);
+  const v1::Status status = client.status();
+  remark = status.ring().message();
+  return status.light();
 }
 
 void run_led(const Context& context, const LedOptions& options) {
-  const v1::LightState light = run(context, options);
+  std::string remark;
+  const v1::LightState light = run(context, options, remark);
   context.out << (context.json ? cli::json_line(light) : text_of(light) + '\n');
+  if (!context.json && !remark.empty()) context.out << remark << '\n';
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ bool LightDriver::submit(std::uint64_t ticket, const hal::Light& light) {
 
 std::string LightDriver::message() const {
   const std::scoped_lock lock(mutex_);
-  return message_;
+  return message_.empty() ? note_ : message_;
 }
 
 hal::Light LightDriver::light() const {
@@ -67,6 +67,10 @@ void LightDriver::serve(const Request& request) {
 
 void LightDriver::look() {
   const hal::RingReport report = ring_->report();
+  {
+    const std::scoped_lock lock(mutex_);
+    note_ = report.note;
+  }
   if (report.away) {
     if (!std::exchange(away_, true)) kept_ = light();
   } else {

@@ -47,7 +47,8 @@ class LightDriver {
   [[nodiscard]] bool submit(std::uint64_t ticket, const hal::Light& light);
   [[nodiscard]] bool next_event(Event& out) { return events_.pop(out); }
   [[nodiscard]] hal::RingInfo info() const { return ring_->info(); }
-  /// The last error, or why the ring shows less light than it was asked for; empty when well.
+  /// The last error, or why the ring shows less light than it was asked for, or what else is worth
+  /// knowing of it; empty when well.
   [[nodiscard]] std::string message() const;
   [[nodiscard]] hal::Light light() const;
 
@@ -80,6 +81,7 @@ class LightDriver {
   mutable std::mutex mutex_;  // between this thread and the network thread, held for a copy
   hal::Light light_;
   std::string message_;
+  std::string note_;
   // This thread's own:
   hal::Light kept_;        // to be shown when the ring is back
   bool away_ = false;      // when looked at last

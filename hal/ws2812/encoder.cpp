@@ -56,8 +56,14 @@ Pulses pulses_of(const SpiFormat& format) {
   return {s.zero_high * bit_ns, s.one_high * bit_ns, (s.bits - s.one_high) * bit_ns};
 }
 
+RateWindow window_of(int bits) {
+  const Spelling s = spelling_of(bits);
+  return {1e9 * std::max(s.zero_high / kZeroHighMaxNs, s.one_high / kOneHighMaxNs),
+          1e9 * std::min({s.zero_high / kZeroHighMinNs, s.one_high / kOneHighMinNs,
+                          (s.bits - s.one_high) / kLowMinNs})};
+}
+
 std::string why_refused(const SpiFormat& format) {
-  const Spelling s = spelling_of(format.bits);
   const Pulses p = pulses_of(format);
   // A rate at the window's very edge is inside: a nanosecond's millionth is rounding.
   constexpr double kSlack = 1e-6;
@@ -73,13 +79,11 @@ std::string why_refused(const SpiFormat& format) {
   check("the low after a 1", p.least_low, kLowMinNs, kLatchNs);
   if (outside.empty()) return {};
 
-  const double slowest = std::max(s.zero_high / kZeroHighMaxNs, s.one_high / kOneHighMaxNs);
-  const double fastest = std::min({s.zero_high / kZeroHighMinNs, s.one_high / kOneHighMinNs,
-                                   (s.bits - s.one_high) / kLowMinNs});
+  const RateWindow window = window_of(format.bits);
   return fmt::format(
       "at {:.3f} MHz with {} SPI bits for each WS2812B bit, {}: use {:.2f} … {:.2f} MHz",
-      format.hz / 1e6, format.bits, outside, std::ceil(slowest * 1e5) / 100,
-      std::floor(fastest * 1e5) / 100);
+      format.hz / 1e6, format.bits, outside, std::ceil(window.slowest / 1e4) / 100,
+      std::floor(window.fastest / 1e4) / 100);
 }
 
 std::size_t latch_bytes(double hz) {

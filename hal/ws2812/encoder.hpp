@@ -36,6 +36,10 @@ inline constexpr double kLatchNs = 300'000;
 ///
 /// At 4 and 8 bits every byte ends low, so a controller that pauses between bytes only lengthens a
 /// low; at 3 bits a byte ends inside a pulse and such a pause would turn a 0 into a 1.
+///
+/// A clock that falls after it was asked for may fall by as much, from the fastest rate to the
+/// slowest: to 75 % at 3 bits, 66 % at 4, 60 % at 8. Below that a 0's pulse grows until LEDs read a
+/// 1 and all of them go white.
 struct SpiFormat {
   int bits = 4;           ///< SPI bits for each WS2812B bit: 3, 4 or 8.
   double hz = 3'200'000;  ///< SPI clock.
@@ -50,14 +54,33 @@ struct Pulses {
 /// Throws std::invalid_argument when `bits` is not 3, 4 or 8.
 [[nodiscard]] Pulses pulses_of(const SpiFormat& format);
 
+/// SPI clocks at which every pulse of a spelling lies in the window, hertz.
+struct RateWindow {
+  double slowest = 0;
+  double fastest = 0;
+};
+/// Throws std::invalid_argument like pulses_of().
+[[nodiscard]] RateWindow window_of(int bits);
+
 /// Empty when the format's pulses lie in the window; else the sentence that says which pulse is
 /// outside and which clock rates fit. Throws std::invalid_argument like pulses_of().
 [[nodiscard]] std::string why_refused(const SpiFormat& format);
 
 /// Bytes to send, most significant bit first: zeros for the latch time, the LEDs in the order
-/// green, red, blue, zeros for the latch time. The leading zeros are for controllers whose data
-/// line idles high: the long high would be the first LED's first bit (green) and everything after
-/// it shifted; low for the latch time, it is forgotten. Needs a format that why_refused() accepts.
+/// green, red, blue, zeros for the latch time.
+///
+/// The trailing zeros latch the colours whatever level the data line (MOSI) rests at after them.
+/// The leading zeros are for controllers whose line rests high: the long high would be the first
+/// LED's first bit (green) and everything after it shifted; low for the latch time, it is
+/// forgotten. A line that rests low needs neither. Zeros and bytes for 8 LEDs:
+///
+///   bits, hz         zeros, each side        in all      LEDs that fit spidev's 4096 bytes
+///   3, 2.7 MHz       102 bytes = 302 µs      276         432
+///   4, 3.2 MHz       120 bytes = 300 µs      336         321
+///   8, 6.4 MHz       240 bytes = 300 µs      672         150
+///
+/// All of it must be one transfer: between two the line rests, long enough for LEDs to latch half a
+/// picture, or high, which is a bit. Needs a format that why_refused() accepts.
 [[nodiscard]] std::vector<std::uint8_t> encode(std::span<const Rgb> leds, const SpiFormat& format);
 
 /// Zero bytes on each side of the LEDs' bytes in encode().

@@ -130,6 +130,7 @@ void Ring::write(std::unique_lock<std::mutex>& lock, const Leds& leds) {
   report_.failures += error.empty() ? 0U : 1U;
   report_.ok = error.empty();
   report_.message = error;
+  report_.note = wire_->note();
   if (done_ != ticket) {  // else a re-send, which is nobody's command
     if (report_.ok) shown_ = leds;
     // The command has failed, so that the light before it is still the one to show.

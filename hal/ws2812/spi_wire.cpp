@@ -7,7 +7,6 @@
 #include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <utility>
 #include <vector>
 
@@ -16,20 +15,22 @@ namespace {
 
 // At 3.2 MHz 4096 bytes last 10 ms, of which an interruption of 50 µs is half a percent.
 constexpr std::size_t kLongestProbe = 16384;
-constexpr int kProbes = 8;
+constexpr std::size_t kProbes = 8;
 // Above this a deviation is worth a note although the pulses still fit.
 constexpr double kNoteworthy = 0.03;
 
-// What makes the clock run off on a Raspberry Pi: the SPI clock is divided from the core clock,
-// which the firmware scales with load, and the divider is set for one of its values.
-constexpr const char* kCure =
-    "on a Raspberry Pi hold the core clock still (Pi 4: core_freq=500 and core_freq_min=500, Pi 3: "
-    "core_freq=250, in /boot/firmware/config.txt, then reboot)";
+// Transfers that are off in a row before the clock is suspected.
+constexpr int kInARow = 3;
 
-std::string failed(const SpiPort& port, int error) {
-  return fmt::format("{}: write failed: {}: {}", port.name(), std::strerror(error),
-                     spi_remedy(error));
-}
+// What makes the clock run off on a Raspberry Pi: the SPI clock is divided from the core clock
+// (spi-bcm2835.c), which the firmware scales with load, and the divider is set for one of its
+// values. A Pi 4 ignores core_freq=250 and falls to 200 at idle unless core_freq_min holds it
+// (README of jgarff/rpi_ws281x; rpi-ws281x/rpi-ws281x-python#35).
+constexpr const char* kCure =
+    "on a Raspberry Pi hold the core clock still in /boot/firmware/config.txt and reboot (Pi 4: "
+    "core_freq=500 and core_freq_min=500, Pi 3: core_freq=250, or on either force_turbo=1); "
+    "elsewhere ring.ws2812.spi_bits = 8 with spi_hz = 8000000 stands the most, a clock that falls "
+    "to 63 %";
 
 }  // namespace
 
@@ -37,18 +38,20 @@ MeasuredRate measure_rate(SpiPort& port, base::Clock& clock) {
   const std::size_t longer = std::min(port.max_bytes(), kLongestProbe);
   const std::array<std::size_t, 2> lengths{longer / 4, longer};
   const std::vector<std::uint8_t> zeros(longer, 0);
-  std::array<std::int64_t, 2> least{};
-  least.fill(std::numeric_limits<std::int64_t>::max());
-  for (int probe = 0; probe < kProbes; ++probe) {
+  std::array<std::array<std::int64_t, kProbes>, 2> took{};
+  for (std::size_t probe = 0; probe < kProbes; ++probe) {
     for (std::size_t i = 0; i < lengths.size(); ++i) {
       const std::int64_t start = clock.monotonic_ns();
       if (const int e = port.transfer(std::span(zeros).first(lengths[i])); e != 0) return {0, e};
-      least[i] = std::min(least[i], clock.monotonic_ns() - start);
+      took[i][probe] = clock.monotonic_ns() - start;
     }
   }
-  const double seconds = static_cast<double>(least[1] - least[0]) * 1e-9;
-  const auto bits = static_cast<double>(8 * (lengths[1] - lengths[0]));
-  return {seconds > 0 ? bits / seconds : 0, 0};
+  for (auto& times : took) std::ranges::sort(times);
+  const double seconds = static_cast<double>(took[1][0] - took[0][0]) * 1e-9;
+  if (seconds <= 0) return {};
+  const double hz = static_cast<double>(8 * (lengths[1] - lengths[0])) / seconds;
+  const double wire_ns = static_cast<double>(8 * lengths[0]) / hz * 1e9;
+  return {hz, 0, static_cast<double>(took[0][kProbes / 2]) - wire_ns};
 }
 
 std::string why_rate_refused(const SpiFormat& asked, double measured_hz) {
@@ -78,24 +81,70 @@ std::string SpiWire::prepare(int leds) {
         "the kernel's command line",
         port_->name(), leds, need, port_->max_bytes(), std::max<std::size_t>(4096, need));
   }
-  if (!check_rate_) return {};
+  return check_rate_ ? check_rate() : std::string();
+}
+
+std::string SpiWire::note() const {
+  if (again_ == 0) return deviation_;
+  return fmt::format(
+      "{}{}{}: {} of {} transfers were off and sent again, the last {}: the clock, or a busy "
+      "machine",
+      deviation_, deviation_.empty() ? "" : "; ", port_->name(), again_, sent_, last_off_);
+}
+
+std::string SpiWire::send(std::span<const Rgb> leds) {
+  lost_ = false;
+  const std::vector<std::uint8_t> bytes = encode(leds, format_);
+  const RateWindow window = window_of(format_.bits);
+  const auto bits = static_cast<double>(8 * bytes.size());
+  for (int i = 0; i < kInARow; ++i) {
+    const Timed timed = transfer(bytes);
+    if (timed.error != 0) return gave_up(timed.error);
+    const double ns = timed.ns - overhead_ns_;
+    if (!check_rate_ || (ns >= bits / window.fastest * 1e9 && ns <= bits / window.slowest * 1e9)) {
+      return {};
+    }
+    ++again_;
+    last_off_ = fmt::format("{:.2f} ms for {:.2f} ms", timed.ns * 1e-6,
+                            (bits / format_.hz * 1e9 + overhead_ns_) * 1e-6);
+  }
+  if (std::string refused = check_rate(); !refused.empty()) {
+    lost_ = true;
+    return refused;
+  }
+  // The clock is right, now at least. It may have been off a moment ago.
+  return gave_up(transfer(bytes).error);
+}
+
+SpiWire::Timed SpiWire::transfer(std::span<const std::uint8_t> bytes) noexcept {
+  ++sent_;
+  const std::int64_t start = clock_.monotonic_ns();
+  const int error = port_->transfer(bytes);
+  return {error, static_cast<double>(clock_.monotonic_ns() - start)};
+}
+
+std::string SpiWire::check_rate() {
   const MeasuredRate rate = measure_rate(*port_, clock_);
-  if (rate.error != 0) return failed(*port_, rate.error);
+  if (rate.error != 0) return gave_up(rate.error);
   if (const std::string refused = why_rate_refused(format_, rate.hz); !refused.empty()) {
     return fmt::format("{}: {}", port_->name(), refused);
   }
-  if (const double off = rate.hz / format_.hz - 1; std::abs(off) > kNoteworthy) {
-    note_ = fmt::format("{}: asked for {:.3f} MHz, measured {:.3f} MHz ({:+.1f} %); {}",
-                        port_->name(), format_.hz / 1e6, rate.hz / 1e6, off * 100, kCure);
+  overhead_ns_ = rate.overhead_ns;
+  const double off = rate.hz / format_.hz - 1;
+  deviation_.clear();
+  if (std::abs(off) > kNoteworthy) {
+    deviation_ = fmt::format("{}: asked for {:.3f} MHz, measured {:.3f} MHz ({:+.1f} %); {}",
+                             port_->name(), format_.hz / 1e6, rate.hz / 1e6, off * 100, kCure);
   }
   return {};
 }
 
-std::string SpiWire::send(std::span<const Rgb> leds) {
-  const int error = port_->transfer(encode(leds, format_));
+std::string SpiWire::gave_up(int error) {
   // What spidev answers once its device has gone, or its controller with it.
   lost_ = error == ESHUTDOWN || error == ENODEV || error == ENXIO;
-  return error == 0 ? std::string() : failed(*port_, error);
+  if (error == 0) return {};
+  return fmt::format("{}: write failed: {}: {}", port_->name(), std::strerror(error),
+                     spi_remedy(error));
 }
 
 }  // namespace dtact::hal::ws2812

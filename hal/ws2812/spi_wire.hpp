@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -16,8 +17,9 @@ namespace dtact::hal::ws2812 {
 /// timed and their difference taken, which cancels what a call costs besides the wire; the least of
 /// several, since interruptions only lengthen.
 struct MeasuredRate {
-  double hz = 0;  ///< 0: the transfers took no time, so no wire was driven.
-  int error = 0;  ///< errno of a transfer that failed.
+  double hz = 0;           ///< 0: the transfers took no time, so no wire was driven.
+  int error = 0;           ///< errno of a transfer that failed.
+  double overhead_ns = 0;  ///< What a transfer takes besides the wire's time, typically.
 };
 [[nodiscard]] MeasuredRate measure_rate(SpiPort& port, base::Clock& clock);
 
@@ -26,24 +28,45 @@ struct MeasuredRate {
 [[nodiscard]] std::string why_rate_refused(const SpiFormat& asked, double measured_hz);
 
 /// WS2812B on an SPI controller's data line (MOSI).
+///
+/// The controller's clock may change while we run, and LEDs then show anything without an error
+/// (jgarff/rpi_ws281x#381, #401: a Raspberry Pi 4 at idle). So each transfer is timed, on the
+/// thread that writes it: less what a transfer costs besides the wire, it tells the rate, which
+/// must lie in the window. One that is off is sent again, which heals the LEDs if the clock was off
+/// for a moment and costs a millisecond if it was not. An interruption only lengthens, so that a
+/// short transfer is always a fast clock; a long one may be a busy machine, and so may three in a
+/// row. Then the rate is measured as at the start, which interruptions hardly reach, and that alone
+/// decides: a clock outside the window is an error, and the wire is lost() until it is right again.
 class SpiWire final : public Wire {
  public:
-  /// Needs a format that why_refused() accepts.
+  /// Needs a format that why_refused() accepts. Without `check_rate` nothing is measured or timed.
   SpiWire(std::unique_ptr<SpiPort> port, const SpiFormat& format, bool check_rate,
           base::Clock& clock = base::system_clock());
 
   [[nodiscard]] RingInfo info() const override;
   [[nodiscard]] std::string prepare(int leds) override;
-  [[nodiscard]] std::string note() const override { return note_; }
+  [[nodiscard]] std::string note() const override;
   [[nodiscard]] std::string send(std::span<const Rgb> leds) override;
   [[nodiscard]] bool lost() const override { return lost_; }
 
  private:
+  struct Timed {
+    int error = 0;
+    double ns = 0;
+  };
+  [[nodiscard]] std::string check_rate();
+  [[nodiscard]] Timed transfer(std::span<const std::uint8_t> bytes) noexcept;
+  [[nodiscard]] std::string gave_up(int error);
+
   std::unique_ptr<SpiPort> port_;
   SpiFormat format_;
   bool check_rate_;
   base::Clock& clock_;
-  std::string note_;
+  std::string deviation_;    // of the rate measured last, worth a note
+  double overhead_ns_ = 0;   // of a transfer, measured with it
+  std::uint64_t sent_ = 0;   // transfers of colours
+  std::uint64_t again_ = 0;  // of these, sent again because they were off
+  std::string last_off_;
   bool lost_ = false;
 };
 

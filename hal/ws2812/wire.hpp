@@ -20,7 +20,7 @@ class Wire {
   /// The first call: finds out, without a colour that LEDs would show, whether the wire can serve a
   /// chain of `leds`.
   [[nodiscard]] virtual std::string prepare(int leds) = 0;
-  /// What prepare() found worth knowing; empty when nothing.
+  /// What prepare() or send() found worth knowing; empty when nothing.
   [[nodiscard]] virtual std::string note() const = 0;
   /// Sends one colour to each LED, the chain's first LED first, and waits until it is through.
   [[nodiscard]] virtual std::string send(std::span<const Rgb> leds) = 0;

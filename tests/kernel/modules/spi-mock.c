@@ -8,10 +8,13 @@
  *             flags bit 0: the first transfer of its message
  *   fail      the errno (positive) that transfers return from now on; 0 = none
  *   realtime  1: a transfer takes its time on the wire, len * 8 / speed
+ *   clock_percent    the clock's true rate of what is asked for; the log has what was asked for
+ *   clock_transfers  how many transfers that holds for before it is 100 again; 0 = for good
  */
 #include <linux/debugfs.h>
 #include <linux/delay.h>
 #include <linux/ktime.h>
+#include <linux/math64.h>
 #include <linux/module.h>
 #include <linux/mutex.h>
 #include <linux/platform_device.h>
@@ -43,6 +46,7 @@ static size_t log_used;
 static DEFINE_MUTEX(log_lock);
 static u32 fail;
 static bool realtime;
+static u32 clock_percent = 100, clock_transfers;
 
 static void record_transfer(struct spi_device *device, struct spi_transfer *transfer)
 {
@@ -79,10 +83,13 @@ static int transfer_one(struct spi_controller *c, struct spi_device *device,
 		memset(transfer->rx_buf, 0, transfer->len);
 	if (realtime && transfer->speed_hz) {
 		/* fsleep() may take twice as long, and the time is what a test measures */
-		u64 us = div_u64((u64)transfer->len * 8 * 1000000, transfer->speed_hz);
+		u64 us = div64_u64((u64)transfer->len * 8 * 1000000 * 100,
+				   (u64)transfer->speed_hz * max(clock_percent, 1U));
 
 		usleep_range(us, us + us / 128 + 1);
 	}
+	if (clock_transfers && --clock_transfers == 0)
+		clock_percent = 100;
 	return 0; /* finished */
 }
 
@@ -148,6 +155,8 @@ static int __init mock_init(void)
 	debugfs_create_file("log", 0600, folder, NULL, &log_operations);
 	debugfs_create_u32("fail", 0600, folder, &fail);
 	debugfs_create_bool("realtime", 0600, folder, &realtime);
+	debugfs_create_u32("clock_percent", 0600, folder, &clock_percent);
+	debugfs_create_u32("clock_transfers", 0600, folder, &clock_transfers);
 	return 0;
 
 unregister_parent:

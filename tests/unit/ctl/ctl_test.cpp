@@ -127,6 +127,18 @@ TEST(Led, ShowsAndChanges) {
             "brightness 128, LEDs ffffff ffffff 000000 000000 ffffff ffffff 000000 000000\n");
 }
 
+TEST(Led, SaysWhatTheRingDoesNotShow) {
+  Rig rig;
+  pipeline::Status status;
+  status.ring_message = "/dev/spidev0.0: cannot be opened: turn it on";
+  rig.port.set_status(status);
+  const auto result = ctl(rig, {"led"});
+  EXPECT_EQ(result.code, 0);
+  EXPECT_THAT(result.out, AllOf(StartsWith("brightness 255, LEDs"),
+                                EndsWith("\n/dev/spidev0.0: cannot be opened: turn it on\n")));
+  EXPECT_THAT(ctl(rig, {"led", "--json"}).out, Not(HasSubstr("spidev")));
+}
+
 TEST(Led, ChangesSingleOnes) {
   Rig rig({}, answer_done);
   const auto result = ctl(rig, {"led", "--led", "0:ff0000", "--led", "7:0000ff"});

@@ -202,6 +202,21 @@ TEST(SetLight, AFailedWriteIsNotBuiltOn) {
   EXPECT_EQ(std::get<pipeline::SetLight>(second->what).light.brightness, 255);
 }
 
+TEST(SetLight, ALightKeptForTheRingIsBuiltOn) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([](const pipeline::Command& command) {
+      return CommandDone{command.ticket, Outcome::ring_away, "/dev/spidev0.0: not there"};
+    });
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(client.request(brightness(10)).error().code(), v1::ERROR_DEVICE);
+  (void)client.request(scheme("scheme2"));
+  const auto second = rig.port.wait_command(1);
+  ASSERT_TRUE(second.has_value());
+  EXPECT_EQ(std::get<pipeline::SetLight>(second->what).light.brightness, 10);
+}
+
 TEST(Rezero, IsRefusedUnderContactUnlessForced) {
   Rig rig({}, [](FakePort& port) {
     port.answer([](const pipeline::Command& command) {

@@ -124,6 +124,17 @@ TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
   EXPECT_TRUE(eventually([&] { return !driver.trouble() && driver.message().empty(); }));
 }
 
+TEST_F(LightDriverTest, WhatIsWorthKnowingOfTheRingIsToldWhileNothingIsWrong) {
+  driver.start();
+  ring.tell({.ok = true, .message = {}, .note = "one write was late", .writes = 2, .failures = 0});
+  EXPECT_TRUE(eventually([&] { return driver.message() == "one write was late"; }));
+  EXPECT_FALSE(driver.trouble());
+  ring.broken = true;
+  ASSERT_TRUE(driver.submit(6, dimmed(100)));
+  ASSERT_TRUE(next());
+  EXPECT_EQ(driver.message(), "the fake ring is broken: mend it");
+}
+
 // It writes for nobody but us, so that its report says nothing of how it goes.
 TEST_F(LightDriverTest, ARingThatNeverReSendsHealsByTheNextWriteAlone) {
   driver.start();

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <ostream>
+#include <span>
 #include <stdexcept>
 
 #include "tests/unit/ws2812/chain_model.hpp"
@@ -63,6 +64,16 @@ TEST(Ws2812Encoder, SurroundsTheLedsWithTheLatchTime) {
   EXPECT_EQ(latch_bytes(2'500'000), 94U);  // 93.75
 }
 
+TEST(Ws2812Encoder, TheLatchOfEachEncoding) {
+  EXPECT_EQ(latch_bytes(2'700'000), 102U);  // 302 µs
+  EXPECT_EQ(latch_bytes(3'200'000), 120U);  // 300
+  EXPECT_EQ(latch_bytes(6'400'000), 240U);  // 300
+  const std::array<Rgb, 8> leds{};
+  EXPECT_EQ(encode(leds, {3, 2'700'000}).size(), 276U);
+  EXPECT_EQ(encode(leds, {4, 3'200'000}).size(), 336U);
+  EXPECT_EQ(encode(leds, {8, 6'400'000}).size(), 672U);
+}
+
 TEST(Ws2812Encoder, NoLedsAreTwoLatches) {
   EXPECT_EQ(encode({}, {4, 3'200'000}), std::vector<std::uint8_t>(240, 0));
 }
@@ -113,6 +124,61 @@ TEST(Ws2812Encoder, AChainShowsWhatWasEncoded) {
     EXPECT_THAT(chain.shown(), ElementsAreArray(leds)) << format.bits << " bits";
     EXPECT_EQ(chain.odd_pulses(), 1) << "the idle high and nothing else";
   }
+}
+
+// MOSI rests at whatever level a controller leaves it at, before, between and after pictures.
+TEST(Ws2812Encoder, AChainShowsWhatWasEncodedWhereverTheLineRests) {
+  const std::array<Rgb, 2> first{Rgb{1, 2, 3}, Rgb{255, 128, 0}};
+  const std::array<Rgb, 2> second{Rgb{0, 0, 0}, Rgb{255, 255, 255}};
+  for (const SpiFormat format : {SpiFormat{3, 2.7e6}, SpiFormat{4, 3.2e6}, SpiFormat{8, 6.4e6}}) {
+    for (const bool rests_high : {false, true}) {
+      test::ChainModel chain;
+      for (const auto& leds : {first, second}) {
+        chain.level(rests_high, 5e6);
+        chain.spi(encode(leds, format), format.hz);
+        chain.level(rests_high, 5e6);
+        EXPECT_THAT(chain.shown(), ElementsAreArray(leds)) << format.bits << " bits";
+      }
+    }
+  }
+}
+
+// Why a chain beyond spidev's buffer is refused and not cut.
+TEST(Ws2812Encoder, APictureInTwoTransfersIsAnother) {
+  const std::array<Rgb, 4> leds{Rgb{1, 2, 3}, Rgb{4, 5, 6}, Rgb{7, 8, 9}, Rgb{10, 11, 12}};
+  const SpiFormat format{4, 3.2e6};
+  const auto bytes = encode(leds, format);
+  const std::span<const std::uint8_t> all(bytes);
+  for (const bool rests_high : {false, true}) {
+    test::ChainModel chain;
+    chain.spi(all.first(120 + 24), format.hz);
+    chain.level(rests_high, 1e6);
+    chain.spi(all.subspan(120 + 24), format.hz);
+    EXPECT_NE(chain.shown(), std::vector<Rgb>(leds.begin(), leds.end()));
+  }
+}
+
+// rpi_ws281x#381: what LEDs make of black when the clock is 0.4 of what was asked for.
+TEST(Ws2812Encoder, ASlowClockTurnsBlackIntoWhite) {
+  const std::array<Rgb, 8> dark{};
+  const std::array<Rgb, 8> white = Light::all({255, 255, 255});
+  test::ChainModel chain;
+  chain.spi(encode(dark, {4, 3.2e6}), 0.4 * 3.2e6);
+  EXPECT_THAT(chain.shown(), ElementsAreArray(white));
+}
+
+TEST(Ws2812Encoder, AClockMayFallByTheWindowsWidth) {
+  struct Case {
+    int bits;
+    double share;
+  };
+  for (const Case& c : {Case{3, 0.75}, Case{4, 0.66}, Case{8, 0.60}}) {
+    const double fastest = window_of(c.bits).fastest;
+    EXPECT_EQ(why_refused({c.bits, fastest}), "");
+    EXPECT_EQ(why_refused({c.bits, fastest * (c.share + 0.001)}), "") << c.bits;
+    EXPECT_NE(why_refused({c.bits, fastest * (c.share - 0.001)}), "") << c.bits;
+  }
+  EXPECT_EQ(why_refused({8, 0.626 * 8e6}), "");  // what kCure in spi_wire.cpp promises
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "hal/base/clock.hpp"
@@ -28,12 +29,18 @@ class FakePort final : public SpiPort {
     if (error != 0) return error;
     longest = std::max(longest, bytes.size());
     sent.assign(bytes.begin(), bytes.end());
-    clock_.now += overhead_ns;
-    if (hz > 0)
-      clock_.now += static_cast<std::int64_t>(static_cast<double>(bytes.size()) * 8e9 / hz);
+    if (sent != std::vector<std::uint8_t>(sent.size(), 0)) ++pictures;
+    clock_.now += overhead_ns + (noise_ns ? noise_ns() : 0);
+    const double rate = odd_hz.empty() ? hz : odd_hz.back();
+    if (!odd_hz.empty()) odd_hz.pop_back();
+    if (rate > 0)
+      clock_.now += static_cast<std::int64_t>(static_cast<double>(bytes.size()) * 8e9 / rate);
     return 0;
   }
   double hz = 3'200'000;
+  std::vector<double> odd_hz;              // rates of the transfers to come, before hz again
+  std::function<std::int64_t()> noise_ns;  // what interruptions add to each
+  int pictures = 0;                        // transfers that were not only zeros
   std::int64_t overhead_ns = 80'000;
   std::size_t bufsiz = 4096;
   int error = 0;

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cerrno>
+#include <random>
 #include <stdexcept>
 
 #include "tests/unit/ws2812/chain_model.hpp"
@@ -15,6 +16,8 @@ namespace {
 
 using testing::ElementsAreArray;
 using testing::HasSubstr;
+
+constexpr std::array<Rgb, 8> kDark{};
 
 struct Bench {
   test::FakeClock clock;
@@ -34,6 +37,12 @@ TEST(Ws2812SpiWire, MeasuresTheRateWhateverACallCosts) {
       EXPECT_NEAR(measure_rate(bench.port, bench.clock).hz, hz, hz * 1e-4);
     }
   }
+}
+
+TEST(Ws2812SpiWire, MeasuresWhatACallCosts) {
+  Bench bench;
+  bench.port.overhead_ns = 130'000;
+  EXPECT_NEAR(measure_rate(bench.port, bench.clock).overhead_ns, 130'000, 100);
 }
 
 TEST(Ws2812SpiWire, MeasuresWithZerosWithinBufsiz) {
@@ -82,6 +91,8 @@ TEST(Ws2812SpiWire, TheCheckCanBeTurnedOff) {
   SpiWire wire = bench.wire({}, false);
   EXPECT_EQ(wire.prepare(8), "");
   EXPECT_TRUE(bench.port.sent.empty());
+  EXPECT_EQ(wire.send(kDark), "");
+  EXPECT_EQ(bench.port.pictures, 1);
 }
 
 TEST(Ws2812SpiWire, NamesTheBufsizThatIsNeeded) {
@@ -90,6 +101,19 @@ TEST(Ws2812SpiWire, NamesTheBufsizThatIsNeeded) {
   SpiWire wire = bench.wire();
   EXPECT_THAT(wire.prepare(8), HasSubstr("8 LEDs need 336 bytes"));
   EXPECT_THAT(wire.prepare(8), HasSubstr("spidev.bufsiz=4096"));
+}
+
+TEST(Ws2812SpiWire, TheLongestChainThatFitsBufsiz) {
+  struct Case {
+    SpiFormat format;
+    int leds;
+  };
+  for (const Case& c : {Case{{3, 2.7e6}, 432}, {{4, 3.2e6}, 321}, {{8, 6.4e6}, 150}}) {
+    Bench bench;
+    SpiWire wire = bench.wire(c.format, false);
+    EXPECT_EQ(wire.prepare(c.leds), "");
+    EXPECT_THAT(wire.prepare(c.leds + 1), HasSubstr("spidev takes 4096: put spidev.bufsiz=41"));
+  }
 }
 
 TEST(Ws2812SpiWire, SendsWhatAChainThenShows) {
@@ -112,6 +136,90 @@ TEST(Ws2812SpiWire, ErrorsNameDeviceAndRemedy) {
   EXPECT_THAT(wire.prepare(8), HasSubstr("Permission denied"));
   bench.port.error = EMSGSIZE;
   EXPECT_THAT(wire.send({}), HasSubstr("spidev.bufsiz"));
+}
+
+// As a Raspberry Pi 4's clock does whose core falls from 500 to 200 MHz at idle, for one transfer.
+TEST(Ws2812SpiWire, ATransferThatWasOffIsSentAgain) {
+  Bench bench;
+  SpiWire wire = bench.wire();
+  ASSERT_EQ(wire.prepare(8), "");
+  bench.port.odd_hz = {1.28e6};
+  EXPECT_EQ(wire.send(kDark), "");
+  EXPECT_EQ(bench.port.pictures, 2);
+  EXPECT_FALSE(wire.lost());
+  // 2688 bits, and what a call costs here: 0.08 ms.
+  EXPECT_EQ(wire.note(),
+            "/dev/fakespi: 1 of 2 transfers were off and sent again, the last 2.18 ms for 0.92 ms: "
+            "the clock, or a busy machine");
+  EXPECT_EQ(wire.send(kDark), "");
+  EXPECT_EQ(bench.port.pictures, 3);
+}
+
+TEST(Ws2812SpiWire, AClockThatChangedIsNamedAfterThreeTransfersInARow) {
+  for (const double hz : {1.28e6, 8e6}) {
+    Bench bench;
+    SpiWire wire = bench.wire();
+    ASSERT_EQ(wire.prepare(8), "");
+    bench.port.hz = hz;
+    const std::string error = wire.send(kDark);
+    EXPECT_THAT(error, HasSubstr(hz < 3e6 ? "/dev/fakespi: asked for 3.200 MHz, the controller "
+                                            "really sends 1.280 MHz"
+                                          : "really sends 8.000 MHz"));
+    EXPECT_THAT(error, HasSubstr("core_freq_min=500"));
+    EXPECT_THAT(error, HasSubstr("core_freq=250"));
+    EXPECT_THAT(error, HasSubstr("force_turbo=1"));
+    EXPECT_THAT(error, HasSubstr("spi_bits = 8"));
+    EXPECT_EQ(bench.port.pictures, 3) << "and none while the clock is known to be off";
+    EXPECT_TRUE(wire.lost());
+    bench.port.hz = 3.2e6;
+    EXPECT_EQ(wire.prepare(8), "");
+    EXPECT_EQ(wire.send(kDark), "");
+    EXPECT_FALSE(wire.lost());
+  }
+}
+
+TEST(Ws2812SpiWire, EachEncodingToleratesItsWindow) {
+  struct Case {
+    SpiFormat format;
+    double slowest, fastest;
+  };
+  for (const Case& c : {Case{{3, 2.7e6}, 2.50e6, 3.33e6},
+                        {{4, 3.2e6}, 3.00e6, 4.54e6},
+                        {{8, 6.4e6}, 5e6, 8.33e6}}) {
+    for (const double hz :
+         {c.slowest * 0.99, c.slowest * 1.01, c.fastest * 0.99, c.fastest * 1.01}) {
+      Bench bench;
+      bench.port.hz = c.format.hz;
+      SpiWire wire = bench.wire(c.format);
+      ASSERT_EQ(wire.prepare(8), "");
+      bench.port.hz = hz;
+      const bool fits = hz > c.slowest && hz < c.fastest;
+      EXPECT_EQ(wire.send(kDark).empty(), fits) << c.format.bits << " bits at " << hz;
+      EXPECT_EQ(bench.port.pictures, fits ? 1 : 3);
+    }
+  }
+}
+
+// Interruptions only lengthen. The light is sent, and said to be, however busy the machine is.
+TEST(Ws2812SpiWire, ABusyMachineIsNotASlowClock) {
+  Bench bench;
+  std::mt19937 random(1);
+  std::exponential_distribution<double> late(1 / 300'000.0);  // ns; a slow clock adds 56,000
+  bench.port.noise_ns = [&] { return static_cast<std::int64_t>(late(random)); };
+  SpiWire wire = bench.wire();
+  ASSERT_EQ(wire.prepare(8), "");
+  for (int i = 0; i < 2000; ++i) ASSERT_EQ(wire.send(kDark), "") << i;
+  EXPECT_THAT(wire.note(), HasSubstr("or a busy machine"));
+}
+
+// When three late ones turn out to be the machine's, the clock may have been off for a moment.
+TEST(Ws2812SpiWire, AfterAMeasurementTheLightIsSentOnceMore) {
+  Bench bench;
+  SpiWire wire = bench.wire();
+  ASSERT_EQ(wire.prepare(8), "");
+  bench.port.odd_hz = {1.28e6, 1.28e6, 1.28e6};
+  EXPECT_EQ(wire.send(kDark), "");
+  EXPECT_EQ(bench.port.pictures, 4);
 }
 
 // What spidev's ioctl answers once its device is unbound: ESHUTDOWN (spidev_sync in
