@@ -2,9 +2,10 @@
 # setup.sh: makes the guest kernel of the kernel tests, once, in a cache folder.
 #
 # The kernel is User Mode Linux (a Linux kernel that runs as an ordinary program) built from
-# Debian's linux-source-6.1 with uml.config, and the modules of modules/ beside it: about 4 minutes
-# on 2 cores. It is made again when this, uml.config or a module changes. Nothing is installed but build
-# tools, and those only by root. Every time, the kernel is booted once to see that it runs here.
+# Debian's linux-source-6.1 with uml.config: about 4 minutes on 2 cores. What modules are built with
+# is kept beside it, so that a change in modules/ builds those alone, in seconds. Nothing is
+# installed but build tools, and those only by root. Every time, the kernel is booted once to see that
+# it runs here.
 #
 # Exit code: 0 the kernel is there and runs; 77 it cannot be had on this machine; else it does not
 # build or does not run here. The reason is printed.
@@ -19,9 +20,6 @@ skip() {
   exit 77
 }
 
-stamp=$(cat "$here/setup.sh" "$here/uml.config" "$here"/modules/* | sha256sum | cut -c1-16)
-is_ready() { [ -x "$cache/linux" ] && [ "$(cat "$cache/stamp" 2> /dev/null)" = "$stamp" ]; }
-
 mkdir -p "$cache"
 exec 9> "$cache/lock"
 flock 9 # two test runs at once make one kernel
@@ -35,67 +33,98 @@ change_once() {
   sed -i "s/$2/$3/" "$1"
 }
 
-# build FOLDER: the kernel and its modules from Debian's source, in FOLDER.
-build() (
+# build_kernel FOLDER: from Debian's source, the kernel, its modules and what modules are built with.
+build_kernel() (
   set -e
   cd "$1"
   dpkg -x "${source_package}"_*.deb .
   tar -xJf "usr/src/$source_package.tar.xz"
   rm -rf usr ./*.deb
-  source=$1/$source_package
-  out=$1/out
   # The space for a process's vector registers. The kernel can take them from the machine in part but
   # not give them back in part, and with AMX (Intel, since 2023) they are 11,008 bytes.
-  change_once "$source/arch/x86/um/user-offsets.c" 'HOST_FP_SIZE, 2696)' 'HOST_FP_SIZE, 12288)'
-  mkdir "$out"
-  quick=(make -s -C "$source" ARCH=um "O=$out")
+  change_once "$source_package/arch/x86/um/user-offsets.c" 'HOST_FP_SIZE, 2696)' 'HOST_FP_SIZE, 12288)'
+  mkdir out in-tree
+  quick=(make -s -C "$1/$source_package" ARCH=um "O=$1/out")
   if command -v ccache; then quick+=("CC=ccache gcc"); fi
   "${quick[@]}" tinyconfig
-  (cd "$source" && scripts/kconfig/merge_config.sh -O "$out" -m "$out/.config" "$here/uml.config")
+  (cd "$source_package" && scripts/kconfig/merge_config.sh -O ../out -m ../out/.config "$here/uml.config")
   "${quick[@]}" olddefconfig
   "${quick[@]}" -j"$(nproc)"
-  cp -r "$here/modules" modules
-  "${quick[@]}" "M=$1/modules" modules
+  mv out/linux .
+  find out -name '*.ko' -exec cp {} in-tree/ ';'
+  mkdir headers
+  (cd "$source_package" && cp -r --parents Makefile scripts include arch/um arch/x86 ../headers/)
+  rm -rf "$source_package"
+  find out -mindepth 1 -maxdepth 1 ! -name include ! -name arch ! -name scripts ! -name .config \
+    ! -name Module.symvers -exec rm -rf {} +
+  find out headers -name '*.o' -delete
 )
 
-make_kernel() {
+# build_modules FOLDER: those of modules/, with what build_kernel has left there.
+build_modules() (
+  set -e
+  rm -rf "$1/modules"
+  cp -r "$here/modules" "$1/modules"
+  make -s -C "$1/headers" ARCH=um "O=$1/out" "M=$1/modules" modules
+)
+
+need_tools() {
   [ "$(uname -m)" = x86_64 ] || skip "User Mode Linux runs on x86-64, this is $(uname -m)"
-  local missing=() package work built
+  local missing=() package
   for package in "${packages[@]}"; do
     dpkg-query -W -f '${Status}' "$package" 2> /dev/null | grep -q 'ok installed' || missing+=("$package")
   done
-  if [ ${#missing[@]} -gt 0 ]; then
-    [ "$(id -u)" = 0 ] || skip "run: sudo apt-get install ${missing[*]}"
-    echo "installing ${missing[*]}"
-    apt-get install -y -qq --no-install-recommends "${missing[@]}" > "$cache/install.log" 2>&1 \
-      || { apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}"; } \
-        >> "$cache/install.log" 2>&1 || skip "cannot install ${missing[*]}: see $cache/install.log"
-  fi
+  [ ${#missing[@]} -gt 0 ] || return 0
+  [ "$(id -u)" = 0 ] || skip "run: sudo apt-get install ${missing[*]}"
+  echo "installing ${missing[*]}"
+  apt-get install -y -qq --no-install-recommends "${missing[@]}" > "$cache/install.log" 2>&1 \
+    || { apt-get update -qq && apt-get install -y -qq --no-install-recommends "${missing[@]}"; } \
+      >> "$cache/install.log" 2>&1 || skip "cannot install ${missing[*]}: see $cache/install.log"
+}
 
-  work=$(mktemp -d "$cache/build.XXXXXX")
-  # shellcheck disable=SC2064  # the folder of now
-  trap "rm -rf '$work'" EXIT
+# logged COMMAND...: runs it; where it fails, shows the end of the log and ends.
+logged() {
+  local built
+  # Not as a condition, in which bash would go on after a step that failed.
+  set +e
+  "$@" >> "$cache/build.log" 2>&1
+  built=$?
+  set -e
+  [ $built = 0 ] && return
+  tail -n 20 "$cache/build.log" >&2
+  echo "setup.sh: $1 failed: see $cache/build.log" >&2
+  exit 1
+}
+
+stamp_of() { sha256sum | cut -c1-16; }
+is_stamped() { [ "$(cat "$cache/$1" 2> /dev/null)" = "$2" ]; }
+
+# The kernel is what its configuration and its recipe make it; the modules are built for that.
+kernel_stamp=$({ declare -f change_once build_kernel; cat "$here/uml.config"; } | stamp_of)
+modules_stamp=$({ echo "$kernel_stamp"; declare -f build_modules; cat "$here"/modules/*; } | stamp_of)
+
+if ! is_stamped stamp "$kernel_stamp"; then
+  need_tools
+  # Always the same folder, so that ccache knows what it has built there before.
+  work=$cache/build.new
+  trap 'rm -rf "$work"' EXIT
+  rm -rf "$work" "$cache/modules.stamp"
+  mkdir "$work"
   echo "building the guest kernel from $source_package: a few minutes, once (log: $cache/build.log)"
   (cd "$work" && apt-get download -q "$source_package") > "$cache/build.log" 2>&1 \
     || skip "cannot download $source_package: see $cache/build.log"
-  # Not as a condition, in which bash would go on after a step that failed.
-  set +e
-  build "$work" >> "$cache/build.log" 2>&1
-  built=$?
-  set -e
-  if [ $built != 0 ]; then
-    tail -n 20 "$cache/build.log" >&2
-    echo "setup.sh: the guest kernel does not build: see $cache/build.log" >&2
-    exit 1
-  fi
-  rm -rf "$cache/modules"
-  mkdir "$cache/modules"
-  find "$work/modules" "$work/out" -name '*.ko' -exec cp {} "$cache/modules/" ';'
-  cp "$work/out/linux" "$cache/linux.new"
-  mv "$cache/linux.new" "$cache/linux"
-  echo "$stamp" > "$cache/stamp"
-}
-
-is_ready || make_kernel
+  logged build_kernel "$work"
+  rm -rf "$cache/modules" "$cache/build"
+  mv "$work/in-tree" "$cache/modules"
+  mv "$work/linux" "$cache/linux"
+  mv "$work" "$cache/build"
+  echo "$kernel_stamp" > "$cache/stamp"
+fi
+if ! is_stamped modules.stamp "$modules_stamp"; then
+  need_tools
+  logged build_modules "$cache/build"
+  cp "$cache/build/modules"/*.ko "$cache/modules/"
+  echo "$modules_stamp" > "$cache/modules.stamp"
+fi
 "$here/selftest"
 echo "guest kernel: $cache"
