@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 #include <fmt/ostream.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iostream>
 #include <ostream>
 #include <string>
 
@@ -48,6 +51,13 @@ void print_text(const SurveyedCamera& camera, std::ostream& out) {
   }
 }
 
+/// Nodes that no name never means: in grey, where the terminal has it.
+void print_not_taken(const SurveyedCamera& camera, bool terminal, std::ostream& out) {
+  const hal::v4l2::Attached& who = camera.attached;
+  fmt::print(out, "{}  {} ({}): {}{}\n", terminal ? "\x1b[2m" : "", who.node, who.card,
+             who.not_taken, terminal ? "\x1b[22m" : "");
+}
+
 cli::AttachedCamera report_of(const SurveyedCamera& camera) {
   const hal::v4l2::Attached& who = camera.attached;
   cli::AttachedCamera report;
@@ -60,6 +70,7 @@ cli::AttachedCamera report_of(const SurveyedCamera& camera) {
   report.set_card(who.card);
   report.set_driver(who.driver);
   report.set_problem(who.problem);
+  report.set_not_taken(who.not_taken);
   for (const Mode& mode : camera.modes) {
     cli::CameraMode& to = *report.add_modes();
     to.set_format(mode.format_name());
@@ -85,22 +96,29 @@ cli::AttachedCamera report_of(const SurveyedCamera& camera) {
 
 }  // namespace
 
-void print_cameras(const std::vector<SurveyedCamera>& cameras, bool json, std::ostream& out) {
+void print_cameras(const std::vector<SurveyedCamera>& cameras, bool json, bool terminal,
+                   std::ostream& out) {
   if (json) {
     cli::CamerasReport report;
     for (const SurveyedCamera& camera : cameras) *report.add_cameras() = report_of(camera);
     out << cli::json_line(report);
     return;
   }
-  if (cameras.empty()) out << "no camera is attached\n";
-  for (const SurveyedCamera& camera : cameras) print_text(camera, out);
+  const auto rest = std::ranges::find_if(
+      cameras, [](const SurveyedCamera& c) { return !c.attached.not_taken.empty(); });
+  if (rest == cameras.begin()) out << "no camera is attached\n";
+  for (auto it = cameras.begin(); it != rest; ++it) print_text(*it, out);
+  if (rest != cameras.end()) out << "not taken\n";
+  for (auto it = rest; it != cameras.end(); ++it) print_not_taken(*it, terminal, out);
 }
 
 void add_cameras(CLI::App& app, Context& context) {
   CLI::App* command =
       app.add_subcommand("cameras", "List the cameras attached to this machine (needs no daemon)");
-  command->callback(
-      [&context] { print_cameras(hal::v4l2::survey_cameras(), context.json, context.out); });
+  command->callback([&context] {
+    const bool terminal = &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1;
+    print_cameras(hal::v4l2::survey_cameras(), context.json, terminal, context.out);
+  });
 }
 
 }  // namespace dtact::ctl

@@ -12,8 +12,8 @@ namespace dtact::ctl {
 /// the controls. Needs no daemon; one that streams is not disturbed.
 void add_cameras(CLI::App& app, Context& context);
 
-/// What the command prints.
-void print_cameras(const std::vector<hal::v4l2::SurveyedCamera>& cameras, bool json,
+/// What the command prints. On a `terminal`, nodes that are not taken are grey.
+void print_cameras(const std::vector<hal::v4l2::SurveyedCamera>& cameras, bool json, bool terminal,
                    std::ostream& out);
 
 }  // namespace dtact::ctl

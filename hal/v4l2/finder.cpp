@@ -8,10 +8,13 @@
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 
 #include "hal/v4l2/error_of.hpp"
 #include "hal/v4l2/ioctl.hpp"
+#include "hal/v4l2/modes.hpp"
+#include "hal/v4l2/usb_device.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {
@@ -41,33 +44,58 @@ std::vector<fs::path> entries(const char* folder) {
 /// The link in `folder` that leads to the node, or nothing. Several: the shortest.
 std::string link_to(const std::string& node, const char* folder) {
   for (const fs::path& link : entries(folder)) {
+    // udev makes a link as ".#NAME" and random digits and renames it (systemd, tempfn_random()).
+    if (link.filename().native().starts_with('.')) continue;
     std::error_code error;
     if (fs::canonical(link, error) == node && !error) return link;
   }
   return {};
 }
 
-/// The nearest "serial" among the parents of the node's device, as the kernel read it from USB.
-std::string serial_of(const std::string& node) {
-  std::error_code error;
-  fs::path device =
-      fs::canonical(fs::path(kClassFolder) / fs::path(node).filename() / "device", error);
-  while (!error && device.has_relative_path()) {
-    std::ifstream file(device / "serial");
-    std::string serial;
-    if (std::getline(file, serial)) return serial;
-    // A host controller has a serial too: its own.
-    if (fs::exists(device / "idVendor")) return {};
-    device = device.parent_path();
-  }
-  return {};
+/// Of the USB device, as the kernel read it from it.
+std::string serial_of(const fs::path& usb_device) {
+  std::ifstream file(usb_device / "serial");
+  std::string serial;
+  std::getline(file, serial);
+  return serial;
 }
 
-bool captures(const v4l2_capability& capability) {
-  const std::uint32_t caps = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
-                                 ? capability.device_caps
-                                 : capability.capabilities;
+std::uint32_t caps_of(const v4l2_capability& capability) {
+  return (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0 ? capability.device_caps
+                                                               : capability.capabilities;
+}
+
+bool captures(std::uint32_t caps) {
   return (caps & V4L2_CAP_VIDEO_CAPTURE) != 0 && (caps & V4L2_CAP_STREAMING) != 0;
+}
+
+/// "The video input ioctls must be supported by all video capture devices", says
+/// Documentation/userspace-api/media/v4l/dev-capture.rst. The capture nodes of scalers have none:
+/// bcm2835-isp registers four on a Pi 4 (bcm2835-v4l2-isp.c in raspberrypi/linux, whose ioctls lack
+/// vidioc_enum_input), and they say that they deliver YUYV at every size.
+bool has_input(int fd) {
+  v4l2_input input{};
+  return call(fd, VIDIOC_ENUMINPUT, input) == 0;
+}
+
+/// Why the node is no camera that can be read as it is; empty when it is one.
+std::string why_no_camera(int fd, std::uint32_t caps, bool usb) {
+  if ((caps & (V4L2_CAP_VIDEO_M2M | V4L2_CAP_VIDEO_M2M_MPLANE)) != 0) {
+    return "it converts images, as a codec does";
+  }
+  if (!captures(caps)) {
+    if ((caps & V4L2_CAP_META_CAPTURE) != 0) return "it delivers metadata, not images";
+    if ((caps & V4L2_CAP_VIDEO_CAPTURE_MPLANE) != 0) {
+      return "it has only multi-planar buffers: use camera.backend = \"libcamera\"";
+    }
+    return "it delivers no images";
+  }
+  if (usb) return {};
+  if ((caps & V4L2_CAP_IO_MC) != 0) {
+    return "its pipeline has to be set up first: use camera.backend = \"libcamera\"";
+  }
+  if (!has_input(fd)) return "it has no video input: it converts what a program hands to it";
+  return {};
 }
 
 std::string text_of(const __u8* characters, std::size_t size) {
@@ -90,6 +118,75 @@ std::string names_of(const std::vector<Attached>& cameras) {
   return text;
 }
 
+/// Not by node: which of two cameras got the first number is a matter of chance.
+std::string order_of(const Attached& camera) { return camera.stable_name() + camera.node; }
+
+/// The nodes on USB, or the others. The two are looked at apart, since opening costs: a codec's
+/// (bcm2835-codec) starts a component of the firmware.
+std::vector<Attached> look_at(bool usb) {
+  std::vector<Attached> nodes;
+  for (const fs::path& entry : entries(kClassFolder)) {
+    if (!entry.filename().native().starts_with("video")) continue;
+    Attached found;
+    found.node = "/dev/" + entry.filename().string();
+    const fs::path usb_device = usb_device_of(found.node);
+    found.usb = !usb_device.empty();
+    if (found.usb != usb) continue;
+    const base::UniqueFd fd = open_node(found.node);
+    if (!fd) {
+      const int error = errno;
+      if (error == ENOENT || error == ENODEV || error == ENXIO) continue;  // just unplugged
+      found.problem = error_of(error, "open", found.node).what();
+    } else {
+      v4l2_capability capability{};
+      if (call(fd.get(), VIDIOC_QUERYCAP, capability) != 0) continue;
+      found.bus = text_of(capability.bus_info, sizeof capability.bus_info);
+      found.card = text_of(capability.card, sizeof capability.card);
+      found.driver = text_of(capability.driver, sizeof capability.driver);
+      found.not_taken = why_no_camera(fd.get(), caps_of(capability), usb);
+    }
+    found.by_path = link_to(found.node, kByPath);
+    found.by_id = link_to(found.node, kById);
+    if (usb) found.serial = serial_of(usb_device);
+    nodes.push_back(std::move(found));
+  }
+  return nodes;
+}
+
+void keep_cameras(std::vector<Attached>& nodes) {
+  std::erase_if(nodes, [](const Attached& n) { return !n.not_taken.empty(); });
+  std::ranges::sort(nodes, {}, order_of);
+}
+
+/// Says of the cameras among `others` that cannot deliver a readable format at the size, why they
+/// are not taken. 0×0: any size will do.
+void require_format(std::vector<Attached>& others, int width, int height) {
+  for (Attached& other : others) {
+    if (!other.not_taken.empty() || !other.problem.empty()) continue;
+    const base::UniqueFd fd = open_node(other.node);
+    const std::vector<Mode> modes = fd ? list_modes(fd.get()) : std::vector<Mode>{};
+    if (std::ranges::any_of(modes, [&](const Mode& mode) {
+          return mode.usable() && (width == 0 || mode.has_size(width, height));
+        })) {
+      continue;
+    }
+    other.not_taken =
+        width == 0 ? "it delivers no format that can be read (GREY, NV12, YUYV, MJPEG)"
+                   : fmt::format("it delivers no format that can be read at {}x{}", width, height);
+  }
+}
+
+/// What no name chooses from.
+std::vector<Attached> candidates(int width, int height) {
+  std::vector<Attached> cameras = look_at(true);
+  keep_cameras(cameras);
+  if (!cameras.empty()) return cameras;
+  cameras = look_at(false);
+  require_format(cameras, width, height);
+  keep_cameras(cameras);
+  return cameras;
+}
+
 }  // namespace
 
 std::string Attached::stable_name() const {
@@ -99,31 +196,30 @@ std::string Attached::stable_name() const {
 }
 
 std::vector<Attached> list_attached() {
-  std::vector<Attached> cameras;
-  for (const fs::path& entry : entries(kClassFolder)) {
-    if (!entry.filename().native().starts_with("video")) continue;
-    Attached camera;
-    camera.node = "/dev/" + entry.filename().string();
-    const base::UniqueFd fd = open_node(camera.node);
-    if (!fd) {
-      const int error = errno;
-      if (error == ENOENT || error == ENODEV || error == ENXIO) continue;  // just unplugged
-      camera.problem = error_of(error, "open", camera.node).what();
-    } else {
-      v4l2_capability capability{};
-      if (call(fd.get(), VIDIOC_QUERYCAP, capability) != 0 || !captures(capability)) continue;
-      camera.bus = text_of(capability.bus_info, sizeof capability.bus_info);
-      camera.card = text_of(capability.card, sizeof capability.card);
-      camera.driver = text_of(capability.driver, sizeof capability.driver);
-    }
-    camera.by_path = link_to(camera.node, kByPath);
-    camera.by_id = link_to(camera.node, kById);
-    camera.serial = serial_of(camera.node);
-    cameras.push_back(std::move(camera));
-  }
-  // Not by node: which of two cameras got the first number is a matter of chance.
-  std::ranges::sort(cameras, {}, [](const Attached& c) { return c.stable_name() + c.node; });
+  std::vector<Attached> cameras = look_at(true);
+  std::ranges::move(look_at(false), std::back_inserter(cameras));
+  keep_cameras(cameras);
   return cameras;
+}
+
+std::vector<Attached> list_nodes() {
+  std::vector<Attached> nodes = look_at(true);
+  const bool any_usb =
+      std::ranges::any_of(nodes, [](const Attached& n) { return n.not_taken.empty(); });
+  std::vector<Attached> others = look_at(false);
+  require_format(others, 0, 0);
+  for (Attached& other : others) {
+    if (any_usb && other.not_taken.empty()) {
+      other.not_taken = fmt::format(
+          "it is not on USB, and a USB camera is there: set camera.v4l2.device = \"{}\" to take it",
+          other.stable_name());
+    }
+    nodes.push_back(std::move(other));
+  }
+  const auto rest =
+      std::ranges::stable_partition(nodes, [](const Attached& n) { return n.not_taken.empty(); });
+  std::ranges::sort(nodes.begin(), rest.begin(), {}, order_of);
+  return nodes;
 }
 
 DeviceName::DeviceName(const std::string& text) : text_(text) {
@@ -154,7 +250,7 @@ bool DeviceName::means(const Attached& camera) const {
   }
 }
 
-DeviceName::Opened DeviceName::open() const {
+DeviceName::Opened DeviceName::open(int width, int height) const {
   Opened opened;
   if (kind_ == Kind::path) {
     std::error_code error;
@@ -168,13 +264,15 @@ DeviceName::Opened DeviceName::open() const {
     }
     opened.identity = value_;
   } else {
-    std::vector<Attached> cameras = list_attached();
+    std::vector<Attached> cameras =
+        kind_ == Kind::only ? candidates(width, height) : list_attached();
     const std::string names = names_of(cameras);
     std::erase_if(cameras, [&](const Attached& c) { return !means(c); });
     if (cameras.empty()) {
       throw DeviceError(CameraState::unplugged,
                         kind_ == Kind::only
-                            ? "no camera is attached: plug it in"
+                            ? "no camera is attached: plug it in (dtactctl cameras says why other "
+                              "video nodes are not taken)"
                             : fmt::format("no camera {} is attached: plug it in, or set "
                                           "camera.v4l2.device ({})",
                                           text_, names));
@@ -200,7 +298,7 @@ DeviceName::Opened DeviceName::open() const {
   if (const int e = call(opened.fd.get(), VIDIOC_QUERYCAP, capability); e != 0) {
     throw error_of(e, "query", opened.node);
   }
-  if (!captures(capability)) {
+  if (!captures(caps_of(capability))) {
     throw ModeError(
         fmt::format("{} ({}) is not a capture node (a USB camera has a second node for "
                     "metadata): set camera.v4l2.device to another ({})",

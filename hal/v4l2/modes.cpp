@@ -96,8 +96,12 @@ std::string Mode::format_name() const {
   return format != nullptr ? format->name : fourcc_text(fourcc);
 }
 
+bool Mode::has_size(int w, int h) const noexcept {
+  return w >= min_width && w <= width && h >= min_height && h <= height;
+}
+
 bool Mode::offers(int w, int h, double rate) const noexcept {
-  if (w < min_width || w > width || h < min_height || h > height) return false;
+  if (!has_size(w, h)) return false;
   if (fps.empty()) return true;
   if (fps_is_range) {
     return rate <= fps.front() + kRateTolerance && rate >= fps.back() - kRateTolerance;

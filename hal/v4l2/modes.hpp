@@ -38,6 +38,7 @@ struct Mode {
   /// As in CameraInfo, or the four letters of a format that the HAL cannot read.
   [[nodiscard]] std::string format_name() const;
   [[nodiscard]] bool usable() const noexcept { return find_format(fourcc) != nullptr; }
+  [[nodiscard]] bool has_size(int w, int h) const noexcept;
   [[nodiscard]] bool offers(int w, int h, double rate) const noexcept;
 };
 

@@ -8,9 +8,9 @@ namespace dtact::hal::v4l2 {
 
 std::vector<SurveyedCamera> survey_cameras() {
   std::vector<SurveyedCamera> cameras;
-  for (Attached& attached : list_attached()) {
+  for (Attached& attached : list_nodes()) {
     SurveyedCamera camera;
-    if (attached.problem.empty()) {
+    if (attached.problem.empty() && attached.not_taken.empty()) {
       try {
         const DeviceName::Opened opened = DeviceName(attached.node).open();
         camera.modes = list_modes(opened.fd.get());

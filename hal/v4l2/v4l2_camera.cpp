@@ -15,7 +15,7 @@ namespace dtact::hal::v4l2 {
 namespace {
 
 live::Opened open(const CameraConfig& config, const DeviceName& name, const PhotometricLock& lock) {
-  DeviceName::Opened device = name.open();
+  DeviceName::Opened device = name.open(config.width, config.height);
   const std::uint32_t fourcc = choose(list_modes(device.fd.get()), config, device.identity);
   const auto stream =
       std::make_shared<Stream>(std::move(device.fd), device.node, fourcc, config, lock);

@@ -1,9 +1,16 @@
+#include <fcntl.h>
+#include <linux/videodev2.h>
+
 #include <array>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
+#include <string>
 
+#include "hal/base/unique_fd.hpp"
+#include "hal/v4l2/ioctl.hpp"
+#include "hal/v4l2/modes.hpp"
 #include "tests/kernel/camera/guest_camera.hpp"
 
 namespace dtact::kernel_test {
@@ -11,6 +18,17 @@ namespace {
 
 using hal::CameraState;
 using hal::Frame;
+
+/// What dtactctl cameras prints.
+std::string listed() {
+  FILE* pipe = ::popen(DTACT_DTACTCTL " cameras", "r");
+  if (pipe == nullptr) throw std::runtime_error("cannot run " DTACT_DTACTCTL);
+  std::string text;
+  std::array<char, 4096> buffer{};
+  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) text += buffer.data();
+  EXPECT_EQ(::pclose(pipe), 0);
+  return text;
+}
 
 /// Names as udev gives them. Needs a running udevd.
 class Names : public GuestCamera {
@@ -78,12 +96,7 @@ TEST_F(Names, TheMetadataNodeSLinkIsRefused) {
 TEST_F(Names, DtactctlListsTheCameraWithoutADaemon) {
   const UsbCamera usb({folder()});
   wait_for_links();
-  FILE* pipe = ::popen(DTACT_DTACTCTL " cameras", "r");
-  ASSERT_NE(pipe, nullptr);
-  std::string text;
-  std::array<char, 4096> buffer{};
-  while (std::fgets(buffer.data(), buffer.size(), pipe) != nullptr) text += buffer.data();
-  EXPECT_EQ(::pclose(pipe), 0);
+  const std::string text = listed();
   EXPECT_EQ(text.substr(0, text.find("  controls")),
             std::string(kByPath) +
                 "\n"
@@ -101,6 +114,71 @@ TEST_F(Names, DtactctlListsTheCameraWithoutADaemon) {
   EXPECT_NE(text.find("    exposure_time_absolute      1 to 10000, step 1, default 156, now 156\n"),
             std::string::npos)
       << text;
+}
+
+/// The same beside the nodes that a Pi 4 has without a camera. Needs pi-video-mock.
+class PiNodes : public Names {
+ protected:
+  static hal::CameraConfig the_only_camera() {
+    hal::CameraConfig c = config();
+    c.v4l2.device.clear();
+    return c;
+  }
+};
+
+TEST_F(PiNodes, SayThatTheyCapture) {
+  for (const char* node : {"/dev/video14", "/dev/video15", "/dev/video21", "/dev/video22"}) {
+    const base::UniqueFd fd(::open(node, O_RDWR | O_CLOEXEC));
+    v4l2_capability capability{};
+    ASSERT_EQ(hal::v4l2::call(fd.get(), VIDIOC_QUERYCAP, capability), 0) << node;
+    EXPECT_EQ(capability.device_caps, 0x04200001U) << node;
+    EXPECT_TRUE(hal::v4l2::list_modes(fd.get()).at(1).offers(800, 600, 60)) << node;
+  }
+}
+
+TEST_F(PiNodes, AreNoCamera) {
+  wait_for_no_camera();
+  hal::v4l2::V4l2Camera camera(the_only_camera());
+  camera.start();
+  EXPECT_EQ(camera.report().state, CameraState::unplugged);
+  EXPECT_EQ(camera.report().remedy,
+            "no camera is attached: plug it in (dtactctl cameras says why other video nodes are "
+            "not taken)");
+  const UsbCamera usb({folder()});
+  Frame frame;
+  grab_frame(camera, frame);
+  EXPECT_GE(played().match_jpeg(frame.luma()), 0);
+}
+
+TEST_F(PiNodes, AreListedWithTheReason) {
+  const UsbCamera usb({folder()});
+  wait_for_links();
+  hal::v4l2::V4l2Camera camera(the_only_camera());
+  camera.start();
+  EXPECT_EQ(camera.info().identity, kByPath);
+  ASSERT_TRUE(eventually(kPatience, [] { return std::filesystem::exists("/dev/video1"); }));
+  const std::string text = listed();
+  EXPECT_TRUE(text.starts_with(kByPath)) << text;
+  const std::string codec = "it converts images, as a codec does\n";
+  const std::string scaler = "it has no video input: it converts what a program hands to it\n";
+  EXPECT_EQ(text.substr(text.find("not taken")),
+            "not taken\n"
+            "  /dev/video1 (Fake UVC camera: Fake UVC camer): it delivers metadata, not images\n"
+            "  /dev/video10 (bcm2835-codec-decode): " +
+                codec + "  /dev/video11 (bcm2835-codec-encode): " + codec +
+                "  /dev/video12 (bcm2835-codec-isp): " + codec +
+                "  /dev/video13 (bcm2835-isp): it delivers no images\n"
+                "  /dev/video14 (bcm2835-isp): " +
+                scaler + "  /dev/video15 (bcm2835-isp): " + scaler +
+                "  /dev/video16 (bcm2835-isp): it delivers metadata, not images\n"
+                "  /dev/video18 (bcm2835-codec-image_fx): " +
+                codec +
+                "  /dev/video20 (bcm2835-isp): it delivers no images\n"
+                "  /dev/video21 (bcm2835-isp): " +
+                scaler + "  /dev/video22 (bcm2835-isp): " + scaler +
+                "  /dev/video23 (bcm2835-isp): it delivers metadata, not images\n"
+                "  /dev/video31 (bcm2835-codec-encode_image): " +
+                codec);
 }
 
 }  // namespace

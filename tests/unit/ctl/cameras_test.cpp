@@ -28,9 +28,10 @@ hal::v4l2::SurveyedCamera camera() {
   return c;
 }
 
-std::string printed(const std::vector<hal::v4l2::SurveyedCamera>& cameras, bool json) {
+std::string printed(const std::vector<hal::v4l2::SurveyedCamera>& cameras, bool json,
+                    bool terminal = false) {
   std::ostringstream out;
-  print_cameras(cameras, json, out);
+  print_cameras(cameras, json, terminal, out);
   return out.str();
 }
 
@@ -53,7 +54,7 @@ TEST(Cameras, AreListedWithNamesModesAndControls) {
       R"("min_height":600,"fps_is_range":false,"fps":[60,30]},{"format":"H264","usable":false,)"
       R"("width":800,"height":600,"min_width":800,"min_height":600,"fps_is_range":false,)"
       R"("fps":[60,30]}],"controls":[{"name":"gain","minimum":"0","maximum":"100","step":"1",)"
-      R"("default":"5","value":"10"}]}]})"
+      R"("default":"5","value":"10"}],"not_taken":""}]})"
       "\n");
 }
 
@@ -65,6 +66,25 @@ TEST(Cameras, NoneAndForbiddenOnes) {
   forbidden.attached.problem = "no permission to open /dev/video0: join the group";
   EXPECT_EQ(printed({forbidden}, false),
             "/dev/video0\n  no permission to open /dev/video0: join the group\n");
+}
+
+TEST(Cameras, WhatIsNotTakenComesLastAndGreyOnATerminal) {
+  hal::v4l2::SurveyedCamera scaler;
+  scaler.attached.node = "/dev/video14";
+  scaler.attached.card = "bcm2835-isp";
+  scaler.attached.not_taken = "it has no video input: it converts what a program hands to it";
+  EXPECT_EQ(printed({scaler}, false),
+            "no camera is attached\n"
+            "not taken\n"
+            "  /dev/video14 (bcm2835-isp): it has no video input: it converts what a program hands "
+            "to it\n");
+  const std::string text = printed({camera(), scaler}, false, true);
+  EXPECT_EQ(
+      text.substr(text.find("not taken")),
+      "not taken\n"
+      "\x1b[2m  /dev/video14 (bcm2835-isp): it has no video input: it converts what a program "
+      "hands to it\x1b[22m\n");
+  EXPECT_EQ(printed({camera(), scaler}, true, true).find('\x1b'), std::string::npos);
 }
 
 }  // namespace
