@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 
 #include "hal/v4l2/error_of.hpp"
@@ -135,7 +136,16 @@ std::uint32_t choose(const std::vector<Mode>& modes, const CameraConfig& asked,
       fmt::format("{} has no mode {}x{} at {:g} frames a second{}: set camera.width, "
                   "camera.height, camera.fps and camera.v4l2.pixel_format to one of: {}",
                   name, asked.width, asked.height, asked.fps, key == "auto" ? "" : " in " + key,
-                  describe(modes)));
+                  alternatives(modes, asked)));
+}
+
+std::string alternatives(const std::vector<Mode>& modes, const CameraConfig& asked) {
+  std::vector<Mode> usable;
+  std::ranges::copy_if(modes, std::back_inserter(usable), &Mode::usable);
+  std::ranges::stable_partition(
+      usable, [&](const Mode& mode) { return mode.has_size(asked.width, asked.height); });
+  if (!usable.empty() || modes.empty()) return describe(usable);
+  return fmt::format("nothing (it has only {}, which cannot be read)", describe(modes));
 }
 
 std::string describe(const std::vector<Mode>& modes) {

@@ -51,6 +51,9 @@ struct Mode {
 [[nodiscard]] std::uint32_t choose(const std::vector<Mode>& modes, const CameraConfig& asked,
                                    const std::string& name);
 
+/// The modes that would do instead, as describe() says them: those whose format can be read, and
+/// those of the asked size first.
+[[nodiscard]] std::string alternatives(const std::vector<Mode>& modes, const CameraConfig& asked);
 /// "MJPEG 800x600 at 60, 30, 15; YUYV 640x480 at 30".
 [[nodiscard]] std::string describe(const std::vector<Mode>& modes);
 /// Four letters: "MJPG".

@@ -65,7 +65,7 @@ Stream::Stream(base::UniqueFd fd, const std::string& node, std::uint32_t fourcc,
                const CameraConfig& asked, const PhotometricLock& lock)
     : fd_(std::move(fd)), node_(node), lock_(lock) {
   set_format(fourcc, asked);
-  set_rate(asked.fps);
+  set_rate(fourcc, asked);
   map_buffers();
 }
 
@@ -90,31 +90,52 @@ void Stream::set_format(std::uint32_t fourcc, const CameraConfig& asked) {
   if (known != nullptr) format_.encoding = known->encoding;
   if (known == nullptr || pix.pixelformat != fourcc || format_.width != asked.width ||
       format_.height != asked.height) {
-    throw ModeError(fmt::format(
-        "{} runs {} at {}x{} when asked for {} at {}x{}: set camera.width, "
-        "camera.height and camera.v4l2.pixel_format to one of: {}",
-        node_, fourcc_text(pix.pixelformat), format_.width, format_.height, fourcc_text(fourcc),
-        asked.width, asked.height, describe(list_modes(fd_.get()))));
+    // What the driver lists and then doesn't run is no way out; what it runs instead may be one.
+    std::vector<Mode> modes = list_modes(fd_.get());
+    const auto is = [](std::uint32_t code, int width, int height) {
+      return [=](const Mode& m) { return m.fourcc == code && m.has_size(width, height); };
+    };
+    std::erase_if(modes, is(fourcc, asked.width, asked.height));
+    if (std::ranges::none_of(modes, is(pix.pixelformat, format_.width, format_.height))) {
+      Mode instead;
+      instead.fourcc = pix.pixelformat;
+      instead.width = instead.min_width = format_.width;
+      instead.height = instead.min_height = format_.height;
+      modes.push_back(std::move(instead));
+    }
+    throw ModeError(
+        fmt::format("{} runs {} at {}x{} when asked for {} at {}x{}: set camera.width, "
+                    "camera.height and camera.v4l2.pixel_format to one of: {}",
+                    node_, fourcc_text(pix.pixelformat), format_.width, format_.height,
+                    fourcc_text(fourcc), asked.width, asked.height, alternatives(modes, asked)));
   }
 }
 
-void Stream::set_rate(double fps) {
+void Stream::set_rate(std::uint32_t fourcc, const CameraConfig& asked) {
   v4l2_streamparm parameters{};
   parameters.type = kType;
   // 60.5 fps is 1000/60500 s; drivers take the nearest they have.
-  parameters.parm.capture.timeperframe = {1000, static_cast<std::uint32_t>(std::lround(fps * 1e3))};
+  parameters.parm.capture.timeperframe = {1000,
+                                          static_cast<std::uint32_t>(std::lround(asked.fps * 1e3))};
   const int error = call(fd_.get(), VIDIOC_S_PARM, parameters);
   // A driver without a choice of rates has no such call.
   if (error == ENOTTY || error == EINVAL) return;
   if (error != 0) throw error_of(error, "set the frame rate of", node_);
   const v4l2_fract& got = parameters.parm.capture.timeperframe;
-  const double rate = got.numerator == 0 ? fps : double{1.0} * got.denominator / got.numerator;
-  if (std::abs(rate - fps) > 0.5) {
-    throw ModeError(
-        fmt::format("{} runs at {:.2f} frames a second when asked for {:g}: set "
-                    "camera.fps to what it offers: {}",
-                    node_, rate, fps, describe(list_modes(fd_.get()))));
+  const double rate =
+      got.numerator == 0 ? asked.fps : double{1.0} * got.denominator / got.numerator;
+  if (std::abs(rate - asked.fps) <= 0.5) return;
+  // Of this mode it runs what it says now, whatever it has listed.
+  std::vector<Mode> modes = list_modes(fd_.get());
+  for (Mode& mode : modes) {
+    if (mode.fourcc != fourcc || !mode.has_size(asked.width, asked.height)) continue;
+    mode.fps = {rate};
+    mode.fps_is_range = false;
   }
+  throw ModeError(
+      fmt::format("{} runs at {:.2f} frames a second when asked for {:g}: set camera.fps, "
+                  "camera.width, camera.height and camera.v4l2.pixel_format to one of: {}",
+                  node_, rate, asked.fps, alternatives(modes, asked)));
 }
 
 void Stream::map_buffers() {

@@ -38,7 +38,7 @@ class Stream final : public live::Source {
 
  private:
   void set_format(std::uint32_t fourcc, const CameraConfig& asked);
-  void set_rate(double fps);
+  void set_rate(std::uint32_t fourcc, const CameraConfig& asked);
   void map_buffers();
 
   base::UniqueFd fd_;

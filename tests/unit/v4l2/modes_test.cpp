@@ -52,6 +52,26 @@ TEST(Modes, NamesWhatIsOffered) {
   EXPECT_EQ(describe({}), "nothing (the driver lists no mode)");
 }
 
+TEST(Modes, NamesTheModesThatWouldDo) {
+  try {
+    (void)choose(kModes, asked(800, 600, 120), "cam");
+    FAIL() << "no error";
+  } catch (const ModeError& e) {
+    EXPECT_STREQ(e.what(),
+                 "cam has no mode 800x600 at 120 frames a second: set camera.width, camera.height, "
+                 "camera.fps and camera.v4l2.pixel_format to one of: MJPEG 800x600 at 60, 30; "
+                 "YUYV 800x600 at 30");
+  }
+  // A size that would do with another rate comes first.
+  const std::vector<Mode> modes{mode(V4L2_PIX_FMT_MJPEG, 1280, 720, {60}),
+                                mode(V4L2_PIX_FMT_H264, 800, 600, {60}),
+                                mode(V4L2_PIX_FMT_YUYV, 800, 600, {30})};
+  EXPECT_EQ(alternatives(modes, asked(800, 600, 60)), "YUYV 800x600 at 30; MJPEG 1280x720 at 60");
+  EXPECT_EQ(alternatives({modes[1]}, asked(800, 600, 60)),
+            "nothing (it has only H264 800x600 at 60, which cannot be read)");
+  EXPECT_EQ(alternatives({}, asked(800, 600, 60)), "nothing (the driver lists no mode)");
+}
+
 TEST(Modes, RangesOfSizesAndRates) {
   Mode range = mode(V4L2_PIX_FMT_GREY, 1920, 1080, {120, 1});
   range.min_width = 64;
