@@ -9,13 +9,20 @@
 
 namespace dtact::hal {
 
+/// What is known of a control after it was set.
+enum class ControlVerdict : std::uint8_t {
+  refused,   ///< It isn't as asked for, and may act by itself.
+  accepted,  ///< Taken without an error; no answer of the camera's own says that it holds.
+  confirmed  ///< The camera itself, asked after the setting, says the value.
+};
+
 /// One photometric control as the camera reports it after it was set.
 struct CameraControl {
   std::string name;        ///< "exposure_absolute", ...
   std::int64_t value = 0;  ///< In the camera's own unit, as read back.
-  bool locked = false;     ///< Manual and equal to what was asked for.
-  std::string note =
-      {};  ///< When not locked: what the camera refused. Else what to know, or empty.
+  ControlVerdict verdict = ControlVerdict::refused;
+  /// When refused: by whom, and what may follow. Else what to know, or empty.
+  std::string note = {};
 };
 
 /// Who the camera is and how it runs. Size and rate are fixed from construction on; the other

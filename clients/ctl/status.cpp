@@ -13,6 +13,20 @@
 namespace dtact::ctl {
 namespace {
 
+/// What is known of a control. A daemon from before the verdict says `locked` alone.
+const char* words_of(const v1::CameraControl& control) {
+  switch (control.verdict()) {
+    case v1::CONTROL_VERDICT_CONFIRMED:
+      return "confirmed by the camera";
+    case v1::CONTROL_VERDICT_ACCEPTED:
+      return "accepted, cannot be confirmed";
+    case v1::CONTROL_VERDICT_REFUSED:
+      return "refused";
+    default:
+      return control.locked() ? "locked" : "not locked";
+  }
+}
+
 void print_camera(const v1::CameraStatus& camera, std::ostream& out) {
   fmt::print(out, "camera       {} {}, {}x{} {} at {:g} fps, {}\n", camera.backend(),
              camera.identity(), camera.width(), camera.height(), camera.pixel_format(),
@@ -29,9 +43,8 @@ void print_camera(const v1::CameraStatus& camera, std::ostream& out) {
   }
   if (!camera.moved().empty()) fmt::print(out, "             {}\n", camera.moved());
   for (const auto& control : camera.controls()) {
-    fmt::print(out, "             {} {}{}{}\n", control.name(), control.value(),
-               control.locked() ? "" : " (not locked)",
-               control.note().empty() ? "" : ": " + control.note());
+    fmt::print(out, "             {} {}, {}{}\n", control.name(), control.value(),
+               words_of(control), control.note().empty() ? "" : ": " + control.note());
   }
 }
 

@@ -39,6 +39,18 @@ v1::State to_wire(State state) {
   return v1::STATE_UNSPECIFIED;
 }
 
+v1::ControlVerdict to_wire(hal::ControlVerdict verdict) {
+  switch (verdict) {
+    case hal::ControlVerdict::refused:
+      return v1::CONTROL_VERDICT_REFUSED;
+    case hal::ControlVerdict::accepted:
+      return v1::CONTROL_VERDICT_ACCEPTED;
+    case hal::ControlVerdict::confirmed:
+      return v1::CONTROL_VERDICT_CONFIRMED;
+  }
+  return v1::CONTROL_VERDICT_UNSPECIFIED;
+}
+
 v1::TimestampMeaning to_wire(hal::TimestampMeaning meaning) {
   switch (meaning) {
     case hal::TimestampMeaning::start_of_exposure:
@@ -106,7 +118,8 @@ void fill_camera(const hal::CameraInfo& info, const hal::CameraReport& report,
     auto& to = *out.add_controls();
     to.set_name(control.name);
     to.set_value(control.value);
-    to.set_locked(control.locked);
+    to.set_locked(control.verdict != hal::ControlVerdict::refused);
+    to.set_verdict(to_wire(control.verdict));
     to.set_note(control.note);
   }
 }

@@ -131,6 +131,7 @@ PhotometricLock::Wishes PhotometricLock::wishes(const lc::ControlInfoMap& offere
     } else {
       wishes.list.set(control.id.id(), value_of(control.id.type(), *value));
       entry.value = report_value(control.id, *value);
+      entry.verdict = ControlVerdict::accepted;
       entry.note = "set; the frames have not said yet what came of it";
     }
     wishes.controls.push_back(std::move(entry));
@@ -156,14 +157,15 @@ std::string PhotometricLock::compare(const Readings& readings,
   std::string moved;
   for (CameraControl& entry : controls) {
     const Control* control = find(entry.name);
-    if (control == nullptr || (!entry.locked && !entry.note.starts_with("set;"))) continue;
+    if (control == nullptr || entry.verdict == ControlVerdict::refused) continue;
     const auto reading = readings.find(control->id.id());
     if (reading == readings.end()) {
-      if (!entry.locked) entry.note = "set; this camera's frames do not say what came of it";
+      if (entry.verdict == ControlVerdict::accepted)
+        entry.note = "set; this camera's frames do not say what came of it";
       continue;
     }
     if (same(reading->second, entry.value)) {
-      entry.locked = true;
+      entry.verdict = ControlVerdict::confirmed;
       entry.note.clear();
     } else {
       moved += fmt::format("{}{} is {} though it was set to {}", moved.empty() ? "" : "; ",

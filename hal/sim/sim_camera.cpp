@@ -28,7 +28,7 @@ Scene configured_scene(const CameraConfig& config) {
 }
 
 CameraControl control(const char* name, double value) {
-  return {name, std::llround(value * 1000), true};
+  return {name, std::llround(value * 1000), ControlVerdict::confirmed};
 }
 
 // Waits until `fd` is readable or `ns` have passed, and clears it.

@@ -13,14 +13,18 @@
 
 #include "hal/live/exposure.hpp"
 #include "hal/v4l2/ioctl.hpp"
+#include "hal/v4l2/usb_device.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct Control {
   const char* name;
   std::uint32_t id;
-  std::optional<std::int64_t> off;  ///< The value that keeps it from acting by itself.
+  std::optional<std::int64_t> off;     ///< The value that keeps it from acting by itself.
+  const char* when_refused = nullptr;  ///< What may follow, where its name doesn't say it.
 };
 
 constexpr const char* kAutoExposure = "auto_exposure";
@@ -28,14 +32,17 @@ constexpr const char* kExposure = "exposure_time_absolute";
 /// V4L2_CID_EXPOSURE_ABSOLUTE counts in 100 µs.
 constexpr double kExposureUnitUs = 100;
 
-/// In the order of setting: many cameras refuse a value while its automatic is on.
+/// In the order of setting: many cameras refuse a value while its automatic is on. uvcvideo's
+/// answer about a value reads its automatic, which must have been set by then (see LockedControl).
 constexpr std::array<Control, 17> kControls{{
     {kAutoExposure, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL},
-    {"exposure_dynamic_framerate", V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0},
+    {"exposure_dynamic_framerate", V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0,
+     "in the dark the camera may halve its frame rate"},
     {"gain_automatic", V4L2_CID_AUTOGAIN, 0},
     {"white_balance_automatic", V4L2_CID_AUTO_WHITE_BALANCE, 0},
     {"focus_automatic_continuous", V4L2_CID_FOCUS_AUTO, 0},
-    {"power_line_frequency", V4L2_CID_POWER_LINE_FREQUENCY, V4L2_CID_POWER_LINE_FREQUENCY_DISABLED},
+    {"power_line_frequency", V4L2_CID_POWER_LINE_FREQUENCY, V4L2_CID_POWER_LINE_FREQUENCY_DISABLED,
+     "the camera may keep its exposure to the mains, and the LEDs then show as bands"},
     {"backlight_compensation", V4L2_CID_BACKLIGHT_COMPENSATION, 0},
     {kExposure, V4L2_CID_EXPOSURE_ABSOLUTE, std::nullopt},
     {"gain", V4L2_CID_GAIN, std::nullopt},
@@ -75,16 +82,26 @@ int set(int fd, std::uint32_t id, std::int64_t value) {
   return call(fd, VIDIOC_S_CTRL, control);
 }
 
+/// Reads a control. `asked`: it took a transfer, so the answer is the camera's own.
+int get_counted(int fd, std::uint32_t id, const fs::path& usb_device, std::int64_t& value,
+                bool& asked) {
+  const auto before = transfers_of(usb_device);
+  const int error = get(fd, id, value);
+  asked = error == 0 && before && transfers_of(usb_device) != before;
+  return error;
+}
+
 /// Sets one control and reads it back.
-CameraControl lock(int fd, const Control& control, const v4l2_queryctrl& offered,
-                   std::int64_t value) {
-  CameraControl result;
+LockedControl lock(int fd, const Control& control, const v4l2_queryctrl& offered,
+                   std::int64_t value, const fs::path& usb_device) {
+  LockedControl locked;
+  CameraControl& result = locked.control;
   result.name = control.name;
   if (value < offered.minimum || value > offered.maximum) {
     (void)get(fd, control.id, result.value);
     result.note = fmt::format("{} = {} is outside this camera's {} to {}", control.name, value,
                               offered.minimum, offered.maximum);
-    return result;
+    return locked;
   }
   int error = set(fd, control.id, value);
   if (error != 0 && control.id == V4L2_CID_EXPOSURE_AUTO) {
@@ -92,19 +109,29 @@ CameraControl lock(int fd, const Control& control, const v4l2_queryctrl& offered
     value = V4L2_EXPOSURE_SHUTTER_PRIORITY;
     error = set(fd, control.id, value);
   }
-  const int read_error = get(fd, control.id, result.value);
   if (error != 0) {
+    (void)get(fd, control.id, result.value);
     result.note =
         fmt::format("the camera refuses {} = {} ({})", control.name, value, std::strerror(error));
-  } else if (read_error != 0) {
-    result.note =
-        fmt::format("{} cannot be read back ({})", control.name, std::strerror(read_error));
-  } else if (result.value != value) {
-    result.note = fmt::format("{} is {} after it was set to {}", control.name, result.value, value);
-  } else {
-    result.locked = true;
+    return locked;
   }
-  return result;
+  error = get_counted(fd, control.id, usb_device, result.value, locked.asked);
+  if (error != 0) {
+    result.note = fmt::format("{} cannot be read back ({})", control.name, std::strerror(error));
+    return locked;
+  }
+  if (locked.asked) {
+    std::int64_t same = 0;
+    (void)get_counted(fd, control.id, usb_device, same, locked.always_asked);
+  }
+  // The control framework asks the driver for volatile ones, and answers itself for the rest.
+  if ((offered.flags & V4L2_CTRL_FLAG_VOLATILE) != 0) locked.asked = locked.always_asked = true;
+  if (result.value != value) {
+    result.note = fmt::format("{} is {} after it was set to {}", control.name, result.value, value);
+    return locked;
+  }
+  result.verdict = locked.asked ? ControlVerdict::confirmed : ControlVerdict::accepted;
+  return locked;
 }
 
 }  // namespace
@@ -141,17 +168,17 @@ PhotometricLock::PhotometricLock(const V4l2Config& config)
   }
 }
 
-std::vector<CameraControl> PhotometricLock::apply(int fd) const {
-  std::vector<CameraControl> controls;
+std::vector<LockedControl> PhotometricLock::apply(int fd, const fs::path& usb_device) const {
+  std::vector<LockedControl> controls;
   for (const Control& control : kControls) {
     const auto configured = config_.controls.find(control.name);
     const bool exposure = control.name == std::string(kExposure) && exposure_us_ > 0;
     const auto offered = query(fd, control.id);
     if (!offered) {
       if (exposure || configured != config_.controls.end()) {
-        CameraControl missing;
-        missing.name = control.name;
-        missing.note = fmt::format("this camera has no {}", control.name);
+        LockedControl missing;
+        missing.control.name = control.name;
+        missing.control.note = fmt::format("this camera has no {}", control.name);
         controls.push_back(std::move(missing));
       }
       continue;
@@ -159,11 +186,33 @@ std::vector<CameraControl> PhotometricLock::apply(int fd) const {
     std::int64_t value = control.off.value_or(offered->default_value);
     if (configured != config_.controls.end()) value = configured->second;
     if (exposure) value = std::max<std::int64_t>(1, std::llround(exposure_us_ / kExposureUnitUs));
-    controls.push_back(lock(fd, control, *offered, value));
-    if (exposure && controls.back().locked) {
-      controls.back().note =
-          live::rounding_note(exposure_us_, static_cast<double>(value) * kExposureUnitUs);
+    controls.push_back(lock(fd, control, *offered, value, usb_device));
+    CameraControl& result = controls.back().control;
+    if (result.verdict == ControlVerdict::refused) {
+      if (control.when_refused != nullptr) result.note += fmt::format(": {}", control.when_refused);
+    } else if (exposure) {
+      result.note = live::rounding_note(exposure_us_, static_cast<double>(value) * kExposureUnitUs);
     }
+  }
+  return controls;
+}
+
+std::vector<CameraControl> PhotometricLock::apply_again(
+    int fd, const std::vector<LockedControl>& before) const {
+  std::vector<CameraControl> controls;
+  // A stream's transfers hide those of a question, so none are counted.
+  for (LockedControl& locked : apply(fd, {})) {
+    CameraControl& now = locked.control;
+    const auto then =
+        std::ranges::find(before, now.name, [](const LockedControl& l) { return l.control.name; });
+    if (now.verdict == ControlVerdict::accepted && then != before.end()) {
+      if (then->always_asked) {
+        now.verdict = ControlVerdict::confirmed;
+      } else if (then->asked) {
+        now = then->control;
+      }
+    }
+    controls.push_back(std::move(now));
   }
   return controls;
 }
@@ -172,7 +221,7 @@ std::string PhotometricLock::check(int fd, std::vector<CameraControl>& controls)
   std::string moved;
   for (CameraControl& control : controls) {
     const Control* known = find(control.name);
-    if (!control.locked || known == nullptr) continue;
+    if (control.verdict == ControlVerdict::refused || known == nullptr) continue;
     std::int64_t value = control.value;
     if (get(fd, known->id, value) != 0 || value == control.value) continue;
     moved += fmt::format("{}{} moved from {} to {} by itself", moved.empty() ? "" : "; ",

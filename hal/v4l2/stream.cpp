@@ -15,6 +15,7 @@
 #include "hal/v4l2/error_of.hpp"
 #include "hal/v4l2/ioctl.hpp"
 #include "hal/v4l2/modes.hpp"
+#include "hal/v4l2/usb_device.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {
@@ -218,6 +219,12 @@ DequeueStatus Stream::dequeue(Filled& out) noexcept {
 bool Stream::enqueue(int index) noexcept {
   v4l2_buffer buffer = buffer_request(static_cast<std::uint32_t>(index));
   return call(fd_.get(), VIDIOC_QBUF, buffer) == 0;
+}
+
+void Stream::lock_controls() { controls_ = lock_.apply(fd_.get(), usb_device_of(node_)); }
+
+std::vector<CameraControl> Stream::lock_controls_again() {
+  return lock_.apply_again(fd_.get(), controls_);
 }
 
 std::string Stream::check_controls(std::vector<CameraControl>& controls) {

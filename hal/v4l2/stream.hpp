@@ -24,8 +24,11 @@ class Stream final : public live::Source {
          const CameraConfig& asked, const PhotometricLock& lock);
   ~Stream() override;
 
-  /// Sets every control of the lock and reads it back.
-  [[nodiscard]] std::vector<CameraControl> lock_controls() { return lock_.apply(fd_.get()); }
+  /// Sets every control of the lock and reads it back: before start(), so that the first frame is
+  /// right.
+  void lock_controls();
+  /// The same after start(), since some cameras forget when they start. Returns what is known then.
+  [[nodiscard]] std::vector<CameraControl> lock_controls_again();
   /// Hands all buffers to the driver and starts it. Throws DeviceError.
   void start();
 
@@ -44,6 +47,7 @@ class Stream final : public live::Source {
   base::UniqueFd fd_;
   std::string node_;
   PhotometricLock lock_;
+  std::vector<LockedControl> controls_;  // before the stream began
   live::Format format_;
   std::vector<std::span<std::uint8_t>> buffers_;
 };

@@ -19,11 +19,9 @@ live::Opened open(const CameraConfig& config, const DeviceName& name, const Phot
   const std::uint32_t fourcc = choose(list_modes(device.fd.get()), config, device.identity);
   const auto stream =
       std::make_shared<Stream>(std::move(device.fd), device.node, fourcc, config, lock);
-  // Before the stream begins, so that its first frame is right; and again in it, since some
-  // cameras forget when they start.
-  (void)stream->lock_controls();
+  stream->lock_controls();
   stream->start();
-  return {stream, device.identity, find_format(fourcc)->name, stream->lock_controls()};
+  return {stream, device.identity, find_format(fourcc)->name, stream->lock_controls_again()};
 }
 
 live::Opener opener(const CameraConfig& config) {

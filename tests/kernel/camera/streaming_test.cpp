@@ -109,7 +109,7 @@ TEST_F(Streaming, NamesWhatTheCameraOffers) {
 
 TEST_F(Streaming, TwoCamerasAreToldApartBySerial) {
   const UsbCamera left({"-n", "left", "-p", "0", folder()});
-  const UsbCamera right({"-n", "right", "-p", "1", "-s", folder()});
+  const UsbCamera right({"-n", "right", "-p", "1", folder()});
   wait_for_camera(2);
   hal::CameraConfig c = config();
   c.fps = 30;

@@ -70,6 +70,16 @@ static int enum_fmt(struct file *file, void *fh, struct v4l2_fmtdesc *format)
 	return 0;
 }
 
+/* The core lists formats only where there is one to get. */
+static int g_fmt(struct file *file, void *fh, struct v4l2_format *format)
+{
+	format->fmt.pix.width = 1280;
+	format->fmt.pix.height = 1280;
+	format->fmt.pix.pixelformat = formats[0];
+	format->fmt.pix.field = V4L2_FIELD_NONE;
+	return 0;
+}
+
 static int enum_framesizes(struct file *file, void *fh, struct v4l2_frmsizeenum *size)
 {
 	if (size->index)
@@ -82,6 +92,7 @@ static int enum_framesizes(struct file *file, void *fh, struct v4l2_frmsizeenum 
 static const struct v4l2_ioctl_ops ioctls = {
 	.vidioc_querycap = querycap,
 	.vidioc_enum_fmt_vid_cap = enum_fmt,
+	.vidioc_g_fmt_vid_cap = g_fmt,
 	.vidioc_enum_framesizes = enum_framesizes,
 };
 static const struct v4l2_file_operations operations = {

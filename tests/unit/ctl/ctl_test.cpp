@@ -105,6 +105,21 @@ TEST(Status, IsPrinted) {
                                 HasSubstr("reference    follows the light by -0.42 %")));
 }
 
+TEST(Status, SaysOfEachControlWhatIsKnown) {
+  Rig rig;
+  pipeline::Status status;
+  status.camera.backend = "v4l2";
+  status.camera.controls = {
+      {"gain", 5, hal::ControlVerdict::confirmed},
+      {"gamma", 120, hal::ControlVerdict::accepted},
+      {"sharpness", 3, hal::ControlVerdict::refused, "the camera refuses sharpness = 2"}};
+  rig.port.set_status(status);
+  EXPECT_THAT(ctl(rig, {"status"}).out,
+              HasSubstr("             gain 5, confirmed by the camera\n"
+                        "             gamma 120, accepted, cannot be confirmed\n"
+                        "             sharpness 3, refused: the camera refuses sharpness = 2\n"));
+}
+
 TEST(Status, IsOneLineOfJson) {
   Rig rig;
   const auto result = ctl(rig, {"status", "--json"});

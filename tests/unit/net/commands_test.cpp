@@ -267,7 +267,9 @@ TEST(GetStatus, TellsEverything) {
   status.health.set(pipeline::Health::light_mismatch);
   status.camera.backend = "sim";
   status.camera.width = 800;
-  status.camera.controls = {{"exposure", 157, true}};
+  status.camera.controls = {{"exposure", 157, hal::ControlVerdict::confirmed},
+                            {"gamma", 100, hal::ControlVerdict::accepted},
+                            {"gain", 5, hal::ControlVerdict::refused, "no"}};
   status.camera_report.state = hal::CameraState::stalled;
   status.camera_report.lost = 3;
   status.ring.backend = "null";
@@ -302,6 +304,12 @@ TEST(GetStatus, TellsEverything) {
   EXPECT_EQ(reply.camera().condition(), "stalled");
   EXPECT_EQ(reply.camera().lost(), 3U);
   EXPECT_EQ(reply.camera().controls(0).value(), 157);
+  EXPECT_EQ(reply.camera().controls(0).verdict(), v1::CONTROL_VERDICT_CONFIRMED);
+  EXPECT_TRUE(reply.camera().controls(0).locked());
+  EXPECT_EQ(reply.camera().controls(1).verdict(), v1::CONTROL_VERDICT_ACCEPTED);
+  EXPECT_TRUE(reply.camera().controls(1).locked());
+  EXPECT_EQ(reply.camera().controls(2).verdict(), v1::CONTROL_VERDICT_REFUSED);
+  EXPECT_FALSE(reply.camera().controls(2).locked());
   EXPECT_EQ(reply.ring().backend(), "null");
   EXPECT_EQ(reply.light().brightness(), 255U);
   EXPECT_EQ(reply.frames(), 600U);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <ctime>
+#include <fstream>
 #include <stdexcept>
 #include <string_view>
 
@@ -30,6 +31,7 @@ constexpr const char* kDevices =
     "E: SUBSYSTEM=usb\n"
     "A: serial=4711\\n\n"
     "A: idVendor=1d6b\\n\n"
+    "A: urbnum=7\\n\n"
     "\n"
     "P: /devices/usb\n"
     "E: SUBSYSTEM=usb\n"
@@ -53,6 +55,8 @@ void put_text(__u8 (&field)[Size], std::string_view text) {
 EmulatedCamera::EmulatedCamera()
     : testbed_(umockdev_testbed_new()), handler_(umockdev_ioctl_base_new()) {
   controls_[V4L2_CID_EXPOSURE_AUTO] = {"Auto Exposure", 0, 3, 3, 3};
+  controls_[V4L2_CID_EXPOSURE_AUTO_PRIORITY] = {"Exposure, Dynamic Framerate", 0, 1, 1, 1};
+  controls_[V4L2_CID_POWER_LINE_FREQUENCY] = {"Power Line Frequency", 0, 2, 2, 2};
   controls_[V4L2_CID_EXPOSURE_ABSOLUTE] = {"Exposure Time", 1, 1000, 156, 156};
   controls_[V4L2_CID_GAIN] = {"Gain", 0, 100, 5, 60};
   GError* error = nullptr;
@@ -126,6 +130,28 @@ void EmulatedCamera::grant_buffers(std::uint32_t count) {
 void EmulatedCamera::set_control(std::uint32_t id, std::int32_t value) {
   const std::lock_guard guard(mutex_);
   controls_.at(id).value = value;
+}
+
+void EmulatedCamera::answer_from_a_copy(std::uint32_t id) {
+  const std::lock_guard guard(mutex_);
+  controls_.at(id).copied = true;
+}
+
+void EmulatedCamera::ignore(std::uint32_t id) {
+  const std::lock_guard guard(mutex_);
+  controls_.at(id).ignored = true;
+}
+
+void EmulatedCamera::refuse(std::uint32_t id) {
+  const std::lock_guard guard(mutex_);
+  controls_.at(id).refused = true;
+}
+
+void EmulatedCamera::count_transfer() const {
+  const std::string path = root_ + "/sys/devices/usb/1-1/urbnum";
+  std::uint64_t count = 0;
+  std::ifstream(path) >> count;
+  std::ofstream(path) << count + 1 << '\n';
 }
 
 std::int32_t EmulatedCamera::control(std::uint32_t id) const {
@@ -242,12 +268,20 @@ int EmulatedCamera::answer(unsigned long request, std::vector<std::uint8_t>& arg
     }
     case VIDIOC_G_CTRL: {
       auto& control = as<v4l2_control>(argument);
-      control.value = controls_.at(control.id).value;
+      Control& known = controls_.at(control.id);
+      const bool asked = !known.copied || !known.copy;
+      if (asked) known.copy = known.value;
+      if (asked || streaming_) count_transfer();  // a stream always has some under way
+      control.value = *known.copy;
       return 0;
     }
     case VIDIOC_S_CTRL: {
       const auto& control = as<v4l2_control>(argument);
-      controls_.at(control.id).value = control.value;
+      Control& known = controls_.at(control.id);
+      count_transfer();
+      if (known.refused) return EIO;
+      if (!known.ignored) known.value = control.value;
+      if (known.copy) known.copy = control.value;
       return 0;
     }
     default:

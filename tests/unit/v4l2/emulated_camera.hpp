@@ -8,6 +8,7 @@
 #include <deque>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,7 @@ struct EmulatedBuffer {
 };
 
 /// /dev/video0 emulated in this process by libumockdev: a camera of 32×16 GREY at 60 frames a
-/// second with three controls, whose every system call can be made to fail. Needs
+/// second with five controls, whose every system call can be made to fail. Needs
 /// libumockdev-preload.
 class EmulatedCamera {
  public:
@@ -49,6 +50,12 @@ class EmulatedCamera {
   /// As of a camera that has none; its hub has.
   void forget_serial() const;
   void set_control(std::uint32_t id, std::int32_t value);
+  /// As uvcvideo does with controls that the camera doesn't call AUTO_UPDATE: asked once, and
+  /// answered from a copy from then on, in which settings are entered.
+  void answer_from_a_copy(std::uint32_t id);
+  /// Takes every value without an error and stays as it is.
+  void ignore(std::uint32_t id);
+  void refuse(std::uint32_t id);
   [[nodiscard]] std::int32_t control(std::uint32_t id) const;
   [[nodiscard]] bool streaming() const;
 
@@ -56,7 +63,11 @@ class EmulatedCamera {
   struct Control {
     const char* name;
     std::int32_t minimum, maximum, initial, value;
+    bool copied = false;
+    std::optional<std::int32_t> copy = {};
+    bool ignored = false, refused = false;
   };
+  void count_transfer() const;
   static gboolean on_ioctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self);
   void handle(UMockdevIoctlClient* client);
   int answer(unsigned long request, std::vector<std::uint8_t>& argument);

@@ -5,8 +5,12 @@
 
 #include <cerrno>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "hal/base/unique_fd.hpp"
+#include "hal/v4l2/ioctl.hpp"
 #include "tests/unit/v4l2/emulated_camera.hpp"
 
 namespace dtact::hal::v4l2 {
@@ -19,6 +23,16 @@ std::string error_of(const V4l2Config& config) {
     return e.what();
   }
   return "";
+}
+
+constexpr const char* kUsbDevice = "/sys/devices/usb/1-1";
+
+std::vector<CameraControl> applied(const V4l2Config& config, int fd) {
+  std::vector<CameraControl> controls;
+  for (LockedControl& locked : PhotometricLock(config).apply(fd, kUsbDevice)) {
+    controls.push_back(std::move(locked.control));
+  }
+  return controls;
 }
 
 base::UniqueFd open_camera() {
@@ -64,57 +78,136 @@ TEST(PhotometricLock, ExposesForWholePwmPeriods) {
   V4l2Config c;
   c.pwm_hz = 2000;
   c.exposure_pwm_periods = 9;
-  auto controls = PhotometricLock(c).apply(fd.get());
-  ASSERT_EQ(controls.size(), 3U);
-  EXPECT_EQ(controls[1].name, "exposure_time_absolute");
-  EXPECT_EQ(controls[1].value, 45);  // 9 × 500 µs in units of 100 µs
-  EXPECT_EQ(controls[1].note, "");
-  EXPECT_TRUE(controls[1].locked);
+  auto controls = applied(c, fd.get());
+  ASSERT_EQ(controls.size(), 5U);
+  EXPECT_EQ(controls[3].name, "exposure_time_absolute");
+  EXPECT_EQ(controls[3].value, 45);  // 9 × 500 µs in units of 100 µs
+  EXPECT_EQ(controls[3].note, "");
+  EXPECT_EQ(controls[3].verdict, ControlVerdict::confirmed);
 
   c.pwm_hz = 430;
   c.exposure_pwm_periods = 1;
-  controls = PhotometricLock(c).apply(fd.get());
-  EXPECT_EQ(controls[1].value, 23);
-  EXPECT_TRUE(controls[1].locked);
-  EXPECT_EQ(controls[1].note, "2300 us is the nearest this camera has to 2325.6 us");
+  controls = applied(c, fd.get());
+  EXPECT_EQ(controls[3].value, 23);
+  EXPECT_EQ(controls[3].verdict, ControlVerdict::confirmed);
+  EXPECT_EQ(controls[3].note, "2300 us is the nearest this camera has to 2325.6 us");
 }
 
 TEST(PhotometricLock, SaysWhatIsRefused) {
   EmulatedCamera device;
   const base::UniqueFd fd = open_camera();
-  const PhotometricLock lock(V4l2Config{});
+  const V4l2Config config;
 
   device.fail(VIDIOC_S_CTRL, EIO);
-  auto controls = lock.apply(fd.get());
-  ASSERT_EQ(controls.size(), 3U);
-  EXPECT_FALSE(controls[2].locked);
-  EXPECT_EQ(controls[2].value, 60);  // as it is, not as it should be
-  EXPECT_EQ(controls[2].note, "the camera refuses gain = 5 (Input/output error)");
+  auto controls = applied(config, fd.get());
+  ASSERT_EQ(controls.size(), 5U);
+  EXPECT_EQ(controls[4].verdict, ControlVerdict::refused);
+  EXPECT_EQ(controls[4].value, 60);  // as it is, not as it should be
+  EXPECT_EQ(controls[4].note, "the camera refuses gain = 5 (Input/output error)");
 
   device.fail(VIDIOC_S_CTRL, 0);
   device.fail(VIDIOC_G_CTRL, EIO);
-  controls = lock.apply(fd.get());
-  EXPECT_EQ(controls[2].note, "gain cannot be read back (Input/output error)");
+  controls = applied(config, fd.get());
+  EXPECT_EQ(controls[4].verdict, ControlVerdict::refused);
+  EXPECT_EQ(controls[4].note, "gain cannot be read back (Input/output error)");
 
   device.fail(VIDIOC_G_CTRL, 0);
   device.fail(VIDIOC_QUERYCTRL, EINVAL);
-  EXPECT_TRUE(lock.apply(fd.get()).empty());
+  EXPECT_TRUE(applied(config, fd.get()).empty());
+}
+
+TEST(PhotometricLock, SaysWhatFollowsWhereTheNameDoesNot) {
+  EmulatedCamera device;
+  const base::UniqueFd fd = open_camera();
+  device.refuse(V4L2_CID_EXPOSURE_AUTO_PRIORITY);
+  device.ignore(V4L2_CID_POWER_LINE_FREQUENCY);
+  const auto controls = applied({}, fd.get());
+  ASSERT_EQ(controls.size(), 5U);
+  EXPECT_EQ(controls[1].note,
+            "the camera refuses exposure_dynamic_framerate = 0 (Input/output error): in the dark "
+            "the camera may halve its frame rate");
+  EXPECT_EQ(controls[2].note,
+            "power_line_frequency is 2 after it was set to 0: the camera may keep its exposure to "
+            "the mains, and the LEDs then show as bands");
+}
+
+struct Verdicts {
+  const char* title;
+  bool copied, ignored, asked_before;
+  ControlVerdict verdict;
+  std::int64_t value;
+};
+
+class EachVerdict : public testing::TestWithParam<Verdicts> {};
+
+// What a control is told to be after both passes: the second one's answers may be the driver's own.
+TEST_P(EachVerdict, IsWhatTheCameraItselfHasSaid) {
+  EmulatedCamera device;
+  const base::UniqueFd fd = open_camera();
+  const Verdicts& p = GetParam();
+  if (p.copied) device.answer_from_a_copy(V4L2_CID_GAIN);
+  if (p.ignored) device.ignore(V4L2_CID_GAIN);
+  if (p.asked_before) (void)list_controls(fd.get());  // by whatever program, since the plug
+  const PhotometricLock lock(V4l2Config{});
+  const auto before = lock.apply(fd.get(), kUsbDevice);
+  std::uint32_t type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  ASSERT_EQ(call(fd.get(), VIDIOC_STREAMON, type), 0);
+  const auto controls = lock.apply_again(fd.get(), before);
+  ASSERT_EQ(controls.size(), 5U);
+  EXPECT_EQ(controls[4].name, "gain");
+  EXPECT_EQ(controls[4].verdict, p.verdict);
+  EXPECT_EQ(controls[4].value, p.value);
+  EXPECT_EQ(controls[4].note,
+            p.verdict == ControlVerdict::refused ? "gain is 60 after it was set to 5" : "");
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    PhotometricLock, EachVerdict,
+    testing::Values(
+        Verdicts{"AlwaysAsked", false, false, false, ControlVerdict::confirmed, 5},
+        Verdicts{"AlwaysAskedAndIgnored", false, true, false, ControlVerdict::refused, 60},
+        Verdicts{"AskedOnce", true, false, false, ControlVerdict::confirmed, 5},
+        Verdicts{"AskedOnceAndIgnored", true, true, false, ControlVerdict::refused, 60},
+        Verdicts{"AskedBefore", true, false, true, ControlVerdict::accepted, 5},
+        Verdicts{"AskedBeforeAndIgnored", true, true, true, ControlVerdict::accepted, 5}),
+    [](const auto& row) { return std::string(row.param.title); });
+
+TEST(PhotometricLock, ConfirmsNothingWithoutAUsbDevice) {
+  const EmulatedCamera device;
+  const base::UniqueFd fd = open_camera();
+  for (const LockedControl& locked : PhotometricLock(V4l2Config{}).apply(fd.get(), {})) {
+    EXPECT_EQ(locked.control.verdict, ControlVerdict::accepted) << locked.control.name;
+  }
+}
+
+// Refused before the stream and taken in it: nothing has confirmed it.
+TEST(PhotometricLock, WhatTheStreamBringsIsAccepted) {
+  EmulatedCamera device;
+  const base::UniqueFd fd = open_camera();
+  const PhotometricLock lock(V4l2Config{});
+  device.fail(VIDIOC_S_CTRL, EIO);
+  const auto before = lock.apply(fd.get(), kUsbDevice);
+  device.fail(VIDIOC_S_CTRL, 0);
+  for (const CameraControl& control : lock.apply_again(fd.get(), before)) {
+    EXPECT_EQ(control.verdict, ControlVerdict::accepted) << control.name;
+    EXPECT_EQ(control.note, "");
+  }
 }
 
 TEST(PhotometricLock, FallsBackToShutterPriority) {
   EmulatedCamera device;
   const base::UniqueFd fd = open_camera();
   device.fail(VIDIOC_S_CTRL, EINVAL, 1);  // manual mode
-  const auto controls = PhotometricLock(V4l2Config{}).apply(fd.get());
+  const auto controls = applied({}, fd.get());
   EXPECT_EQ(device.control(V4L2_CID_EXPOSURE_AUTO), V4L2_EXPOSURE_SHUTTER_PRIORITY);
-  EXPECT_TRUE(controls[0].locked);
+  EXPECT_EQ(controls[0].verdict, ControlVerdict::confirmed);
 }
 
 TEST(PhotometricLock, FindsAndSetsBackWhatMoved) {
   EmulatedCamera device;
   const base::UniqueFd fd = open_camera();
   const PhotometricLock lock(V4l2Config{});
-  auto controls = lock.apply(fd.get());
+  auto controls = applied({}, fd.get());
   EXPECT_EQ(lock.check(fd.get(), controls), "");
   device.set_control(V4L2_CID_GAIN, 33);
   EXPECT_EQ(lock.check(fd.get(), controls),
@@ -128,11 +221,11 @@ TEST(ListControls, SaysRangesAndValues) {
   const EmulatedCamera device;
   const base::UniqueFd fd = open_camera();
   const auto offered = list_controls(fd.get());
-  ASSERT_EQ(offered.size(), 3U);
-  EXPECT_EQ(offered[2].name, "gain");
-  EXPECT_EQ(offered[2].maximum, 100);
-  EXPECT_EQ(offered[2].initial, 5);
-  EXPECT_EQ(offered[2].value, 60);
+  ASSERT_EQ(offered.size(), 5U);
+  EXPECT_EQ(offered[4].name, "gain");
+  EXPECT_EQ(offered[4].maximum, 100);
+  EXPECT_EQ(offered[4].initial, 5);
+  EXPECT_EQ(offered[4].value, 60);
 }
 
 }  // namespace

@@ -339,6 +339,19 @@ TEST(V4l2Camera, AModeTheDriverBendsIsAnErrorThatNamesTheOffer) {
   }
 }
 
+TEST(V4l2Camera, KeepsWhatTheCameraSaidBeforeTheStream) {
+  EmulatedCamera device;
+  device.answer_from_a_copy(V4L2_CID_GAIN);
+  device.ignore(V4L2_CID_GAIN);
+  V4l2Camera camera(small());
+  camera.start();
+  const CameraInfo info = camera.info();
+  ASSERT_EQ(info.controls.size(), 5U);
+  EXPECT_EQ(info.controls[3].verdict, ControlVerdict::confirmed);
+  EXPECT_EQ(info.controls[4].verdict, ControlVerdict::refused);
+  EXPECT_EQ(info.controls[4].note, "gain is 60 after it was set to 5");
+}
+
 TEST(V4l2Camera, ToleratesHalfAFrameASecond) {
   EmulatedCamera device;
   device.insist_on_rate(61);

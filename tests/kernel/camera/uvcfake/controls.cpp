@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdio>
 #include <cstring>
+#include <stdexcept>
 
 #include "tests/kernel/camera/uvcfake/descriptors.hpp"
 
@@ -23,6 +24,8 @@ struct Control {
   int initial;
   bool moves_by_itself;
   int current = initial;
+  Fault fault = Fault::none;
+  int told = initial;  // what a lying control says
 };
 
 std::array<Control, 15> table{{
@@ -58,7 +61,7 @@ int value_of(const Control& c, int request) {
     case kDef:
       return c.initial;
     default:
-      return c.current;
+      return c.fault == Fault::lies ? c.told : c.current;
   }
 }
 
@@ -68,6 +71,18 @@ int answer_bytes(const Control& c, int request) {
 }
 
 }  // namespace
+
+void Controls::set_fault(const std::string& name, Fault fault) {
+  std::string names;
+  for (Control& c : table) {
+    if (name == c.name) {
+      c.fault = fault;
+      return;
+    }
+    names += std::string(" ") + c.name;
+  }
+  throw std::runtime_error("no control " + name + "; there are" + names);
+}
 
 std::optional<int> Controls::handle(int entity, int selector, int request,
                                     std::span<std::uint8_t> data) {
@@ -84,8 +99,9 @@ std::optional<int> Controls::handle(int entity, int selector, int request,
   std::memcpy(&value, data.data(), static_cast<std::size_t>(c->bytes));
   if (c->bytes == 2) value = static_cast<std::int16_t>(value);
   std::fprintf(stderr, "uvcfake: %s = %d\n", c->name, value);
-  if (stubborn_ && std::strcmp(c->name, "sharpness") == 0) return std::nullopt;
-  if (!(stubborn_ && std::strcmp(c->name, "gamma") == 0)) c->current = value;
+  if (c->fault == Fault::refuses) return std::nullopt;
+  if (c->fault == Fault::none) c->current = value;
+  c->told = value;
   return c->bytes;
 }
 

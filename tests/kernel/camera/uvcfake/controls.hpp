@@ -3,14 +3,24 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 
 namespace uvcfake {
+
+/// What a control does instead of what it is told.
+enum class Fault {
+  none,
+  refuses,  ///< SET_CUR stalls.
+  ignores,  ///< Takes every value, keeps the old one, and says so when asked.
+  lies      ///< Takes every value, keeps the old one, and says the new one.
+};
 
 /// The camera's photometric controls. It comes up as cameras do: everything automatic.
 class Controls {
  public:
-  /// `stubborn`: sharpness refuses to be set; gamma accepts every value and stays as it is.
-  explicit Controls(bool stubborn) : stubborn_(stubborn) {}
+  /// `name` as in the table of controls.cpp. Throws std::runtime_error, with all names, for
+  /// another.
+  void set_fault(const std::string& name, Fault fault);
 
   /// A class request to an entity's control (UVC 1.1, section 4.2): `request` is SET_CUR (1) or
   /// one of GET_CUR … GET_DEF (0x81 … 0x87); `data` is read or written. Returns the bytes of the
@@ -18,9 +28,6 @@ class Controls {
   std::optional<int> handle(int entity, int selector, int request, std::span<std::uint8_t> data);
   /// The gain moves by 7 without having been asked, as under an automatic that won't be off.
   void drift();
-
- private:
-  bool stubborn_;
 };
 
 }  // namespace uvcfake

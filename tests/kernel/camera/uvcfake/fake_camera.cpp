@@ -78,10 +78,10 @@ bool write_all(int fd, const void* from, std::size_t n) {
 
 FakeCamera::FakeCamera(const Options& options)
     : options_(options),
-      controls_(options.stubborn),
       configuration_(configuration_descriptor(options.isochronous)),
       timer_(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC)),
       scratch_(kMaxMessage) {
+  for (const auto& [name, fault] : options_.faults) controls_.set_fault(name, fault);
   probe_[kFormatAt] = kMjpeg;
   probe_[kFrameAt] = 1;
   negotiate();

@@ -5,6 +5,7 @@
 #include <deque>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "hal/base/unique_fd.hpp"
@@ -19,8 +20,8 @@ struct Options {
   double fps = 0;            ///< Forced rate; 0 = as negotiated.
   unsigned cut_every = 0;    ///< Every n-th frame is cut in half.
   unsigned flag_every = 0;   ///< Every n-th frame carries the payload header's error bit.
-  bool stubborn = false;     ///< See Controls.
-  int port = 0;              ///< Of the virtual host controller.
+  std::vector<std::pair<std::string, Fault>> faults;  ///< Of controls, by name.
+  int port = 0;                                       ///< Of the virtual host controller.
   std::string serial = "0001";
   std::string folder;  ///< *.jpg (MJPEG) and *.yuv (YUYV), played in the order of their names.
 };

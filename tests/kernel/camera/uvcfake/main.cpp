@@ -14,13 +14,16 @@
 namespace {
 
 constexpr const char* kUsage =
-    "uvcfake [-i] [-f FPS] [-x N] [-e N] [-s] [-p PORT] [-n SERIAL] FOLDER\n"
+    "uvcfake [-i] [-f FPS] [-x N] [-e N] [-p PORT] [-n SERIAL]\n"
+    "        [-r CONTROL] [-k CONTROL] [-l CONTROL] FOLDER\n"
     "plays FOLDER/*.jpg (MJPEG) or FOLDER/*.yuv (YUYV), sorted, in a loop\n"
     "  -i         isochronous endpoint, as most cameras have, instead of bulk\n"
     "  -f FPS     forces the rate (default: as negotiated)\n"
     "  -x N       every n-th frame is cut in half\n"
     "  -e N       every n-th frame carries the error bit\n"
-    "  -s         stubborn: refuses sharpness, ignores gamma\n"
+    "  -r CONTROL refuses to be set\n"
+    "  -k CONTROL keeps its value whatever it is set to\n"
+    "  -l CONTROL the same, and lies about it\n"
     "  -p PORT    port of the virtual controller (0 to 7)\n"
     "  -n SERIAL  serial number (0001)\n"
     "SIGUSR1 freezes and resumes the stream, SIGUSR2 moves the gain, SIGTERM unplugs\n";
@@ -41,7 +44,7 @@ void on_signal(int signal) {
 
 uvcfake::Options parse(int argc, char** argv) {
   uvcfake::Options options;
-  for (int option = 0; (option = ::getopt(argc, argv, "if:x:e:sp:n:")) > 0;) {
+  for (int option = 0; (option = ::getopt(argc, argv, "if:x:e:r:k:l:p:n:")) > 0;) {
     switch (option) {
       case 'i':
         options.isochronous = true;
@@ -55,8 +58,14 @@ uvcfake::Options parse(int argc, char** argv) {
       case 'e':
         options.flag_every = static_cast<unsigned>(std::atoi(optarg));
         break;
-      case 's':
-        options.stubborn = true;
+      case 'r':
+        options.faults.emplace_back(optarg, uvcfake::Fault::refuses);
+        break;
+      case 'k':
+        options.faults.emplace_back(optarg, uvcfake::Fault::ignores);
+        break;
+      case 'l':
+        options.faults.emplace_back(optarg, uvcfake::Fault::lies);
         break;
       case 'p':
         options.port = std::atoi(optarg);
