@@ -7,6 +7,10 @@ namespace {
 
 luma::Layout layout_of(Encoding encoding) {
   switch (encoding) {
+    case Encoding::grey10:
+      return luma::Layout::grey10;
+    case Encoding::grey16:
+      return luma::Layout::grey16;
     case Encoding::yuyv:
       return luma::Layout::yuyv;
     case Encoding::nv12:

@@ -14,7 +14,7 @@
 namespace dtact::hal::live {
 
 /// How a payload is encoded.
-enum class Encoding : std::uint8_t { grey, nv12, yuyv, jpeg };
+enum class Encoding : std::uint8_t { grey, grey10, grey16, nv12, yuyv, jpeg };
 
 struct Format {
   Encoding encoding = Encoding::grey;

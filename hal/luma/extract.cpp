@@ -21,18 +21,29 @@ constexpr std::array<std::uint8_t, 256> make_expansion() {
 
 constexpr auto kExpansion = make_expansion();
 
-std::ptrdiff_t packed_line(Layout layout, int width) noexcept {
-  return layout == Layout::yuyv ? std::ptrdiff_t{2} * width : width;
+int pixel_bytes(Layout layout) noexcept {
+  return layout == Layout::grey || layout == Layout::nv12 ? 1 : 2;
 }
 
-template <int kStep>
-void copy_line(const std::uint8_t* in, std::uint8_t* out, int width, Range range) noexcept {
-  if (range == Range::limited) {
-    for (int x = 0; x < width; ++x) out[x] = kExpansion[in[std::ptrdiff_t{kStep} * x]];
-  } else if constexpr (kStep == 1) {
-    std::memcpy(out, in, static_cast<std::size_t>(width));
-  } else {
-    for (int x = 0; x < width; ++x) out[x] = in[std::ptrdiff_t{kStep} * x];
+bool has_chroma(Layout layout) noexcept { return layout == Layout::yuyv || layout == Layout::nv12; }
+
+void copy_line(Layout layout, const std::uint8_t* in, std::uint8_t* out, int width) noexcept {
+  switch (layout) {
+    case Layout::grey:
+    case Layout::nv12:
+      std::memcpy(out, in, static_cast<std::size_t>(width));
+      return;
+    case Layout::grey10:
+      for (int x = 0; x < width; ++x) {
+        out[x] = static_cast<std::uint8_t>(in[2 * x] >> 2U | in[2 * x + 1] << 6U);
+      }
+      return;
+    case Layout::grey16:
+      for (int x = 0; x < width; ++x) out[x] = in[2 * x + 1];
+      return;
+    case Layout::yuyv:
+      for (int x = 0; x < width; ++x) out[x] = in[2 * x];
+      return;
   }
 }
 
@@ -42,7 +53,7 @@ std::uint8_t expand_limited(std::uint8_t y) noexcept { return kExpansion[y]; }
 
 std::size_t payload_bytes(Layout layout, int width, int height,
                           std::ptrdiff_t bytes_per_line) noexcept {
-  const std::ptrdiff_t packed = packed_line(layout, width);
+  const std::ptrdiff_t packed = std::ptrdiff_t{pixel_bytes(layout)} * width;
   const std::ptrdiff_t line = bytes_per_line == 0 ? packed : bytes_per_line;
   const std::ptrdiff_t lines = layout == Layout::nv12 ? height + height / 2 : height;
   return static_cast<std::size_t>((lines - 1) * line + packed);
@@ -52,20 +63,20 @@ ExtractStatus extract(Layout layout, Range range, std::span<const std::uint8_t> 
                       std::ptrdiff_t bytes_per_line, LumaBuffer& out) noexcept {
   const int width = out.width();
   const int height = out.height();
-  const std::ptrdiff_t packed = packed_line(layout, width);
+  const std::ptrdiff_t packed = std::ptrdiff_t{pixel_bytes(layout)} * width;
   const std::ptrdiff_t line = bytes_per_line == 0 ? packed : bytes_per_line;
   const bool odd =
-      (layout != Layout::grey && width % 2 != 0) || (layout == Layout::nv12 && height % 2 != 0);
+      (has_chroma(layout) && width % 2 != 0) || (layout == Layout::nv12 && height % 2 != 0);
   if (height < 1 || line < packed || odd) return ExtractStatus::bad_shape;
   if (payload.size() < payload_bytes(layout, width, height, line)) {
     return ExtractStatus::short_payload;
   }
   for (int y = 0; y < height; ++y) {
-    const std::uint8_t* in = payload.data() + y * line;
-    if (layout == Layout::yuyv) {
-      copy_line<2>(in, out.row(y), width, range);
-    } else {
-      copy_line<1>(in, out.row(y), width, range);
+    std::uint8_t* row = out.row(y);
+    copy_line(layout, payload.data() + y * line, row, width);
+    // In the copy: looking values up reads byte by byte.
+    if (range == Range::limited) {
+      for (int x = 0; x < width; ++x) row[x] = kExpansion[row[x]];
     }
   }
   return ExtractStatus::ok;

@@ -10,9 +10,11 @@ namespace dtact::hal::luma {
 
 /// How an uncompressed payload is laid out. Chroma is skipped, never computed.
 enum class Layout : std::uint8_t {
-  grey,  ///< V4L2 GREY: one byte a pixel.
-  yuyv,  ///< V4L2 YUYV: Y0 U Y1 V, two bytes a pixel, even width.
-  nv12   ///< V4L2 NV12: a plane of Y, then a half-size plane of UV pairs, even width and height.
+  grey,    ///< V4L2 GREY: one byte a pixel.
+  grey10,  ///< V4L2 Y10: two bytes a pixel, little-endian, ten bits at the lower end.
+  grey16,  ///< V4L2 Y16: two bytes a pixel, little-endian, all bits used.
+  yuyv,    ///< V4L2 YUYV: Y0 U Y1 V, two bytes a pixel, even width.
+  nv12     ///< V4L2 NV12: a plane of Y, then a half-size plane of UV pairs, even width and height.
 };
 
 /// What the numbers of a payload mean; from the driver's colour metadata (V4L2_QUANTIZATION_*) or
@@ -39,7 +41,8 @@ enum class ExtractStatus : std::uint8_t {
 
 /// Writes the payload's luma in full range into `out`, whose size says the image's. Lines of the
 /// payload are `bytes_per_line` apart (0: no padding between lines); bytes after the image are
-/// ignored. Does not allocate.
+/// ignored; of more than eight bits the upper eight are taken. Reads each byte once, in wide loads:
+/// the memory of some cameras is not cached. Does not allocate.
 [[nodiscard]] ExtractStatus extract(Layout layout, Range range,
                                     std::span<const std::uint8_t> payload,
                                     std::ptrdiff_t bytes_per_line, LumaBuffer& out) noexcept;

@@ -7,6 +7,7 @@
 
 #include "hal/luma/extract.hpp"
 #include "hal/luma/luma_buffer.hpp"
+#include "tests/fakes/counted_loads.hpp"
 
 namespace dtact::hal::luma {
 namespace {
@@ -65,6 +66,28 @@ TEST(Extract, GreyKeepsFullRangeAsItIs) {
   EXPECT_EQ(out.row(1)[2], 2);
 }
 
+TEST(Extract, MoreThanEightBitsKeepTheUpperEight) {
+  // 1023, 512, 3 and 4 of ten bits; 65535, 32768, 255 and 256 of sixteen.
+  const std::vector<std::uint8_t> ten = {0xFF, 0x03, 0x00, 0x02, 0x03, 0x00, 0x04, 0x00, 99};
+  const std::vector<std::uint8_t> sixteen = {0xFF, 0xFF, 0x00, 0x80, 0xFF, 0x00, 0x00, 0x01, 99};
+  LumaBuffer out(2, 2);
+  EXPECT_EQ(payload_bytes(Layout::grey10, 2, 2, 0), 8U);
+  ASSERT_EQ(extract(Layout::grey10, Range::full, ten, 0, out), ExtractStatus::ok);
+  EXPECT_EQ(out.row(0)[0], 255);
+  EXPECT_EQ(out.row(0)[1], 128);
+  EXPECT_EQ(out.row(1)[0], 0);
+  EXPECT_EQ(out.row(1)[1], 1);
+  ASSERT_EQ(extract(Layout::grey16, Range::full, sixteen, 4, out), ExtractStatus::ok);
+  EXPECT_EQ(out.row(0)[0], 255);
+  EXPECT_EQ(out.row(0)[1], 128);
+  EXPECT_EQ(out.row(1)[0], 0);
+  EXPECT_EQ(out.row(1)[1], 1);
+  LumaBuffer odd(3, 1);
+  EXPECT_EQ(extract(Layout::grey10, Range::full, ten, 0, odd), ExtractStatus::ok);
+  EXPECT_EQ(extract(Layout::grey16, Range::full, std::span(ten).first(5), 0, odd),
+            ExtractStatus::short_payload);
+}
+
 TEST(Extract, YuyvTakesEverySecondByteAndExpands) {
   const std::vector<std::uint8_t> payload = {16, 99, 235, 99, 126, 99, 10, 99};
   LumaBuffer out(4, 1);
@@ -112,6 +135,24 @@ TEST(Extract, RefusesShapesTheLayoutCannotHave) {
   EXPECT_EQ(extract(Layout::grey, Range::full, payload, 3, even), ExtractStatus::bad_shape);
   LumaBuffer none;
   EXPECT_EQ(extract(Layout::grey, Range::full, payload, 0, none), ExtractStatus::bad_shape);
+}
+
+// A Pi's drivers give memory without caches.
+TEST(Extract, ReadsMemoryWithoutCachesInWideLoads) {
+  constexpr int kWidth = 800;
+  constexpr int kHeight = 8;
+  const fakes::CountedLoads payload(std::size_t{2} * kWidth * kHeight);
+  LumaBuffer out(kWidth, kHeight);
+  for (const Layout layout : {Layout::grey, Layout::grey10, Layout::grey16, Layout::yuyv}) {
+    for (const Range range : {Range::full, Range::limited}) {
+      const std::size_t bytes = payload_bytes(layout, kWidth, kHeight, 0);
+      const auto loads = payload.count(
+          [&] { (void)extract(layout, range, payload.bytes().first(bytes), 0, out); });
+      if (!loads) GTEST_SKIP() << "loads can be counted on x86-64 only";
+      EXPECT_GT(*loads, 0U);
+      EXPECT_LE(*loads, bytes / 8) << static_cast<int>(layout) << " " << static_cast<int>(range);
+    }
+  }
 }
 
 }  // namespace
