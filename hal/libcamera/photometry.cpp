@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "hal/live/exposure.hpp"
 
@@ -24,6 +25,18 @@ struct Control {
 };
 
 constexpr const char* kExposure = "exposure_time";
+constexpr const char* kGain = "analogue_gain";
+/// Asked for as FrameDurationLimits, read as FrameDuration.
+constexpr const char* kFrameDuration = "frame_duration";
+
+/// Microseconds. What a Pi's cameras start with when nobody says anything (ipa_base.cpp:
+/// defaultExposureTime); their list of controls names no default.
+constexpr double kDefaultExposure = 20000;
+/// Of a frame's duration. The rest is what sensors need between two exposures: 4 to some 40 lines
+/// of about a thousand (cam_helper_*.cpp: frameIntegrationDiff).
+constexpr double kMostOfAFrame = 0.9;
+/// Microseconds: sensors count exposure in lines, of which the longest last about so long.
+constexpr std::int64_t kLine = 64;
 
 const std::array<Control, 10>& known_controls() {
   static const std::array<Control, 10> controls{{
@@ -31,7 +44,7 @@ const std::array<Control, 10>& known_controls() {
       {"auto_white_balance", lc::controls::AwbEnable, 0},
       {"auto_focus", lc::controls::AfMode, 0},  // AfModeManual
       {kExposure, lc::controls::ExposureTime, std::nullopt},
-      {"analogue_gain", lc::controls::AnalogueGain, std::nullopt},
+      {kGain, lc::controls::AnalogueGain, std::nullopt},
       {"lens_position", lc::controls::LensPosition, std::nullopt},
       {"brightness", lc::controls::Brightness, std::nullopt},
       {"contrast", lc::controls::Contrast, std::nullopt},
@@ -54,6 +67,8 @@ std::optional<double> number(const lc::ControlValue& value) {
       return value.get<bool>() ? 1 : 0;
     case lc::ControlTypeInteger32:
       return value.get<std::int32_t>();
+    case lc::ControlTypeInteger64:
+      return static_cast<double>(value.get<std::int64_t>());
     case lc::ControlTypeFloat:
       return value.get<float>();
     default:
@@ -77,9 +92,58 @@ std::int64_t report_value(const lc::ControlId& id, double value) {
   return std::llround(id.type() == lc::ControlTypeFloat ? value * 1000 : value);
 }
 
-/// Sensors have steps: a hundredth of the value, or one unit, is the same value.
+/// A hundredth of the value, or one unit, is the same value.
 bool same(std::int64_t a, std::int64_t b) {
   return std::llabs(a - b) <= std::max<std::int64_t>(1, std::llabs(b) / 100);
+}
+
+/// Whether `got` is what the sensor's steps make of `asked`.
+bool nearest(const std::string& name, std::int64_t got, std::int64_t asked) {
+  if (name != kExposure) return same(got, asked);
+  return std::llabs(got - asked) <= std::max(kLine, asked / 20);
+}
+
+/// What became of a control, as the first frames taken with it say.
+void settle(CameraControl& entry, std::int64_t got) {
+  const std::int64_t asked = std::exchange(entry.value, got);
+  const bool as_asked = nearest(entry.name, got, asked);
+  entry.verdict = as_asked ? ControlVerdict::confirmed : ControlVerdict::refused;
+  entry.note.clear();
+  if (as_asked) {
+    if (entry.name == kExposure) {
+      entry.note = live::rounding_note(static_cast<double>(asked), static_cast<double>(got));
+    }
+  } else if (entry.name == kFrameDuration) {
+    entry.note = fmt::format(
+        "the sensor runs at {:.1f} frames a second, not at {:.1f}: set "
+        "camera.fps to that, or another camera.width and camera.height",
+        1e6 / static_cast<double>(got), 1e6 / static_cast<double>(asked));
+  } else if (entry.name == kExposure) {
+    entry.note = fmt::format(
+        "{} us were asked for: the frame leaves no more; lower "
+        "camera.libcamera.exposure_us or camera.fps",
+        asked);
+  } else {
+    entry.note = fmt::format("{} is {} after it was set to {}", entry.name, got, asked);
+  }
+}
+
+std::optional<unsigned> id_of_reading(const std::string& name) {
+  if (name == kFrameDuration) return lc::controls::FrameDuration.id();
+  const Control* control = find(name);
+  return control != nullptr ? std::optional(control->id.id()) : std::nullopt;
+}
+
+/// The value to lock what the configuration says nothing of.
+std::optional<double> default_of(const Control& control, const lc::ControlInfo& offered,
+                                 double frame_us) {
+  std::optional<double> value = number(offered.def());
+  // Longer ones are clipped without a word (ipa_base.cpp: applyAGC()).
+  if (control.name == std::string(kExposure)) {
+    value = std::min(value.value_or(kDefaultExposure), kMostOfAFrame * frame_us);
+  }
+  if (!value && control.name == std::string(kGain)) value = number(offered.min());
+  return value;
 }
 
 }  // namespace
@@ -89,6 +153,12 @@ PhotometricLock::PhotometricLock(const LibcameraConfig& config, double fps)
       exposure_us_(live::exposure_us("camera.libcamera", config.exposure_us,
                                      config.exposure_pwm_periods, config.pwm_hz)),
       fps_(fps) {
+  if (exposure_us_ * fps_ > 1e6) {
+    throw std::runtime_error(
+        fmt::format("camera.libcamera: an exposure of {:g} us is longer than a frame at camera.fps "
+                    "= {:g} ({:.0f} us): lower exposure_us, exposure_pwm_periods or camera.fps",
+                    exposure_us_, fps_, 1e6 / fps_));
+  }
   for (const auto& [name, value] : config.controls) {
     if (find(name) != nullptr && name != kExposure) continue;
     std::string names;
@@ -104,9 +174,14 @@ PhotometricLock::PhotometricLock(const LibcameraConfig& config, double fps)
 }
 
 PhotometricLock::Wishes PhotometricLock::wishes(const lc::ControlInfoMap& offered) const {
+  // libcamera 0.0.3: count() counts every control there is, not the camera's, and find() needs
+  // some.
+  const auto find_offered = [&](const lc::ControlId& id) {
+    return offered.empty() ? offered.end() : offered.find(id.id());
+  };
   Wishes wishes{lc::ControlList(lc::controls::controls), {}};
   for (const Control& control : known_controls()) {
-    const auto info = offered.find(control.id.id());
+    const auto info = find_offered(control.id);
     const auto configured = config_.controls.find(control.name);
     std::optional<double> value = control.off;
     if (configured != config_.controls.end()) value = configured->second;
@@ -121,7 +196,7 @@ PhotometricLock::Wishes PhotometricLock::wishes(const lc::ControlInfoMap& offere
       wishes.controls.push_back(std::move(entry));
       continue;
     }
-    if (!value) value = number(info->second.def());
+    if (!value) value = default_of(control, info->second, 1e6 / fps_);
     if (!value) continue;  // the pipeline names no default to go back to
     const std::optional<double> least = number(info->second.min());
     const std::optional<double> most = number(info->second.max());
@@ -136,40 +211,42 @@ PhotometricLock::Wishes PhotometricLock::wishes(const lc::ControlInfoMap& offere
     }
     wishes.controls.push_back(std::move(entry));
   }
-  // Not count(): libcamera 0.0.3 counts every control there is, not the camera's.
-  if (offered.find(lc::controls::FrameDurationLimits.id()) != offered.end()) {
+  if (find_offered(lc::controls::FrameDurationLimits) != offered.end()) {
     const auto us = static_cast<std::int64_t>(std::llround(1e6 / fps_));
     wishes.list.set(lc::controls::FrameDurationLimits, {us, us});
+    wishes.controls.push_back(
+        {kFrameDuration, us, ControlVerdict::accepted,
+         "set; the frames have not said yet how long they last"});
   }
   return wishes;
 }
 
 void PhotometricLock::read(const lc::ControlList& metadata, Readings& readings) {
-  for (const Control& control : known_controls()) {
-    if (!metadata.contains(control.id.id())) continue;
-    const auto value = number(metadata.get(control.id.id()));
-    if (value) readings[control.id.id()] = report_value(control.id, *value);
-  }
+  const auto note = [&](const lc::ControlId& id) {
+    if (!metadata.contains(id.id())) return;
+    const auto value = number(metadata.get(id.id()));
+    if (value) readings[id.id()] = report_value(id, *value);
+  };
+  for (const Control& control : known_controls()) note(control.id);
+  note(lc::controls::FrameDuration);
 }
 
 std::string PhotometricLock::compare(const Readings& readings,
                                      std::vector<CameraControl>& controls) {
   std::string moved;
   for (CameraControl& entry : controls) {
-    const Control* control = find(entry.name);
-    if (control == nullptr || entry.verdict == ControlVerdict::refused) continue;
-    const auto reading = readings.find(control->id.id());
+    const std::optional<unsigned> id = id_of_reading(entry.name);
+    if (!id || entry.verdict == ControlVerdict::refused) continue;
+    const auto reading = readings.find(*id);
     if (reading == readings.end()) {
-      if (entry.verdict == ControlVerdict::accepted)
+      if (entry.verdict == ControlVerdict::accepted) {
         entry.note = "set; this camera's frames do not say what came of it";
-      continue;
-    }
-    if (same(reading->second, entry.value)) {
-      entry.verdict = ControlVerdict::confirmed;
-      entry.note.clear();
-    } else {
-      moved += fmt::format("{}{} is {} though it was set to {}", moved.empty() ? "" : "; ",
-                           entry.name, reading->second, entry.value);
+      }
+    } else if (entry.verdict == ControlVerdict::accepted) {
+      settle(entry, reading->second);
+    } else if (!same(reading->second, entry.value)) {
+      moved += fmt::format("{}{} is {} though it was {}", moved.empty() ? "" : "; ", entry.name,
+                           reading->second, entry.value);
     }
   }
   return moved;

@@ -17,11 +17,12 @@ namespace dtact::hal::libcamera_backend {
 using Readings = std::map<unsigned, std::int64_t>;
 
 /// The photometric lock over libcamera: the automatics off, the rest set to the configured value or
-/// the camera's default. Values in CameraControl are libcamera's, reals in thousandths.
+/// the camera's default, the frame's duration as camera.fps says. Values in CameraControl are
+/// libcamera's, reals in thousandths, times in microseconds.
 class PhotometricLock {
  public:
-  /// Throws std::runtime_error naming the key.
-  explicit PhotometricLock(const LibcameraConfig& config, double fps);
+  /// Throws std::runtime_error naming the key, also for an exposure longer than a frame.
+  PhotometricLock(const LibcameraConfig& config, double fps);
 
   /// What to hand to the camera at its start, and the controls as they are reported until the first
   /// frames say what came of it.
@@ -34,8 +35,10 @@ class PhotometricLock {
   /// The readings of the controls that matter, out of a frame's metadata.
   static void read(const libcamera::ControlList& metadata, Readings& readings);
 
-  /// Compares the frames' readings with what was asked for and notes it in `controls`. Returns the
-  /// sentence that says which locked ones have moved; empty when none.
+  /// Compares the readings of frames that were taken with what was asked for, and notes it in
+  /// `controls`: at first what each has become, with the nearest that the sensor has as its value
+  /// or with the remedy where it is something else. Returns the sentence that says which locked
+  /// ones have moved since; empty when none.
   [[nodiscard]] static std::string compare(const Readings& readings,
                                            std::vector<CameraControl>& controls);
 
