@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "hal/libcamera/dma_buffer.hpp"
 #include "hal/libcamera/formats.hpp"
 #include "hal/libcamera/photometry.hpp"
 #include "hal/libcamera/session.hpp"
@@ -96,11 +97,13 @@ class Search {
 live::Opener opener(const CameraConfig& config) {
   check_pixel_format(config.libcamera.pixel_format);
   return [config, lock = PhotometricLock(config.libcamera, config.fps),
-          search = Search(config.libcamera.device),
+          search = Search(config.libcamera.device), heap = std::make_shared<DmaHeap>(),
           session = std::shared_ptr<Session>()]() mutable -> live::Opened {
     const std::shared_ptr<lc::Camera> camera = search();
     session.reset();  // the one before, which see
-    session = std::make_shared<Session>(camera, config, lock);
+    // What other cameras send is written by the processor, into cached memory.
+    const bool bare = sensor_of(camera->properties()) != Sensor::none;
+    session = std::make_shared<Session>(camera, config, lock, bare ? heap.get() : nullptr);
     return {session, camera->id(), session->pixel_format(), session->controls()};
   };
 }

@@ -2,18 +2,18 @@
 
 #include <fmt/format.h>
 #include <libcamera/control_ids.h>
-#include <linux/dma-buf.h>
-#include <sys/ioctl.h>
-#include <sys/mman.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <iterator>
+#include <system_error>
 #include <utility>
 
 #include "hal/base/clock.hpp"
-#include "hal/libcamera/formats.hpp"
+#include "hal/libcamera/sensor_mode.hpp"
 #include "hal/live/device_error.hpp"
 
 namespace dtact::hal::libcamera_backend {
@@ -38,94 +38,154 @@ using live::DeviceError;
       fmt::format("cannot {} {} ({}): plug the camera in again", what, id, std::strerror(error)));
 }
 
-/// Caches are told that the processor reads (begin) or has read (end) a buffer that the camera
-/// writes. Exporters without caches to keep refuse, and nothing is lost by it.
-void sync_for_reading(int fd, bool begin) noexcept {
-  dma_buf_sync sync{};
-  sync.flags = DMA_BUF_SYNC_READ | (begin ? DMA_BUF_SYNC_START : DMA_BUF_SYNC_END);
-  (void)::ioctl(fd, DMA_BUF_IOCTL_SYNC, &sync);
-}
-
 std::size_t page_bytes(std::size_t n) {
   const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
   return (n + page - 1) / page * page;
 }
 
+/// The EXIF orientation of the pictures as they will come: 1 = upright.
+template <class Configuration>
+int orientation_of(const Configuration& configuration) {
+  if constexpr (requires { configuration.orientation; }) {
+    return static_cast<int>(configuration.orientation);
+  } else {
+    // Before 0.1 a transform, of which sensors have flips alone: none, left-right, top-bottom,
+    // both.
+    constexpr std::array kExif{1, 2, 4, 3};
+    return kExif.at(static_cast<std::size_t>(configuration.transform));
+  }
+}
+
+/// Until what was set at the start shows in the frames: a sensor takes two to three, before which
+/// the buffers of the queue are filled.
+constexpr int kSettlingFrames = 16;
+
+/// Of what the pipeline answered when it was configured.
+ControlVerdict granted(bool as_asked) {
+  return as_asked ? ControlVerdict::confirmed : ControlVerdict::refused;
+}
+
 }  // namespace
 
 Session::Session(std::shared_ptr<lc::Camera> camera, const CameraConfig& config,
-                 const PhotometricLock& lock)
-    : camera_(std::move(camera)) {
+                 const PhotometricLock& lock, const DmaHeap* heap)
+    : camera_(std::move(camera)),
+      sensor_(sensor_of(camera_->properties())),
+      settling_(kSettlingFrames) {
   if (const int e = camera_->acquire(); e != 0) fail(e, "acquire", camera_->id());
   acquired_ = true;
   try {
-    configuration_ = camera_->generateConfiguration({lc::StreamRole::VideoRecording});
-    if (!configuration_ || configuration_->empty()) fail(ENODEV, "configure", camera_->id());
-    const Choice choice = choose_format(*configuration_, config, camera_->id());
-    if (const int e = camera_->configure(configuration_.get()); e != 0) {
-      fail(e, "configure", camera_->id());
-    }
-    format_ = format_of(configuration_->at(0), choice);
-    pixel_format_ = choice.name;
-    make_requests();
+    configure(config);
+    make_requests(heap);
     start(lock);
   } catch (...) {
     stop();
-    for (const Slot& slot : slots_) {
-      ::munmap(const_cast<std::uint8_t*>(slot.mapping.data()), slot.mapping.size());
-    }
     throw;
   }
 }
 
-Session::~Session() {
-  stop();
-  for (const Slot& slot : slots_) {
-    ::munmap(const_cast<std::uint8_t*>(slot.mapping.data()), slot.mapping.size());
+Session::~Session() { stop(); }
+
+void Session::configure(const CameraConfig& config) {
+  // The role of a stream that goes on at a rate, from the image processor where there is one. A
+  // mono sensor's own format is asked for on top of it: the role for raw streams is refused by
+  // pipelines that have no sensor (virtual.cpp: generateConfiguration()), and its list of formats
+  // leaves out what the image processor makes.
+  configuration_ = camera_->generateConfiguration({lc::StreamRole::VideoRecording});
+  if (!configuration_ || configuration_->empty()) {
+    throw live::ModeError(
+        fmt::format("libcamera has no video of {}: it lacks what this board's image processor "
+                    "needs; use a newer libcamera, or a USB camera",
+                    camera_->id()));
   }
+  const auto configure = [&] {
+    const Choice choice = choose_format(*configuration_, config, sensor_, camera_->id());
+    if (const int e = camera_->configure(configuration_.get()); e != 0) {
+      fail(e, "configure", camera_->id());
+    }
+    return choice;
+  };
+  Choice choice = configure();
+  const double fastest = fastest_rate(camera_->controls());
+  if (!keeps_rate(fastest, config.fps)) {
+    const std::vector<SensorMode> modes = list_sensor_modes(*camera_, *configuration_);
+    const std::optional<SensorMode> mode = choose_sensor_mode(modes, config);
+    if (!mode) throw live::ModeError(too_slow(camera_->id(), fastest, modes, config));
+    set_sensor_mode(*configuration_, *mode);
+    choice = configure();
+    controls_.push_back({"sensor_height", mode->height, ControlVerdict::confirmed,
+                         fmt::format("the sensor's mode {}x{} with {} bits, which keeps the rate",
+                                     mode->width, mode->height, mode->bit_depth)});
+  }
+  format_ = format_of(configuration_->at(0), choice);
+  format_.lendable = true;
+  pixel_format_ = choice.name;
+  note_pictures(choice);
 }
 
-void Session::make_requests() {
+void Session::note_pictures(const Choice& choice) {
+  if (choice.encoding != live::Encoding::jpeg) {
+    controls_.push_back({"full_range", format_.full_range ? 1 : 0, granted(format_.full_range),
+                         format_.full_range ? ""
+                                            : "the camera gives luma from 16 to 235: it is "
+                                              "stretched, and has 220 grey levels"});
+  }
+  const int orientation = orientation_of(*configuration_);
+  controls_.push_back({"orientation", orientation, granted(orientation == 1),
+                       orientation == 1 ? ""
+                                        : "the pictures come turned (a number as in EXIF): the "
+                                          "camera cannot turn them as it is mounted"});
+}
+
+void Session::make_requests(const DmaHeap* heap) {
+  if (heap != nullptr) own_buffers_ = make_frame_buffers(*heap, configuration_->at(0));
+  for (const auto& buffer : own_buffers_) add_slot(*buffer);
+  if (!own_buffers_.empty()) return;
+  // A bare sensor's driver gives memory without caches, which is to be read once only.
+  if (sensor_ != Sensor::none) format_.lendable = false;
   lc::Stream* stream = configuration_->at(0).stream();
   allocator_ = std::make_unique<lc::FrameBufferAllocator>(camera_);
   if (const int n = allocator_->allocate(stream); n < 2) {
     fail(n < 0 ? n : ENOMEM, "get buffers of", camera_->id());
   }
-  format_.lendable = true;
-  for (const auto& buffer : allocator_->buffers(stream)) {
-    if (slots_.size() == completed_.size()) break;
-    Slot slot;
-    slot.request = camera_->createRequest(slots_.size());
-    if (!slot.request || slot.request->addBuffer(stream, buffer.get()) != 0) {
-      fail(ENOMEM, "make requests of", camera_->id());
-    }
-    const lc::FrameBuffer::Plane& luma = buffer->planes().front();
-    std::size_t end = 0;  // planes of one descriptor lie one after the other
-    for (const lc::FrameBuffer::Plane& plane : buffer->planes()) {
-      if (plane.fd.get() == luma.fd.get()) {
-        end = std::max<std::size_t>(end, std::size_t{plane.offset} + plane.length);
-      }
-    }
-    void* memory = ::mmap(nullptr, end, PROT_READ, MAP_SHARED, luma.fd.get(), 0);
-    if (memory == MAP_FAILED) fail(errno, "map buffers of", camera_->id());
-    slot.buffer = buffer.get();
-    slot.fd = luma.fd.get();
-    slot.mapping = {static_cast<const std::uint8_t*>(memory), end};
-    slot.offset = luma.offset;
-    slot.length = luma.length;
-    // The last page is there as a whole, and may be read beyond the buffer's end.
-    const std::size_t image =
-        static_cast<std::size_t>(format_.bytes_per_line) * static_cast<std::size_t>(format_.height);
-    if (slot.offset + image + kLumaPadding > page_bytes(end)) format_.lendable = false;
-    slots_.push_back(std::move(slot));
+  for (const auto& buffer : allocator_->buffers(stream)) add_slot(*buffer);
+}
+
+void Session::add_slot(lc::FrameBuffer& buffer) {
+  if (slots_.size() == completed_.size()) return;
+  Slot slot;
+  slot.request = camera_->createRequest(slots_.size());
+  if (!slot.request || slot.request->addBuffer(configuration_->at(0).stream(), &buffer) != 0) {
+    fail(ENOMEM, "make requests of", camera_->id());
   }
+  const lc::FrameBuffer::Plane& luma = buffer.planes().front();
+  std::size_t end = 0;  // planes of one descriptor lie one after the other
+  for (const lc::FrameBuffer::Plane& plane : buffer.planes()) {
+    if (plane.fd.get() == luma.fd.get()) {
+      end = std::max<std::size_t>(end, std::size_t{plane.offset} + plane.length);
+    }
+  }
+  try {
+    slot.mapping = Mapping(luma.fd.get(), end);
+  } catch (const std::system_error& e) {
+    fail(e.code().value(), "map buffers of", camera_->id());
+  }
+  slot.buffer = &buffer;
+  slot.fd = luma.fd.get();
+  slot.offset = luma.offset;
+  slot.length = luma.length;
+  // The last page is there as a whole, and may be read beyond the buffer's end.
+  const std::size_t image =
+      static_cast<std::size_t>(format_.bytes_per_line) * static_cast<std::size_t>(format_.height);
+  if (slot.offset + image + kLumaPadding > page_bytes(end)) format_.lendable = false;
+  slots_.push_back(std::move(slot));
 }
 
 void Session::start(const PhotometricLock& lock) {
   camera_->requestCompleted.connect(this, &Session::on_completed);
   camera_->disconnected.connect(this, &Session::on_disconnected);
   PhotometricLock::Wishes wishes = lock.wishes(camera_->controls());
-  controls_ = std::move(wishes.controls);
+  std::ranges::move(wishes.controls, std::back_inserter(controls_));
   if (const int e = camera_->start(&wishes.list); e != 0) fail(e, "start", camera_->id());
   for (Slot& slot : slots_) {
     // Some pipelines look at a request's controls only, not at those of the start.
@@ -185,12 +245,15 @@ live::DequeueStatus Session::dequeue(live::Filled& out) noexcept {
   --completed_count_;
 
   const Slot& slot = slots_[static_cast<std::size_t>(out.index)];
-  sync_for_reading(slot.fd, true);
+  const bool readable = sync_for_reading(slot.fd, true);
   const lc::FrameMetadata& metadata = slot.buffer->metadata();
   const std::size_t used = metadata.planes().empty() ? 0 : metadata.planes()[0].bytesused;
-  out.payload = slot.mapping.subspan(slot.offset, std::min(used, slot.length));
+  // The virtual camera of libcamera 0.4.0 fills the buffer and says nothing of it.
+  const bool silent = used == 0 && metadata.timestamp == 0;
+  out.payload =
+      slot.mapping.bytes().subspan(slot.offset, silent ? slot.length : std::min(used, slot.length));
   out.sequence = metadata.sequence;
-  out.flagged = metadata.status != lc::FrameMetadata::FrameSuccess;
+  out.flagged = !readable || metadata.status != lc::FrameMetadata::FrameSuccess;
   const std::int64_t now = base::system_clock().monotonic_ns();
   const auto stamp = static_cast<std::int64_t>(metadata.timestamp);
   const auto exposed = slot.request->metadata().get(lc::controls::SensorTimestamp);
@@ -204,6 +267,10 @@ live::DequeueStatus Session::dequeue(live::Filled& out) noexcept {
     out.timestamp_ns = stamp;
     out.meaning = TimestampMeaning::end_of_frame;
   }
+  if (settling_ > 0) {
+    --settling_;
+    return live::DequeueStatus::filled;
+  }
   try {
     PhotometricLock::read(slot.request->metadata(), readings_);
   } catch (const std::exception&) {
@@ -215,7 +282,7 @@ live::DequeueStatus Session::dequeue(live::Filled& out) noexcept {
 bool Session::enqueue(int index) noexcept {
   if (!acquired_) return false;
   const Slot& slot = slots_[static_cast<std::size_t>(index)];
-  sync_for_reading(slot.fd, false);
+  (void)sync_for_reading(slot.fd, false);
   slot.request->reuse(lc::Request::ReuseBuffers);
   return camera_->queueRequest(slot.request.get()) == 0;
 }

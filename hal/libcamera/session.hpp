@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "hal/config.hpp"
+#include "hal/libcamera/dma_buffer.hpp"
+#include "hal/libcamera/formats.hpp"
 #include "hal/libcamera/photometry.hpp"
 #include "hal/live/source.hpp"
 
@@ -24,10 +26,11 @@ namespace dtact::hal::libcamera_backend {
 /// session until libcamera shows a camera again, which its thread does after that.
 class Session final : public live::Source {
  public:
-  /// Configures the camera and starts it. Throws live::ModeError when it lacks the mode asked for,
+  /// Configures the camera and starts it, with buffers from `heap` (may be null) where that has
+  /// some, else with the driver's own. Throws live::ModeError when it lacks the mode asked for,
   /// live::DeviceError when it is busy or fails.
   Session(std::shared_ptr<libcamera::Camera> camera, const CameraConfig& config,
-          const PhotometricLock& lock);
+          const PhotometricLock& lock, const DmaHeap* heap);
   ~Session() override;
 
   [[nodiscard]] const std::string& pixel_format() const noexcept { return pixel_format_; }
@@ -46,23 +49,29 @@ class Session final : public live::Source {
     std::unique_ptr<libcamera::Request> request;
     libcamera::FrameBuffer* buffer = nullptr;
     int fd = -1;  ///< The buffer's own.
-    std::span<const std::uint8_t> mapping;
+    Mapping mapping;
     std::size_t offset = 0;  ///< Of the first plane within the mapping.
     std::size_t length = 0;  ///< Of the first plane.
   };
 
-  void make_requests();
+  void configure(const CameraConfig& config);
+  /// Adds to the controls what the pictures are like.
+  void note_pictures(const Choice& choice);
+  void make_requests(const DmaHeap* heap);
+  void add_slot(libcamera::FrameBuffer& buffer);
   void start(const PhotometricLock& lock);
   void on_completed(libcamera::Request* request);
   void on_disconnected();
   [[nodiscard]] bool gone() noexcept;
 
   std::shared_ptr<libcamera::Camera> camera_;
+  Sensor sensor_;
   std::unique_ptr<libcamera::CameraConfiguration> configuration_;
   std::unique_ptr<libcamera::FrameBufferAllocator> allocator_;
   live::Format format_;
   std::string pixel_format_;
   std::vector<CameraControl> controls_;
+  std::vector<std::unique_ptr<libcamera::FrameBuffer>> own_buffers_;  // those from the heap
   std::vector<Slot> slots_;
   bool acquired_ = false;
 
@@ -72,6 +81,7 @@ class Session final : public live::Source {
   std::array<int, 16> completed_{};  // slot indices, oldest first; never more than there are slots
   std::size_t completed_count_ = 0;
   bool gone_ = false;
+  int settling_;  // frames that may still be of what was set before
   Readings readings_;
 };
 

@@ -22,6 +22,14 @@ class Libcamera : public GuestCamera {
     c.libcamera.pixel_format = format;
     return c;
   }
+
+  [[nodiscard]] static std::int64_t value_of(const hal::Camera& camera, const std::string& name) {
+    for (const hal::CameraControl& control : camera.info().controls) {
+      if (control.name == name) return control.value;
+    }
+    ADD_FAILURE() << "no control " << name;
+    return -1;
+  }
 };
 
 TEST_F(Libcamera, StreamsMjpegByteForByte) {
@@ -54,6 +62,9 @@ TEST_F(Libcamera, StreamsYuyv) {
     ASSERT_GE(played().match_yuyv(frame.luma()), 0) << i;
   }
   EXPECT_EQ(camera->info().pixel_format, "YUYV");
+  // uvcvideo has no full range to give, and turns nothing.
+  EXPECT_EQ(value_of(*camera, "full_range"), 0);
+  EXPECT_EQ(value_of(*camera, "orientation"), 1);
 }
 
 TEST_F(Libcamera, NamesWhatTheCameraOffers) {
