@@ -32,7 +32,8 @@ struct Area {
 
 /// What the moment in FrameInfo::timestamp_ns is.
 enum class TimestampMeaning : std::uint8_t {
-  start_of_exposure,  ///< The first row's exposure began (UVC's SOE).
+  start_of_exposure,  ///< The first row's exposure began.
+  first_packet,       ///< The frame's first bytes reached the driver: its first rows were exposed.
   end_of_frame,       ///< The last byte left the sensor or reached the driver.
   arrival             ///< The frame reached this process; nothing earlier is known.
 };

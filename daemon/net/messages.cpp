@@ -55,6 +55,8 @@ v1::TimestampMeaning to_wire(hal::TimestampMeaning meaning) {
   switch (meaning) {
     case hal::TimestampMeaning::start_of_exposure:
       return v1::TIMESTAMP_START_OF_EXPOSURE;
+    case hal::TimestampMeaning::first_packet:
+      return v1::TIMESTAMP_FIRST_PACKET;
     case hal::TimestampMeaning::end_of_frame:
       return v1::TIMESTAMP_END_OF_FRAME;
     case hal::TimestampMeaning::arrival:

@@ -7,8 +7,9 @@
 
 namespace dtact::pipeline {
 
-/// When a frame's exposure began, CLOCK_MONOTONIC nanoseconds, as well as its timestamp tells: a
-/// stamp from the frame's end lies at most a frame period after it.
+/// When a frame's exposure began, CLOCK_MONOTONIC nanoseconds, as well as its timestamp tells: any
+/// stamp but that of the beginning itself is taken to lie a frame period after it. What a camera
+/// holds a frame back for longer than that is part of its light_delay_frames.
 [[nodiscard]] std::int64_t exposure_start_ns(const hal::FrameInfo& info,
                                              std::int64_t period_ns) noexcept;
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <ctime>
 #include <utility>
 
@@ -44,9 +45,36 @@ bool is_full_range(const v4l2_pix_format& pix, const std::string& configured) {
   return pix.colorspace == V4L2_COLORSPACE_JPEG || pix.pixelformat == V4L2_PIX_FMT_GREY;
 }
 
+}  // namespace
+
+Stream::Stream(base::UniqueFd fd, const std::string& node, std::uint32_t fourcc,
+               const CameraConfig& asked, const PhotometricLock& lock)
+    : fd_(std::move(fd)), node_(node), lock_(lock) {
+  v4l2_capability driver{};
+  if (call(fd_.get(), VIDIOC_QUERYCAP, driver) == 0) {
+    uvcvideo_ = std::strcmp(reinterpret_cast<const char*>(driver.driver), "uvcvideo") == 0;
+  }
+  set_format(fourcc, asked);
+  set_rate(fourcc, asked);
+  map_buffers();
+}
+
+Stream::~Stream() { stop(); }
+
+/// uvcvideo marks its times as start of exposure and takes them when the frame's first packet is
+/// decoded (uvc_video_decode_start() in drivers/media/usb/uvc/uvc_video.c). Only its parameter
+/// hwtimestamps, off by default, derives the start of exposure from the camera's clock, and not of
+/// every frame nor of every camera; which of them is not told, so the later of the two is claimed.
+TimestampMeaning Stream::meaning_of(std::uint32_t flags) const noexcept {
+  if ((flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) != V4L2_BUF_FLAG_TSTAMP_SRC_SOE) {
+    return TimestampMeaning::end_of_frame;
+  }
+  return uvcvideo_ ? TimestampMeaning::first_packet : TimestampMeaning::start_of_exposure;
+}
+
 /// A buffer's time, if its clock is ours and the moment is plausible: uvcvideo's conversion of
 /// camera clocks has been seen to give times in the future.
-void set_time(const v4l2_buffer& buffer, Filled& out) noexcept {
+void Stream::set_time(const v4l2_buffer& buffer, Filled& out) const noexcept {
   const std::int64_t now = base::system_clock().monotonic_ns();
   out.timestamp_ns = now;
   out.meaning = TimestampMeaning::arrival;
@@ -55,22 +83,8 @@ void set_time(const v4l2_buffer& buffer, Filled& out) noexcept {
       std::int64_t{buffer.timestamp.tv_sec} * kSecond + buffer.timestamp.tv_usec * 1000;
   if (stamp > now || stamp < now - kSecond) return;
   out.timestamp_ns = stamp;
-  out.meaning = (buffer.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE
-                    ? TimestampMeaning::start_of_exposure
-                    : TimestampMeaning::end_of_frame;
+  out.meaning = meaning_of(buffer.flags);
 }
-
-}  // namespace
-
-Stream::Stream(base::UniqueFd fd, const std::string& node, std::uint32_t fourcc,
-               const CameraConfig& asked, const PhotometricLock& lock)
-    : fd_(std::move(fd)), node_(node), lock_(lock) {
-  set_format(fourcc, asked);
-  set_rate(fourcc, asked);
-  map_buffers();
-}
-
-Stream::~Stream() { stop(); }
 
 void Stream::set_format(std::uint32_t fourcc, const CameraConfig& asked) {
   v4l2_format format{};

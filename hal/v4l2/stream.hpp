@@ -1,5 +1,7 @@
 #pragma once
 
+#include <linux/videodev2.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -43,12 +45,16 @@ class Stream final : public live::Source {
   void set_format(std::uint32_t fourcc, const CameraConfig& asked);
   void set_rate(std::uint32_t fourcc, const CameraConfig& asked);
   void map_buffers();
+  /// What a buffer's time is, as its flags say and as this driver keeps to it.
+  [[nodiscard]] TimestampMeaning meaning_of(std::uint32_t flags) const noexcept;
+  void set_time(const v4l2_buffer& buffer, live::Filled& out) const noexcept;
 
   base::UniqueFd fd_;
   std::string node_;
   PhotometricLock lock_;
   std::vector<LockedControl> controls_;  // before the stream began
   live::Format format_;
+  bool uvcvideo_ = false;  // the driver
   std::vector<std::span<std::uint8_t>> buffers_;
 };
 

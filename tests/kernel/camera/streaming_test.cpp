@@ -33,8 +33,8 @@ class Streaming : public GuestCamera {
       const auto step = static_cast<int>(frame.info().sequence - first);
       ASSERT_EQ((played().*match)(frame.luma()), (first_picture + step) % PlayedFrames::kCount)
           << "frame " << i;
-      // uvcvideo marks its times as start of exposure.
-      ASSERT_EQ(frame.info().meaning, hal::TimestampMeaning::start_of_exposure);
+      // uvcvideo claims start of exposure, and stamps the first packet.
+      ASSERT_EQ(frame.info().meaning, hal::TimestampMeaning::first_packet);
       ASSERT_LE(frame.info().timestamp_ns, frame.info().ready_ns);
       decode_ns += frame.info().decode_ns;
     }

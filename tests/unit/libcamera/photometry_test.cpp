@@ -82,10 +82,10 @@ TEST(LibcameraPhotometry, AsksForADefaultExposureThatFitsTheFrame) {
 TEST(LibcameraPhotometry, ConfirmsWhatTheFramesWereTakenWith) {
   const PiSensor sensor;
   auto wishes = PhotometricLock(exposure(6000), 60).wishes(sensor.offered());
-  EXPECT_FALSE(control(wishes.controls, "exposure_time").locked);
+  EXPECT_EQ(control(wishes.controls, "exposure_time").verdict, ControlVerdict::accepted);
   EXPECT_EQ(PhotometricLock::compare(sensor.run(wishes.list), wishes.controls), "");
   for (const char* name : {"exposure_time", "analogue_gain", "frame_duration"}) {
-    EXPECT_TRUE(control(wishes.controls, name).locked) << name;
+    EXPECT_EQ(control(wishes.controls, name).verdict, ControlVerdict::confirmed) << name;
     EXPECT_EQ(control(wishes.controls, name).note, "") << name;
   }
   EXPECT_EQ(control(wishes.controls, "frame_duration").value, 16667);
@@ -97,7 +97,7 @@ TEST(LibcameraPhotometry, TakesTheNearestExposureThatTheSensorHas) {
   const Readings readings = sensor.run(wishes.list);
   EXPECT_EQ(PhotometricLock::compare(readings, wishes.controls), "");
   const CameraControl entry = control(wishes.controls, "exposure_time");
-  EXPECT_TRUE(entry.locked);
+  EXPECT_EQ(entry.verdict, ControlVerdict::confirmed);
   EXPECT_EQ(entry.value, 495);
   // It stays that, and is no control that moved.
   EXPECT_EQ(PhotometricLock::compare(readings, wishes.controls), "");
@@ -109,7 +109,7 @@ TEST(LibcameraPhotometry, SaysWhichRateTheSensorRunsAt) {
   auto wishes = PhotometricLock(exposure(6000), 60).wishes(sensor.offered());
   EXPECT_EQ(PhotometricLock::compare(sensor.run(wishes.list), wishes.controls), "");
   const CameraControl entry = control(wishes.controls, "frame_duration");
-  EXPECT_FALSE(entry.locked);
+  EXPECT_EQ(entry.verdict, ControlVerdict::refused);
   EXPECT_EQ(entry.value, 24000);
   EXPECT_EQ(entry.note,
             "the sensor runs at 41.7 frames a second, not at 60.0: set camera.fps to that, or "
@@ -122,7 +122,7 @@ TEST(LibcameraPhotometry, SaysWhichExposureAFrameLeavesRoomFor) {
   auto wishes = PhotometricLock(exposure(16600), 60).wishes(sensor.offered());
   EXPECT_EQ(PhotometricLock::compare(sensor.run(wishes.list), wishes.controls), "");
   const CameraControl entry = control(wishes.controls, "exposure_time");
-  EXPECT_FALSE(entry.locked);
+  EXPECT_EQ(entry.verdict, ControlVerdict::refused);
   EXPECT_EQ(entry.value, 14400);
   EXPECT_EQ(entry.note,
             "16600 us were asked for: the frame leaves no more; lower "
@@ -152,7 +152,7 @@ TEST(LibcameraPhotometry, ConfirmsNothingThatTheFramesDoNotSay) {
   auto wishes = PhotometricLock(exposure(6000), 60).wishes(sensor.offered());
   EXPECT_EQ(PhotometricLock::compare({}, wishes.controls), "");
   const CameraControl entry = control(wishes.controls, "exposure_time");
-  EXPECT_FALSE(entry.locked);
+  EXPECT_EQ(entry.verdict, ControlVerdict::accepted);
   EXPECT_EQ(entry.note, "set; this camera's frames do not say what came of it");
 }
 

@@ -103,6 +103,11 @@ void EmulatedCamera::deliver_grey(std::uint8_t value, std::uint32_t sequence) {
   deliver(buffer);
 }
 
+void EmulatedCamera::set_driver(const std::string& name) {
+  const std::lock_guard guard(mutex_);
+  driver_ = name;
+}
+
 void EmulatedCamera::set_pixel_format(std::uint32_t fourcc) {
   const std::lock_guard guard(mutex_);
   fourcc_ = fourcc;
@@ -195,7 +200,7 @@ int EmulatedCamera::answer(unsigned long request, std::vector<std::uint8_t>& arg
   switch (request) {
     case VIDIOC_QUERYCAP: {
       auto& capability = as<v4l2_capability>(argument);
-      put_text(capability.driver, "emulated");
+      put_text(capability.driver, driver_);
       put_text(capability.card, "Emulated camera");
       put_text(capability.bus_info, "usb-emulated-1");
       capability.device_caps = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;

@@ -43,6 +43,7 @@ class EmulatedCamera {
   /// A picture of one grey value.
   void deliver_grey(std::uint8_t value, std::uint32_t sequence);
   void set_pixel_format(std::uint32_t fourcc);
+  void set_driver(const std::string& name);
   /// What S_FMT answers, whatever was asked; 0 = as asked.
   void insist_on_width(std::uint32_t width);
   void insist_on_rate(std::uint32_t fps);
@@ -83,6 +84,7 @@ class EmulatedCamera {
   std::deque<EmulatedBuffer> pending_;
   std::deque<std::uint32_t> queued_;
   std::map<std::uint32_t, Control> controls_;
+  std::string driver_ = "emulated";
   std::uint32_t fourcc_ = V4L2_PIX_FMT_GREY;
   std::uint32_t forced_width_ = 0;
   std::uint32_t forced_fps_ = 0;

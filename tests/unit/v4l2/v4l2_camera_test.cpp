@@ -49,6 +49,26 @@ TEST(V4l2Camera, ConvertsAndStampsAFrame) {
   EXPECT_EQ(camera.report().remedy, "");
 }
 
+// uvc_video_decode_start() takes the time as it decodes a frame's first packet, while the queue
+// (uvc_queue.c) marks it V4L2_BUF_FLAG_TSTAMP_SRC_SOE.
+TEST(V4l2Camera, StampsOfUvcvideoAreThoseOfTheFirstPacket) {
+  EmulatedCamera device;
+  device.set_driver("uvcvideo");
+  V4l2Camera camera(small());
+  camera.start();
+  device.deliver_grey(77, 5);
+  Frame frame;
+  ASSERT_EQ(camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().meaning, TimestampMeaning::first_packet);
+  EmulatedBuffer at_the_end;
+  at_the_end.payload.assign(512, 1);
+  at_the_end.sequence = 6;
+  at_the_end.flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_EOF;
+  device.deliver(at_the_end);
+  ASSERT_EQ(camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().meaning, TimestampMeaning::end_of_frame);
+}
+
 TEST(V4l2Camera, TimesOutWithoutAFrame) {
   const EmulatedCamera device;
   V4l2Camera camera(small());
