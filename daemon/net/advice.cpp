@@ -1,5 +1,7 @@
 #include "daemon/net/advice.hpp"
 
+#include <fmt/format.h>
+
 #include <array>
 #include <string_view>
 
@@ -59,6 +61,10 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::image_noisy,
      "Pixels are too noisy: raise the light and lower the camera's gain; many dead pixels look "
      "alike."},
+    {Health::camera_slow,
+     "The camera takes fewer frames than its mode promises: set exposure_dynamic_framerate "
+     "(automatic priority) to 0, make the exposure shorter than a frame, or give the camera more "
+     "USB bandwidth (a port without a hub, MJPEG)."},
     {Health::frames_lost,
      "The camera loses frames: look at the USB cable, hub and processor load."},
     {Health::not_realtime,
@@ -73,7 +79,11 @@ void add(std::string& text, std::string_view sentence) {
 }
 
 /// The report's own sentence where there is one: it knows the device.
-std::string_view detail(const pipeline::Status& status, Health health) {
+std::string detail(const pipeline::Status& status, Health health) {
+  if (health == Health::camera_slow) {
+    return fmt::format("By their timestamps {:.1f} come in a second instead of {:g}.",
+                       status.camera_fps, status.camera.fps);
+  }
   if (health == Health::camera_trouble) return status.camera_report.remedy;
   if (health == Health::camera_mismatch) return status.camera_report.moved;
   if (health == Health::camera_moved) return status.place_message;

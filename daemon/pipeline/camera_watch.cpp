@@ -10,6 +10,8 @@ bool CameraWatch::arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexc
   // A camera that comes back may count from anywhere.
   const bool gap = have_sequence_ && !returned && info.sequence > sequence_ + 1;
   if (gap || (info.flags & hal::kFrameAfterGap) != 0) lose(now_ns);
+  if (returned) rate_.forget();
+  rate_.add(info);
   sequence_ = info.sequence;
   have_sequence_ = true;
   last_ns_ = now_ns;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "daemon/pipeline/rate_watch.hpp"
 #include "hal/camera.hpp"
 
 namespace dtact::pipeline {
@@ -9,7 +10,7 @@ namespace dtact::pipeline {
 /// What grab() said lately, as conditions. One thread.
 class CameraWatch {
  public:
-  explicit CameraWatch(std::int64_t period_ns) noexcept : period_ns_(period_ns) {}
+  explicit CameraWatch(std::int64_t period_ns) noexcept : period_ns_(period_ns), rate_(period_ns) {}
 
   /// Silence is counted from here.
   void started(std::int64_t now_ns) noexcept { last_ns_ = now_ns; }
@@ -30,11 +31,13 @@ class CameraWatch {
   [[nodiscard]] bool lost_lately(std::int64_t now_ns) const noexcept {
     return lost_ && now_ns - lost_ns_ < 1'000'000'000;
   }
+  [[nodiscard]] const RateWatch& rate() const noexcept { return rate_; }
 
  private:
   void lose(std::int64_t now_ns) noexcept;
 
   std::int64_t period_ns_;
+  RateWatch rate_;
   std::int64_t last_ns_ = 0;
   std::int64_t lost_ns_ = 0;
   std::uint64_t sequence_ = 0;

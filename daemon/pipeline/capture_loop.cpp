@@ -28,7 +28,8 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
                  parts.place),
       depth_(config, clock_),
       watch_(period_ns_),
-      timeline_(config.light, camera_.info().light_delay_frames, period_ns_),
+      timeline_(config.light, camera_.info().light_delay_frames,
+                period_ns_),
       teller_(exchange_),
       desk_(exchange_, teller_, untouched_, depth_),
       whole_{0, 0, camera_.info().width, camera_.info().height},
@@ -102,6 +103,7 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
     exchange_.camera_returned.store(true, std::memory_order_release);
     exchange_.wake.signal();
   }
+  exchange_.camera_fps.store(watch_.rate().fps(), std::memory_order_relaxed);
   want_depth_ = exchange_.want_depth.load(std::memory_order_relaxed);
   controls_moved_ = (info.flags & hal::kFrameControlsMoved) != 0;
   const std::int64_t exposure_ns = exposure_start_ns(info, period_ns_);
@@ -211,6 +213,7 @@ HealthSet CaptureLoop::health(std::int64_t now_ns) const noexcept {
   set.set(Health::beyond_calibration, depth_.beyond());
   set.set(Health::frames_lost, watch_.lost_lately(now_ns));
   set.set(Health::camera_trouble, watch_.trouble());
+  set.set(Health::camera_slow, watch_.rate().slow());
   set.set(Health::ring_trouble, light_.trouble());
   set.set(Health::not_realtime, exchange_.not_realtime.load(std::memory_order_relaxed));
   return set;

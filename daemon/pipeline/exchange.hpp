@@ -59,6 +59,7 @@ struct Exchange {
   std::atomic<std::uint32_t> health{0};  ///< HealthSet::bits()
   std::atomic<std::uint64_t> frames{0};
   std::atomic<std::uint64_t> turns{0};       ///< Of the capture loop.
+  std::atomic<double> camera_fps{0};         ///< By the frames' timestamps; 0 = not known yet.
   std::atomic<double> light_followed{0};     ///< Share of the reference's light, ±.
   std::atomic<std::uint64_t> generation{0};  ///< Of the calibration in use; 0 = none.
 };

@@ -37,9 +37,10 @@ enum class Health : std::uint8_t {
   image_dark = 15,       ///< The picture is too dark to measure in.
   image_noisy = 16,      ///< Pixels are noisier than smoothing makes up for, or many are dead.
   image_repeated = 17,   ///< All or part of the picture is the one before: frozen or torn.
-  camera_moved = 18      ///< The layer's marks lie elsewhere than at calibration (place_watch.hpp).
+  camera_moved = 18,     ///< The layer's marks lie elsewhere than at calibration (place_watch.hpp).
+  camera_slow = 19       ///< Fewer frames a second than the camera's mode promises.
 };
-inline constexpr int kHealthCount = 19;
+inline constexpr int kHealthCount = 20;
 
 class HealthSet {
  public:

@@ -213,6 +213,7 @@ Status Pipeline::status() const {
   status.frames = exchange_.frames.load(std::memory_order_relaxed);
   status.skipped = exchange_.slot.replaced();
   status.fps = exchange_.statistics.fps(clock_.monotonic_ns());
+  status.camera_fps = exchange_.camera_fps.load(std::memory_order_relaxed);
   status.realtime = realtime_;
   status.stages = exchange_.statistics.stages();
   status.capture_thread = exchange_.statistics.usage();

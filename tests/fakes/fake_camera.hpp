@@ -33,7 +33,7 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
                          .pixel_format = "GREY",
                          .width = kToyWidth,
                          .height = kToyHeight,
-                         .fps = 400,
+                         .fps = 100,  // promised: less than it has, so that it is never slow
                          .light_delay_frames = 2,
                          .controls = {}};
     bool refuse_start = false;

@@ -98,7 +98,7 @@ class SteppedLoop {
     void start() override {}
     [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
                                        std::chrono::nanoseconds /*timeout*/) noexcept override {
-      owner.clock.now += static_cast<std::int64_t>(1e9 / description.fps);
+      owner.clock.now += static_cast<std::int64_t>(1e9 * slower / description.fps);
       if (status != hal::GrabStatus::ok) return status;
       hal::FrameInfo frame;
       frame.sequence = sequence++;
@@ -117,6 +117,7 @@ class SteppedLoop {
     hal::GrabStatus status = hal::GrabStatus::ok;
     ToyScene scene;
     std::uint32_t flags = hal::kFrameNormal;  ///< Of the next frame.
+    double slower = 1;                        ///< Times the period that its mode promises.
     std::int64_t delay_ns = 0;                ///< From a frame's timestamp to its arrival.
     std::uint64_t sequence = 0;
     std::vector<std::uint8_t> pixels =

@@ -56,6 +56,17 @@ TEST(Advice, SaysHowFarTheCameraHasMovedOnlyWhileItHas) {
   EXPECT_THAT(advice(status), EndsWith("calibrate again. " + status.place_message));
 }
 
+TEST(Advice, NamesBothRatesOfASlowCamera) {
+  pipeline::Status status;
+  status.state = pipeline::State::serving;
+  status.camera.fps = 60;
+  status.camera_fps = 30.04;
+  EXPECT_EQ(advice(status), "");
+  status.health.set(Health::camera_slow);
+  EXPECT_THAT(advice(status), StartsWith("The camera takes fewer frames than its mode promises"));
+  EXPECT_THAT(advice(status), EndsWith("30.0 come in a second instead of 60."));
+}
+
 TEST(Advice, EndsWithWhatCouldNotBeKept) {
   pipeline::Status status;
   status.state = pipeline::State::serving;

@@ -46,6 +46,18 @@ TEST(CaptureLoop, FollowsTheLightBesideAPressThatLasts) {
   EXPECT_TRUE(loop.frame->health.empty());
 }
 
+TEST(CaptureLoop, ACameraThatHalvesItsRateIsNamedWithoutLosses) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.slower = 2;
+  ASSERT_TRUE(loop.until([&] { return loop.health().has(Health::camera_slow); }, 60));
+  EXPECT_FALSE(loop.health().has(Health::frames_lost));
+  EXPECT_NEAR(loop.exchange.camera_fps, 30, 0.01);
+  loop.camera.slower = 1;
+  ASSERT_TRUE(loop.until([&] { return loop.health().empty(); }, 120));
+}
+
 // The light that nobody can follow, since it came too fast, is in what the map states.
 TEST(CaptureLoop, StatesWhatOfTheLightItDoesNotFollow) {
   SteppedLoop loop;

@@ -7,6 +7,7 @@
 #include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/camera_watch.hpp"
 #include "daemon/pipeline/light_timeline.hpp"
+#include "daemon/pipeline/rate_watch.hpp"
 #include "daemon/pipeline/statistics.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
@@ -82,9 +83,81 @@ TEST(CameraWatch, ReturningIsToldOnceAndIsNoGap) {
   EXPECT_FALSE(watch.arrived(numbered(901), 3 * kPeriod));
 }
 
+/// `frames` frames, `ns` after one another.
+void add_frames(RateWatch& watch, hal::FrameInfo& info, int frames, std::int64_t ns) {
+  for (int i = 0; i < frames; ++i) {
+    ++info.sequence;
+    info.timestamp_ns += ns;
+    watch.add(info);
+  }
+}
+
+TEST(RateWatch, NamesACameraThatHalvesItsRateWithinASecond) {
+  RateWatch watch(kPeriod);
+  hal::FrameInfo info;
+  add_frames(watch, info, 100, kPeriod);
+  EXPECT_EQ(watch.fps(), 0);  // 99 intervals
+  add_frames(watch, info, 1, kPeriod);
+  EXPECT_DOUBLE_EQ(watch.fps(), 100);
+  EXPECT_FALSE(watch.slow());
+  add_frames(watch, info, 50, 2 * kPeriod);
+  EXPECT_DOUBLE_EQ(watch.fps(), 50);
+  EXPECT_TRUE(watch.slow());
+  add_frames(watch, info, 100, kPeriod);
+  EXPECT_FALSE(watch.slow());
+}
+
+TEST(RateWatch, LostFramesAreNoSlowCamera) {
+  RateWatch watch(kPeriod);
+  hal::FrameInfo info;
+  for (int i = 0; i < 60; ++i) {
+    ++info.sequence;  // every other frame is lost
+    info.timestamp_ns += kPeriod;
+    add_frames(watch, info, 1, kPeriod);
+  }
+  EXPECT_DOUBLE_EQ(watch.fps(), 100);
+  EXPECT_FALSE(watch.slow());
+}
+
+TEST(RateWatch, OneLongPauseIsNoSlowCamera) {
+  RateWatch watch(kPeriod);
+  hal::FrameInfo info;
+  add_frames(watch, info, 4, kPeriod);
+  add_frames(watch, info, 1, 500 * kPeriod);
+  add_frames(watch, info, 10, kPeriod);
+  EXPECT_DOUBLE_EQ(watch.fps(), 100);
+}
+
+TEST(RateWatch, ATenthLessIsToldAndAClocksErrorIsNot) {
+  RateWatch watch(kPeriod);
+  hal::FrameInfo info;
+  add_frames(watch, info, 101, kPeriod * 110 / 100);
+  EXPECT_FALSE(watch.slow());
+  add_frames(watch, info, 101, kPeriod * 112 / 100);
+  EXPECT_TRUE(watch.slow());
+}
+
+TEST(RateWatch, BeginsAnewWithACameraOpenedAnew) {
+  CameraWatch watch(kPeriod);
+  std::int64_t at_ns = 0;
+  std::uint64_t sequence = 0;
+  const auto arrive = [&](std::uint32_t flags, std::int64_t after_ns) {
+    hal::FrameInfo info = numbered(++sequence, flags);
+    info.timestamp_ns = at_ns += after_ns;
+    (void)watch.arrived(info, at_ns);
+  };
+  for (int i = 0; i < 60; ++i) arrive(hal::kFrameNormal, 2 * kPeriod);
+  EXPECT_TRUE(watch.rate().slow());
+  arrive(hal::kFrameReopened, kPeriod);
+  EXPECT_FALSE(watch.rate().slow());
+  EXPECT_EQ(watch.rate().fps(), 0);
+}
+
 TEST(LightTimeline, ExposureBeginsAPeriodBeforeTheFramesEnd) {
   hal::FrameInfo info;
   info.timestamp_ns = 50 * kMs;
+  info.meaning = hal::TimestampMeaning::first_packet;
+  EXPECT_EQ(exposure_start_ns(info, kPeriod), 40 * kMs);
   info.meaning = hal::TimestampMeaning::end_of_frame;
   EXPECT_EQ(exposure_start_ns(info, kPeriod), 40 * kMs);
   info.meaning = hal::TimestampMeaning::arrival;
