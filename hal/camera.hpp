@@ -34,8 +34,8 @@ struct CameraInfo {
   int width = 0;             ///< Pixels.
   int height = 0;            ///< Pixels.
   double fps = 0;            ///< Frames a second that the mode promises.
-  /// The delay, in frames, after which a light change is complete in the image (exposure plus the
-  /// camera's queue).
+  /// A light change is complete in the frames whose exposure began at least so many periods after
+  /// it, as well as their timestamps tell (exposure plus the camera's queue).
   int light_delay_frames = 2;
   std::vector<CameraControl> controls;
 };

@@ -28,7 +28,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
                  parts.place),
       depth_(config, clock_),
       watch_(period_ns_),
-      timeline_(config.light, camera_.info().light_delay_frames,
+      timeline_(config.light, config.light_delay_frames.value_or(camera_.info().light_delay_frames),
                 period_ns_),
       teller_(exchange_),
       desk_(exchange_, teller_, untouched_, depth_),

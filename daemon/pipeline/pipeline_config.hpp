@@ -43,6 +43,8 @@ struct PipelineConfig {
   int fifo_priority = 40;   ///< SCHED_FIFO 1 … 99; 0 = normal scheduling.
   bool lock_memory = true;  ///< Keep the process's memory out of swap.
   hal::Light light;         ///< What the ring shows at start.
+  /// As CameraInfo::light_delay_frames, measured; empty = what the camera states.
+  std::optional<int> light_delay_frames;
   ContactRules contact;
   ReferenceRules reference;
   DriftRules drift;

@@ -48,15 +48,18 @@ TEST_F(ConfigFile, EmptyFileKeepsTheDefaults) {
   EXPECT_EQ(config.hal.camera.fps, 60);
   EXPECT_EQ(config.net.port, 7377);
   EXPECT_EQ(config.log_level, "info");
+  EXPECT_FALSE(config.pipeline.light_delay_frames.has_value());
 }
 
 TEST_F(ConfigFile, SetsEveryKind) {
   const Config config = load(
-      "log_level = 'debug'\n[camera]\nwidth = 640\nfps = 30\n[camera.replay]\nloop = false\n"
+      "log_level = 'debug'\n[camera]\nwidth = 640\nfps = 30\nlight_delay_frames = "
+      "4\n[camera.replay]\nloop = false\n"
       "folder = 'frames'\n[ring]\nbrightness = 128\nscheme = 'scheme4'\n[capture]\ncpu = false\n"
       "[net]\nhello_timeout_ms = 250\n");
   EXPECT_EQ(config.log_level, "debug");
   EXPECT_EQ(config.hal.camera.width, 640);
+  EXPECT_EQ(config.pipeline.light_delay_frames, 4);
   EXPECT_EQ(config.hal.camera.fps, 30);
   EXPECT_FALSE(config.hal.camera.replay.loop);
   EXPECT_EQ(config.hal.camera.replay.folder, folder_ / "frames");

@@ -58,6 +58,19 @@ TEST(CaptureLoop, ACameraThatHalvesItsRateIsNamedWithoutLosses) {
   ASSERT_TRUE(loop.until([&] { return loop.health().empty(); }, 120));
 }
 
+TEST(CaptureLoop, TheConfiguredDelayOfTheLightTakesThePlaceOfTheCameras) {
+  SteppedLoop loop(100);
+  loop.config.light_delay_frames = 5;  // the camera states two
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.light->start();  // writes to the ring
+  loop.light->stop();
+  loop.step(4);
+  EXPECT_TRUE(loop.health().has(Health::light_unsettled));
+  loop.step(1);
+  EXPECT_TRUE(loop.health().empty());
+}
+
 // The light that nobody can follow, since it came too fast, is in what the map states.
 TEST(CaptureLoop, StatesWhatOfTheLightItDoesNotFollow) {
   SteppedLoop loop;
