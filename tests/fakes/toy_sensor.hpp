@@ -21,11 +21,24 @@ struct ToyScene {
   double press_mm = 0;  ///< Indentation in the middle of the press.
   double x_px = 80;     ///< Its place.
   double y_px = 60;
+  double marks = 0;  ///< Height of the layer's marks, grey levels.
+  int marks_px = 0;  ///< How far to the right they lie of where they were at calibration.
 };
 
 inline constexpr int kToyWidth = 160;
 inline constexpr int kToyHeight = 120;
 inline constexpr double kToyMmPerPx = 0.2;
+
+/// −1 … 1, and coarse enough that eight bits show it where it is two levels high.
+inline double toy_mark(int x, int y) {
+  const auto hash = [](int u, int v) {
+    auto h =
+        static_cast<std::uint32_t>(u) * 0x9E3779B1U + static_cast<std::uint32_t>(v) * 0x85EBCA77U;
+    h = (h ^ (h >> 15U)) * 0x2C1B3C6DU;
+    return static_cast<double>((h ^ (h >> 12U)) & 255U) / 128 - 1;
+  };
+  return hash((x + 100) / 2, y / 2);  // never negative
+}
 
 /// Grey level at a pixel, with its fraction.
 inline double toy_grey(const ToyScene& scene, int x, int y) {
@@ -36,7 +49,8 @@ inline double toy_grey(const ToyScene& scene, int x, int y) {
   const double spot = std::exp(-(r / 12) * (r / 12));
   const double ring = std::exp(-((r - 24) / 6) * ((r - 24) / 6));
   const double pressed = untouched - scene.press_mm * (31.25 * spot - 8 * ring);
-  return pressed * scene.light * (1 + scene.tilt * u);
+  const double mark = scene.marks == 0 ? 0 : scene.marks * toy_mark(x - scene.marks_px, y);
+  return (pressed + mark) * scene.light * (1 + scene.tilt * u);
 }
 
 /// One frame, rows of kToyWidth bytes. Rounded after adding −0.5 … 0.5, which differs from frame to
@@ -75,10 +89,12 @@ inline std::vector<std::uint16_t> toy_reference_q8(const ToyScene& scene = {}) {
   return q8;
 }
 
-/// Its calibration, made under full white light: the whole frame but eight pixels on each side.
-inline std::shared_ptr<calibration::Calibration> toy_calibration() {
+/// Its calibration, made under full white light: the whole frame but eight pixels on each side, or
+/// the left `width` pixels of that.
+inline std::shared_ptr<calibration::Calibration> toy_calibration(const ToyScene& untouched = {},
+                                                                 int width = kToyWidth - 16) {
   auto model = std::make_shared<recon::Model>();
-  model->rectify = recon::make_crop_table(kToyWidth, kToyHeight, 8, 8, 144, 104);
+  model->rectify = recon::make_crop_table(kToyWidth, kToyHeight, 8, 8, width, 104);
   model->mm_per_px = kToyMmPerPx;
   model->smoothing_px = 1;
   model->list.first_q6 = -40 * 64;
@@ -88,7 +104,7 @@ inline std::shared_ptr<calibration::Calibration> toy_calibration() {
   for (int q6 = -40 * 64; q6 <= 110 * 64; ++q6) {
     model->list.um.push_back(static_cast<std::int16_t>(q6 / 2));
   }
-  model->reference_q8 = toy_reference_q8();
+  model->reference_q8 = toy_reference_q8(untouched);
   auto made = std::make_shared<calibration::Calibration>();
   made->name = "toy";
   made->crop_col = 8;

@@ -258,6 +258,13 @@ TEST(ClientLibrary, SaysWhyItWasRefused) {
   }
 }
 
+std::string framed(const v1::ServerMessage& message) {
+  const auto length = wire::encode_length(message.ByteSizeLong());
+  std::string bytes(reinterpret_cast<const char*>(length.data()), length.size());
+  message.AppendToString(&bytes);
+  return bytes;
+}
+
 /// A daemon that greets its one client and then does what a test wants.
 class PlayedDaemon {
  public:
@@ -279,9 +286,7 @@ class PlayedDaemon {
     thread_ = std::thread([this, play = std::move(play)] {
       const base::UniqueFd fd(::accept(listening_.get(), nullptr, nullptr));
       const Send send = [&fd](const v1::ServerMessage& message) {
-        const auto length = wire::encode_length(message.ByteSizeLong());
-        std::string bytes(reinterpret_cast<const char*>(length.data()), length.size());
-        message.AppendToString(&bytes);
+        const std::string bytes = framed(message);
         return ::send(fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) > 0;
       };
       std::array<char, 1024> hello{};
@@ -328,11 +333,15 @@ TEST(ClientLibrary, SaysTheReasonThatCameBeforeAReset) {
 }
 
 TEST(ClientLibrary, GivesUpOnAnAnswerThoughFramesCome) {
-  PlayedDaemon daemon([](int, const PlayedDaemon::Send& send) {
+  // So many at once that the next always lies ready: sending them is faster than reading them.
+  PlayedDaemon daemon([](int fd, const PlayedDaemon::Send&) {
     v1::ServerMessage frame;
     frame.mutable_frame()->set_sequence(1);
+    std::string frames;
+    for (int i = 0; i < 10'000; ++i) frames += framed(frame);
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (std::chrono::steady_clock::now() < end && send(frame)) {
+    while (std::chrono::steady_clock::now() < end &&
+           ::send(fd, frames.data(), frames.size(), MSG_NOSIGNAL) > 0) {
     }
   });
   daemon.options.timeout = std::chrono::seconds(1);

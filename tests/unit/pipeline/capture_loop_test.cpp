@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <memory>
 #include <string>
 
@@ -242,6 +244,39 @@ TEST(CaptureLoop, AnotherCalibrationMeasuresAgainstTheReferenceThatStays) {
   loop.camera.scene.press_mm = 1;
   loop.step(6);
   EXPECT_NEAR(loop.frame->contact.deepest_mm, 1, 0.02);
+}
+
+TEST(CaptureLoop, NothingOfTheMapBeforeIsLeftInAnotherCalibrationsMap) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.scene.press_mm = 1;
+  loop.step(6);  // in each of the three buffers
+  loop.camera.scene.press_mm = 0;
+  ASSERT_TRUE(
+      loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration({}, 128))}));
+  for (int i = 0; i < 6; ++i) {
+    ASSERT_TRUE(loop.step());
+    ASSERT_TRUE(loop.frame->has_depth);
+    ASSERT_EQ(loop.frame->depth_um.size(), std::size_t{128} * 104);
+    EXPECT_EQ(std::ranges::count(loop.frame->depth_um, 0), 128 * 104);
+  }
+}
+
+TEST(CaptureLoop, EveryRezeroIsAnswered) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  ASSERT_TRUE(loop.exchange.orders.push(RezeroOrder{1, false}));
+  loop.step(1);
+  ASSERT_TRUE(loop.exchange.orders.push(RezeroOrder{2, false}));
+  loop.step(40);
+  const auto answers = loop.all<Answer>();
+  ASSERT_EQ(answers.size(), 2U);
+  EXPECT_EQ(answers[0].ticket, 1U);
+  EXPECT_EQ(answers[0].outcome, Outcome::done);
+  EXPECT_EQ(answers[1].ticket, 2U);
+  EXPECT_EQ(answers[1].outcome, Outcome::done);
 }
 
 TEST(CaptureLoop, BeyondTheListIsCountedInTheCalibrationsPixels) {

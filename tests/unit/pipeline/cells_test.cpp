@@ -346,6 +346,21 @@ TEST_F(CellsTest, SeesTheLightBesideAPress) {
   }
 }
 
+// Eight in twenty of all cells: the darkest of the light's half would be the middle of all.
+TEST_F(CellsTest, APressIsNoLightHoweverWideItIs) {
+  settle(32);
+  int seen = 0;
+  for (int i = 0; i < 32; ++i) {
+    // Darker by 0.15 levels in the middle of what is left, by 0.05 at its one end.
+    (void)active_tiles(
+        frame([](int x, int) { return x < 96 ? 20.0 : 0.15 + (152 - x) / 56.0 * 0.1; }));
+    if (report_.light.from != LightSeen::From::quiet) continue;
+    ++seen;
+    EXPECT_NEAR(report_.light.change, -0.001, 0.0003);
+  }
+  EXPECT_EQ(seen, 2);
+}
+
 TEST_F(CellsTest, ANewReferenceForgetsEverything) {
   CellSettings settings;
   settings.drift_per_frame = 0.01;

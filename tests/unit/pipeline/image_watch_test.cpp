@@ -87,6 +87,17 @@ TEST_F(ImageWatchTest, BandsMustLastSixFrames) {
   EXPECT_TRUE(watch_.conditions().empty());
 }
 
+// However long they were there.
+TEST_F(ImageWatchTest, BandsAreOverSevenFramesAfterTheLast) {
+  report_.frame.ripple = 0.6;
+  for (int i = 0; i < 100; ++i) look();
+  report_.frame.ripple = 0;
+  for (int i = 0; i < 6; ++i) look();
+  EXPECT_TRUE(has(Health::light_banded));
+  look();
+  EXPECT_FALSE(has(Health::light_banded));
+}
+
 TEST_F(ImageWatchTest, FineBandsCountAsBands) {
   report_.frame.fine_ripple = 3.9;
   for (int i = 0; i < 12; ++i) look();

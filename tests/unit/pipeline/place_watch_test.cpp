@@ -2,10 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <vector>
 
 #include "tests/fakes/toy_sensor.hpp"
 
@@ -14,32 +14,11 @@ namespace {
 
 constexpr int kFrames = 16;
 
-std::size_t at(int x, int y) {
-  return static_cast<std::size_t>(y) * fakes::kToyWidth + static_cast<std::size_t>(x);
-}
-
-/// Coarse enough marks that eight bits show them, two levels high.
-double toy_mark(int x, int y) {
-  const auto hash = [](int u, int v) {
-    auto h =
-        static_cast<std::uint32_t>(u) * 0x9E3779B1U + static_cast<std::uint32_t>(v) * 0x85EBCA77U;
-    h = (h ^ (h >> 15U)) * 0x2C1B3C6DU;
-    return static_cast<double>((h ^ (h >> 12U)) & 255U) / 128 - 1;
-  };
-  return 2 * hash((x + 100) / 2, y / 2);  // never negative
-}
-
-/// Of a toy sensor's layer with such marks.
+/// Of a toy sensor's layer with marks two levels high.
 std::shared_ptr<const LayerMarks> calibrated(const recon::FrameRegion& part = {
                                                  0, 0, fakes::kToyWidth, fakes::kToyHeight}) {
-  std::vector<std::uint16_t> reference_q8 = fakes::toy_reference_q8();
-  for (int y = 0; y < fakes::kToyHeight; ++y) {
-    for (int x = 0; x < fakes::kToyWidth; ++x) {
-      auto& q8 = reference_q8[at(x, y)];
-      q8 = static_cast<std::uint16_t>(std::lround(q8 + 256 * toy_mark(x, y)));
-    }
-  }
-  return std::make_shared<const LayerMarks>(reference_q8, fakes::kToyWidth, part);
+  return std::make_shared<const LayerMarks>(fakes::toy_reference_q8({.marks = 2}), fakes::kToyWidth,
+                                            part);
 }
 
 class PlaceWatchTest : public ::testing::Test {
@@ -49,13 +28,11 @@ class PlaceWatchTest : public ::testing::Test {
   /// So many frames of a layer that lies `dx` pixels to the right of where it was at calibration.
   void show(int frames, int dx, bool untouched = true) {
     for (int i = 0; i < frames; ++i) {
-      fakes::ToyFrame frame({}, sequence++);
+      fakes::ToyFrame frame({.marks = 2, .marks_px = dx}, sequence);
+      const fakes::ToyFrame still({.marks = 2}, sequence++);
       for (int y = 0; y < fakes::kToyHeight; ++y) {
-        for (int x = 0; x < fakes::kToyWidth; ++x) {
-          auto& pixel = frame.pixels[at(x, y)];
-          const int moved = x < still_columns ? 0 : dx;
-          pixel = static_cast<std::uint8_t>(std::lround(pixel + toy_mark(x - moved, y)));
-        }
+        const std::ptrdiff_t row = std::ptrdiff_t{y} * fakes::kToyWidth;
+        std::copy_n(still.pixels.begin() + row, still_columns, frame.pixels.begin() + row);
       }
       now_ns += 16'666'667;
       watch.look(frame.view(), untouched, now_ns);

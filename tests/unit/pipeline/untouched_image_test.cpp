@@ -1,0 +1,109 @@
+#include "daemon/pipeline/untouched/untouched_image.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "tests/fakes/toy_sensor.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+constexpr int kFrames = 16;
+constexpr Moment kUnsettled{.settled = false, .whole = true};
+
+PipelineConfig config() {
+  PipelineConfig made;
+  made.reference.frames = kFrames;
+  return made;
+}
+
+/// The untouched image of a toy sensor, whose layer has marks.
+class UntouchedImageTest : public ::testing::Test {
+ protected:
+  UntouchedImageTest() {
+    place_.start();
+    image_.use(&calibrated_);
+  }
+
+  Look look(const fakes::ToyFrame& frame, Moment moment = {.settled = true, .whole = true}) {
+    now_ns_ += 16'666'667;
+    moment.timestamp_ns = moment.now_ns = now_ns_;
+    const Look seen = image_.look(frame.view(), moment);
+    place_.settle();
+    return seen;
+  }
+  void show(int frames) {
+    for (int i = 0; i < frames; ++i) (void)look(next());
+  }
+  /// Whether depth can be measured after so many frames, and with nothing to complain of.
+  bool settles() {
+    show(3 * kFrames);
+    return image_.footing() == Footing::fresh && image_.conditions().empty();
+  }
+  fakes::ToyFrame next() { return fakes::ToyFrame(scene_, sequence_++); }
+  [[nodiscard]] bool has(Health health) const { return image_.conditions().has(health); }
+
+  PipelineConfig config_ = config();
+  fakes::ToyScene scene_{.marks = 2};
+  CalibratedImage calibrated_{fakes::toy_calibration(scene_)};
+  ReferenceWriter writer_{fakes::kToyWidth, fakes::kToyHeight, {}};
+  PlaceWatch place_{fakes::kToyWidth, fakes::kToyHeight, kFrames};
+  UntouchedImage image_{fakes::kToyWidth, fakes::kToyHeight, config_.light,
+                        config_,          writer_,           place_};
+  std::uint64_t sequence_ = 0;
+  std::int64_t now_ns_ = 0;
+};
+
+// What is held drags the layer along, and its marks with it.
+TEST_F(UntouchedImageTest, TheCamerasPlaceIsNotJudgedByALayerThatIsTouched) {
+  ASSERT_TRUE(settles());
+  now_ns_ += PlaceWatch::kPauseNs;
+  scene_.marks_px = 4;
+  image_.touched(true);
+  show(2 * kFrames);
+  EXPECT_FALSE(has(Health::camera_moved));
+  image_.touched(false);
+  show(2 * kFrames);
+  EXPECT_TRUE(has(Health::camera_moved));
+}
+
+TEST_F(UntouchedImageTest, AFrameReadInPartIsNoPartOfAReference) {
+  ASSERT_TRUE(settles());
+  ASSERT_EQ(image_.rezero(true), std::nullopt);
+  fakes::ToyFrame part = next();
+  std::fill_n(part.pixels.begin(), std::ptrdiff_t{8} * fakes::kToyWidth, std::uint8_t{0});
+  EXPECT_EQ(look(part, {.settled = true, .whole = false}).rezeroed, std::nullopt);
+  std::optional<RezeroResult> answer;
+  for (int i = 0; i < kFrames; ++i) answer = look(next()).rezeroed;
+  EXPECT_EQ(answer, RezeroResult::taken);
+  // 103 levels; with a sixteenth of nothing in it, 97.
+  EXPECT_NEAR(image_.reference()[0], fakes::toy_reference_q8(scene_)[0], 256);
+}
+
+// The ring writes again what it shows, say, and flickers.
+TEST_F(UntouchedImageTest, NoDepthIsMeasuredBeforeTheLightHasSettled) {
+  ASSERT_TRUE(settles());
+  EXPECT_TRUE(look(next()).measurable);
+  EXPECT_FALSE(look(next(), kUnsettled).measurable);
+  EXPECT_TRUE(image_.ready());
+  EXPECT_TRUE(look(next()).measurable);
+}
+
+TEST_F(UntouchedImageTest, WhatWasWrongWithThePictureIsNotToldWhileTheLightChanges) {
+  ASSERT_TRUE(settles());
+  scene_.light = 0.12;  // 17 levels
+  show(1);
+  EXPECT_TRUE(has(Health::image_dark));
+  scene_.light = 1;
+  (void)look(next(), kUnsettled);
+  EXPECT_FALSE(has(Health::image_dark));
+  EXPECT_TRUE(has(Health::light_unsettled));
+}
+
+}  // namespace
+}  // namespace dtact::pipeline
