@@ -250,6 +250,7 @@ TEST(CaptureLoop, NothingOfTheMapBeforeIsLeftInAnotherCalibrationsMap) {
   SteppedLoop loop;
   loop.begin(toy_calibration());
   ASSERT_TRUE(loop.until_fresh());
+  loop.camera.scene.x_px = loop.camera.scene.y_px = 32;
   loop.camera.scene.press_mm = 1;
   loop.step(6);  // in each of the three buffers
   loop.camera.scene.press_mm = 0;
