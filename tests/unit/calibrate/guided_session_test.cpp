@@ -4,7 +4,9 @@
 
 #include <cstdlib>
 
+#include "clients/calibrate/guided/capture.hpp"
 #include "clients/calibrate/guided/session.hpp"
+#include "clients/calibrate/guided/work_folder.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/calibrate/guided_fakes.hpp"
 
@@ -196,6 +198,16 @@ TEST_F(GuidedSession, WaitsForAPressToHoldStill) {
   EXPECT_THAT(console.said, HasSubstr("darkest 39 grey levels"));
 }
 
+// 0.35 levels a second: within the 1.5 that a picture may move while it is taken, but its second
+// half is 0.5 darker than its first.
+TEST(Capture, WhatCreepsIsNoStillPicture) {
+  FakeSensor sensor({{.depth_mm = 1, .frames = 1000, .step_mm = 0.0117 / 30}});
+  FakeConsole console({});
+  const CellGrid grid({100, 90, 120, 120});
+  Capture capture(sensor, console, grid, {.patience_s = 2}, [](const Look&, const std::string&) {});
+  EXPECT_THROW((void)capture.untouched(90), NotTaken);
+}
+
 TEST_F(GuidedSession, APersonMayTakeWhatDoesNotHoldStill) {
   FakeSensor sensor({kUntouched, {.depth_mm = 0.5, .frames = 1000, .step_mm = 0.001}});
   FakeConsole console({"", "~25", "", "~3", "", "~50", "q"});
@@ -292,6 +304,11 @@ TEST_F(GuidedSession, AnotherBallIsRefused) {
               ThrowsMessage<std::runtime_error>(
                   AllOf(HasSubstr("of a ball of 4 mm radius, not 5 mm"), HasSubstr("--radius-mm 4"),
                         HasSubstr("another --folder"))));
+}
+
+TEST_F(GuidedSession, TheHundredAndFirstPressTakesNobodysPlace) {
+  for (const char* name : {"press-99", "press-100"}) fs::create_directories(plan_.folder / name);
+  EXPECT_EQ(WorkFolder(plan_.folder).next_press(), "press-101");
 }
 
 TEST_F(GuidedSession, TheFoldersNameSuitsTheDaemon) {

@@ -65,6 +65,18 @@ TEST(Build, ACropMovesTheMapNotTheDepth) {
   EXPECT_LE(e.mae_mm, 0.01);
 }
 
+TEST(Build, AGainStaysAtItsPlaceOnTheSurface) {
+  BallPress press = press_of(Ball{});
+  press.lens = recon::Lens{};
+  press.lens->homography = {20, 0, 129.5, 0, 20, 119.5, 0, 0, 1};
+  press.crop = Crop{30, 20, 180, 180};  // its middle 0.5 mm left of the lens's place (0, 0)
+  press.gain.polynomial = {0.1, 0};
+  // 1 + 0.1 (x - 0.5), up to a factor.
+  const auto gain = build(press).model->gain.polynomial;
+  ASSERT_EQ(gain.size(), 2U);
+  EXPECT_NEAR(gain[0], 0.1 / 0.95, 1e-3);
+}
+
 TEST(Build, AnotherPressIsReadToo) {
   const Calibration made = build(press_of(Ball{}));
   const Ball other{.col = 140, .row = 120, .depth_mm = 1.0};

@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "clients/calibrate/fit/chain_fit.hpp"
 #include "clients/calibrate/fit/press_chain.hpp"
@@ -69,6 +71,13 @@ TEST(FitChain, NamesWhatNoPressShows) {
   EXPECT_NEAR(shallow.gaps[0].to_mm, 0.9, 0.1);
 }
 
+TEST(FitChain, WhatOnePressShowsIsNoGapBehindAnother) {
+  // 0.25 to 0.45 mm, 0.56 to 1.4, within that 0.68 to 0.7, and 1.43 to 1.6.
+  const ChainFit fit =
+      fit_chain({rings(0.45, 1.3), rings(1.4, 2.5), rings(0.7, 0.5), rings(1.6, 1.2)});
+  EXPECT_TRUE(fit.gaps.empty());
+}
+
 TEST(FitChain, NeedsADarkRing) {
   EXPECT_THROW((void)fit_chain({}), std::invalid_argument);
   EXPECT_THROW((void)fit_chain({SagProfile{.rings = {{-1, 0, 1}}, .depth_mm = {}}}),
@@ -106,12 +115,10 @@ TEST(BuildFromPresses, ReadsALinearResponse) {
   }
 }
 
-TEST(BuildFromPresses, UnevenLightPaysForAGain) {
-  BallPresses set = set_of({Ball{.depth_mm = 0.5}, Ball{.col = 90, .row = 90, .depth_mm = 1.0},
-                            Ball{.depth_mm = 0.7}, Ball{.col = 165, .row = 140, .depth_mm = 1.0},
-                            Ball{.depth_mm = 1.5}});
-  // From left to right the light falls to seven tenths, and darkening with it.
-  const auto light = [&](std::size_t i) { return 1 - 0.3 * static_cast<double>(i % 260) / 259; };
+/// The set's images with the light falling to seven tenths from left to right, and darkening with
+/// it.
+void shade(BallPresses& set) {
+  const auto light = [](std::size_t i) { return 1 - 0.3 * static_cast<double>(i % 260) / 259; };
   for (std::size_t i = 0; i < set.reference_q8.pixels.size(); ++i) {
     set.reference_q8.pixels[i] = static_cast<std::uint16_t>(51200 * light(i));
   }
@@ -121,6 +128,13 @@ TEST(BuildFromPresses, UnevenLightPaysForAGain) {
       pixel = static_cast<std::uint8_t>(std::lround(pixel * light(i)));
     }
   }
+}
+
+TEST(BuildFromPresses, UnevenLightPaysForAGain) {
+  BallPresses set = set_of({Ball{.depth_mm = 0.5}, Ball{.col = 90, .row = 90, .depth_mm = 1.0},
+                            Ball{.depth_mm = 0.7}, Ball{.col = 165, .row = 140, .depth_mm = 1.0},
+                            Ball{.depth_mm = 1.5}});
+  shade(set);
   PressReport report;
   const Calibration made = build(set, &report);
   EXPECT_EQ(made.model->gain.shape, recon::GainShape::uniform);
@@ -215,6 +229,68 @@ TEST(LeaveEachOut, FreesOnlyTheDepthOfThePress) {
   EXPECT_NEAR(meet(measured, list).mean_error_mm(), 0.08, 0.015);
 }
 
+TEST(LeaveEachOut, KnowsNothingOfThePressThatIsLeftOut) {
+  const auto press = [](double depth_mm) {
+    return PressRings{.all = rings(depth_mm, 2), .seen_mm = 2, .ball_radius_mm = 4};
+  };
+  const LeftOut out = leave_each_out({press(0.6), press(0.9), press(1.3)});
+  ASSERT_EQ(out.without.size(), 3U);
+  // A list ends with the deepest press that made it, at 30 levels a millimetre.
+  EXPECT_NEAR(out.without[0].knots.back().level, 39, 0.1);
+  EXPECT_NEAR(out.without[2].knots.back().level, 27, 0.1);
+}
+
+TEST(GainTerms, CountFromTheMapsMiddle) {
+  SettledPress press;
+  press.map = {261, 101, 0.1, {}};
+  press.contact.col = 150;
+  press.contact.row = 80;
+  const std::vector<double> terms = gain_terms(press, 5);
+  ASSERT_EQ(terms.size(), 5U);
+  for (const auto& [term, expected] : {std::pair{0, 2.0}, {1, 3.0}, {2, 4.0}, {3, 6.0}, {4, 9.0}}) {
+    EXPECT_NEAR(terms[static_cast<std::size_t>(term)], expected, 1e-9) << term;
+  }
+}
+
+TEST(BuildFromPresses, APressThatOneGainCannotSeeIsLeftOut) {
+  // The second darkens by 9 levels where the light is three quarters: 7 as it is, but 8 of the mean
+  // light.
+  BallPresses set =
+      set_of({Ball{.depth_mm = 0.5}, Ball{.col = 185, .depth_mm = 0.33}, Ball{.depth_mm = 0.7},
+              Ball{.col = 90, .row = 90, .depth_mm = 1.0}, Ball{.depth_mm = 1.5}});
+  shade(set);
+  PressReport report;
+  (void)build(set, &report);
+  EXPECT_THAT(report.left_out, testing::ElementsAre(HasSubstr("press 2")));
+  ASSERT_EQ(report.presses.size(), 4U);
+  EXPECT_EQ(report.presses[1].name, "press 3");
+  EXPECT_NEAR(report.presses[1].depth_mm, 0.7, 0.03);
+}
+
+// Presses that differ by a tenth either way make a list that is sure to a tenth over the root of
+// their number.
+TEST(BuildFromPresses, StatesHowFarThePressesThatMadeTheListDiffer) {
+  std::vector<Ball> balls;
+  for (const double depth_mm : {0.5, 0.8, 1.1, 1.4}) {
+    balls.push_back(Ball{.depth_mm = depth_mm});
+    balls.push_back(Ball{.depth_mm = depth_mm});
+  }
+  BallPresses set = set_of(balls);
+  for (std::size_t p = 0; p < set.presses.size(); ++p) {
+    const double slope = p % 2 == 0 ? 0.9 : 1.1;
+    for (auto& pixel : set.presses[p].frames[0].pixels) {
+      const int level = std::max(0, 200 - pixel);  // without the ring, whose light is in doubt
+      pixel = static_cast<std::uint8_t>(std::lround(200 - slope * level));
+    }
+  }
+  const auto rows = build(set).model->uncertainty;
+  ASSERT_GE(rows.size(), 6U);
+  // And 5 % for objects of another shape.
+  for (const auto& row : rows) {
+    EXPECT_NEAR(row.error_um, std::hypot(50, 100 / std::sqrt(8)) * row.depth_mm, 5);
+  }
+}
+
 TEST(BuildFromPresses, SaysWhatToPressNext) {
   EXPECT_THAT(
       [] { (void)build(set_of({Ball{.depth_mm = 1.4}, Ball{.depth_mm = 1.5}})); },
@@ -255,6 +331,22 @@ TEST(BuildRegression, FindsOneSlopeWhereThereIsOne) {
   EXPECT_GT(um_at(made.model->list, 30), 800);
   EXPECT_LT(um_at(made.model->list, 30), 1000);
   EXPECT_EQ(um_at(made.model->list, 0), 0);
+}
+
+TEST(BuildRegression, CountsTheDistanceFromTheCentreItIsGiven) {
+  BallPresses set = set_of({Ball{.depth_mm = 1.0}, Ball{.col = 90, .row = 90, .depth_mm = 1.2},
+                            Ball{.col = 165, .row = 140, .depth_mm = 0.8}});
+  // A grey level is deeper by a fifth for each millimetre from a place 3 mm right of the middle.
+  for (auto& press : set.presses) {
+    for (std::size_t i = 0; i < press.frames[0].pixels.size(); ++i) {
+      const double x_mm = 0.05 * (static_cast<double>(i % 260) - 129.5) - 3;
+      const double y_mm = 0.05 * (static_cast<double>(i / 260) - 119.5);
+      auto& pixel = press.frames[0].pixels[i];
+      pixel = static_cast<std::uint8_t>(
+          std::lround(200 - 1.5 * (200 - pixel) / (1 + 0.2 * std::hypot(x_mm, y_mm))));
+    }
+  }
+  EXPECT_NEAR(build_regression(set, 3, 0).model->gain.per_mm, 0.2, 0.15);
 }
 
 TEST(BuildRegression, NeedsPressesInSeveralPlaces) {

@@ -46,6 +46,16 @@ TEST(EnclosingCircle, OfAFilledSquare) {
   expect_circle(enclosing_circle(square), 5, 5, 7.0710678118654755);
 }
 
+TEST(PublishedCircle, IsOfTheBallAndNotOfASpeck) {
+  const Ball ball{.col = 120, .row = 110};
+  image::Grey8 frame = ball.frame();
+  frame.pixels[5 * 260 + 5] = 150;
+  const Circle circle = published_circle(ball.untouched(), frame);
+  EXPECT_NEAR(circle.col, 120, 1);
+  EXPECT_NEAR(circle.row, 110, 1);
+  EXPECT_GT(circle.radius, 50);
+}
+
 double um_at(const recon::DepthList& list, int level) {
   return list.um[static_cast<std::size_t>(level) * 64];
 }
