@@ -115,10 +115,9 @@ TEST(BuildFromPresses, ReadsALinearResponse) {
   }
 }
 
-/// The set's images with the light falling to seven tenths from left to right, and darkening with
-/// it.
-void shade(BallPresses& set) {
-  const auto light = [](std::size_t i) { return 1 - 0.3 * static_cast<double>(i % 260) / 259; };
+/// The set's images with the light falling from left to right, and darkening with it.
+void shade(BallPresses& set, double by = 0.3) {
+  const auto light = [by](std::size_t i) { return 1 - by * static_cast<double>(i % 260) / 259; };
   for (std::size_t i = 0; i < set.reference_q8.pixels.size(); ++i) {
     set.reference_q8.pixels[i] = static_cast<std::uint16_t>(51200 * light(i));
   }
@@ -178,6 +177,25 @@ TEST(BuildFromPresses, NoGainIsTriedThatThePressesCannotJudge) {
   EXPECT_THAT(tried(4), testing::ElementsAre("none", "share of the light"));
   EXPECT_THAT(tried(5), testing::ElementsAre("none", "share of the light", "plane",
                                              "share of the light, plane"));
+}
+
+TEST(BuildFromPresses, AGainThatIsBetterByChanceIsNotTaken) {
+  std::vector<Ball> balls = eight_balls();
+  balls.resize(4);
+  BallPresses set = set_of(balls);
+  for (std::size_t p = 0; p < set.presses.size(); ++p) {
+    for (auto& pixel : set.presses[p].frames[0].pixels) {
+      pixel =
+          static_cast<std::uint8_t>(std::lround(200 - (p % 2 == 0 ? 1.03 : 0.97) * (200 - pixel)));
+    }
+  }
+  shade(set, 0.08);
+  PressReport report;
+  const Calibration made = build(set, &report);
+  EXPECT_LT(report.gains[1].error_mm, report.gains[0].error_mm);
+  EXPECT_LT(report.gains[0].error_mm - report.gains[1].error_mm, report.gains[0].standard_error_mm);
+  EXPECT_TRUE(report.gains[0].chosen);
+  EXPECT_EQ(made.model->gain.shape, recon::GainShape::none);
 }
 
 TEST(BuildFromPresses, AThickerSidePaysForAPlane) {
