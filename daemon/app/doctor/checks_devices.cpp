@@ -57,6 +57,7 @@ Findings check_camera(const Machine& machine, const hal::CameraConfig& camera) {
   }
   Findings findings;
   bool captures = false;
+  bool usb = false;
   for (const std::string& node : nodes) {
     if (const int error = machine.access(node); error != 0) {
       findings.push_back({bad, fmt::format("{}: {}", node, std::strerror(error)),
@@ -69,11 +70,20 @@ Findings check_camera(const Machine& machine, const hal::CameraConfig& camera) {
           {Verdict::note, fmt::format("{}: {}", node, std::strerror(video.error)), "dmesg | tail"});
     } else if (video.captures) {
       captures = true;
-      findings.push_back({Verdict::good, fmt::format("{} \"{}\" captures", node, video.card), ""});
+      usb = usb || video.usb;
+      findings.push_back({Verdict::good,
+                          fmt::format("{} \"{}\" captures{}", node, video.card,
+                                      video.usb ? "" : ", on no USB port"),
+                          ""});
     }  // Metadata nodes are nobody's concern.
   }
   if (!captures && findings.empty()) {
     findings.push_back({bad, "no video node captures", "v4l2-ctl --list-devices"});
+  }
+  // A Raspberry Pi 4 has such nodes of its image processor without any camera (bcm2835-isp).
+  if (captures && !usb && camera.backend == "v4l2" && camera.v4l2.device.empty()) {
+    findings.push_back({Verdict::note, "none of them is a USB camera",
+                        "lsusb, then dtactctl cameras and camera.v4l2.device"});
   }
   return findings;
 }

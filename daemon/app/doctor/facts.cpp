@@ -57,8 +57,10 @@ void print_facts(const Machine& machine, const hal::Config& config, std::ostream
                                  config.camera.width, config.camera.height, config.camera.fps,
                                  config.ring.backend));
   for (const hal::v4l2::SurveyedCamera& camera : machine.cameras()) {
-    fact("attached", fmt::format("{} ({}): {}", camera.attached.card, camera.attached.driver,
-                                 hal::v4l2::describe(camera.modes)));
+    if (!camera.attached.problem.empty()) continue;  // A finding says so.
+    fact("attached",
+         fmt::format("{} ({}): {}", camera.attached.card, camera.attached.driver,
+                     camera.modes.empty() ? "no modes" : hal::v4l2::describe(camera.modes)));
   }
 }
 

@@ -16,6 +16,7 @@
 #include <memory>
 #include <sstream>
 #include <stdexcept>
+#include <string_view>
 
 #include "hal/base/clock.hpp"
 #include "hal/base/unique_fd.hpp"
@@ -81,17 +82,20 @@ rlim_t Machine::limit(int resource) const {
 
 Machine::Video Machine::video(const std::string& path) const {
   const base::UniqueFd fd(::open(below_root(path).c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
-  if (!fd) return {.captures = false, .card = {}, .error = errno};
+  if (!fd) return {.captures = false, .card = {}, .error = errno, .usb = false};
   v4l2_capability capability{};
   if (::ioctl(fd.get(), VIDIOC_QUERYCAP, &capability) != 0) {
-    return {.captures = false, .card = {}, .error = errno};
+    return {.captures = false, .card = {}, .error = errno, .usb = false};
   }
   const std::uint32_t node = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0
                                  ? capability.device_caps
                                  : capability.capabilities;
-  return {.captures = (node & (V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE)) != 0,
-          .card = reinterpret_cast<const char*>(capability.card),
-          .error = 0};
+  return {
+      .captures = (node & (V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE)) != 0,
+      .card = reinterpret_cast<const char*>(capability.card),
+      .error = 0,
+      .usb =
+          std::string_view(reinterpret_cast<const char*>(capability.bus_info)).starts_with("usb-")};
 }
 
 Machine::SpiRate Machine::spi_rate(const std::string& device, std::uint32_t asked_hz) const {

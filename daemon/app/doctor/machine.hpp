@@ -45,7 +45,8 @@ class Machine {
   struct Video {
     bool captures = false;  ///< Frames come from it (a camera's second node gives metadata).
     std::string card;
-    int error = 0;  ///< errno when it is no video node.
+    int error = 0;    ///< errno when it is no video node.
+    bool usb = true;  ///< Nodes of image processors and codecs capture as well, on no USB port.
   };
   [[nodiscard]] virtual Video video(const std::string& path) const;
 

@@ -45,6 +45,19 @@ TEST(DoctorCamera, OnlyMetadataIsNoCamera) {
   EXPECT_EQ(only_trouble(check_camera(machine, v4l2())).what, "no video node captures");
 }
 
+// As bcm2835-isp registers them on a Raspberry Pi 4 (raspberrypi/linux pull 3565).
+TEST(DoctorCamera, AnImageProcessorIsNoUsbCamera) {
+  FakeMachine machine;
+  machine.file("/dev/video14");
+  machine.videos = {{"/dev/video14", {true, "bcm2835-isp", 0, false}}};
+  const Findings findings = check_camera(machine, v4l2());
+  EXPECT_EQ(findings[0].what, "/dev/video14 \"bcm2835-isp\" captures, on no USB port");
+  EXPECT_EQ(only_trouble(findings).what, "none of them is a USB camera");
+  machine.file("/dev/video0");
+  machine.videos["/dev/video0"] = {true, "Endoscope", 0};
+  EXPECT_TRUE(all_good(check_camera(machine, v4l2())));
+}
+
 TEST(DoctorCamera, AForbiddenNodeNamesTheGroup) {
   FakeMachine machine;
   machine.file("/dev/video0");

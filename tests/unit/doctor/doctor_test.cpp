@@ -43,6 +43,9 @@ class TellingMachine : public PiMachine {
     mode.width = mode.min_width = 800;
     mode.height = mode.min_height = 600;
     mode.fps = {60, 30};
+    hal::v4l2::SurveyedCamera& closed = attached.emplace_back();
+    closed.attached.node = "/dev/video2";
+    closed.attached.problem = "sudo usermod -aG video anna";
   }
 };
 
