@@ -29,9 +29,11 @@ struct Known {
 ///
 /// The three grey ones of a bare mono sensor bypass the image processor: its gamma, its noise
 /// filters that smear in time, its scaling. A Pi 4 gives R8, or R10 where the sensor's driver has
-/// no 8 bits (vc4.cpp: platformValidate()); a Pi 5 widens every raw stream to 16 bits at the upper
-/// end (pisp.cpp: platformValidate()), and is asked for that, since its compressed kind cannot be
-/// read. A sensor has them in its own sizes only: another size comes from the image processor.
+/// no 8 bits (vc4.cpp: platformValidate()); a Pi 5 widens every raw stream to 16 bits (pisp.cpp:
+/// platformValidate(); raspberrypi/picamera2#1010), and is asked for that, since its compressed
+/// kind, MONO_PISP_COMP1, cannot be read. Unused bits are the upper ones on a Pi 4 and the lower
+/// ones on a Pi 5 (Raspberry Pi's documentation of rpicam-raw, unpacked formats). A sensor has them
+/// in its own sizes only: another size comes from the image processor.
 const std::array<Known, 7>& known_formats() {
   static const std::array<Known, 7> formats{{
       {lc::formats::R8, "grey", {"GREY", live::Encoding::grey}},

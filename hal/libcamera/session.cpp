@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "hal/base/clock.hpp"
+#include "hal/libcamera/pass_over.hpp"
 #include "hal/libcamera/sensor_mode.hpp"
 #include "hal/live/device_error.hpp"
 
@@ -69,15 +70,14 @@ ControlVerdict granted(bool as_asked) {
 
 Session::Session(std::shared_ptr<lc::Camera> camera, const CameraConfig& config,
                  const PhotometricLock& lock, const DmaHeap* heap)
-    : camera_(std::move(camera)),
-      sensor_(sensor_of(camera_->properties())),
-      settling_(kSettlingFrames) {
+    : camera_(std::move(camera)), sensor_(sensor_of(camera_->properties())) {
   if (const int e = camera_->acquire(); e != 0) fail(e, "acquire", camera_->id());
   acquired_ = true;
   try {
     configure(config);
     make_requests(heap);
     start(lock);
+    settle(config.fps);
   } catch (...) {
     stop();
     throw;
@@ -196,6 +196,16 @@ void Session::start(const PhotometricLock& lock) {
   }
 }
 
+void Session::settle(double fps) {
+  // Now, since the controls are compared with a calibration's, which has what became of them, when
+  // the camera has been opened, and only then.
+  const auto patience = static_cast<std::int64_t>(1e9 + kSettlingFrames * 1e9 / fps);
+  const bool said =
+      pass_over(*this, kSettlingFrames, base::system_clock().monotonic_ns() + patience,
+                [this] { return !readings_.empty(); });
+  if (said) (void)PhotometricLock::compare(readings_, controls_);
+}
+
 void Session::stop() noexcept {
   if (!std::exchange(acquired_, false)) return;
   // Requests under way come back cancelled from within stop(); they must still be there.
@@ -266,10 +276,6 @@ live::DequeueStatus Session::dequeue(live::Filled& out) noexcept {
   } else if (stamp <= now && stamp > now - kPlausible) {
     out.timestamp_ns = stamp;
     out.meaning = TimestampMeaning::end_of_frame;
-  }
-  if (settling_ > 0) {
-    --settling_;
-    return live::DequeueStatus::filled;
   }
   try {
     PhotometricLock::read(slot.request->metadata(), readings_);

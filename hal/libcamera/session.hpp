@@ -60,6 +60,8 @@ class Session final : public live::Source {
   void make_requests(const DmaHeap* heap);
   void add_slot(libcamera::FrameBuffer& buffer);
   void start(const PhotometricLock& lock);
+  /// Passes over the first frames, and notes in the controls what the last of them says.
+  void settle(double fps);
   void on_completed(libcamera::Request* request);
   void on_disconnected();
   [[nodiscard]] bool gone() noexcept;
@@ -81,7 +83,6 @@ class Session final : public live::Source {
   std::array<int, 16> completed_{};  // slot indices, oldest first; never more than there are slots
   std::size_t completed_count_ = 0;
   bool gone_ = false;
-  int settling_;  // frames that may still be of what was set before
   Readings readings_;
 };
 
