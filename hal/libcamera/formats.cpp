@@ -85,6 +85,8 @@ Sensor sensor_of(const lc::ControlList& properties) {
   return *colours == lc::properties::draft::MONO ? Sensor::mono : Sensor::colour;
 }
 
+bool driver_memory_is_cached(Sensor sensor) noexcept { return sensor == Sensor::none; }
+
 Choice choose_format(lc::CameraConfiguration& configuration, const CameraConfig& asked,
                      Sensor sensor, const std::string& identity) {
   lc::StreamConfiguration& stream = configuration.at(0);

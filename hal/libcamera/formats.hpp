@@ -14,6 +14,9 @@ namespace dtact::hal::libcamera_backend {
 /// bare sensor, whose pictures an image processor on the board makes.
 enum class Sensor : std::uint8_t { none, mono, colour };
 [[nodiscard]] Sensor sensor_of(const libcamera::ControlList& properties);
+/// Whether the memory that its driver gives is cached: what a camera sends that makes pictures by
+/// itself is written by the processor.
+[[nodiscard]] bool driver_memory_is_cached(Sensor sensor) noexcept;
 
 struct Choice {
   const char* name;         ///< As in CameraInfo: "NV12", "MJPEG".

@@ -101,9 +101,8 @@ live::Opener opener(const CameraConfig& config) {
           session = std::shared_ptr<Session>()]() mutable -> live::Opened {
     const std::shared_ptr<lc::Camera> camera = search();
     session.reset();  // the one before, which see
-    // What other cameras send is written by the processor, into cached memory.
-    const bool bare = sensor_of(camera->properties()) != Sensor::none;
-    session = std::make_shared<Session>(camera, config, lock, bare ? heap.get() : nullptr);
+    const bool cached = driver_memory_is_cached(sensor_of(camera->properties()));
+    session = std::make_shared<Session>(camera, config, lock, cached ? nullptr : heap.get());
     return {session, camera->id(), session->pixel_format(), session->controls()};
   };
 }

@@ -141,8 +141,8 @@ void Session::make_requests(const DmaHeap* heap) {
   if (heap != nullptr) own_buffers_ = make_frame_buffers(*heap, configuration_->at(0));
   for (const auto& buffer : own_buffers_) add_slot(*buffer);
   if (!own_buffers_.empty()) return;
-  // A bare sensor's driver gives memory without caches, which is to be read once only.
-  if (sensor_ != Sensor::none) format_.lendable = false;
+  // Without caches it is to be read once only.
+  if (!driver_memory_is_cached(sensor_)) format_.lendable = false;
   lc::Stream* stream = configuration_->at(0).stream();
   allocator_ = std::make_unique<lc::FrameBufferAllocator>(camera_);
   if (const int n = allocator_->allocate(stream); n < 2) {

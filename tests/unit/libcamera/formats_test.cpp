@@ -114,6 +114,12 @@ TEST(Formats, NamesWhatThereIs) {
   }
 }
 
+TEST(Formats, TakesABareSensorsMemoryForUncached) {
+  EXPECT_TRUE(driver_memory_is_cached(Sensor::none));
+  EXPECT_FALSE(driver_memory_is_cached(Sensor::mono));
+  EXPECT_FALSE(driver_memory_is_cached(Sensor::colour));
+}
+
 TEST(Formats, KnowsBareSensorsByTheirColourFilters) {
   lc::ControlList properties(lc::properties::properties);
   EXPECT_EQ(sensor_of(properties), Sensor::none);
