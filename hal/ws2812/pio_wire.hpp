@@ -25,7 +25,6 @@ class PioWire final : public Wire {
  public:
   explicit PioWire(std::string device, base::Clock& clock = base::system_clock());
 
-  [[nodiscard]] RingInfo info() const override { return {"ws2812_pio", device_}; }
   /// Sets the brightness to 0 and sees whether the driver takes as many LEDs and no more, which
   /// leaves them dark.
   [[nodiscard]] std::string prepare(int leds) override;

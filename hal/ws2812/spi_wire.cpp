@@ -71,8 +71,6 @@ SpiWire::SpiWire(std::unique_ptr<SpiPort> port, const SpiFormat& format, bool ch
                  base::Clock& clock)
     : port_(std::move(port)), format_(format), check_rate_(check_rate), clock_(clock) {}
 
-RingInfo SpiWire::info() const { return {"ws2812_spi", port_->name()}; }
-
 std::string SpiWire::prepare(int leds) {
   const std::vector<Rgb> dark(static_cast<std::size_t>(leds));
   if (const std::size_t need = encode(dark, format_).size(); need > port_->max_bytes()) {

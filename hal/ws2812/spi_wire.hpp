@@ -43,7 +43,6 @@ class SpiWire final : public Wire {
   SpiWire(std::unique_ptr<SpiPort> port, const SpiFormat& format, bool check_rate,
           base::Clock& clock = base::system_clock());
 
-  [[nodiscard]] RingInfo info() const override;
   [[nodiscard]] std::string prepare(int leds) override;
   [[nodiscard]] std::string note() const override;
   [[nodiscard]] std::string send(std::span<const Rgb> leds) override;

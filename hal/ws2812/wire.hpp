@@ -16,7 +16,6 @@ class Wire {
   Wire& operator=(const Wire&) = delete;
   virtual ~Wire() = default;
 
-  [[nodiscard]] virtual RingInfo info() const = 0;
   /// The first call: finds out, without a colour that LEDs would show, whether the wire can serve a
   /// chain of `leds`.
   [[nodiscard]] virtual std::string prepare(int leds) = 0;

@@ -53,7 +53,6 @@ class RecordingWire final : public Wire {
     ++record_->open;
   }
   ~RecordingWire() override { --record_->open; }
-  [[nodiscard]] RingInfo info() const override { return {"recording", "here"}; }
   [[nodiscard]] std::string prepare(int /*leds*/) override { return record_->refusal; }
   [[nodiscard]] std::string note() const override { return record_->note; }
   [[nodiscard]] std::string send(std::span<const Rgb> leds) override {
