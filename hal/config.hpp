@@ -50,7 +50,7 @@ inline constexpr std::array kLibcameraControls{"auto_exposure", "auto_white_bala
 struct V4l2Config {
   /// Which camera: a path below /dev/v4l/by-path or by-id, "serial:NUMBER", "bus:NAME" (the
   /// driver's bus_info), or a node such as /dev/video0, whose number may change at every plug.
-  /// Empty = the only camera attached.
+  /// Empty = the only camera on USB, or the only other one that delivers the size.
   std::string device;
   std::string pixel_format = "auto";  ///< "auto", "grey", "nv12", "yuyv" or "mjpeg".
   std::string range = "auto";  ///< Of raw luma: "full", "limited", or "auto" = as the driver says.
