@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <numeric>
 #include <system_error>
 #include <utility>
 
@@ -57,6 +58,10 @@ void Device::loop() {
       sequence_ += static_cast<std::uint64_t>(late);
       lost_ += static_cast<std::uint64_t>(late);
       deadline += late * period;
+      // What was skipped was exposed all the same.
+      for (std::int64_t i = std::min<std::int64_t>(late, std::ssize(seen_)); i > 0; --i) {
+        (void)exposed_light();
+      }
     }
   }
 }
@@ -76,8 +81,7 @@ const Payload* Device::make_next() noexcept {
 
 bool Device::make(std::uint64_t sequence, Payload& payload) noexcept {
   const LedLevels light = exposed_light();
-  const Fault* const fault = scene().fault_at(sequence);
-  const auto struck_by = [&](FaultKind kind) { return fault != nullptr && fault->kind == kind; };
+  const auto struck_by = [&](FaultKind kind) { return scene().strikes(kind, sequence); };
   hangs_ = struck_by(FaultKind::hang);
   if (struck_by(FaultKind::unplug)) {
     ++lost_;
@@ -97,11 +101,40 @@ bool Device::make(std::uint64_t sequence, Payload& payload) noexcept {
   if (struck_by(FaultKind::torn)) rows /= 2;
   if (struck_by(FaultKind::repeat)) rows = 0;
   renderer_.render(sequence, light, image_.data(), image_.stride(), rows);
+  if (struck_by(FaultKind::covered)) cover(rows);
+  regulate(struck_by(FaultKind::auto_exposure));
   payload.bytes = encoder_.encode(image_.view(), payload.buffer);
   if (struck_by(FaultKind::truncate)) payload.bytes /= 2;
   payload.sequence = sequence;
   payload.lost_before = lost_;
   return true;
+}
+
+void Device::cover(int rows) noexcept {
+  for (int y = 0; y < rows; ++y) {
+    std::uint8_t* const row = image_.data() + y * image_.stride();
+    for (int x = 0; x < image_.width() / 3; ++x) row[x] = static_cast<std::uint8_t>(row[x] / 2);
+  }
+}
+
+void Device::regulate(bool automatic) noexcept {
+  if (!automatic) {
+    kept_grey_ = 0;
+    renderer_.set_gain(gain_ = 1);
+    return;
+  }
+  constexpr int kRowStep = 8;       // of the rows that it measures
+  constexpr double kAFrame = 0.15;  // of what is missing is made up for with each frame
+  const LumaView image = image_.view();
+  std::int64_t sum = 0;
+  int rows = 0;
+  for (int y = 0; y < image.height; y += kRowStep, ++rows) {
+    sum = std::accumulate(image.row(y), image.row(y) + image.width, sum);
+  }
+  const double grey = std::max(1.0, static_cast<double>(sum) / rows / image.width);
+  if (kept_grey_ == 0) kept_grey_ = grey;
+  gain_ = std::clamp(gain_ * (1 + kAFrame * (kept_grey_ / grey - 1)), 0.25, 4.0);
+  renderer_.set_gain(gain_);
 }
 
 LedLevels Device::exposed_light() noexcept {

@@ -59,6 +59,10 @@ class Device {
   void loop();
   bool make(std::uint64_t sequence, Payload& payload) noexcept;
   [[nodiscard]] LedLevels exposed_light() noexcept;
+  /// Takes half of the light from the left third of the image's first rows.
+  void cover(int rows) noexcept;
+  /// Exposes the next frame so that the mean goes back to that of the first frame so regulated.
+  void regulate(bool automatic) noexcept;
   void wake() noexcept;
 
   Renderer renderer_;
@@ -66,6 +70,8 @@ class Device {
   std::shared_ptr<LightLink> link_;
   base::Clock& clock_;
   luma::LumaBuffer image_;
+  double gain_ = 1;              // of an exposure that runs automatically
+  double kept_grey_ = 0;         // the mean that it keeps; 0: it does not
   std::vector<LedLevels> seen_;  // [0] what the ring shows now, [1] a frame ago, ...
 
   std::array<Payload, 3> payloads_;

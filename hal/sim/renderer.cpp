@@ -35,6 +35,11 @@ Renderer::Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::
   }
 }
 
+void Renderer::set_gain(double gain) noexcept {
+  const auto q12 = static_cast<std::uint32_t>(std::lround(4096 * std::clamp(gain, 0.25, 4.0)));
+  if (std::exchange(gain_q12_, q12) != q12) exposed_rows_ = 0;
+}
+
 void Renderer::update(std::uint64_t sequence, const LedLevels& light, int rows) noexcept {
   if (!lit_ || light != levels_) {
     levels_ = light;
@@ -77,7 +82,7 @@ void Renderer::expose(int rows) noexcept {
     std::uint16_t* const grey = grey_.data() + begin;
     for (std::size_t x = 0; x < width; ++x) {
       const auto kept = static_cast<std::uint32_t>(32768 - loss_row_[x]);
-      const std::uint32_t lit = (light[x] * kept) >> 15U;
+      const std::uint32_t lit = (((light[x] * kept) >> 15U) * gain_q12_) >> 12U;
       grey[x] = tone_[std::min<std::uint32_t>(lit, kWhite)];
     }
     noise_.amplitude({grey, width}, {amplitude_.data() + begin, width});

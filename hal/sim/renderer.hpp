@@ -15,8 +15,8 @@
 namespace dtact::hal::sim {
 
 /// Makes the frames of a scene, without a clock, threads or faults: bytes are a function of scene,
-/// seed, sequence and light. What did not change since the last frame is not computed again; noise
-/// always is. Does not allocate after construction. One thread at a time.
+/// seed, sequence, light and gain. What did not change since the last frame is not computed again;
+/// noise always is. Does not allocate after construction. One thread at a time.
 class Renderer {
  public:
   /// Solves the scene's contacts. Throws std::runtime_error as Truth does.
@@ -24,6 +24,9 @@ class Renderer {
   /// The same presses under the camera, optics and light of `scene`, whose camera mode and layer
   /// must be the truth's: contact is solved once for many lights.
   Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::uint64_t seed);
+
+  /// From now on frames are exposed so many times as brightly as the scene says, 0.25 … 4.
+  void set_gain(double gain) noexcept;
 
   /// Frame `sequence` in full-range luma: the first `rows` rows, `stride` bytes apart.
   void render(std::uint64_t sequence, const LedLevels& light, std::uint8_t* luma,
@@ -48,6 +51,7 @@ class Renderer {
   Truth::Moment moment_{-1, -1, 0};  // what indentation_ and loss_ belong to
   LedLevels levels_{};               // what light_ belongs to
   bool lit_ = false;
+  std::uint32_t gain_q12_ = 4096;
   int exposed_rows_ = 0;  // rows of grey_ that are up to date
   std::vector<std::int16_t> indentation_;
   std::vector<std::int16_t> loss_;

@@ -102,8 +102,8 @@ Press read_press(KeyReader& table, const std::filesystem::path& folder, double t
 }
 
 Fault read_fault(KeyReader& table) {
-  static const std::vector<std::string> kKinds = {"drop",  "repeat", "torn", "truncate",
-                                                  "stall", "unplug", "hang"};
+  static const std::vector<std::string> kKinds = {
+      "drop", "repeat", "torn", "truncate", "stall", "unplug", "hang", "auto_exposure", "covered"};
   Fault fault;
   table.require("kind");
   table.require("frame");
@@ -208,11 +208,10 @@ double Scene::time_s(std::uint64_t sequence) const noexcept {
   return loop_from_s + std::fmod(t - loop_from_s, loop_to_s - loop_from_s);
 }
 
-const Fault* Scene::fault_at(std::uint64_t sequence) const noexcept {
-  for (const Fault& fault : faults) {
-    if (sequence >= fault.frame && sequence - fault.frame < fault.frames) return &fault;
-  }
-  return nullptr;
+bool Scene::strikes(FaultKind kind, std::uint64_t sequence) const noexcept {
+  return std::ranges::any_of(faults, [&](const Fault& fault) {
+    return fault.kind == kind && sequence >= fault.frame && sequence - fault.frame < fault.frames;
+  });
 }
 
 Scene default_scene() {

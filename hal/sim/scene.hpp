@@ -70,7 +70,17 @@ struct Press {
   std::vector<PressKey> keys;  ///< At least one, times strictly ascending.
 };
 
-enum class FaultKind : std::uint8_t { drop, repeat, torn, truncate, stall, unplug, hang };
+enum class FaultKind : std::uint8_t {
+  drop,
+  repeat,
+  torn,
+  truncate,
+  stall,
+  unplug,
+  hang,
+  auto_exposure,
+  covered
+};
 
 struct Fault {
   FaultKind kind = FaultKind::drop;
@@ -91,8 +101,8 @@ struct Scene {
 
   /// Seconds of the choreography at frame `sequence`.
   [[nodiscard]] double time_s(std::uint64_t sequence) const noexcept;
-  /// The fault that strikes frame `sequence`, or null.
-  [[nodiscard]] const Fault* fault_at(std::uint64_t sequence) const noexcept;
+  /// A fault of this kind strikes frame `sequence`.
+  [[nodiscard]] bool strikes(FaultKind kind, std::uint64_t sequence) const noexcept;
 };
 
 /// The built-in scene, config/scenes/default.toml as it was when the library was built.

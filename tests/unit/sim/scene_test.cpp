@@ -122,10 +122,11 @@ TEST(Scene, TimeRunsThenLoops) {
 
 TEST(Scene, FaultsStrikeTheirFrames) {
   const Scene scene = small_scene("[[fault]]\nkind = \"stall\"\nframe = 5\nframes = 2\n");
-  EXPECT_EQ(scene.fault_at(4), nullptr);
-  ASSERT_NE(scene.fault_at(5), nullptr);
-  EXPECT_EQ(scene.fault_at(6)->kind, FaultKind::stall);
-  EXPECT_EQ(scene.fault_at(7), nullptr);
+  EXPECT_FALSE(scene.strikes(FaultKind::stall, 4));
+  EXPECT_TRUE(scene.strikes(FaultKind::stall, 5));
+  EXPECT_TRUE(scene.strikes(FaultKind::stall, 6));
+  EXPECT_FALSE(scene.strikes(FaultKind::drop, 6));
+  EXPECT_FALSE(scene.strikes(FaultKind::stall, 7));
 }
 
 TEST(Scene, AnotherModeKeepsTheFieldOfView) {

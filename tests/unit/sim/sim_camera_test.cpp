@@ -209,6 +209,25 @@ TEST_F(SimCameraTest, TruncatedFramesAreDamagedInEveryFormat) {
   }
 }
 
+TEST_F(SimCameraTest, AutomaticExposureKeepsTheMeanUntilItsFaultEnds) {
+  SimCamera locked(config(fault("covered", 5, 200), "luma"), link_);
+  SimCamera automatic(config(fault("covered", 5, 200) + fault("auto_exposure", 1, 99), "luma"),
+                      link_);
+  Frame fixed;
+  Frame frame;
+  ASSERT_EQ(automatic.grab(frame, 0s), GrabStatus::ok);
+  const double mean = mean_grey(frame);
+  for (int i = 1; i < 100; ++i) ASSERT_EQ(automatic.grab(frame, 0s), GrabStatus::ok);
+  for (int i = 0; i < 100; ++i) ASSERT_EQ(locked.grab(fixed, 0s), GrabStatus::ok);
+  // Half of the light of a third of the picture is a sixth.
+  EXPECT_NEAR(mean_grey(fixed), mean * 5 / 6, 2);
+  EXPECT_NEAR(mean_grey(frame), mean, 0.2);
+  EXPECT_NEAR(frame.luma().row(60)[120], fixed.luma().row(60)[120] * 1.2, 6);
+  EXPECT_TRUE(automatic.info().controls[0].locked);
+  for (int i = 0; i < 2; ++i) ASSERT_EQ(automatic.grab(frame, 0s), GrabStatus::ok);
+  EXPECT_NEAR(mean_grey(frame), mean_grey(fixed), 0.2);
+}
+
 TEST_F(SimCameraTest, StallAndUnplugEndAndSayWhatToDo) {
   SimCamera camera(config(fault("stall", 1, 2) + fault("unplug", 4, 3), "mjpeg"), link_);
   Frame frame;
