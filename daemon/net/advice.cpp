@@ -61,6 +61,10 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::image_noisy,
      "Pixels are too noisy: raise the light and lower the camera's gain; many dead pixels look "
      "alike."},
+    {Health::exposure_follows,
+     "The rest of the picture brightens as a part darkens: exposure or gain runs automatically, "
+     "whatever the camera's controls say, and depth is wrong by as much. Switch it off with the "
+     "camera's own program, or use another camera; then run dtactctl rezero."},
     {Health::camera_slow,
      "The camera takes fewer frames than its mode promises: set exposure_dynamic_framerate "
      "(automatic priority) to 0, make the exposure shorter than a frame, or give the camera more "

@@ -22,7 +22,8 @@ static_assert(matches(Health::light_mismatch, v1::HEALTH_LIGHT_MISMATCH));
 static_assert(matches(Health::not_realtime, v1::HEALTH_NOT_REALTIME));
 static_assert(matches(Health::camera_moved, v1::HEALTH_CAMERA_MOVED));
 static_assert(matches(Health::camera_slow, v1::HEALTH_CAMERA_SLOW));
-static_assert(pipeline::kHealthCount == static_cast<int>(v1::HEALTH_CAMERA_SLOW));
+static_assert(matches(Health::exposure_follows, v1::HEALTH_EXPOSURE_FOLLOWS));
+static_assert(pipeline::kHealthCount == static_cast<int>(v1::HEALTH_EXPOSURE_FOLLOWS));
 
 v1::State to_wire(State state) {
   switch (state) {

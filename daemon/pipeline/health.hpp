@@ -38,9 +38,10 @@ enum class Health : std::uint8_t {
   image_noisy = 16,      ///< Pixels are noisier than smoothing makes up for, or many are dead.
   image_repeated = 17,   ///< All or part of the picture is the one before: frozen or torn.
   camera_moved = 18,     ///< The layer's marks lie elsewhere than at calibration (place_watch.hpp).
-  camera_slow = 19       ///< Fewer frames a second than the camera's mode promises.
+  camera_slow = 19,      ///< Fewer frames a second than the camera's mode promises.
+  exposure_follows = 20  ///< The rest brightens as a part darkens, as if exposure were automatic.
 };
-inline constexpr int kHealthCount = 20;
+inline constexpr int kHealthCount = 21;
 
 class HealthSet {
  public:

@@ -23,6 +23,7 @@ struct ToyScene {
   double y_px = 60;
   double marks = 0;  ///< Height of the layer's marks, grey levels.
   int marks_px = 0;  ///< How far to the right they lie of where they were at calibration.
+  double covered = 0;  ///< Share of its light that the left quarter loses.
 };
 
 inline constexpr int kToyWidth = 160;
@@ -50,7 +51,8 @@ inline double toy_grey(const ToyScene& scene, int x, int y) {
   const double ring = std::exp(-((r - 24) / 6) * ((r - 24) / 6));
   const double pressed = untouched - scene.press_mm * (31.25 * spot - 8 * ring);
   const double mark = scene.marks == 0 ? 0 : scene.marks * toy_mark(x - scene.marks_px, y);
-  return (pressed + mark) * scene.light * (1 + scene.tilt * u);
+  const double left = x < kToyWidth / 4 ? 1 - scene.covered : 1;
+  return (pressed + mark) * left * scene.light * (1 + scene.tilt * u);
 }
 
 /// One frame, rows of kToyWidth bytes. Rounded after adding −0.5 … 0.5, which differs from frame to

@@ -47,9 +47,10 @@ void ImageWatch::forget() noexcept {
   conditions_ = {};
 }
 
-void ImageWatch::look(const CellReport& report, const hal::LumaView& luma, double light) noexcept {
-  if (report.cells == 0) return;
-  compare_light(report, luma, light);
+std::optional<LightCompared> ImageWatch::look(const CellReport& report, const hal::LumaView& luma,
+                                              double light) noexcept {
+  if (report.cells == 0) return std::nullopt;
+  const auto compared = compare_light(report, luma, light);
   const bool bands = report.frame.ripple > kRipple || report.frame.fine_ripple > kFineRipple;
   banded_ = std::clamp(banded_ + (bands ? 1 : -1), 0, kBandedMost);
   conditions_.set(Health::light_drifted, drifted_);
@@ -59,28 +60,39 @@ void ImageWatch::look(const CellReport& report, const hal::LumaView& luma, doubl
   conditions_.set(Health::image_dark, report.mean_grey < kDarkGrey);
   conditions_.set(Health::image_noisy, report.frame.rough_noise > kNoise);
   conditions_.set(Health::image_repeated, report.frame.unchanged_rows >= kUnchangedRows);
+  return compared;
 }
 
-void ImageWatch::compare_light(const CellReport& report, const hal::LumaView& luma,
-                               double light) noexcept {
+std::optional<LightCompared> ImageWatch::compare_light(const CellReport& report,
+                                                       const hal::LumaView& luma,
+                                                       double light) noexcept {
   if (!have_reference_ || report.active_cells * kActiveShare < report.cells) {
     drifted_ = false;
     until_check_ = 0;
-    return;
+    return std::nullopt;
   }
-  if (until_check_-- > 0) return;
+  if (until_check_-- > 0) return std::nullopt;
   until_check_ = kCheckEvery - 1;
   measure(luma, now_);
   (void)check_.compare(reference_, now_, region_, kDriftDegree, field_);
   double change = 0;
+  double brighter = 0;
+  double expected = 0;
+  double shown = 0;
   int cells = 0;
   for (int y = region_.y0; y < region_.y1; ++y) {
     for (int x = region_.x0; x < region_.x1; ++x) {
-      change += std::abs(field_[cell_at(x, y)] / light - 1);
+      const std::size_t cell = cell_at(x, y);
+      const double more = field_[cell] / light - 1;
+      change += std::abs(more);
+      brighter += more;
+      expected += static_cast<double>(reference_.cells[cell] * field_[cell]);
+      shown += static_cast<double>(now_.cells[cell]);
       ++cells;
     }
   }
   drifted_ = change > kDriftShare * std::max(1, cells);
+  return LightCompared{brighter / std::max(1, cells), 1 - shown / std::max(1.0, expected)};
 }
 
 }  // namespace dtact::pipeline

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "daemon/pipeline/health.hpp"
 #include "daemon/pipeline/untouched/cells.hpp"
+#include "daemon/pipeline/untouched/exposure_watch.hpp"
 #include "daemon/pipeline/untouched/luma_grid.hpp"
 #include "daemon/pipeline/untouched/touch_check.hpp"
 #include "hal/frame.hpp"
@@ -21,8 +23,9 @@ class ImageWatch {
                      const CellRegion& region) noexcept;
   /// The next frame. Cheap, but for every sixteenth one while a quarter of the picture is active:
   /// then the light is compared, in up to half a millisecond. `light`: the factor on the reference
-  /// that is followed.
-  void look(const CellReport& report, const hal::LumaView& luma, double light) noexcept;
+  /// that is followed. Returns what the comparison found, where there was one.
+  std::optional<LightCompared> look(const CellReport& report, const hal::LumaView& luma,
+                                    double light) noexcept;
   /// No depth is measured at present, so nothing is said about it.
   void forget() noexcept;
 
@@ -31,7 +34,8 @@ class ImageWatch {
   [[nodiscard]] const HealthSet& conditions() const noexcept { return conditions_; }
 
  private:
-  void compare_light(const CellReport& report, const hal::LumaView& luma, double light) noexcept;
+  std::optional<LightCompared> compare_light(const CellReport& report, const hal::LumaView& luma,
+                                             double light) noexcept;
 
   TouchCheck check_;
   CellRegion region_;

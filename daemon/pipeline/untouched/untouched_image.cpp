@@ -61,11 +61,13 @@ Look UntouchedImage::look(const hal::LumaView& luma, const Moment& moment) noexc
   if (!look.measurable) {
     report_ = {};
     watch_.forget();
+    exposure_.forget();
     return look;
   }
   report_ = image_->cells.look(luma);
-  watch_.look(report_, luma, follower_.factor());
+  const auto compared = watch_.look(report_, luma, follower_.factor());
   if (fresh) {
+    exposure_.look(report_.light, compared, moment.timestamp_ns);
     if (const auto factor = follower_.look(report_.light, moment.timestamp_ns)) {
       image_->cells.set_light(*factor);
       look.new_light = true;
@@ -83,6 +85,7 @@ void UntouchedImage::use_reference() noexcept {
   // Nobody can apply a factor where depth is measured by the published method.
   follower_.restart(model.method == recon::Method::list);
   watch_.set_reference(reference, width_, height_, image_->region);
+  exposure_.restart();
   place_.hurry();
   const double level = watch_.reference_mean() / image_->grid.mean;
   other_level_ = model.method == recon::Method::published && std::abs(level - 1) > kOtherLevel;
@@ -112,6 +115,7 @@ HealthSet UntouchedImage::conditions() const noexcept {
   set.set(Health::reference_restored, keeper_.footing() == Footing::restored);
   set.set(Health::light_mismatch, other_light_ || other_level_);
   set.set(Health::camera_moved, place_.moved());
+  set.set(Health::exposure_follows, exposure_.follows());
   set.add(watch_.conditions());
   if (follower_.drifted()) set.set(Health::light_drifted);
   return set;

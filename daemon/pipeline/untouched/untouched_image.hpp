@@ -7,6 +7,7 @@
 #include "daemon/pipeline/health.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/pipeline/untouched/calibrated_image.hpp"
+#include "daemon/pipeline/untouched/exposure_watch.hpp"
 #include "daemon/pipeline/untouched/image_watch.hpp"
 #include "daemon/pipeline/untouched/light_follower.hpp"
 #include "daemon/pipeline/untouched/place_watch.hpp"
@@ -112,6 +113,7 @@ class UntouchedImage {
   ReferenceKeeper keeper_;
   LightFollower follower_;
   ImageWatch watch_;
+  ExposureWatch exposure_;
   CellReport report_;
   hal::Light shown_;
   bool settled_ = true;       // the frame looked at

@@ -15,6 +15,7 @@
 #include "tests/accuracy/atlas/methods.hpp"
 #include "tests/accuracy/atlas/rows.hpp"
 #include "tests/accuracy/atlas/scenes.hpp"
+#include "tests/accuracy/atlas/scripts.hpp"
 
 namespace dtact::atlas {
 namespace {
@@ -107,6 +108,42 @@ TEST(Atlas, AFlatPressOfTheWholeFieldIsNotFollowed) {
 TEST(Atlas, ReferenceUnderAPressIsToldFromAFifthOfAMillimetreOn) {
   EXPECT_TRUE(at("touched", 0.2).told());
   EXPECT_LT(at("touched", 0.1).error_mm(), 2 * nominal_mm());
+}
+
+/// Frames, of two seconds, that were said to be of an exposure that runs automatically.
+int followed(Script script) {
+  script.frames = kPress + 120;
+  script.judged = script.frames;
+  const Outcome outcome = run(ours().calibration, script);
+  return outcome.conditions.at(static_cast<std::size_t>(pipeline::Health::exposure_follows));
+}
+
+/// The left third loses half of its light, which an exposure with a time constant of a fifth of a
+/// second makes up for with a `share` of what keeps the mean.
+Script covered(double share) {
+  return press(ball_truth(), share, [](Shot& shot, int n, double part) {
+    shot.moment = 0;
+    if (n < kPress) return;
+    shot.covered = 0.5;
+    shot.exposure = 1 + 0.2 * part * (1 - std::exp((kPress - n) / 12.0));
+  });
+}
+
+TEST(Atlas, AnExposureThatKeepsTheMeanIsNamed) {
+  EXPECT_GT(followed(covered(1)), 20);
+  EXPECT_GT(followed(covered(0.6)), 20);
+  EXPECT_EQ(followed(covered(0)), 0);
+}
+
+// The layer bulges round a press, by a few levels; light changes while something touches.
+TEST(Atlas, NothingElseIsTakenForAnExposureThatFollows) {
+  for (const char* id : {"deep", "full_field", "texture", "walls", "bulge", "brightness_up",
+                         "exposure_drift", "leak"}) {
+    const Row one = row(id);
+    for (const double value : {one.values[one.values.size() / 2], one.values.back()}) {
+      EXPECT_EQ(followed(one.script(value)), 0) << id << ' ' << value;
+    }
+  }
 }
 
 // What the page calls undecidable: two causes, one image. Differences are those of frames with the

@@ -69,7 +69,8 @@ void Spoiler::light_up(const Shot& shot, std::uint64_t sequence) {
     const double factor = shot.exposure * (1 + shot.band * std::sin(phase)) / 64;
     for (int x = 0; x < width_; ++x) {
       const std::size_t i = index_of(x, y, width_);
-      grey_[i] = static_cast<float>(clean[i] * factor);
+      const double left = 3 * x < width_ ? 1 - shot.covered : 1;
+      grey_[i] = static_cast<float>(clean[i] * factor * left);
       if (shot.leak > 0) {
         grey_[i] += static_cast<float>(shot.leak * std::pow(0.1, static_cast<double>(x) / width_));
       }

@@ -19,6 +19,7 @@ struct Shot {
   std::uint64_t moment = 0;  ///< Frame of the solved choreography.
   hal::Light light;          ///< What the ring really shows.
   double exposure = 1;       ///< Factor on the light, clipped at 255.
+  double covered = 0;        ///< Share of its light that the left third loses.
   double leak = 0;         ///< Grey levels added at the left edge, falling to a tenth at the right.
   double band = 0;         ///< Amplitude of PWM banding, share of the light.
   double band_rows = 90;   ///< Its period: 400 Hz in a rolling shutter of 600 rows at 60 fps.
