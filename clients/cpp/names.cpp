@@ -19,6 +19,10 @@ std::string plain(std::string_view name, std::string_view prefix, int value) {
 
 std::string name_of(v1::State state) { return plain(v1::State_Name(state), "STATE_", state); }
 
+std::string name_of(v1::TimestampMeaning meaning) {
+  return plain(v1::TimestampMeaning_Name(meaning), "TIMESTAMP_", meaning);
+}
+
 std::string name_of(v1::Health condition) {
   return plain(v1::Health_Name(condition), "HEALTH_", condition);
 }

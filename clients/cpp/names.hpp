@@ -9,6 +9,8 @@ namespace dtact::client {
 
 /// STATE_SERVING → "serving"; a value of a newer daemon → "13".
 [[nodiscard]] std::string name_of(v1::State state);
+/// TIMESTAMP_FIRST_PACKET → "first_packet".
+[[nodiscard]] std::string name_of(v1::TimestampMeaning meaning);
 /// HEALTH_LIGHT_UNSETTLED → "light_unsettled".
 [[nodiscard]] std::string name_of(v1::Health condition);
 /// The `health` of a frame, an event or the status.

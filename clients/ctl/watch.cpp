@@ -130,8 +130,9 @@ class Watch {
                                   seconds, all_.frames(), options_.summary ? 0 : all_.counted(),
                                   fps);
       if (latency.count() > 0) {
-        context_.out << fmt::format("latency p50 {:.1f} ms, p99 {:.1f} ms; ",
-                                    latency.percentile_ms(0.5), latency.percentile_ms(0.99));
+        context_.out << fmt::format("latency p50 {:.1f} ms, p99 {:.1f} ms since {}; ",
+                                    latency.percentile_ms(0.5), latency.percentile_ms(0.99),
+                                    client::name_of(last_.meaning()));
       }
       std::string conditions;
       for (const v1::Health condition : all_.health()) {
@@ -164,7 +165,8 @@ class Watch {
 void add_watch(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand(
       "watch",
-      "Show rate, contact, latency from capture to here (daemon on this machine only), drops and "
+      "Show rate, contact, latency since the frame's timestamp (daemon on this machine only; the "
+      "summary says which moment the camera stamps), drops and "
       "health until Ctrl-C, then a summary");
   const auto options = std::make_shared<WatchOptions>();
   command->add_option("--seconds", options->seconds, "End by itself after so long")

@@ -392,7 +392,8 @@ TEST(Watch, PrintsLinesAndASummary) {
   const auto result = ctl(rig, {"watch", "--seconds", "1.5", "--min-fps", "0.5"});
   EXPECT_EQ(result.code, 0) << result.error;
   EXPECT_THAT(result.out, AllOf(HasSubstr(" fps  contact "), HasSubstr("latency p50"),
-                                HasSubstr("\nwatched 1.5 s: "), HasSubstr("conditions: none\n")));
+                                HasSubstr("\nwatched 1.5 s: "), HasSubstr(" ms since arrival; "),
+                                HasSubstr("conditions: none\n")));
 }
 
 TEST(Watch, PrintsJson) {
