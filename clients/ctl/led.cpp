@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "clients/common/json.hpp"
+#include "clients/ctl/light_delay.hpp"
 #include "clients/ctl/light_text.hpp"
 #include "clients/ctl/online.hpp"
 
@@ -15,6 +16,7 @@ struct LedOptions {
   std::optional<std::uint32_t> brightness;
   std::optional<std::string> scheme;
   std::vector<std::string> leds;
+  bool measure = false;
 };
 
 /// `remark`: what the ring has to say when it is only looked at.
@@ -78,7 +80,20 @@ void add_led(CLI::App& app, Context& context) {
           return std::string(e.what());
         }
       });
-  command->callback([&context, options] { run_led(context, *options); });
+  command
+      ->add_flag(
+          "--measure", options->measure,
+          "Measure how many frames a change of the light takes until the picture shows it, by "
+          "stepping the brightness for some seconds, and print the line for the "
+          "configuration. Nothing may touch; the light is as before afterwards")
+      ->excludes("--brightness", "--scheme", "--led");
+  command->callback([&context, options] {
+    if (options->measure) {
+      measure_light_delay(context);
+    } else {
+      run_led(context, *options);
+    }
+  });
 }
 
 void add_rezero(CLI::App& app, Context& context) {

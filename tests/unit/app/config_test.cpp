@@ -85,9 +85,11 @@ TEST_F(ConfigFile, ReadsTheCamerasControls) {
 }
 
 TEST_F(ConfigFile, UnknownKeyNamesFileLineAndWhatIsAllowed) {
-  EXPECT_THAT(error("[camera]\nwidht = 640\n"),
-              AllOf(HasSubstr("c.toml:2:"), HasSubstr("\"camera.widht\""),
-                    HasSubstr("width, height, fps, light_delay_frames, [sim], [replay], [v4l2], [libcamera]")));
+  EXPECT_THAT(
+      error("[camera]\nwidht = 640\n"),
+      AllOf(HasSubstr("c.toml:2:"), HasSubstr("\"camera.widht\""),
+            HasSubstr(
+                "width, height, fps, light_delay_frames, [sim], [replay], [v4l2], [libcamera]")));
   EXPECT_THAT(error("[camra]\n"), AllOf(HasSubstr("c.toml:1:"), HasSubstr("[camera]")));
 }
 
