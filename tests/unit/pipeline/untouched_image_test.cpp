@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
-#include <vector>
 
+#include "daemon/pipeline/untouched/reference_store.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
 namespace dtact::pipeline {
@@ -26,10 +27,19 @@ PipelineConfig config() {
 class UntouchedImageTest : public ::testing::Test {
  protected:
   UntouchedImageTest() {
+    std::filesystem::remove_all(folder_);
     place_.start();
+    writer_.start();
     image_.use(&calibrated_);
   }
 
+ public:
+  ~UntouchedImageTest() override {
+    writer_.stop();
+    std::filesystem::remove_all(folder_);
+  }
+
+ protected:
   Look look(const fakes::ToyFrame& frame, Moment moment = {.settled = true, .whole = true}) {
     now_ns_ += 16'666'667;
     moment.timestamp_ns = moment.now_ns = now_ns_;
@@ -51,13 +61,23 @@ class UntouchedImageTest : public ::testing::Test {
   PipelineConfig config_ = config();
   fakes::ToyScene scene_{.marks = 2};
   CalibratedImage calibrated_{fakes::toy_calibration(scene_)};
-  ReferenceWriter writer_{fakes::kToyWidth, fakes::kToyHeight, {}};
+  std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) / "dtact_untouched";
+  ReferenceWriter writer_{fakes::kToyWidth, fakes::kToyHeight, folder_};
   PlaceWatch place_{fakes::kToyWidth, fakes::kToyHeight, kFrames};
   UntouchedImage image_{fakes::kToyWidth, fakes::kToyHeight, config_.light,
                         config_,          writer_,           place_};
   std::uint64_t sequence_ = 0;
   std::int64_t now_ns_ = 0;
 };
+
+TEST_F(UntouchedImageTest, AnotherLightThanAtCalibrationIsToldFromTheStart) {
+  hal::Light dim = config_.light;
+  dim.brightness = 128;
+  UntouchedImage dimmed(fakes::kToyWidth, fakes::kToyHeight, dim, config_, writer_, place_);
+  dimmed.use(&calibrated_);
+  EXPECT_TRUE(dimmed.conditions().has(Health::light_mismatch));
+  EXPECT_FALSE(has(Health::light_mismatch));
+}
 
 // What is held drags the layer along, and its marks with it.
 TEST_F(UntouchedImageTest, TheCamerasPlaceIsNotJudgedByALayerThatIsTouched) {
@@ -83,6 +103,20 @@ TEST_F(UntouchedImageTest, AFrameReadInPartIsNoPartOfAReference) {
   EXPECT_EQ(answer, RezeroResult::taken);
   // 103 levels; with a sixteenth of nothing in it, 97.
   EXPECT_NEAR(image_.reference()[0], fakes::toy_reference_q8(scene_)[0], 256);
+}
+
+TEST_F(UntouchedImageTest, AReferenceForcedUnderATouchIsNotKeptForTheNextStart) {
+  ASSERT_TRUE(settles());
+  scene_.press_mm = 1;
+  ASSERT_EQ(image_.rezero(true), std::nullopt);
+  show(3 * kFrames);
+  constexpr std::size_t kMiddle = 60 * fakes::kToyWidth + 80;
+  EXPECT_NEAR(image_.reference()[kMiddle], 119 * 256, 3 * 256);
+  writer_.stop();
+  const auto kept =
+      load_reference(*calibrated_.calibration, fakes::kToyWidth, fakes::kToyHeight, folder_);
+  ASSERT_TRUE(kept.has_value());
+  EXPECT_NEAR(kept->image_q8[kMiddle], 150 * 256, 3 * 256);
 }
 
 // The ring writes again what it shows, say, and flickers.
