@@ -9,7 +9,7 @@ namespace dtact::ctl {
 
 /// A camera that looks at a plane, worked out from rays alone: independent of recon::Lens and of
 /// OpenCV's calibration. With (x, y) a ray's slopes and r² = x² + y², it shows the ray at the pixel
-/// centre + focal·(x, y)·(1 + k1·r² + k2·r⁴).
+/// centre + focal·(x, y)·(1 + k1·r² + k2·r⁴ + k3·r⁶).
 struct BoardCamera {
   int width = 640;
   int height = 480;
@@ -17,6 +17,7 @@ struct BoardCamera {
   cv::Point2d centre{320, 240};
   double k1 = 0;
   double k2 = 0;
+  double k3 = 0;
   /// The plane: its origin `distance_mm` before the camera and `shift_mm` beside the axis, turned
   /// about the camera's x, then y, then z axis. Degrees.
   double distance_mm = 32;
@@ -69,7 +70,7 @@ struct BoardCamera {
     const cv::Vec2d mm = left.inv() * cv::Vec2d(ray.x * t[2] - t[0], ray.y * t[2] - t[1]);
     return {mm[0], mm[1]};
   }
-  [[nodiscard]] double factor(double r2) const { return 1 + k1 * r2 + k2 * r2 * r2; }
+  [[nodiscard]] double factor(double r2) const { return 1 + r2 * (k1 + r2 * (k2 + r2 * k3)); }
   [[nodiscard]] cv::Vec3d place() const { return {shift_mm.x, shift_mm.y, distance_mm}; }
   [[nodiscard]] cv::Matx33d axes() const {
     constexpr double kDegree = std::numbers::pi / 180;

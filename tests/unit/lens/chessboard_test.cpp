@@ -57,6 +57,22 @@ double worst_px(const recon::Lens& lens, const BoardCamera& camera) {
   return worst;
 }
 
+/// From the board as `camera` shows it and five more images of it tilted.
+ChessboardLens calibrate_tilted(const BoardCamera& camera) {
+  std::vector<cv::Mat1b> images{photograph(camera)};
+  std::vector<std::string> names{"flat.png"};
+  for (const auto& [x, y] : {std::pair{25., 0.}, {-22., 8.}, {0., 25.}, {6., -24.}, {18., 18.}}) {
+    BoardCamera tilted = camera;
+    tilted.tilt_x = x;
+    tilted.tilt_y = y;
+    tilted.turn = x - y;
+    tilted.distance_mm = 36;
+    images.push_back(photograph(tilted));
+    names.push_back("tilted.png");
+  }
+  return calibrate_chessboards(images, names, kBoard);
+}
+
 TEST(ChessboardLens, OneImageGivesTheLens) {
   const ChessboardLens made = calibrate_chessboards({photograph(flat())}, {"flat.png"}, kBoard);
   EXPECT_EQ(made.marks.size(), 48U);
@@ -66,20 +82,31 @@ TEST(ChessboardLens, OneImageGivesTheLens) {
 }
 
 TEST(ChessboardLens, TiltedImagesGiveTheLensOfTheFirst) {
-  std::vector<cv::Mat1b> images{photograph(flat())};
-  std::vector<std::string> names{"flat.png"};
-  for (const auto& [x, y] : {std::pair{25., 0.}, {-22., 8.}, {0., 25.}, {6., -24.}, {18., 18.}}) {
-    BoardCamera camera = flat();
-    camera.tilt_x = x;
-    camera.tilt_y = y;
-    camera.turn = x - y;
-    camera.distance_mm = 36;
-    images.push_back(photograph(camera));
-    names.push_back("tilted.png");
-  }
-  const ChessboardLens made = calibrate_chessboards(images, names, kBoard);
+  const ChessboardLens made = calibrate_tilted(flat());
   EXPECT_LT(worst_px(made.lens.lens, flat()), 0.3);
   EXPECT_LT(rms(made.lens.left_out), 0.01);
+}
+
+TEST(ChessboardLens, AStrongLensHasThreeTerms) {
+  BoardCamera camera = flat();
+  camera.k3 = -1.2;
+  const ChessboardLens made = calibrate_tilted(camera);
+  EXPECT_EQ(made.lens.model, LensModel::radial3);
+  EXPECT_LT(worst_px(made.lens.lens, camera), 0.3);
+}
+
+TEST(ChessboardLens, WhatIsRightOnTheSurfaceIsRightInTheLens) {
+  for (const double turn : {0, 90, 180, 270}) {
+    BoardCamera camera;
+    camera.width = 480;
+    camera.turn = turn;
+    camera.centre = {240, 240};
+    camera.focal = 420;
+    const ChessboardLens made = calibrate_chessboards({photograph(camera)}, {"flat.png"}, kBoard);
+    const recon::Point at = project(made.lens.lens, {0, 0});
+    EXPECT_GT(project(made.lens.lens, {1, 0}).x, at.x + 5) << turn;
+    EXPECT_GT(project(made.lens.lens, {0, 1}).y, at.y + 5) << turn;
+  }
 }
 
 TEST(ChessboardLens, AStraightPictureNeedsNoRadialTerm) {
