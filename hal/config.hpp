@@ -109,7 +109,7 @@ struct Ws2812Config {
   std::string spi_device = "/dev/spidev0.0";
   int spi_hz = 3'200'000;
   int spi_bits = 4;            ///< SPI bits for each WS2812B bit: 3, 4 or 8.
-  bool spi_check_rate = true;  ///< Measure the true rate at start and refuse a wrong one.
+  bool spi_check_rate = true;  ///< Measure the rate, time every transfer, refuse.
 
   std::string pio_device = "/dev/leds0";  ///< Of a Raspberry Pi 5's ws2812-pio driver.
 

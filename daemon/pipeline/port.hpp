@@ -85,7 +85,7 @@ struct Status {
   hal::CameraInfo camera;
   hal::CameraReport camera_report;
   hal::RingInfo ring;
-  std::string ring_message;  ///< The ring's last error; empty when well.
+  std::string ring_message;  ///< The ring's last error, or what to know; empty when well.
   hal::Light light;
   std::shared_ptr<const calibration::Calibration> calibration;  ///< Null when uncalibrated.
   std::uint64_t frames = 0;                                     ///< Published since start.

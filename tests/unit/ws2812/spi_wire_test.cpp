@@ -119,6 +119,7 @@ TEST(Ws2812SpiWire, TheLongestChainThatFitsBufsiz) {
 TEST(Ws2812SpiWire, SendsWhatAChainThenShows) {
   Bench bench;
   SpiWire wire = bench.wire();
+  ASSERT_EQ(wire.prepare(3), "");
   const std::array<Rgb, 3> leds{Rgb{1, 2, 3}, Rgb{255, 0, 128}, Rgb{0, 0, 0}};
   EXPECT_EQ(wire.send(leds), "");
   test::ChainModel chain;
