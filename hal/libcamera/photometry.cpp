@@ -214,9 +214,8 @@ PhotometricLock::Wishes PhotometricLock::wishes(const lc::ControlInfoMap& offere
   if (find_offered(lc::controls::FrameDurationLimits) != offered.end()) {
     const auto us = static_cast<std::int64_t>(std::llround(1e6 / fps_));
     wishes.list.set(lc::controls::FrameDurationLimits, {us, us});
-    wishes.controls.push_back(
-        {kFrameDuration, us, ControlVerdict::accepted,
-         "set; the frames have not said yet how long they last"});
+    wishes.controls.push_back({kFrameDuration, us, ControlVerdict::accepted,
+                               "set; the frames have not said yet how long they last"});
   }
   return wishes;
 }
