@@ -28,6 +28,7 @@ int pixel_bytes(Layout layout) noexcept {
 bool has_chroma(Layout layout) noexcept { return layout == Layout::yuyv || layout == Layout::nv12; }
 
 void copy_line(Layout layout, const std::uint8_t* in, std::uint8_t* out, int width) noexcept {
+  const auto pair = [in](int x) { return in + std::ptrdiff_t{2} * x; };
   switch (layout) {
     case Layout::grey:
     case Layout::nv12:
@@ -35,14 +36,14 @@ void copy_line(Layout layout, const std::uint8_t* in, std::uint8_t* out, int wid
       return;
     case Layout::grey10:
       for (int x = 0; x < width; ++x) {
-        out[x] = static_cast<std::uint8_t>(in[2 * x] >> 2U | in[2 * x + 1] << 6U);
+        out[x] = static_cast<std::uint8_t>(pair(x)[0] >> 2U | pair(x)[1] << 6U);
       }
       return;
     case Layout::grey16:
-      for (int x = 0; x < width; ++x) out[x] = in[2 * x + 1];
+      for (int x = 0; x < width; ++x) out[x] = pair(x)[1];
       return;
     case Layout::yuyv:
-      for (int x = 0; x < width; ++x) out[x] = in[2 * x];
+      for (int x = 0; x < width; ++x) out[x] = *pair(x);
       return;
   }
 }
