@@ -21,13 +21,16 @@
 #include "tests/unit/libcamera/kernel_double.hpp"
 
 // libcamera 0.4.0's virtual camera leaves a frame's metadata as the memory was (virtual.cpp:
-// queueRequestDevice()): zeros, then, for the whole program.
-void* operator new(std::size_t size) {
+// queueRequestDevice()): zeros, then, for the whole program. Not inlined:
+// gcc would take what one of the two leaves of itself for a mismatch.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   if (void* memory = std::calloc(1, size); memory != nullptr) return memory;
   throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t /*size*/) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t /*size*/) noexcept {
+  std::free(memory);
+}
 
 namespace dtact::hal::libcamera_backend {
 namespace {
