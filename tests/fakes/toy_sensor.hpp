@@ -21,8 +21,8 @@ struct ToyScene {
   double press_mm = 0;  ///< Indentation in the middle of the press.
   double x_px = 80;     ///< Its place.
   double y_px = 60;
-  double marks = 0;  ///< Height of the layer's marks, grey levels.
-  int marks_px = 0;  ///< How far to the right they lie of where they were at calibration.
+  double marks = 0;    ///< Height of the layer's marks, grey levels.
+  int marks_px = 0;    ///< How far to the right they lie of where they were at calibration.
   double covered = 0;  ///< Share of its light that the left quarter loses.
 };
 
