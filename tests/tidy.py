@@ -44,6 +44,8 @@ def headers(build):
 
 def key(entry, read, common):
     made = re.search(r" -o (\S+)", entry["command"]).group(1)
+    if made not in read:
+        sys.exit(f"tidy: {made} is not built: bring {entry['directory']} up to date first")
     texts = (digest_of(os.path.join(entry["directory"], path)) for path in read[made])
     return hashlib.sha256("\n".join([common, entry["command"], *texts]).encode()).hexdigest()
 

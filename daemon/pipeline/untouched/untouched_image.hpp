@@ -38,8 +38,8 @@ struct Look {
 struct Trust {
   bool stale = false;     ///< It was scaled from another light.
   double light_left = 0;  ///< What of the light is not followed: a share, positive = brighter.
-  double light_unseen =
-      0;  ///< What the light is to be expected to have moved out of sight: a share.
+  /// What the light is to be expected to have moved out of sight: a share, 0 or more.
+  double light_unseen = 0;
 };
 
 /// The untouched image in the present light, reference × light + drift, and all that is known of
