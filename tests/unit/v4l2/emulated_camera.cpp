@@ -8,9 +8,9 @@
 #include <ctime>
 #include <fstream>
 #include <stdexcept>
-#include <string_view>
 
 #include "hal/base/unique_fd.hpp"
+#include "tests/unit/v4l2/ioctl_argument.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {
@@ -39,16 +39,6 @@ constexpr const char* kDevices =
     "A: idVendor=1d6b\\n\n";
 
 constexpr std::uint32_t kMaxBuffers = 8;
-
-template <typename T>
-T& as(std::vector<std::uint8_t>& argument) {
-  return *reinterpret_cast<T*>(argument.data());
-}
-
-template <std::size_t Size>
-void put_text(__u8 (&field)[Size], std::string_view text) {
-  text.copy(reinterpret_cast<char*>(field), Size - 1);
-}
 
 }  // namespace
 

@@ -6,20 +6,11 @@
 #include <cerrno>
 #include <filesystem>
 #include <stdexcept>
-#include <string_view>
+
+#include "tests/unit/v4l2/ioctl_argument.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {
-
-template <typename T>
-T& as(std::vector<std::uint8_t>& argument) {
-  return *reinterpret_cast<T*>(argument.data());
-}
-
-template <std::size_t Size>
-void put_text(__u8 (&field)[Size], std::string_view text) {
-  text.copy(reinterpret_cast<char*>(field), Size - 1);
-}
 
 std::string node_name(int number) { return fmt::format("/dev/video{}", number); }
 
