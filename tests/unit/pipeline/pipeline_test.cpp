@@ -20,6 +20,11 @@ TEST_F(PipelineTest, ServesDepthAfterItsSequence) {
   EXPECT_FALSE(frame->contact.touching);
   // CLOCK_REALTIME of the same moment: within a second of now.
   EXPECT_LT(std::abs(base::system_clock().wall_ns() - frame->wall_ns), 1'000'000'000);
+  // A frame is published before what it changed is told.
+  ASSERT_TRUE(until([&] {
+    const auto told = all<StateChanged>();
+    return !told.empty() && told.back().state == State::serving && told.back().health.empty();
+  }));
   const auto references = all<ReferenceTaken>();
   ASSERT_EQ(references.size(), 1U);
   EXPECT_FALSE(references[0].restored);
@@ -27,8 +32,6 @@ TEST_F(PipelineTest, ServesDepthAfterItsSequence) {
   ASSERT_GE(states.size(), 3U);
   EXPECT_EQ(states.front().state, State::settling);
   EXPECT_TRUE(states.front().health.has(Health::starting));
-  EXPECT_EQ(states.back().state, State::serving);
-  EXPECT_TRUE(states.back().health.empty());
 }
 
 TEST_F(PipelineTest, MeasuresAPressAndTellsContact) {
@@ -112,7 +115,8 @@ TEST_F(PipelineTest, KeepsTheReferenceForATouchedStart) {
   EXPECT_TRUE(all<ReferenceTaken>()[0].restored);
   camera.press(0);
   ASSERT_TRUE(until_fresh());
-  EXPECT_FALSE(all<ReferenceTaken>().back().restored);
+  ASSERT_TRUE(until([&] { return all<ReferenceTaken>().size() == 2; }));
+  EXPECT_FALSE(all<ReferenceTaken>()[1].restored);
 }
 
 TEST_F(PipelineTest, TouchedFirstStartScalesTheCalibrations) {
@@ -208,7 +212,7 @@ TEST_F(PipelineTest, ARingThatComesLaterBeginsTheReferenceAnew) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_frame(
       [](const DepthFrame& f) { return f.has_depth && f.health.has(Health::ring_trouble); }));
-  EXPECT_EQ(all<ReferenceTaken>().size(), 1U);
+  ASSERT_TRUE(until([&] { return all<ReferenceTaken>().size() == 1; }));
   ring.away = false;
   ASSERT_TRUE(until_fresh());
   ASSERT_TRUE(until([&] { return all<ReferenceTaken>().size() == 2; }));
