@@ -2,7 +2,7 @@
 """tidy.py BUILD: clang-tidy over every source file of ours that BUILD compiles.
 
 BUILD is up to date. A file that passed is not looked at again until something that it is made of
-changes: its own text, every header's, the compiler's command line, .clang-tidy or the tool's version.
+changes: its own text, every header's, the compiler's command line, the rules or the tool's version.
 What passed is kept by a digest of all that in $TIDY_CACHE (default ~/.cache/dtactd-tidy).
 
 Prints what clang-tidy says of each file that does not pass; status 1 when there is one.
@@ -55,14 +55,16 @@ def main():
     cache = pathlib.Path(os.environ.get("TIDY_CACHE") or pathlib.Path.home() / ".cache/dtactd-tidy")
     cache.mkdir(parents=True, exist_ok=True)
     version = subprocess.run([TOOL, "--version"], check=True, capture_output=True, text=True).stdout
-    common = version + pathlib.Path(".clang-tidy").read_text()
+    rules = pathlib.Path(".clang-tidy").read_text()
+    rules_of_tests = rules + pathlib.Path("tests/.clang-tidy").read_text()
     entries = json.loads(pathlib.Path(build, "compile_commands.json").read_text())
     source = os.getcwd() + "/"
     ours = [e for e in entries if e["file"].startswith(source) and OURS.match(e["file"][len(source) - 1 :])]
     read = headers(build)
 
     def check(entry):
-        passed = cache / key(entry, read, common)
+        in_tests = entry["file"].startswith(source + "tests/")
+        passed = cache / key(entry, read, version + (rules_of_tests if in_tests else rules))
         if passed.exists():
             return "known"
         told = subprocess.run([TOOL, "-quiet", "-p", build, entry["file"]], capture_output=True, text=True)

@@ -40,7 +40,8 @@ void rectify_mean_difference_row(const std::uint8_t* luma, std::ptrdiff_t stride
   for (int x = 0; x < width; ++x) {
     std::int32_t q14 = 0;
     for (int k = 0; k < decimation; ++k) {
-      const RectifyTable::Entry* const fine = entries + k * fine_width + x * decimation;
+      const RectifyTable::Entry* const fine =
+          entries + k * fine_width + std::ptrdiff_t{x} * decimation;
       for (int i = 0; i < decimation; ++i) {
         q14 += bilinear(luma + fine[i].y * stride + fine[i].x, stride, fine[i]);
       }
@@ -154,8 +155,8 @@ void sum_row(const std::int16_t* row_um, int y, int x0, int x1, DepthSums& sums)
     if (um > sums.rules.made_um) {
       ++sums.made;
       sums.um += um;
-      sums.um_x += um * x;
-      sums.um_y += um * y;
+      sums.um_x += std::int64_t{um} * x;
+      sums.um_y += std::int64_t{um} * y;
     }
     const bool earlier = y < sums.deepest_y || (y == sums.deepest_y && x < sums.deepest_x);
     if (um > sums.deepest_um || (um == sums.deepest_um && earlier)) {
