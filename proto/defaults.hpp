@@ -7,7 +7,7 @@ namespace dtact::wire {
 /// The version this tree speaks. The daemon refuses another major version; a minor version only
 /// adds fields.
 inline constexpr std::uint32_t kMajor = 1;
-inline constexpr std::uint32_t kMinor = 0;
+inline constexpr std::uint32_t kMinor = 1;
 
 /// The daemon's TCP port unless configured. From the range 7366–7390, which IANA's service name
 /// and port number registry leaves unassigned.
@@ -18,6 +18,9 @@ inline constexpr const char* kDefaultAddress = "127.0.0.1";
 
 /// Longest program name in Hello, bytes.
 inline constexpr std::size_t kMaxProgramName = 64;
+
+/// Longest token in Hello, bytes.
+inline constexpr std::size_t kMaxToken = 256;
 
 /// Longest calibration name in UploadCalibration, bytes.
 inline constexpr std::size_t kMaxCalibrationName = 64;
