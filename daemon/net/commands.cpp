@@ -97,6 +97,10 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
       return list_calibrations(who);
     case v1::ClientMessage::kActivateCalibration:
       return activate_calibration(who, message.activate_calibration());
+    case v1::ClientMessage::kGetReference:
+    case v1::ClientMessage::kPing:
+      return session->reply_error(who.second, v1::ERROR_UNSUPPORTED,
+                                  "this daemon does not know that request: update dtactd");
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::REQUEST_NOT_SET:
       return;  // The session's business.
