@@ -191,7 +191,7 @@ void Commands::get_status(const Who& who) {
   for (const auto& session : hub_.sessions()) {
     if (!session->greeted()) continue;
     auto& client = *status.add_clients();
-    client.set_address(session->address());
+    client.set_address(session->peer().address);
     client.set_program(session->program());
     client.set_sent(session->sent());
     client.set_dropped(session->dropped());

@@ -84,11 +84,18 @@ tcp::acceptor listen(asio::io_context& io, const tcp::endpoint& endpoint, const 
   return acceptor;
 }
 
+std::string describe(const tcp::endpoint& endpoint) {
+  const std::string address = endpoint.address().to_string();
+  return fmt::format(fmt::runtime(endpoint.address().is_v6() ? "[{}]:{}" : "{}:{}"), address,
+                     endpoint.port());
+}
+
 }  // namespace
 
 Listener::Listener(asio::io_context& io, const NetConfig& config, OnConnection on_connection)
     : config_(config),
       acceptor_(listen(io, endpoint_of(config), config.log)),
+      endpoint_(describe(acceptor_.local_endpoint())),
       timer_(io),
       on_connection_(std::move(on_connection)) {}
 
@@ -107,7 +114,9 @@ void Listener::accept() {
       return self->retry_later(error.message());
     }
     self->told_ = false;
-    if (!error) self->on_connection_(std::move(socket));
+    if (!error) {
+      self->on_connection_(over_tcp(std::move(socket), self->endpoint_, self->config_.dead_after));
+    }
     self->accept();
   });
 }

@@ -17,8 +17,8 @@ struct Server::Impl {
         hub(std::make_shared<Hub>(io, config, port)),
         commands(std::make_shared<Commands>(io, worker, config, *hub, port, store)),
         listener(
-            std::make_shared<Listener>(io, config, [this](boost::asio::ip::tcp::socket socket) {
-              hub->admit(std::make_shared<Session>(std::move(socket), config, hub));
+            std::make_shared<Listener>(io, config, [this](std::unique_ptr<Transport> transport) {
+              hub->admit(std::make_shared<Session>(std::move(transport), config, hub));
             })) {}
 
   NetConfig config;

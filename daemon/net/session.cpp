@@ -1,12 +1,10 @@
 #include "daemon/net/session.hpp"
 
 #include <fmt/format.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/write.hpp>
+#include <boost/asio/error.hpp>
 #include <utility>
 
 #include "proto/dtact.pb.h"
@@ -17,10 +15,6 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-/// Bytes of a frame that the kernel may hold unsent. Beyond that a write waits, so that an answer
-/// comes after the frame being sent and not after several that lie in the socket's buffer. Large
-/// enough to keep a gigabit link busy for a millisecond, the time in which this thread runs again.
-constexpr int kNotSentLowWater = 128 * 1024;
 /// How long an ending connection may take to fetch its last answer.
 constexpr std::chrono::milliseconds kLinger{2000};
 
@@ -39,34 +33,12 @@ std::string framed(const v1::ServerMessage& message) {
 
 }  // namespace
 
-Session::Session(asio::ip::tcp::socket socket, const NetConfig& config,
+Session::Session(std::unique_ptr<Transport> transport, const NetConfig& config,
                  std::weak_ptr<SessionHost> host)
-    : socket_(std::move(socket)),
-      timer_(socket_.get_executor()),
+    : transport_(std::move(transport)),
+      timer_(transport_->executor()),
       config_(config),
-      host_(std::move(host)) {
-  prepare_socket();
-}
-
-void Session::prepare_socket() {
-  error_code error;
-  const auto peer = socket_.remote_endpoint(error);
-  // A client may be gone before its connection was accepted; reading will say so.
-  address_ = error ? "unknown" : fmt::format("{}:{}", peer.address().to_string(), peer.port());
-  const auto set = [this](int level, int option, int value) {
-    // Each is an improvement and none a condition: without it the connection is only slower to
-    // answer or to be found dead.
-    (void)::setsockopt(socket_.native_handle(), level, option, &value, sizeof value);
-  };
-  set(IPPROTO_TCP, TCP_NODELAY, 1);
-  set(IPPROTO_TCP, TCP_NOTSENT_LOWAT, kNotSentLowWater);
-  set(IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(config_.dead_after.count()));
-  // An idle client has nothing unacknowledged: probe it, so that a vanished one is let go.
-  set(SOL_SOCKET, SO_KEEPALIVE, 1);
-  set(IPPROTO_TCP, TCP_KEEPIDLE, 15);
-  set(IPPROTO_TCP, TCP_KEEPINTVL, 5);
-  set(IPPROTO_TCP, TCP_KEEPCNT, 3);
-}
+      host_(std::move(host)) {}
 
 void Session::start() {
   arm_timer(config_.hello_timeout, "no Hello came");
@@ -86,14 +58,14 @@ void Session::arm_timer(std::chrono::milliseconds after, const char* reason) {
 }
 
 void Session::read() {
-  socket_.async_read_some(asio::buffer(input_),
-                          [self = shared_from_this()](const error_code& error, std::size_t size) {
-                            if (self->state_ == State::closed) return;
-                            if (error == asio::error::eof) return self->close("the client left");
-                            if (error) return self->close(error.message());
-                            self->take({self->input_.data(), size});
-                            if (self->state_ != State::closed) self->read();
-                          });
+  transport_->read_some(asio::buffer(input_),
+                        [self = shared_from_this()](const error_code& error, std::size_t size) {
+                          if (self->state_ == State::closed) return;
+                          if (error == asio::error::eof) return self->close("the client left");
+                          if (error) return self->close(error.message());
+                          self->take({self->input_.data(), size});
+                          if (self->state_ != State::closed) self->read();
+                        });
 }
 
 void Session::take(std::string_view input) {
@@ -156,7 +128,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   timer_.cancel();
   state_ = State::greeted;
   program_ = printable(hello.program());
-  config_.log(LogLevel::info, fmt::format("client {} ({}) connected", address_, program_));
+  config_.log(LogLevel::info, fmt::format("client {} ({}) connected", peer().address, program_));
   v1::ServerMessage message;
   message.mutable_reply()->set_id(id);
   auto& reply = *message.mutable_reply()->mutable_hello();
@@ -182,7 +154,7 @@ void Session::reply_error(std::uint64_t id, int error_code_, const std::string& 
 }
 
 void Session::end_with(std::uint64_t id, int error_code_, const std::string& sentence) {
-  config_.log(LogLevel::warning, fmt::format("client {}: {}", address_, sentence));
+  config_.log(LogLevel::warning, fmt::format("client {}: {}", peer().address, sentence));
   reply_error(id, error_code_, sentence);
   if (state_ == State::closed) return;
   // Closing at once, with bytes unread, would reset the connection and take the answer with it: so
@@ -231,15 +203,12 @@ void Session::send_frame(std::shared_ptr<const EncodedFrame> frame) {
 void Session::write_next() {
   if (!control_.empty()) return write_control();
   if (waiting_ != nullptr) return write_frame();
-  if (state_ == State::ending) {
-    error_code ignored;
-    socket_.shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
-  }
+  if (state_ == State::ending) transport_->shutdown_send();
 }
 
 void Session::write_control() {
   writing_ = true;
-  asio::async_write(socket_, asio::buffer(control_.front()),
+  transport_->write({asio::buffer(control_.front())},
                     [self = shared_from_this()](const error_code& error, std::size_t) {
                       if (self->state_ == State::closed) return;
                       self->control_bytes_ -= self->control_.front().size();
@@ -252,16 +221,15 @@ void Session::write_frame() {
   writing_ = true;
   sending_ = std::move(waiting_);
   envelope_ = FrameEnvelope(sending_->body.size(), dropped_);
-  const std::array<asio::const_buffer, 3> parts = {
-      asio::buffer(envelope_.head.data(), envelope_.head_size), asio::buffer(sending_->body),
-      asio::buffer(envelope_.tail.data(), envelope_.tail_size)};
-  asio::async_write(socket_, parts,
-                    [self = shared_from_this()](const error_code& error, std::size_t) {
-                      if (self->state_ == State::closed) return;
-                      self->sending_.reset();
-                      if (!error) ++self->sent_;
-                      self->on_written(error);
-                    });
+  transport_->write(
+      {asio::buffer(envelope_.head.data(), envelope_.head_size), asio::buffer(sending_->body),
+       asio::buffer(envelope_.tail.data(), envelope_.tail_size)},
+      [self = shared_from_this()](const error_code& error, std::size_t) {
+        if (self->state_ == State::closed) return;
+        self->sending_.reset();
+        if (!error) ++self->sent_;
+        self->on_written(error);
+      });
 }
 
 void Session::on_written(const error_code& error) {
@@ -274,14 +242,13 @@ void Session::close(const std::string& reason, LogLevel level) {
   if (state_ == State::closed) return;
   const bool known = state_ == State::greeted;
   state_ = State::closed;
-  error_code ignored;
-  socket_.close(ignored);
+  transport_->close();
   timer_.cancel();
   control_.clear();
   waiting_.reset();
   if (known || level != LogLevel::info) {
     config_.log(level, fmt::format("client {} ({}) disconnected: {}; {} frames sent, {} dropped",
-                                   address_, program_, reason, sent_, dropped_));
+                                   peer().address, program_, reason, sent_, dropped_));
   }
   if (const auto host = host_.lock()) host->on_closed(*this);
 }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <cstdint>
 #include <deque>
@@ -10,6 +9,7 @@
 
 #include "daemon/net/frame_encoder.hpp"
 #include "daemon/net/net_config.hpp"
+#include "daemon/net/transport.hpp"
 #include "proto/framing.hpp"
 
 namespace dtact::v1 {
@@ -56,7 +56,7 @@ class Session : public std::enable_shared_from_this<Session> {
   static constexpr std::size_t kMaxBacklogMessages = 1024;
   static constexpr std::size_t kMaxBacklogBytes = std::size_t{4} << 20U;
 
-  Session(boost::asio::ip::tcp::socket socket, const NetConfig& config,
+  Session(std::unique_ptr<Transport> transport, const NetConfig& config,
           std::weak_ptr<SessionHost> host);
 
   /// Waits for Hello.
@@ -78,7 +78,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   [[nodiscard]] const Subscription& subscription() const noexcept { return subscription_; }
   [[nodiscard]] bool greeted() const noexcept { return state_ == State::greeted; }
-  [[nodiscard]] const std::string& address() const noexcept { return address_; }
+  [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
   [[nodiscard]] const std::string& program() const noexcept { return program_; }
   [[nodiscard]] std::uint64_t sent() const noexcept { return sent_; }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
@@ -91,7 +91,6 @@ class Session : public std::enable_shared_from_this<Session> {
     closed
   };
 
-  void prepare_socket();
   void arm_timer(std::chrono::milliseconds after, const char* reason);
   void read();
   void take(std::string_view input);
@@ -104,11 +103,10 @@ class Session : public std::enable_shared_from_this<Session> {
   void write_frame();
   void on_written(const boost::system::error_code& error);
 
-  boost::asio::ip::tcp::socket socket_;
+  std::unique_ptr<Transport> transport_;
   boost::asio::steady_timer timer_;
   const NetConfig& config_;
   std::weak_ptr<SessionHost> host_;
-  std::string address_;
   std::string program_;
   State state_ = State::fresh;
   Subscription subscription_;

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/system/error_code.hpp>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+
+namespace dtact::net {
+
+/// Who is at the other end, and by which way it came.
+struct Peer {
+  std::string address;   ///< For logs and status: "192.168.1.7:40312".
+  std::string endpoint;  ///< The Endpoint.address it came by.
+};
+
+/// One connection, whatever it runs over: what a Session reads from and writes to. All calls and
+/// handlers are on the network thread; at most one read and one write at a time. It must outlive
+/// its handlers: each is called once, with an error after close().
+class Transport {
+ public:
+  using Done = std::function<void(const boost::system::error_code&, std::size_t)>;
+  /// Written one after the other; those that are not needed are empty.
+  using Parts = std::array<boost::asio::const_buffer, 3>;
+
+  explicit Transport(Peer peer) : peer_(std::move(peer)) {}
+  Transport(const Transport&) = delete;
+  Transport& operator=(const Transport&) = delete;
+  virtual ~Transport() = default;
+
+  /// At least one byte, or an error; asio::error::eof when the peer sends nothing more.
+  virtual void read_some(boost::asio::mutable_buffer into, Done done) = 0;
+  /// All of the parts, or an error. What they point to must stay until then.
+  virtual void write(const Parts& parts, Done done) = 0;
+  /// Nothing more is sent; the peer sees the end after what was written.
+  virtual void shutdown_send() = 0;
+  virtual void close() = 0;
+  [[nodiscard]] virtual boost::asio::any_io_executor executor() = 0;
+
+  [[nodiscard]] const Peer& peer() const noexcept { return peer_; }
+
+ private:
+  Peer peer_;
+};
+
+/// Plain TCP, with the socket's options set: answers at once, frames that do not queue up in the
+/// kernel, and a peer found dead after `dead_after`.
+[[nodiscard]] std::unique_ptr<Transport> over_tcp(boost::asio::ip::tcp::socket socket,
+                                                  std::string endpoint,
+                                                  std::chrono::milliseconds dead_after);
+
+}  // namespace dtact::net
