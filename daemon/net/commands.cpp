@@ -193,8 +193,8 @@ void Commands::get_status(const Who& who) {
     auto& client = *status.add_clients();
     client.set_address(session->peer().address);
     client.set_program(session->program());
-    client.set_sent(session->sent());
-    client.set_dropped(session->dropped());
+    client.set_sent(session->outbox().sent());
+    client.set_dropped(session->outbox().dropped());
   }
   status.set_version(config_.version);
   const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - start_;

@@ -24,18 +24,12 @@ std::string printable(std::string text) {
   return text;
 }
 
-std::string framed(const v1::ServerMessage& message) {
-  const auto length = wire::encode_length(message.ByteSizeLong());
-  std::string bytes(reinterpret_cast<const char*>(length.data()), length.size());
-  message.AppendToString(&bytes);
-  return bytes;
-}
-
 }  // namespace
 
 Session::Session(std::unique_ptr<Transport> transport, const NetConfig& config,
                  std::weak_ptr<SessionHost> host)
     : transport_(std::move(transport)),
+      outbox_(*transport_, *this),
       timer_(transport_->executor()),
       config_(config),
       host_(std::move(host)) {}
@@ -160,27 +154,21 @@ void Session::end_with(std::uint64_t id, int error_code_, const std::string& sen
   // Closing at once, with bytes unread, would reset the connection and take the answer with it: so
   // the sending side ends first, and what still comes is read and thrown away for a while.
   state_ = State::ending;
-  waiting_.reset();
   arm_timer(kLinger, "ended");
-  if (!writing_) write_next();
+  outbox_.finish();
 }
 
 void Session::send(const v1::ServerMessage& message) {
   if (state_ == State::closed || state_ == State::ending) return;
-  if (control_.size() >= kMaxBacklogMessages || control_bytes_ > kMaxBacklogBytes) {
-    return close(
-        fmt::format("{} answers and events ({} bytes) lay unread", control_.size(), control_bytes_),
-        LogLevel::warning);
+  if (!outbox_.push(message)) {
+    close(fmt::format("{} lay unread", outbox_.backlog()), LogLevel::warning);
   }
-  control_.push_back(framed(message));
-  control_bytes_ += control_.back().size();
-  if (!writing_) write_next();
 }
 
 void Session::subscribe(const Subscription& subscription) noexcept {
   subscription_ = subscription;
   offered_ = 0;
-  if (!subscription_.active) waiting_.reset();
+  if (!subscription_.active) outbox_.drop_frame();
 }
 
 bool Session::is_due(std::uint64_t missed) noexcept {
@@ -189,53 +177,12 @@ bool Session::is_due(std::uint64_t missed) noexcept {
   const auto due = [this] { return (offered_ + subscription_.every - 1) / subscription_.every; };
   const std::uint64_t before = due();
   offered_ += missed;
-  dropped_ += due() - before;
+  outbox_.count_dropped(due() - before);
   return offered_++ % subscription_.every == 0;
 }
 
 void Session::send_frame(std::shared_ptr<const EncodedFrame> frame) {
-  if (state_ != State::greeted) return;
-  if (waiting_ != nullptr) ++dropped_;
-  waiting_ = std::move(frame);
-  if (!writing_) write_next();
-}
-
-void Session::write_next() {
-  if (!control_.empty()) return write_control();
-  if (waiting_ != nullptr) return write_frame();
-  if (state_ == State::ending) transport_->shutdown_send();
-}
-
-void Session::write_control() {
-  writing_ = true;
-  transport_->write({asio::buffer(control_.front())},
-                    [self = shared_from_this()](const error_code& error, std::size_t) {
-                      if (self->state_ == State::closed) return;
-                      self->control_bytes_ -= self->control_.front().size();
-                      self->control_.pop_front();
-                      self->on_written(error);
-                    });
-}
-
-void Session::write_frame() {
-  writing_ = true;
-  sending_ = std::move(waiting_);
-  envelope_ = FrameEnvelope(sending_->body.size(), dropped_);
-  transport_->write(
-      {asio::buffer(envelope_.head.data(), envelope_.head_size), asio::buffer(sending_->body),
-       asio::buffer(envelope_.tail.data(), envelope_.tail_size)},
-      [self = shared_from_this()](const error_code& error, std::size_t) {
-        if (self->state_ == State::closed) return;
-        self->sending_.reset();
-        if (!error) ++self->sent_;
-        self->on_written(error);
-      });
-}
-
-void Session::on_written(const error_code& error) {
-  writing_ = false;
-  if (error) return close(error.message());
-  write_next();
+  if (state_ == State::greeted) outbox_.push(std::move(frame));
 }
 
 void Session::close(const std::string& reason, LogLevel level) {
@@ -244,11 +191,11 @@ void Session::close(const std::string& reason, LogLevel level) {
   state_ = State::closed;
   transport_->close();
   timer_.cancel();
-  control_.clear();
-  waiting_.reset();
+  outbox_.close();
   if (known || level != LogLevel::info) {
-    config_.log(level, fmt::format("client {} ({}) disconnected: {}; {} frames sent, {} dropped",
-                                   peer().address, program_, reason, sent_, dropped_));
+    config_.log(level,
+                fmt::format("client {} ({}) disconnected: {}; {} frames sent, {} dropped",
+                            peer().address, program_, reason, outbox_.sent(), outbox_.dropped()));
   }
   if (const auto host = host_.lock()) host->on_closed(*this);
 }

@@ -3,12 +3,12 @@
 #include <array>
 #include <boost/asio/steady_timer.hpp>
 #include <cstdint>
-#include <deque>
 #include <memory>
 #include <string>
 
 #include "daemon/net/frame_encoder.hpp"
 #include "daemon/net/net_config.hpp"
+#include "daemon/net/outbox.hpp"
 #include "daemon/net/transport.hpp"
 #include "proto/framing.hpp"
 
@@ -46,16 +46,10 @@ struct Subscription {
   std::uint32_t every = 1;  ///< Every n-th frame.
 };
 
-/// One client: handshake, requests in, answers, events and frames out. All on the network thread.
-///
-/// Overflow. Frames: one being sent and one waiting; a newer one takes the waiting one's place and
-/// the drop is counted. Answers and events: never dropped, sent before the waiting frame; a client
-/// that leaves more than kMaxBacklogMessages or kMaxBacklogBytes of them unread is disconnected.
-class Session : public std::enable_shared_from_this<Session> {
+/// One client: handshake and requests in; answers, events and frames out through its outbox. A
+/// client whose outbox takes no more is disconnected. All on the network thread.
+class Session : public std::enable_shared_from_this<Session>, private Outbox::Owner {
  public:
-  static constexpr std::size_t kMaxBacklogMessages = 1024;
-  static constexpr std::size_t kMaxBacklogBytes = std::size_t{4} << 20U;
-
   Session(std::unique_ptr<Transport> transport, const NetConfig& config,
           std::weak_ptr<SessionHost> host);
 
@@ -80,8 +74,7 @@ class Session : public std::enable_shared_from_this<Session> {
   [[nodiscard]] bool greeted() const noexcept { return state_ == State::greeted; }
   [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
   [[nodiscard]] const std::string& program() const noexcept { return program_; }
-  [[nodiscard]] std::uint64_t sent() const noexcept { return sent_; }
-  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
+  [[nodiscard]] const Outbox& outbox() const noexcept { return outbox_; }
 
  private:
   enum class State : std::uint8_t {
@@ -98,12 +91,11 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_hello(std::uint64_t id, const v1::Hello& hello);
   /// Sends an error as the last answer and ends.
   void end_with(std::uint64_t id, int error_code, const std::string& sentence);
-  void write_next();
-  void write_control();
-  void write_frame();
-  void on_written(const boost::system::error_code& error);
+  std::shared_ptr<void> hold() override { return shared_from_this(); }
+  void on_write_failed(const std::string& reason) override { close(reason); }
 
   std::unique_ptr<Transport> transport_;
+  Outbox outbox_;
   boost::asio::steady_timer timer_;
   const NetConfig& config_;
   std::weak_ptr<SessionHost> host_;
@@ -114,15 +106,6 @@ class Session : public std::enable_shared_from_this<Session> {
 
   std::array<char, 16384> input_{};
   wire::MessageDecoder decoder_;
-
-  std::deque<std::string> control_;  ///< Answers and events with their lengths.
-  std::size_t control_bytes_ = 0;
-  std::shared_ptr<const EncodedFrame> waiting_;  ///< The frame that goes next.
-  std::shared_ptr<const EncodedFrame> sending_;  ///< The frame that is being sent.
-  FrameEnvelope envelope_{0, 0};                 ///< Of `sending_`.
-  bool writing_ = false;
-  std::uint64_t sent_ = 0;     ///< Frames.
-  std::uint64_t dropped_ = 0;  ///< Frames.
 };
 
 }  // namespace dtact::net

@@ -1,0 +1,89 @@
+#include "daemon/net/outbox.hpp"
+
+#include <fmt/format.h>
+
+#include <boost/asio/buffer.hpp>
+#include <utility>
+
+#include "proto/dtact.pb.h"
+#include "proto/framing.hpp"
+
+namespace dtact::net {
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+std::string framed(const v1::ServerMessage& message) {
+  const auto length = wire::encode_length(message.ByteSizeLong());
+  std::string bytes(reinterpret_cast<const char*>(length.data()), length.size());
+  message.AppendToString(&bytes);
+  return bytes;
+}
+
+}  // namespace
+
+bool Outbox::push(const v1::ServerMessage& message) {
+  if (control_.size() >= kMaxMessages || control_bytes_ > kMaxBytes) return false;
+  control_.push_back(framed(message));
+  control_bytes_ += control_.back().size();
+  if (!writing_) write_next();
+  return true;
+}
+
+void Outbox::push(std::shared_ptr<const EncodedFrame> frame) {
+  if (frame_ != nullptr) ++dropped_;
+  frame_ = std::move(frame);
+  if (!writing_) write_next();
+}
+
+void Outbox::finish() {
+  finishing_ = true;
+  frame_.reset();
+  if (!writing_) write_next();
+}
+
+std::string Outbox::backlog() const {
+  return fmt::format("{} answers and events ({} bytes)", control_.size(), control_bytes_);
+}
+
+void Outbox::write_next() {
+  if (!control_.empty()) return write_control();
+  if (frame_ != nullptr) return write_frame();
+  if (finishing_) transport_.shutdown_send();
+}
+
+void Outbox::write_control() {
+  writing_ = true;
+  transport_.write({asio::buffer(control_.front())},
+                   [this, held = owner_.hold()](const error_code& error, std::size_t size) {
+                     if (closed_) return;
+                     control_bytes_ -= control_.front().size();
+                     control_.pop_front();
+                     on_written(error, size);
+                   });
+}
+
+void Outbox::write_frame() {
+  writing_ = true;
+  sending_ = std::move(frame_);
+  envelope_ = FrameEnvelope(sending_->body.size(), dropped_);
+  transport_.write(
+      {asio::buffer(envelope_.head.data(), envelope_.head_size), asio::buffer(sending_->body),
+       asio::buffer(envelope_.tail.data(), envelope_.tail_size)},
+      [this, held = owner_.hold()](const error_code& error, std::size_t size) {
+        sending_.reset();
+        if (closed_) return;
+        if (!error) ++sent_;
+        on_written(error, size);
+      });
+}
+
+void Outbox::on_written(const error_code& error, std::size_t size) {
+  writing_ = false;
+  if (error) return owner_.on_write_failed(error.message());
+  sent_bytes_ += size;
+  write_next();
+}
+
+}  // namespace dtact::net

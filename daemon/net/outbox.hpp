@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+
+#include "daemon/net/frame_encoder.hpp"
+#include "daemon/net/transport.hpp"
+
+namespace dtact::v1 {
+class ServerMessage;
+}
+
+namespace dtact::net {
+
+/// What one client is sent, and in which order. On the network thread.
+///
+/// Overflow. Frames: one being sent and one waiting; a newer one takes the waiting one's place and
+/// the drop is counted. Answers and events: never dropped, sent before the waiting frame; when more
+/// than kMaxMessages or kMaxBytes of them lie unread, no more are taken.
+class Outbox {
+ public:
+  static constexpr std::size_t kMaxMessages = 1024;
+  static constexpr std::size_t kMaxBytes = std::size_t{4} << 20U;
+
+  /// Whose outbox it is.
+  class Owner {
+   public:
+    Owner() = default;
+    Owner(const Owner&) = delete;
+    Owner& operator=(const Owner&) = delete;
+    virtual ~Owner() = default;
+
+    /// Keeps the outbox and its transport alive while a write is under way.
+    virtual std::shared_ptr<void> hold() = 0;
+    /// A write failed; nothing more can be sent.
+    virtual void on_write_failed(const std::string& reason) = 0;
+  };
+
+  Outbox(Transport& transport, Owner& owner) : transport_(transport), owner_(owner) {}
+
+  /// An answer or event. False when too much lies unread: backlog() says how much.
+  [[nodiscard]] bool push(const v1::ServerMessage& message);
+  void push(std::shared_ptr<const EncodedFrame> frame);
+  /// The waiting frame is not wanted any more.
+  void drop_frame() noexcept { frame_.reset(); }
+  /// Sends what is queued, then ends the sending side. Nothing may be pushed after it.
+  void finish();
+  /// The transport is closed: nothing more is sent, and on_write_failed() is not called any more.
+  /// What is being written stays until the transport lets go of it.
+  void close() noexcept { closed_ = true; }
+
+  /// Frames that this client was due and that were gone before they came here.
+  void count_dropped(std::uint64_t frames) noexcept { dropped_ += frames; }
+  [[nodiscard]] std::uint64_t sent() const noexcept { return sent_; }        ///< Frames.
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }  ///< Frames.
+  /// Of all messages with their lengths, whole ones only.
+  [[nodiscard]] std::uint64_t sent_bytes() const noexcept { return sent_bytes_; }
+  /// Of answers and events that are not sent.
+  [[nodiscard]] std::size_t waiting_bytes() const noexcept { return control_bytes_; }
+  /// "3 answers and events (1200 bytes)".
+  [[nodiscard]] std::string backlog() const;
+
+ private:
+  void write_next();
+  void write_control();
+  void write_frame();
+  void on_written(const boost::system::error_code& error, std::size_t size);
+
+  Transport& transport_;
+  Owner& owner_;
+  std::deque<std::string> control_;  ///< Answers and events with their lengths.
+  std::size_t control_bytes_ = 0;
+  std::shared_ptr<const EncodedFrame> frame_;    ///< The frame that goes next.
+  std::shared_ptr<const EncodedFrame> sending_;  ///< The frame that is being sent.
+  FrameEnvelope envelope_{0, 0};                 ///< Of `sending_`.
+  bool writing_ = false;
+  bool finishing_ = false;
+  bool closed_ = false;
+  std::uint64_t sent_ = 0;
+  std::uint64_t dropped_ = 0;
+  std::uint64_t sent_bytes_ = 0;
+};
+
+}  // namespace dtact::net
