@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 
 namespace dtact::hal {
@@ -77,8 +78,9 @@ class FrameOwner {
 class Frame {
  public:
   Frame() = default;
-  Frame(FrameOwner& owner, int index, LumaView luma, FrameInfo info) noexcept
-      : owner_(&owner), index_(index), luma_(luma), info_(info) {}
+  Frame(FrameOwner& owner, int index, LumaView luma, FrameInfo info,
+        std::span<const std::uint8_t> jpeg = {}) noexcept
+      : owner_(&owner), index_(index), luma_(luma), jpeg_(jpeg), info_(info) {}
   Frame(Frame&& other) noexcept { swap(other); }
   Frame& operator=(Frame&& other) noexcept {
     Frame taken(std::move(other));
@@ -92,9 +94,13 @@ class Frame {
   void reset() noexcept {
     if (owner_ != nullptr) std::exchange(owner_, nullptr)->give_back(index_);
     luma_ = {};
+    jpeg_ = {};
   }
   [[nodiscard]] explicit operator bool() const noexcept { return owner_ != nullptr; }
   [[nodiscard]] const LumaView& luma() const noexcept { return luma_; }
+  /// The whole JPEG that the luma was decoded from, as the camera sent it; it may end with padding.
+  /// Empty when the camera sends something else. Valid until the next grab(), too.
+  [[nodiscard]] std::span<const std::uint8_t> jpeg() const noexcept { return jpeg_; }
   [[nodiscard]] const FrameInfo& info() const noexcept { return info_; }
 
  private:
@@ -102,12 +108,14 @@ class Frame {
     std::swap(owner_, other.owner_);
     std::swap(index_, other.index_);
     std::swap(luma_, other.luma_);
+    std::swap(jpeg_, other.jpeg_);
     std::swap(info_, other.info_);
   }
 
   FrameOwner* owner_ = nullptr;
   int index_ = -1;
   LumaView luma_;
+  std::span<const std::uint8_t> jpeg_;
   FrameInfo info_;
 };
 

@@ -79,13 +79,15 @@ class LiveCamera : public Camera, private FrameOwner {
   // The capture thread's own.
   std::array<luma::LumaBuffer, 2> pool_;  // one with the caller, one to decode into
   std::array<std::atomic<bool>, 2> lent_{};
-  /// A payload lent as it is. Two sources may have lent buffers of the same index at a time: one
+  /// A payload that is lent. Two sources may have lent buffers of the same index at a time: one
   /// before and one after the camera was away.
   struct Loan {
     std::shared_ptr<Source> lender;
     int index = -1;  // of the lender's buffer
   };
+  void end_loan(Loan& loan) noexcept;
   std::array<Loan, 2> loans_;  // one with the caller, one to deliver; without lender: free
+  std::array<Loan, 2> jpegs_;  // what the pool's buffers were decoded from
   std::optional<Area> area_;   // what will be read; none: the whole image
   std::int64_t next_try_ns_ = 0;
   std::int64_t last_buffer_ns_ = 0;  // the last sign of life, damaged or not

@@ -94,7 +94,10 @@ PayloadStatus LiveCamera::deliver(const Filled& filled, std::uint64_t sequence, 
   frame.decode_ns = base::system_clock().monotonic_ns() - begin;
   frame.flags = take_flags();
   lent_[static_cast<std::size_t>(index)].store(true, std::memory_order_relaxed);
-  out = Frame(*this, index, buffer.view(), frame);
+  kept = format.encoding == Encoding::jpeg;
+  if (kept) jpegs_[static_cast<std::size_t>(index)] = {connection_->source, filled.index};
+  out = Frame(*this, index, buffer.view(), frame,
+              kept ? filled.payload : std::span<const std::uint8_t>{});
   note_delivery();
   return status;
 }
@@ -115,14 +118,20 @@ void LiveCamera::note_delivery() noexcept {
 }
 
 void LiveCamera::give_back(int index) noexcept {
-  if (index < kLentPayload) {
-    lent_[static_cast<std::size_t>(index)].store(false, std::memory_order_release);
-    return;
+  if (index >= kLentPayload) {
+    return end_loan(loans_[static_cast<std::size_t>(index - kLentPayload)]);
   }
-  const Loan loan = std::exchange(loans_[static_cast<std::size_t>(index - kLentPayload)], Loan{});
+  end_loan(jpegs_[static_cast<std::size_t>(index)]);
+  lent_[static_cast<std::size_t>(index)].store(false, std::memory_order_release);
+}
+
+void LiveCamera::end_loan(Loan& taken) noexcept {
+  const Loan loan = std::exchange(taken, Loan{});
   // Of a source that has been let go, nobody waits for the buffer. An error is met by the next
   // call of dequeue().
-  if (connection_ && loan.lender == connection_->source) (void)loan.lender->enqueue(loan.index);
+  if (loan.lender && connection_ && loan.lender == connection_->source) {
+    (void)loan.lender->enqueue(loan.index);
+  }
 }
 
 void LiveCamera::count_gap(std::uint32_t counted) noexcept {

@@ -123,16 +123,15 @@ GrabStatus ReplayCamera::lend(Frame& out, FrameInfo info) noexcept {
   const std::int64_t began_ns = clock_.monotonic_ns();
   const std::string& payload = recording_.payloads[frame];
   luma::LumaBuffer& buffer = decoded_[static_cast<std::size_t>(next_buffer_)];
-  const auto status =
-      decoder_.decode({reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size()},
-                      buffer.data(), buffer.stride());
+  const std::span jpeg(reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size());
+  const auto status = decoder_.decode(jpeg, buffer.data(), buffer.stride());
   if (status != mjpeg::Status::ok) {
     ++damaged_;
     return GrabStatus::damaged;
   }
   info.decode_ns = clock_.monotonic_ns() - began_ns;
   ++delivered_;
-  out = Frame(*this, next_buffer_, buffer.view(), info);
+  out = Frame(*this, next_buffer_, buffer.view(), info, jpeg);
   next_buffer_ = 1 - next_buffer_;
   return GrabStatus::ok;
 }

@@ -129,7 +129,9 @@ GrabStatus SimCamera::Impl::hand_out(const Payload& payload, Frame& out) noexcep
   info.decode_ns = clock.monotonic_ns() - begin;
   ++delivered;
   lent[index] = true;
-  out = Frame(owner, static_cast<int>(index), buffers[index].view(), info);
+  std::span<const std::uint8_t> jpeg;
+  if (output == Output::mjpeg) jpeg = {payload.buffer.data(), payload.bytes};
+  out = Frame(owner, static_cast<int>(index), buffers[index].view(), info, jpeg);
   return GrabStatus::ok;
 }
 

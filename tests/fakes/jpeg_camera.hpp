@@ -50,7 +50,7 @@ class JpegCamera final : public hal::Camera, private hal::FrameOwner {
       return hal::GrabStatus::damaged;
     }
     frame.decode_ns = base::system_clock().monotonic_ns() - frame.ready_ns;
-    out = hal::Frame(*this, 0, buffer_.view(), frame);
+    out = hal::Frame(*this, 0, buffer_.view(), frame, payload);
     return hal::GrabStatus::ok;
   }
 
