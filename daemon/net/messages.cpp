@@ -231,14 +231,14 @@ void fill(const pipeline::StageStatistics& stage, v1::StagePercentiles& out) {
 bool fill(const pipeline::Event& event, v1::Event& out) {
   if (const auto* contact = std::get_if<pipeline::ContactChanged>(&event)) {
     auto& to = *out.mutable_contact();
-    to.set_sequence(contact->sequence);
-    to.set_monotonic_ns(contact->timestamp_ns);
+    to.set_sequence(contact->at.sequence);
+    to.set_monotonic_ns(contact->at.monotonic_ns);
     fill(contact->contact, *to.mutable_contact());
     to.mutable_contact()->set_touching(contact->touching);
   } else if (const auto* light = std::get_if<pipeline::LightChanged>(&event)) {
     fill(light->light, *out.mutable_light());
   } else if (const auto* reference = std::get_if<pipeline::ReferenceTaken>(&event)) {
-    out.mutable_reference()->set_sequence(reference->sequence);
+    out.mutable_reference()->set_sequence(reference->at.sequence);
     out.mutable_reference()->set_restored(reference->restored);
   } else if (const auto* state = std::get_if<pipeline::StateChanged>(&event)) {
     out.mutable_state()->set_state(to_wire(state->state));

@@ -18,6 +18,7 @@ struct ActiveCalibration {
   Resolutions maps;
   bool camera_mismatch = false;
   std::uint64_t generation = 0;  ///< Counts the calibrations of this run.
+  std::uint64_t key = 0;         ///< UseCalibration::key.
 };
 
 /// Throws std::invalid_argument, saying what to do, when the calibration cannot be used with frames

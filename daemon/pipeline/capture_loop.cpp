@@ -56,7 +56,7 @@ void CaptureLoop::run() noexcept {
 void CaptureLoop::step() noexcept {
   exchange_.turns.fetch_add(1, std::memory_order_relaxed);
   take_notes();
-  desk_.take(watch_.away());
+  desk_.take(watch_.away(), stamp(clock_.monotonic_ns()));
   choose_area();
   const std::int64_t asked_ns = clock_.monotonic_ns();
   const hal::GrabStatus status = camera_.grab(frame_, timeout_);
@@ -78,7 +78,7 @@ void CaptureLoop::take_notes() noexcept {
     if (note.begins) {
       timeline_.change_begins(note.light, note.at_ns);
     } else {
-      timeline_.change_ends(note.light, note.at_ns);
+      timeline_.change_ends(note.light, note.at_ns, note.failed);
     }
   }
 }
@@ -104,6 +104,9 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
     exchange_.wake.signal();
   }
   exchange_.camera_fps.store(watch_.rate().fps(), std::memory_order_relaxed);
+  exchange_.sequence.store(info.sequence, std::memory_order_relaxed);
+  exchange_.light_lag_ns.store(timeline_.delay_ns() + stamp_lag_ns(info.meaning, period_ns_),
+                               std::memory_order_relaxed);
   want_depth_ = exchange_.want_depth.load(std::memory_order_relaxed);
   controls_moved_ = (info.flags & hal::kFrameControlsMoved) != 0;
   const std::int64_t exposure_ns = exposure_start_ns(info, period_ns_);
@@ -127,6 +130,10 @@ void CaptureLoop::label(DepthFrame& out, std::int64_t exposure_ns) noexcept {
   out.camera = frame_.info();
   out.wall_ns = clock_.wall_ns() - (clock_.monotonic_ns() - out.camera.timestamp_ns);
   out.light = timeline_.light_at(exposure_ns);
+  out.light_since_ns = timeline_.since_at(exposure_ns);
+  if (out.light_since_ns) *out.light_since_ns += stamp_lag_ns(out.camera.meaning, period_ns_);
+  out.calibration.reset();
+  if (desk_.active() != nullptr) out.calibration = desk_.active()->key;
   out.times = {};
   out.times.decode_ns = out.camera.decode_ns;
 }
@@ -138,8 +145,10 @@ void CaptureLoop::look(DepthFrame& out, const Moment& moment) noexcept {
   out.times.activity_ns = clock_.monotonic_ns() - began_ns;
   if (look.new_reference) {
     depth_.set_reference(untouched_.reference());
+    desk_.reference_taken(out.camera.sequence);
     if (untouched_.footing() != Footing::stale) {
-      teller_.reference({out.camera.sequence, untouched_.footing() == Footing::restored});
+      teller_.reference({untouched_.footing() == Footing::restored,
+                         {out.camera.sequence, out.camera.timestamp_ns, out.wall_ns}});
     }
   }
   if (look.new_light) depth_.set_light(untouched_.light());
@@ -147,8 +156,10 @@ void CaptureLoop::look(DepthFrame& out, const Moment& moment) noexcept {
   const bool measured = look.measurable && exchange_.want_contact.load(std::memory_order_relaxed);
   if (measured) {
     depth_.make(frame_.luma(), untouched_, want_depth_, out);
+  } else if (desk_.active() == nullptr) {
+    depth_.skip(out, ContactAbsence::uncalibrated);
   } else {
-    depth_.skip(out);
+    depth_.skip(out, look.measurable ? ContactAbsence::unasked : ContactAbsence::referencing);
   }
   if (look.measurable) {
     untouched_.touched(measured ? depth_.touching() : untouched_.anything_active());
@@ -172,11 +183,19 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
       std::copy_n(luma.row(y), width, out.luma.data() + std::ptrdiff_t{y} * luma.width);
     }
   }
+  const bool want_jpeg = exchange_.want_jpeg.load(std::memory_order_relaxed);
+  // Room was made for as much as the picture takes without compression.
+  out.has_jpeg = want_jpeg && !frame_.jpeg().empty() && frame_.jpeg().size() <= out.jpeg.capacity();
+  if (out.has_jpeg) {
+    out.jpeg_width = frame_.luma().width;
+    out.jpeg_height = frame_.luma().height;
+    out.jpeg.assign(frame_.jpeg().begin(), frame_.jpeg().end());
+  }
   out.skipped = exchange_.slot.replaced();
   out.done_ns = clock_.monotonic_ns();
   out.times.publish_ns = out.done_ns - began_ns;
   exchange_.statistics.add(out.times, made, out.camera.ready_ns, out.done_ns);
-  if (!want_depth_ && !out.has_luma) return;
+  if (!want_depth_ && !out.has_luma && !want_jpeg) return;
   exchange_.slot.publish();
   exchange_.frames.fetch_add(1, std::memory_order_relaxed);
   exchange_.wake.signal();
@@ -195,9 +214,15 @@ void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
 }
 
 void CaptureLoop::tell(HealthSet health, std::int64_t now_ns) noexcept {
-  const HealthSet told = teller_.state(state(), health, now_ns);
+  const HealthSet told = teller_.state(state(), health, stamp(now_ns));
   exchange_.state.store(state(), std::memory_order_relaxed);
   exchange_.health.store(told.bits(), std::memory_order_relaxed);
+}
+
+/// After the newest frame.
+Stamp CaptureLoop::stamp(std::int64_t at_ns) const noexcept {
+  return {exchange_.sequence.load(std::memory_order_relaxed), at_ns,
+          clock_.wall_ns() - (clock_.monotonic_ns() - at_ns)};
 }
 
 State CaptureLoop::state() const noexcept {

@@ -56,6 +56,7 @@ class CaptureLoop {
   void publish(DepthFrame& out) noexcept;
   void without_frame(hal::GrabStatus status, std::int64_t asked_ns, std::int64_t now_ns) noexcept;
   void tell(HealthSet health, std::int64_t now_ns) noexcept;
+  [[nodiscard]] Stamp stamp(std::int64_t at_ns) const noexcept;
   [[nodiscard]] State state() const noexcept;
   [[nodiscard]] HealthSet health(std::int64_t now_ns) const noexcept;
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "daemon/pipeline/health.hpp"
@@ -33,6 +34,14 @@ struct ContactSummary {
   double volume_mm3 = 0;  ///< Indentation summed over the contact area.
 };
 
+/// Why a frame says nothing of contact: what is not measured may touch all the same.
+enum class ContactAbsence : std::uint8_t {
+  none,          ///< It was measured.
+  uncalibrated,  ///< There is nothing to measure by.
+  referencing,   ///< The light settles or the untouched image is being taken.
+  unasked        ///< Nobody wanted it when the frame was captured.
+};
+
 /// One frame's result, in buffers that are allocated once and used again.
 struct DepthFrame {
   hal::FrameInfo camera;
@@ -40,9 +49,14 @@ struct DepthFrame {
   std::int64_t done_ns = 0;   ///< CLOCK_MONOTONIC when the result was published.
   std::uint64_t skipped = 0;  ///< Results since start that nobody fetched in time.
   hal::Light light;           ///< What the ring showed when the frame was exposed.
+  /// Frames whose timestamp is not before it are exposed under `light` alone; none: not known.
+  std::optional<std::int64_t> light_since_ns;
+  /// UseCalibration::key of what the frame was measured by; none: uncalibrated.
+  std::optional<std::uint64_t> calibration;
   HealthSet health;
   StageTimes times;
-  ContactSummary contact;
+  ContactAbsence contact_absence = ContactAbsence::none;
+  ContactSummary contact;  ///< Empty unless measured.
 
   bool has_depth = false;
   int width = 0;  ///< Pixels of the depth map.
@@ -50,6 +64,7 @@ struct DepthFrame {
   double mm_per_px = 0;
   int decimation = 1;         ///< The map has 1/decimation of the calibration's resolution.
   double uncertainty_um = 0;  ///< Mean absolute error to expect inside the contact.
+  int contact_um = 0;         ///< What is deeper belongs to the contact.
   std::vector<std::int16_t>
       depth_um;  ///< Row-major; recon::kUntrusted marks pixels not to believe.
 
@@ -62,6 +77,11 @@ struct DepthFrame {
   int luma_width = 0;  ///< Pixels of the camera frame.
   int luma_height = 0;
   std::vector<std::uint8_t> luma;  ///< Row-major, without padding.
+
+  bool has_jpeg = false;
+  int jpeg_width = 0;  ///< Pixels of the camera frame.
+  int jpeg_height = 0;
+  std::vector<std::uint8_t> jpeg;  ///< As the camera sent it.
 };
 
 }  // namespace dtact::pipeline

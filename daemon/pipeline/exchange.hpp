@@ -23,13 +23,18 @@ struct CalibrationOrder {
   std::uint64_t ticket = 0;
   std::unique_ptr<ActiveCalibration> next;
 };
-using Order = std::variant<std::monostate, RezeroOrder, CalibrationOrder>;
+struct ReferenceOrder {
+  std::uint64_t ticket = 0;
+  ReferenceCopy* out = nullptr;  ///< With room for the image; stays until it is answered.
+};
+using Order = std::variant<std::monostate, RezeroOrder, CalibrationOrder, ReferenceOrder>;
 
 // Capture thread → network thread. Like Event, but without strings, which would allocate.
 struct Answer {
   std::uint64_t ticket = 0;
   Outcome outcome = Outcome::done;
   const char* sentence = "";  ///< A literal.
+  Stamp at = {};              ///< Of a calibration.
 };
 using Report = std::variant<std::monostate, Answer, ContactChanged, ReferenceTaken, StateChanged>;
 
@@ -50,6 +55,7 @@ struct Exchange {
   std::atomic<bool> want_contact{false};
   std::atomic<bool> want_depth{false};
   std::atomic<bool> want_luma{false};
+  std::atomic<bool> want_jpeg{false};
   std::atomic<bool> stop{false};
   std::atomic<bool> not_realtime{false};
   /// A camera that was away delivers again: the network thread compares it with the calibration.
@@ -58,6 +64,9 @@ struct Exchange {
   std::atomic<State> state{State::settling};
   std::atomic<std::uint32_t> health{0};  ///< HealthSet::bits()
   std::atomic<std::uint64_t> frames{0};
+  std::atomic<std::uint64_t> sequence{0};  ///< Of the newest frame.
+  /// From a write to the ring until the timestamps of frames exposed under it; -1: not known yet.
+  std::atomic<std::int64_t> light_lag_ns{-1};
   std::atomic<std::uint64_t> turns{0};       ///< Of the capture loop.
   std::atomic<double> camera_fps{0};         ///< By the frames' timestamps; 0 = not known yet.
   std::atomic<double> light_followed{0};     ///< Share of the reference's light, ±.

@@ -12,8 +12,8 @@ constexpr std::int64_t kLookNs = 250'000'000;
 }  // namespace
 
 LightDriver::LightDriver(std::unique_ptr<hal::LightRing> ring, const hal::Light& light,
-                         base::Clock& clock, const EventFd& wake)
-    : ring_(std::move(ring)), clock_(clock), wake_(wake), light_(light) {}
+                         base::Clock& clock, const Exchange& exchange)
+    : ring_(std::move(ring)), clock_(clock), exchange_(exchange), light_(light) {}
 
 void LightDriver::start() {
   stop_ = false;
@@ -43,6 +43,13 @@ hal::Light LightDriver::light() const {
   return light_;
 }
 
+std::optional<std::int64_t> LightDriver::light_since_ns() const {
+  const std::int64_t lag_ns = exchange_.light_lag_ns.load(std::memory_order_relaxed);
+  const std::scoped_lock lock(mutex_);
+  if (lag_ns < 0 || !shown_ns_) return std::nullopt;
+  return *shown_ns_ + lag_ns;
+}
+
 void LightDriver::run() {
   while (!stop_) {
     if (!work_.wait_for(kLookNs)) look();
@@ -61,8 +68,18 @@ void LightDriver::serve(const Request& request) {
              : CommandDone{request.ticket, Outcome::device_error, result.message});
     return;
   }
-  tell(CommandDone{request.ticket, Outcome::done, {}});
-  if (request.light != before) tell(LightChanged{request.light});
+  tell(CommandDone{.ticket = request.ticket, .light_since_ns = light_since_ns()});
+  if (request.light != before) tell(changed());
+}
+
+/// Of the write that has just worked.
+LightChanged LightDriver::changed() const {
+  const std::int64_t passed_ns = clock_.monotonic_ns() - shown_ns_.value_or(0);
+  return {.light = light_,
+          .at = {.sequence = exchange_.sequence.load(std::memory_order_relaxed),
+                 .monotonic_ns = shown_ns_.value_or(0),
+                 .wall_ns = clock_.wall_ns() - passed_ns},
+          .since_ns = light_since_ns()};
 }
 
 void LightDriver::look() {
@@ -73,6 +90,8 @@ void LightDriver::look() {
   }
   if (report.away) {
     if (!std::exchange(away_, true)) kept_ = light();
+    const std::scoped_lock lock(mutex_);
+    shown_ns_.reset();
   } else {
     if (away_) return come_back();
     if (report.writes == 0 || report.ok != trouble_) return;
@@ -87,7 +106,7 @@ void LightDriver::come_back() {
   if (!write(hal::Light(kept_)).ok) {
     away_ = true;  // so that it is tried again
   } else if (kept_ != before) {
-    tell(LightChanged{kept_});
+    tell(changed());
   }
 }
 
@@ -97,14 +116,17 @@ hal::ShowResult LightDriver::write(const hal::Light& light) {
   trouble_ = !result.ok;
   const bool was_away = std::exchange(away_, result.away);
   if (away_) kept_ = light;
+  const std::int64_t ended_ns = clock_.monotonic_ns();
   hal::Light shown;
   {
     const std::scoped_lock lock(mutex_);
     if (result.ok) light_ = light;
+    shown_ns_.reset();
+    if (result.ok) shown_ns_ = ended_ns;
     shown = light_;
     message_ = result.message;
   }
-  note({false, clock_.monotonic_ns(), shown, was_away && result.ok});
+  note({false, ended_ns, shown, was_away && result.ok, !result.ok});
   return result;
 }
 
@@ -118,7 +140,7 @@ void LightDriver::tell(const Event& event) {
   while (!events_.push(Event(event)) && !stop_) {
     clock_.sleep_until(clock_.monotonic_ns() + kRetryNs);
   }
-  wake_.signal();
+  exchange_.wake.signal();
 }
 
 }  // namespace dtact::pipeline

@@ -4,9 +4,10 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 
-#include "daemon/pipeline/event_fd.hpp"
+#include "daemon/pipeline/exchange.hpp"
 #include "daemon/pipeline/port.hpp"
 #include "daemon/pipeline/spsc_queue.hpp"
 #include "hal/base/clock.hpp"
@@ -21,6 +22,7 @@ struct LightNote {
   std::int64_t at_ns = 0;  ///< CLOCK_MONOTONIC.
   hal::Light light;        ///< What the ring is to show, or shows.
   bool returned = false;   ///< The ring was away until this write: what it showed is not known.
+  bool failed = false;     ///< The write did not work.
 };
 
 /// Owns the ring and the thread that writes to it, since a write blocks for a millisecond and more.
@@ -31,9 +33,9 @@ struct LightNote {
 /// shows it when it is back.
 class LightDriver {
  public:
-  /// `wake` is signalled after every event.
+  /// `exchange` is where events are announced, and the newest frame is known.
   LightDriver(std::unique_ptr<hal::LightRing> ring, const hal::Light& light, base::Clock& clock,
-              const EventFd& wake);
+              const Exchange& exchange);
   LightDriver(const LightDriver&) = delete;
   LightDriver& operator=(const LightDriver&) = delete;
   ~LightDriver() { stop(); }
@@ -51,6 +53,8 @@ class LightDriver {
   /// knowing of it; empty when well.
   [[nodiscard]] std::string message() const;
   [[nodiscard]] hal::Light light() const;
+  /// As DepthFrame::light_since_ns, of light().
+  [[nodiscard]] std::optional<std::int64_t> light_since_ns() const;
 
   // Capture thread.
   [[nodiscard]] bool next_note(LightNote& out) noexcept { return notes_.pop(out); }
@@ -68,10 +72,11 @@ class LightDriver {
   hal::ShowResult write(const hal::Light& light);
   void note(const LightNote& note);
   void tell(const Event& event);
+  [[nodiscard]] LightChanged changed() const;
 
   std::unique_ptr<hal::LightRing> ring_;
   base::Clock& clock_;
-  const EventFd& wake_;
+  const Exchange& exchange_;
   SpscQueue<Request, 16> requests_;
   SpscQueue<Event, 64> events_;
   SpscQueue<LightNote, 16> notes_;
@@ -80,6 +85,7 @@ class LightDriver {
   std::atomic<bool> trouble_{false};
   mutable std::mutex mutex_;  // between this thread and the network thread, held for a copy
   hal::Light light_;
+  std::optional<std::int64_t> shown_ns_;  // CLOCK_MONOTONIC of its write; none: not known
   std::string message_;
   std::string note_;
   // This thread's own:

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 
 #include "hal/frame.hpp"
 #include "hal/light_ring.hpp"
@@ -13,6 +14,10 @@ namespace dtact::pipeline {
 [[nodiscard]] std::int64_t exposure_start_ns(const hal::FrameInfo& info,
                                              std::int64_t period_ns) noexcept;
 
+/// From an exposure's beginning to the frame's timestamp, by the same rule.
+[[nodiscard]] std::int64_t stamp_lag_ns(hal::TimestampMeaning meaning,
+                                        std::int64_t period_ns) noexcept;
+
 /// Matches frames with light changes by time. A change has a beginning (the ring is about to be
 /// written) and an end (it has been); it is complete in the frames whose exposure began at least
 /// the camera's delay after the end.
@@ -22,13 +27,20 @@ class LightTimeline {
       : before_(light), now_(light), delay_ns_(delay_frames * period_ns) {}
 
   void change_begins(const hal::Light& light, std::int64_t at_ns) noexcept;
-  /// `light` is what the ring shows now: the old one when the write failed.
-  void change_ends(const hal::Light& light, std::int64_t at_ns) noexcept;
+  /// `light` is what the ring shows now: the old one when the write failed, which leaves it
+  /// unknown since when.
+  void change_ends(const hal::Light& light, std::int64_t at_ns, bool failed) noexcept;
 
   /// What the ring showed when an exposure began.
   [[nodiscard]] const hal::Light& light_at(std::int64_t exposure_ns) const noexcept {
     return exposure_ns < began_ns_ ? before_ : now_;
   }
+  /// Exposures that began at this moment or later show that light alone; none: not known yet.
+  [[nodiscard]] std::optional<std::int64_t> since_at(std::int64_t exposure_ns) const noexcept {
+    return exposure_ns < began_ns_ ? before_since_ns_ : now_since_ns_;
+  }
+  /// From a change's end to the first exposure that shows nothing of the light before.
+  [[nodiscard]] std::int64_t delay_ns() const noexcept { return delay_ns_; }
   /// The frame whose exposure began then shows the present light and nothing of an earlier one.
   [[nodiscard]] bool settled_at(std::int64_t exposure_ns) const noexcept {
     return !writing_ && exposure_ns >= settled_from_ns_;
@@ -40,6 +52,8 @@ class LightTimeline {
   std::int64_t delay_ns_;
   std::int64_t began_ns_ = INT64_MIN;
   std::int64_t settled_from_ns_ = INT64_MIN;
+  std::optional<std::int64_t> before_since_ns_;
+  std::optional<std::int64_t> now_since_ns_;
   bool writing_ = false;
 };
 

@@ -1,5 +1,6 @@
 #include "daemon/pipeline/order_desk.hpp"
 
+#include <algorithm>
 #include <utility>
 #include <variant>
 
@@ -14,6 +15,11 @@ constexpr const char* kDarkSentence =
 constexpr const char* kUncalibratedSentence =
     "there is no calibration, so nothing to re-zero: make one with dtactctl calibrate depth and "
     "send it with dtactctl calibration upload";
+constexpr const char* kNoCalibrationSentence =
+    "there is no calibration, so depth is measured against nothing: make one with dtactctl "
+    "calibrate depth and send it with dtactctl calibration upload";
+constexpr const char* kNoReferenceSentence =
+    "the untouched image is being taken: ask again when the state is serving";
 constexpr const char* kAwaySentence =
     "the camera delivers no frames: see its condition in the status";
 
@@ -24,13 +30,14 @@ void OrderDesk::begin(std::unique_ptr<ActiveCalibration> active) noexcept {
   if (active_) use();
 }
 
-void OrderDesk::take(bool camera_away) noexcept {
+void OrderDesk::take(bool camera_away, const Stamp& now) noexcept {
   // One at a time, and only while its answer and a retired calibration have somewhere to go.
   Order order;
   while (!rezero_ && !teller_.answer_due() && exchange_.retired.room() > 0 &&
          exchange_.orders.pop(order)) {
     if (const auto* rezero = std::get_if<RezeroOrder>(&order)) execute(*rezero, camera_away);
-    if (auto* calibration = std::get_if<CalibrationOrder>(&order)) execute(*calibration);
+    if (auto* calibration = std::get_if<CalibrationOrder>(&order)) execute(*calibration, now);
+    if (const auto* reference = std::get_if<ReferenceOrder>(&order)) execute(*reference);
     teller_.flush();
   }
 }
@@ -46,12 +53,26 @@ void OrderDesk::execute(const RezeroOrder& order, bool camera_away) noexcept {
   }
 }
 
-void OrderDesk::execute(CalibrationOrder& order) noexcept {
+void OrderDesk::execute(CalibrationOrder& order, const Stamp& now) noexcept {
   std::swap(active_, order.next);
   use();
   exchange_.camera_mismatch.store(active_->camera_mismatch, std::memory_order_relaxed);
   exchange_.generation.store(active_->generation, std::memory_order_release);
   if (order.next) (void)exchange_.retired.push(std::move(order.next));  // room was made sure of
+  teller_.answer({order.ticket, Outcome::done, "", now});
+}
+
+void OrderDesk::execute(const ReferenceOrder& order) noexcept {
+  if (!active_) {
+    return teller_.answer({order.ticket, Outcome::uncalibrated, kNoCalibrationSentence});
+  }
+  if (!untouched_.ready()) {
+    return teller_.answer({order.ticket, Outcome::no_reference, kNoReferenceSentence});
+  }
+  std::ranges::copy(untouched_.reference(), order.out->image_q8.begin());
+  order.out->light = untouched_.shown();
+  order.out->sequence = reference_sequence_;
+  order.out->calibration = active_->key;
   teller_.answer({order.ticket, Outcome::done, ""});
 }
 

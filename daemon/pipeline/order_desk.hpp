@@ -21,7 +21,9 @@ class OrderDesk {
 
   /// The calibration to begin with; null: uncalibrated.
   void begin(std::unique_ptr<ActiveCalibration> active) noexcept;
-  void take(bool camera_away) noexcept;
+  void take(bool camera_away, const Stamp& now) noexcept;
+  /// The untouched image is another, whose last frame this was.
+  void reference_taken(std::uint64_t sequence) noexcept { reference_sequence_ = sequence; }
   /// Answers the re-zero under way.
   void answer(RezeroResult result) noexcept;
   /// No frames come: the re-zero under way, if there is one, is given up.
@@ -32,7 +34,8 @@ class OrderDesk {
 
  private:
   void execute(const RezeroOrder& order, bool camera_away) noexcept;
-  void execute(CalibrationOrder& order) noexcept;
+  void execute(CalibrationOrder& order, const Stamp& now) noexcept;
+  void execute(const ReferenceOrder& order) noexcept;
   void use() noexcept;
   void answer(Outcome outcome, const char* sentence) noexcept;
 
@@ -42,6 +45,7 @@ class OrderDesk {
   DepthMaker& depth_;
   std::unique_ptr<ActiveCalibration> active_;
   std::optional<std::uint64_t> rezero_;  // ticket of the one under way
+  std::uint64_t reference_sequence_ = 0;
 };
 
 }  // namespace dtact::pipeline

@@ -48,7 +48,7 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
       camera_(std::move(camera)),
       info_(checked(camera_->info())),
       exchange_(prototype(calibration.get())),
-      light_(std::move(ring), config_.light, clock, exchange_.wake),
+      light_(std::move(ring), config_.light, clock, exchange_),
       writer_(info_.width, info_.height, config_.state_folder),
       place_(info_.width, info_.height, config_.reference.frames),
       depth_capacity_(exchange_.slot.back().depth_um.capacity()) {
@@ -92,6 +92,9 @@ DepthFrame Pipeline::prototype(const calibration::Calibration* calibration) cons
   constexpr int kMostRows = 4096;
   frame.drawn.tiles.resize(kMostRows / recon::TileGrid::kRows);
   frame.luma.resize(pixels(info_.width, info_.height));
+  // As much as YUYV, which is what drivers make room for themselves (uvcvideo: the camera's
+  // dwMaxVideoFrameSize).
+  frame.jpeg.resize(2 * pixels(info_.width, info_.height));
   return frame;
 }
 
@@ -134,7 +137,10 @@ std::optional<Event> Pipeline::next_event() {
   Report report;
   if (!exchange_.reports.pop(report)) return std::nullopt;
   if (const auto* answer = std::get_if<Answer>(&report)) {
-    return CommandDone{answer->ticket, answer->outcome, answer->sentence};
+    CommandDone done{answer->ticket, answer->outcome, answer->sentence, answer->at};
+    const auto copy = copies_.extract(answer->ticket);
+    if (copy && done.outcome == Outcome::done) done.reference = copy.mapped();
+    return done;
   }
   if (const auto* contact = std::get_if<ContactChanged>(&report)) return *contact;
   if (const auto* reference = std::get_if<ReferenceTaken>(&report)) return *reference;
@@ -149,7 +155,20 @@ bool Pipeline::submit(Command command) {
   if (const auto* rezero = std::get_if<Rezero>(&command.what)) {
     return exchange_.orders.push(RezeroOrder{command.ticket, rezero->force});
   }
+  if (std::holds_alternative<CopyReference>(command.what)) return copy_reference(command.ticket);
   return use(command.ticket, std::get<UseCalibration>(command.what));
+}
+
+bool Pipeline::copy_reference(std::uint64_t ticket) {
+  if (exchange_.orders.room() == 0) return false;
+  // Made and freed on this side; the capture thread only writes into it.
+  auto copy = std::make_shared<ReferenceCopy>();
+  copy->width = info_.width;
+  copy->height = info_.height;
+  copy->image_q8.resize(pixels(info_.width, info_.height));
+  (void)exchange_.orders.push(ReferenceOrder{ticket, copy.get()});  // room was made sure of
+  copies_.emplace(ticket, std::move(copy));
+  return true;
 }
 
 bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
@@ -165,6 +184,7 @@ bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
                       table.width, table.height));
     }
     active->generation = ++generations_;
+    active->key = command.key;
     calibrations_.push_back({generations_, command.calibration});
     return exchange_.orders.push(CalibrationOrder{ticket, std::move(active)});
   } catch (const std::invalid_argument& e) {
@@ -195,6 +215,7 @@ void Pipeline::want(Wanted wanted) noexcept {
   exchange_.want_contact.store(wanted.contact || wanted.depth, std::memory_order_relaxed);
   exchange_.want_depth.store(wanted.depth, std::memory_order_relaxed);
   exchange_.want_luma.store(wanted.luma, std::memory_order_relaxed);
+  exchange_.want_jpeg.store(wanted.jpeg, std::memory_order_relaxed);
 }
 
 Status Pipeline::status() const {
@@ -206,6 +227,7 @@ Status Pipeline::status() const {
   status.ring = light_.info();
   status.ring_message = light_.message();
   status.light = light_.light();
+  status.light_since_ns = light_.light_since_ns();
   const std::uint64_t in_use = exchange_.generation.load(std::memory_order_acquire);
   for (const Known& known : calibrations_) {
     if (known.generation == in_use) status.calibration = known.calibration;

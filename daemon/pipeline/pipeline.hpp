@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -57,6 +58,7 @@ class Pipeline final : public Port {
   };
   [[nodiscard]] DepthFrame prototype(const calibration::Calibration* calibration) const;
   [[nodiscard]] bool use(std::uint64_t ticket, const UseCalibration& command);
+  [[nodiscard]] bool copy_reference(std::uint64_t ticket);
   void compare_camera();
   void free_retired();
 
@@ -75,6 +77,7 @@ class Pipeline final : public Port {
   // Network thread only.
   std::deque<Event> own_events_;
   std::deque<Known> calibrations_;  // in use, and on their way to be
+  std::map<std::uint64_t, std::shared_ptr<ReferenceCopy>> copies_;  // being made, by ticket
   std::uint64_t generations_ = 0;
   base::RtThread capture_;  // last: it uses all the others
 };

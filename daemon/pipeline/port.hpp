@@ -16,17 +16,37 @@ namespace dtact::pipeline {
 
 // Commands: what the network may ask of the pipeline. Each is answered by one CommandDone.
 struct SetLight {
-  hal::Light light;
+  hal::Light light = {};
 };
 struct Rezero {
   bool force = false;  ///< Take the reference although something touches.
 };
 struct UseCalibration {
   std::shared_ptr<const calibration::Calibration> calibration;
+  /// The caller's own name for it, in every frame measured by it. 0: the one at start.
+  std::uint64_t key = 0;
 };
+struct CopyReference {};
 struct Command {
   std::uint64_t ticket = 0;  ///< Comes back in CommandDone.
-  std::variant<SetLight, Rezero, UseCalibration> what;
+  std::variant<SetLight, Rezero, UseCalibration, CopyReference> what;
+};
+
+/// When something happened.
+struct Stamp {
+  std::uint64_t sequence = 0;     ///< Of the last frame before; 0 also when there was none.
+  std::int64_t monotonic_ns = 0;  ///< CLOCK_MONOTONIC.
+  std::int64_t wall_ns = 0;       ///< The same moment since 1970.
+};
+
+/// The untouched image in use.
+struct ReferenceCopy {
+  int width = 0;  ///< Pixels of the camera frame.
+  int height = 0;
+  std::vector<std::uint16_t> image_q8;  ///< Row-major, 256 units a grey level.
+  hal::Light light;                     ///< That it was taken under.
+  std::uint64_t sequence = 0;           ///< The last frame in it.
+  std::uint64_t calibration = 0;        ///< UseCalibration::key.
 };
 
 // Events: what the pipeline tells the network. Never lost: when the queue is full the pipeline
@@ -37,29 +57,38 @@ enum class Outcome : std::uint8_t {
   device_error,
   camera_away,
   ring_away,  ///< The light is kept and shown once there is a ring.
-  invalid
+  invalid,
+  uncalibrated,
+  no_reference  ///< The untouched image is being taken.
 };
 struct CommandDone {
   std::uint64_t ticket = 0;
   Outcome outcome = Outcome::done;
-  std::string message;  ///< Empty when done; else what happened and what to do.
+  std::string message = {};  ///< Empty when done; else what happened and what to do.
+  Stamp at = {};             ///< Of UseCalibration, when it was done.
+  std::optional<std::int64_t> light_since_ns = {};      ///< Of SetLight, as DepthFrame's.
+  std::shared_ptr<const ReferenceCopy> reference = {};  ///< Of CopyReference, when done.
 };
+/// What is touched, or not any more, by two measured frames: while nothing can be measured nothing
+/// is told, and what was touched before counts as held.
 struct ContactChanged {
   bool touching = false;
-  std::uint64_t sequence = 0;
-  std::int64_t timestamp_ns = 0;
-  ContactSummary contact;
+  Stamp at = {};  ///< The frame that shows it.
+  ContactSummary contact = {};
 };
 struct LightChanged {
-  hal::Light light;
+  hal::Light light = {};
+  Stamp at = {};
+  std::optional<std::int64_t> since_ns = {};  ///< As DepthFrame::light_since_ns.
 };
 struct ReferenceTaken {
-  std::uint64_t sequence = 0;
   bool restored = false;  ///< The last good one from the state directory, not a new one.
+  Stamp at = {};          ///< The last frame in it.
 };
 struct StateChanged {
   State state = State::settling;
-  HealthSet health;
+  HealthSet health = {};
+  Stamp at = {};
 };
 using Event = std::variant<CommandDone, ContactChanged, LightChanged, ReferenceTaken, StateChanged>;
 
@@ -81,12 +110,13 @@ struct ThreadUsage {
 /// What `dtactctl status` shows.
 struct Status {
   State state = State::settling;
-  HealthSet health;
+  HealthSet health = {};
   hal::CameraInfo camera;
   hal::CameraReport camera_report;
   hal::RingInfo ring;
   std::string ring_message;  ///< The ring's last error, or what to know; empty when well.
-  hal::Light light;
+  hal::Light light = {};
+  std::optional<std::int64_t> light_since_ns;                   ///< As DepthFrame::light_since_ns.
   std::shared_ptr<const calibration::Calibration> calibration;  ///< Null when uncalibrated.
   std::uint64_t frames = 0;                                     ///< Published since start.
   std::uint64_t skipped = 0;          ///< Published but replaced before the network fetched them.
@@ -110,6 +140,7 @@ struct Wanted {
   bool contact = false;  ///< Contact events, and the refusal to re-zero under contact.
   bool depth = false;    ///< Frames with depth or its summary; needs contact.
   bool luma = false;     ///< Frames with the camera's image.
+  bool jpeg = false;     ///< Frames with the camera's own JPEG, if that is what it sends.
   bool operator==(const Wanted&) const = default;
 };
 

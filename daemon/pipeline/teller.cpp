@@ -15,18 +15,16 @@ bool Teller::push(const Report& report) noexcept {
 
 void Teller::contact(const DepthFrame& frame) noexcept {
   const bool touching = frame.contact.touching;
-  if (touching == touching_) return;
-  if (push(ContactChanged{touching, frame.camera.sequence, frame.camera.timestamp_ns,
-                          frame.contact})) {
-    touching_ = touching;
-  }
+  if (frame.contact_absence != ContactAbsence::none || touching == touching_) return;
+  const Stamp at{frame.camera.sequence, frame.camera.timestamp_ns, frame.wall_ns};
+  if (push(ContactChanged{touching, at, frame.contact})) touching_ = touching;
 }
 
-HealthSet Teller::state(State state, HealthSet health, std::int64_t now_ns) noexcept {
-  if (health.has(Health::beyond_calibration)) beyond_until_ns_ = now_ns + kLastsNs;
-  health.set(Health::beyond_calibration, now_ns < beyond_until_ns_);
+HealthSet Teller::state(State state, HealthSet health, const Stamp& now) noexcept {
+  if (health.has(Health::beyond_calibration)) beyond_until_ns_ = now.monotonic_ns + kLastsNs;
+  health.set(Health::beyond_calibration, now.monotonic_ns < beyond_until_ns_);
   if (state_ && state_->state == state && state_->health == health) return health;
-  const StateChanged changed{state, health};
+  const StateChanged changed{state, health, now};
   if (push(changed)) state_ = changed;
   return health;
 }

@@ -19,10 +19,11 @@ class Teller {
   void answer(const Answer& answer) noexcept { answer_ = answer; }
   [[nodiscard]] bool answer_due() const noexcept { return answer_.has_value(); }
 
+  /// A frame that was not measured changes nothing: what touched before it counts as held.
   void contact(const DepthFrame& frame) noexcept;
   /// A press at the list's end would send an event with every frame: Health::beyond_calibration is
   /// told to last a second longer than it does. Returns what is told.
-  HealthSet state(State state, HealthSet health, std::int64_t now_ns) noexcept;
+  HealthSet state(State state, HealthSet health, const Stamp& now) noexcept;
   /// Tries what is due.
   void flush() noexcept;
 

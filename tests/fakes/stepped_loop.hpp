@@ -32,7 +32,7 @@ class SteppedLoop {
   /// After this the configuration is the loop's.
   void begin(const std::shared_ptr<const calibration::Calibration>& calibration,
              bool unusable = false) {
-    light.emplace(std::make_unique<FakeRing>(ring), config.light, clock, exchange.wake);
+    light.emplace(std::make_unique<FakeRing>(ring), config.light, clock, exchange);
     std::unique_ptr<pipeline::ActiveCalibration> active;
     if (calibration) active = activated(calibration);
     loop.emplace(pipeline::CaptureParts{camera, *light, writer, place, exchange, clock}, config,

@@ -22,11 +22,11 @@ void DepthMaker::set_reference(std::span<const std::uint16_t> reference_q8) noex
 
 void DepthMaker::set_light(double factor) noexcept { maps_->set_light(factor); }
 
-void DepthMaker::skip(DepthFrame& out) noexcept {
+void DepthMaker::skip(DepthFrame& out, ContactAbsence why) noexcept {
   beyond_ = false;
   out.has_depth = false;
+  out.contact_absence = why;
   out.contact = {};
-  out.contact.touching = contact_.touching();
 }
 
 void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched, bool judged,
@@ -61,6 +61,8 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   out.times.smooth_ns = steps.smooth_ns;
   out.times.list_ns = steps.list_ns;
   const std::int64_t began_ns = clock_.monotonic_ns();
+  out.contact_um = rules.made_um;
+  out.contact_absence = ContactAbsence::none;
   out.contact = contact_.inspect(sums, out.width, out.height, out.mm_per_px);
   beyond_ = reconstructor.beyond_pixels() * out.decimation * out.decimation > config_.beyond_pixels;
   judge(untouched.trust(), bend_um(sums, out.mm_per_px), out);

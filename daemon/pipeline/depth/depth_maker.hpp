@@ -33,8 +33,8 @@ class DepthMaker {
   /// bend is left out of the uncertainty, unless the resolution is chosen by it.
   void make(const hal::LumaView& luma, const UntouchedImage& untouched, bool judged,
             DepthFrame& out) noexcept;
-  /// The same of a frame of which no depth is made: what was known of contact stands.
-  void skip(DepthFrame& out) noexcept;
+  /// No depth is made of this frame: what was known of contact stands, and `out` says nothing.
+  void skip(DepthFrame& out, ContactAbsence why) noexcept;
 
   [[nodiscard]] bool touching() const noexcept { return contact_.touching(); }
   /// Somewhere in the last frame the image was darker than the list reaches.

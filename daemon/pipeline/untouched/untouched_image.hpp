@@ -98,6 +98,8 @@ class UntouchedImage {
   [[nodiscard]] std::span<const std::uint16_t> reference() const noexcept {
     return keeper_.reference();
   }
+  /// The light it was taken under, or brought to: what the ring shows.
+  [[nodiscard]] const hal::Light& shown() const noexcept { return shown_; }
   /// The present light as a factor on it.
   [[nodiscard]] double light() const noexcept { return follower_.factor(); }
 

@@ -218,7 +218,7 @@ Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
   config.reconstruction.decimation = 1;
   if (!script.follow) config.drift.limit_percent = 0;
   pipeline::LightDriver light(std::make_unique<hal::null::NullRing>(), config.light, clock,
-                              exchange.wake);
+                              exchange);
   pipeline::ReferenceWriter writer(table.frame_width, table.frame_height, {});
   pipeline::PlaceWatch place(table.frame_width, table.frame_height, config.reference.frames);
   place.start();

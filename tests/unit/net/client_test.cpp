@@ -159,7 +159,7 @@ TEST(ClientLibrary, KeepsEventsAndTheNewestFramesWhileItWaitsForAnAnswer) {
     rig.port.publish(make_frame(sequence));
     EXPECT_EQ(other.frame().sequence(), sequence);
   }
-  rig.port.emit(pipeline::ReferenceTaken{42, false});
+  rig.port.emit(pipeline::ReferenceTaken{false, {.sequence = 42}});
   (void)other.event();
   (void)client.status();
   for (std::uint64_t sequence = 3; sequence <= 6; ++sequence) {

@@ -224,11 +224,10 @@ TEST(Stream, SendsEventsToEveryoneGreeted) {
   subscribed.subscribe(v1::DEPTH_INT16);
   pipeline::ContactChanged made;
   made.touching = true;
-  made.sequence = 11;
-  made.timestamp_ns = 12;
+  made.at = {11, 12, 13};
   made.contact.deepest_mm = 0.5;
   rig.port.emit(made);
-  rig.port.emit(pipeline::ReferenceTaken{13, true});
+  rig.port.emit(pipeline::ReferenceTaken{true, {.sequence = 13}});
   pipeline::StateChanged state{pipeline::State::serving, {}};
   state.health.set(pipeline::Health::reference_restored);
   rig.port.emit(state);
@@ -395,7 +394,7 @@ TEST(Stream, LetsAClientGoThatLeavesEventsUnread) {
   other.hello();
   int read = 0;
   for (int i = 1; i <= 60'000 && rig.log().find("lay unread") == std::string::npos; ++i) {
-    rig.port.emit(pipeline::ReferenceTaken{static_cast<std::uint64_t>(i), false});
+    rig.port.emit(pipeline::ReferenceTaken{false, {.sequence = static_cast<std::uint64_t>(i)}});
     EXPECT_EQ(other.event().reference().sequence(), static_cast<std::uint64_t>(i));
     ++read;
   }

@@ -48,10 +48,10 @@ class LightDriverTest : public ::testing::Test {
     return condition();
   }
   std::vector<LightNote> notes;
-  EventFd wake;
+  Exchange exchange{DepthFrame{}};
   fakes::FakeRing::Handle ring;
   LightDriver driver{std::make_unique<fakes::FakeRing>(ring), dimmed(200), base::system_clock(),
-                     wake};
+                     exchange};
 };
 
 TEST_F(LightDriverTest, ShowsTheFirstLightBeforeItReturns) {
@@ -77,7 +77,7 @@ TEST_F(LightDriverTest, AnswersAndTellsEveryone) {
   ASSERT_TRUE(changed);
   EXPECT_EQ(std::get<LightChanged>(*changed).light.brightness, 100);
   EXPECT_EQ(driver.light().brightness, 100);
-  pollfd poll{.fd = wake.get(), .events = POLLIN, .revents = 0};
+  pollfd poll{.fd = exchange.wake.get(), .events = POLLIN, .revents = 0};
   EXPECT_EQ(::poll(&poll, 1, 5000), 1);
 }
 

@@ -43,41 +43,41 @@ TEST_F(TellerTest, TellsChangesOnly) {
   const auto made = next();
   ASSERT_TRUE(made);
   EXPECT_TRUE(std::get<ContactChanged>(*made).touching);
-  EXPECT_EQ(std::get<ContactChanged>(*made).sequence, 2U);
+  EXPECT_EQ(std::get<ContactChanged>(*made).at.sequence, 2U);
   EXPECT_FALSE(next());
   teller.contact(frame(false, 4));
   EXPECT_FALSE(std::get<ContactChanged>(next().value()).touching);
 }
 
 TEST_F(TellerTest, TheFirstStateIsAlwaysTold) {
-  (void)teller.state(State::settling, {}, 0);
-  (void)teller.state(State::settling, {}, 0);
+  (void)teller.state(State::settling, {}, {.monotonic_ns = 0});
+  (void)teller.state(State::settling, {}, {.monotonic_ns = 0});
   ASSERT_TRUE(next());
   EXPECT_FALSE(next());
   HealthSet health;
   health.set(Health::frames_lost);
-  (void)teller.state(State::settling, health, 0);
+  (void)teller.state(State::settling, health, {.monotonic_ns = 0});
   EXPECT_TRUE(std::get<StateChanged>(next().value()).health.has(Health::frames_lost));
 }
 
 TEST_F(TellerTest, BeyondTheListIsToldASecondLonger) {
   HealthSet beyond;
   beyond.set(Health::beyond_calibration);
-  EXPECT_EQ(teller.state(State::serving, beyond, 0), beyond);
+  EXPECT_EQ(teller.state(State::serving, beyond, {.monotonic_ns = 0}), beyond);
   EXPECT_EQ(std::get<StateChanged>(next().value()).health, beyond);
-  EXPECT_EQ(teller.state(State::serving, {}, 500'000'000), beyond);
-  EXPECT_EQ(teller.state(State::serving, beyond, 700'000'000), beyond);
-  EXPECT_EQ(teller.state(State::serving, {}, 1'699'999'999), beyond);
+  EXPECT_EQ(teller.state(State::serving, {}, {.monotonic_ns = 500'000'000}), beyond);
+  EXPECT_EQ(teller.state(State::serving, beyond, {.monotonic_ns = 700'000'000}), beyond);
+  EXPECT_EQ(teller.state(State::serving, {}, {.monotonic_ns = 1'699'999'999}), beyond);
   EXPECT_FALSE(next()) << "flicker is one event";
-  EXPECT_TRUE(teller.state(State::serving, {}, 1'700'000'000).empty());
+  EXPECT_TRUE(teller.state(State::serving, {}, {.monotonic_ns = 1'700'000'000}).empty());
   EXPECT_TRUE(std::get<StateChanged>(next().value()).health.empty());
 }
 
 TEST_F(TellerTest, WhatDoesNotFitIsToldLater) {
   fill();
   teller.contact(frame(true, 7));
-  (void)teller.state(State::serving, {}, 0);
-  teller.reference({.sequence = 8, .restored = true});
+  (void)teller.state(State::serving, {}, {.monotonic_ns = 0});
+  teller.reference({.restored = true, .at = {.sequence = 8}});
   teller.answer({.ticket = 9});
   teller.flush();
   EXPECT_TRUE(teller.answer_due());
@@ -85,11 +85,11 @@ TEST_F(TellerTest, WhatDoesNotFitIsToldLater) {
   teller.flush();
   EXPECT_FALSE(teller.answer_due());
   EXPECT_EQ(std::get<Answer>(next().value()).ticket, 9U);
-  EXPECT_EQ(std::get<ReferenceTaken>(next().value()).sequence, 8U);
+  EXPECT_EQ(std::get<ReferenceTaken>(next().value()).at.sequence, 8U);
   EXPECT_FALSE(next());
   teller.contact(frame(true, 10));  // the next frames carry the rest
-  (void)teller.state(State::serving, {}, 0);
-  EXPECT_EQ(std::get<ContactChanged>(next().value()).sequence, 10U);
+  (void)teller.state(State::serving, {}, {.monotonic_ns = 0});
+  EXPECT_EQ(std::get<ContactChanged>(next().value()).at.sequence, 10U);
   EXPECT_EQ(std::get<StateChanged>(next().value()).state, State::serving);
 }
 

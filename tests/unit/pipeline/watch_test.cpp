@@ -176,7 +176,7 @@ TEST(LightTimeline, FramesBelongToTheLightTheyWereExposedUnder) {
   EXPECT_EQ(timeline.light_at(99 * kMs).brightness, 255);
   EXPECT_EQ(timeline.light_at(100 * kMs).brightness, 100);
   EXPECT_FALSE(timeline.settled_at(1000 * kMs));  // still writing
-  timeline.change_ends(dim, 101 * kMs);
+  timeline.change_ends(dim, 101 * kMs, false);
   EXPECT_FALSE(timeline.settled_at(120 * kMs));
   EXPECT_TRUE(timeline.settled_at(121 * kMs));  // 101 + 2 periods
   hal::Light dark;
@@ -192,7 +192,7 @@ TEST(LightTimeline, AFailedWriteLeavesTheOldLight) {
   dim.brightness = 100;
   LightTimeline timeline(bright, 0, kPeriod);
   timeline.change_begins(dim, 100 * kMs);
-  timeline.change_ends(bright, 105 * kMs);
+  timeline.change_ends(bright, 105 * kMs, true);
   EXPECT_EQ(timeline.light_at(200 * kMs).brightness, 255);
   EXPECT_TRUE(timeline.settled_at(105 * kMs));
 }
