@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "daemon/pipeline/depth_frame.hpp"
+
+namespace dtact::net {
+
+/// dtact.v1.Region: pixels of the depth map at the calibration's full resolution.
+struct DepthRegion {
+  std::uint32_t x = 0;
+  std::uint32_t y = 0;
+  std::uint32_t width = 1;
+  std::uint32_t height = 1;
+  bool operator==(const DepthRegion&) const = default;
+};
+
+/// Which depth map a client asked for.
+struct DepthSpec {
+  int decimation = 1;                      ///< 1, 2 or 4: of the calibration's resolution.
+  int um_per_unit = 1;                     ///< 1, 2, 5 or 10.
+  std::optional<DepthRegion> region = {};  ///< All of the map when unset.
+  bool operator==(const DepthSpec&) const = default;
+};
+
+/// The map as dtact.v1.DepthMap says it.
+struct DepthView {
+  int x = 0;  ///< Of the first column, in pixels of this decimation; so are all sizes.
+  int y = 0;
+  int width = 0;
+  int height = 0;
+  int full_width = 0;
+  int full_height = 0;
+  int decimation = 1;
+  double mm_per_px = 0;
+  int um_per_unit = 1;
+  std::span<const std::int16_t> values;  ///< Row-major; recon::kUntrusted marks untrusted pixels.
+};
+
+/// Makes the maps that were asked for out of the frame's one. Nothing is copied when a frame's rows
+/// can be sent as they are, and the buffers are used again.
+class DepthViewer {
+ public:
+  /// A frame that is coarser than asked is not refined. Coarser pixels are means over the trusted
+  /// pixels of their block, and untrusted when half of it or more is; columns and rows that fill no
+  /// block are left out on both sides alike, as recon::decimate does. The one rounding, to units,
+  /// is half away from zero. A frame that came coarse does not say which columns were left out of
+  /// it, so there a region may lie one pixel of full resolution beside.
+  ///
+  /// Nothing when the region lies outside of the map, or the map has no whole block. The values are
+  /// valid until the next call and while the frame stays as it is. Throws std::invalid_argument for
+  /// another decimation or unit.
+  [[nodiscard]] std::optional<DepthView> view(const pipeline::DepthFrame& frame,
+                                              const DepthSpec& spec);
+
+ private:
+  /// `factor` rows to one of `width` values.
+  void average(const std::int16_t* rows, std::size_t stride, std::size_t width, int factor,
+               int um_per_unit, std::int16_t* out);
+
+  std::vector<std::int16_t> values_;
+  std::vector<std::int32_t> sums_;    ///< A column each, over the rows of a block.
+  std::vector<std::int32_t> counts_;  ///< Of trusted pixels.
+};
+
+}  // namespace dtact::net
