@@ -1,5 +1,5 @@
-// The commands that read, list and change calibrations: their files take longer than a frame, so
-// the worker reads and writes them.
+// The commands that read, list and change calibrations, or read the untouched image: their files
+// take longer than a frame, so the worker reads, writes and packs them.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include "daemon/net/commands.hpp"
 #include "daemon/net/hub.hpp"
 #include "daemon/net/messages.hpp"
+#include "hal/image/png.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -142,7 +143,7 @@ void Commands::upload_calibration(const Who& who, const v1::UploadCalibration& r
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
   auto files = std::make_shared<const CalibrationFiles>(CalibrationFiles{
       .name = request.name(), .toml = request.calibration_toml(), .png = request.reference_png()});
-  change_calibration(who, {std::move(files), 0, {}});
+  change_calibration(who, {std::move(files), 0, {}, 0, {}});
 }
 
 void Commands::activate_calibration(const Who& who, const v1::ActivateCalibration& request) {
@@ -153,7 +154,7 @@ void Commands::activate_calibration(const Who& who, const v1::ActivateCalibratio
                                 "shows the numbers there are");
   }
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
-  change_calibration(who, {nullptr, request.number(), {}});
+  change_calibration(who, {nullptr, request.number(), {}, 0, {}});
 }
 
 void Commands::change_calibration(const Who& who, CalibrationChange change) {
@@ -177,12 +178,12 @@ void Commands::change_calibration(const Who& who, CalibrationChange change) {
 }
 
 void Commands::keep_calibration(const Pending& pending, const CalibrationChange& change) {
-  v1::ServerMessage event;
-  event.mutable_event()->mutable_calibration()->set_name(change.name);
-  hub_.broadcast(event);
   config_.log(LogLevel::info, fmt::format("calibration {} is in use", change.name));
   in_use_.reset();
-  if (change.upload == nullptr) in_use_ = change.number;
+  if (change.upload == nullptr) {
+    in_use_ = change.number;
+    hub_.number_calibration(change.key, change.number);
+  }
   // It is kept only now that the pipeline has taken it, so that a calibration that does not fit
   // this camera never replaces one that does.
   on_worker(
@@ -193,10 +194,14 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
           return change.number;
         });
       },
-      [weak = pending.session, id = pending.id, uploaded = change.upload != nullptr](
-          Commands& self, const Outcome<std::uint64_t>& kept) {
+      [weak = pending.session, id = pending.id, change](Commands& self,
+                                                        const Outcome<std::uint64_t>& kept) {
         self.changing_ = false;
-        if (!kept.failed()) self.in_use_ = kept.value;
+        if (!kept.failed()) {
+          self.in_use_ = kept.value;
+          self.hub_.number_calibration(change.key, kept.value);
+        }
+        self.tell_calibration(change, self.in_use_);
         const auto session = weak.lock();
         if (session == nullptr) return;
         if (kept.failed()) {
@@ -208,8 +213,44 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
         }
         auto message = reply_to(id);
         auto& done = *message.mutable_reply()->mutable_done();
-        if (uploaded) done.set_calibration(kept.value);
+        if (change.upload != nullptr) done.set_calibration(kept.value);
         session->send(message);
+      });
+}
+
+void Commands::tell_calibration(const CalibrationChange& change,
+                                std::optional<std::uint64_t> number) {
+  v1::ServerMessage message;
+  auto& event = *message.mutable_event();
+  fill(change.at, event);
+  event.mutable_calibration()->set_name(change.name);
+  if (number) event.mutable_calibration()->set_number(*number);
+  hub_.broadcast(message);
+}
+
+void Commands::get_reference(const Who& who) {
+  if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+  if (submit(who, pipeline::CopyReference{}, Pending::Reference{})) ++reading_;
+}
+
+void Commands::send_reference(const Who& who,
+                              std::shared_ptr<const pipeline::ReferenceCopy> reference) {
+  ++reading_;
+  on_worker(
+      [reference] {
+        return image::encode_png(image::Grey16{
+            .width = reference->width, .height = reference->height, .pixels = reference->image_q8});
+      },
+      [who, reference, number = hub_.calibration_number(reference->calibration)](Commands& self,
+                                                                                 std::string png) {
+        --self.reading_;
+        auto message = reply_to(who.second);
+        auto& image = *message.mutable_reply()->mutable_reference();
+        image.set_png(std::move(png));
+        fill(reference->light, std::nullopt, *image.mutable_light());
+        image.set_sequence(reference->sequence);
+        if (number) image.set_calibration(*number);
+        who.first->send(message);
       });
 }
 

@@ -8,6 +8,7 @@
 #include "daemon/net/hub.hpp"
 #include "daemon/net/light_schemes.hpp"
 #include "daemon/net/messages.hpp"
+#include "hal/base/clock.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -27,6 +28,10 @@ v1::ErrorCode code_of(pipeline::Outcome outcome) {
       return v1::ERROR_DEVICE;
     case pipeline::Outcome::invalid:
       return v1::ERROR_INVALID;
+    case pipeline::Outcome::uncalibrated:
+      return v1::ERROR_UNCALIBRATED;
+    case pipeline::Outcome::no_reference:
+      return v1::ERROR_BUSY;
   }
   return v1::ERROR_INVALID;
 }
@@ -75,7 +80,9 @@ Commands::Commands(asio::io_context& io, asio::thread_pool& worker, const NetCon
       hub_(hub),
       port_(port),
       store_(store),
-      in_use_(store.current_number()) {}
+      in_use_(store.current_number()) {
+  if (in_use_) hub_.number_calibration(0, *in_use_);  // the pipeline's key of the first
+}
 
 void Commands::on_request(const std::shared_ptr<Session>& session,
                           const v1::ClientMessage& message) {
@@ -98,9 +105,9 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
     case v1::ClientMessage::kActivateCalibration:
       return activate_calibration(who, message.activate_calibration());
     case v1::ClientMessage::kGetReference:
+      return get_reference(who);
     case v1::ClientMessage::kPing:
-      return session->reply_error(who.second, v1::ERROR_UNSUPPORTED,
-                                  "this daemon does not know that request: update dtactd");
+      return ping(who);
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::REQUEST_NOT_SET:
       return;  // The session's business.
@@ -109,17 +116,16 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
 
 void Commands::subscribe(const Who& who, const v1::Subscribe& request) {
   const auto& [session, id] = who;
-  if (!v1::DepthEncoding_IsValid(request.depth()) || !v1::LumaEncoding_IsValid(request.luma())) {
-    return session->reply_error(
-        id, v1::ERROR_INVALID,
-        fmt::format("subscribe: depth encoding {} or luma encoding {} is unknown to this daemon",
-                    static_cast<int>(request.depth()), static_cast<int>(request.luma())));
+  Subscription::Map map;
+  if (const auto calibration = port_.status().calibration) {
+    const CalibrationSummary summary = summarise(*calibration);
+    map = {static_cast<std::uint32_t>(summary.width), static_cast<std::uint32_t>(summary.height)};
   }
-  Subscription subscription;
-  if (!request.summary()) subscription.kind = {request.depth(), request.luma()};
-  subscription.active = request.summary() || subscription.kind != FrameKind{};
-  subscription.every = std::max(request.every(), 1U);
-  session->subscribe(subscription);
+  const auto made = Subscription::from(request, session->minor_version(), map);
+  if (const auto* refusal = std::get_if<Refusal>(&made)) {
+    return session->reply_error(id, refusal->code, refusal->sentence);
+  }
+  session->subscribe(std::get<Subscription>(made));
   hub_.update_want();
   auto message = reply_to(id);
   message.mutable_reply()->mutable_done();
@@ -129,6 +135,7 @@ void Commands::subscribe(const Who& who, const v1::Subscribe& request) {
 bool Commands::submit(const Who& who, decltype(pipeline::Command::what) command,
                       decltype(Pending::what) what) {
   const std::uint64_t ticket = next_ticket_++;
+  if (auto* use = std::get_if<pipeline::UseCalibration>(&command)) use->key = ticket;
   if (!port_.submit({ticket, std::move(command)})) {
     who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
     return false;
@@ -157,7 +164,7 @@ void Commands::rezero(const Who& who, bool force) {
 void Commands::on_done(const pipeline::CommandDone& done) {
   const auto entry = pending_.extract(done.ticket);
   if (entry.empty()) return;
-  const Pending& pending = entry.mapped();
+  Pending& pending = entry.mapped();
   const bool ok = done.outcome == pipeline::Outcome::done;
   const auto* light = std::get_if<hal::Light>(&pending.what);
   if (light != nullptr) {
@@ -165,16 +172,23 @@ void Commands::on_done(const pipeline::CommandDone& done) {
     const bool kept = done.outcome == pipeline::Outcome::ring_away;
     if (!ok && !kept && lights_pending_ == 0) light_.reset();
   }
-  const auto* change = std::get_if<CalibrationChange>(&pending.what);
-  if (change != nullptr && ok) return keep_calibration(pending, *change);
+  auto* const change = std::get_if<CalibrationChange>(&pending.what);
+  if (change != nullptr && ok) {
+    change->key = done.ticket;
+    change->at = done.at;
+    return keep_calibration(pending, *change);
+  }
   if (change != nullptr) changing_ = false;
+  const bool reference = std::holds_alternative<Pending::Reference>(pending.what);
+  if (reference) --reading_;
 
   const auto session = pending.session.lock();
   if (session == nullptr) return;
+  if (reference && ok) return send_reference({session, pending.id}, done.reference);
   if (!ok) return session->reply_error(pending.id, code_of(done.outcome), done.message);
   auto message = reply_to(pending.id);
   if (light != nullptr) {
-    fill(*light, *message.mutable_reply()->mutable_light());
+    fill(*light, done.light_since_ns, *message.mutable_reply()->mutable_light());
   } else {
     message.mutable_reply()->mutable_done();
   }
@@ -195,11 +209,26 @@ void Commands::get_status(const Who& who) {
     client.set_program(session->program());
     client.set_sent(session->outbox().sent());
     client.set_dropped(session->outbox().dropped());
+    client.set_rights(v1::RIGHTS_CONTROL);
+    client.set_endpoint(session->peer().endpoint);
+    client.set_sent_bytes(session->outbox().sent_bytes());
+    client.set_waiting_bytes(session->outbox().waiting_bytes());
   }
   status.set_version(config_.version);
+  status.set_name(config_.name);
+  status.set_serial(hub_.serial());
   const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - start_;
   status.set_uptime_s(uptime.count());
   who.first->send(message);
+}
+
+void Commands::ping(const Who& who) {
+  auto message = reply_to(who.second);
+  auto& pong = *message.mutable_reply()->mutable_pong();
+  auto& clock = base::system_clock();
+  pong.set_monotonic_ns(clock.monotonic_ns());
+  pong.set_wall_ns(clock.wall_ns());
+  who.first->send(message, true);
 }
 
 }  // namespace dtact::net

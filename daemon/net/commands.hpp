@@ -47,14 +47,17 @@ class Commands : public std::enable_shared_from_this<Commands> {
   struct CalibrationChange {
     std::shared_ptr<const CalibrationFiles> upload;
     std::uint64_t number = 0;
-    std::string name;  ///< Once it was read.
+    std::string name;    ///< Once it was read.
+    std::uint64_t key;   ///< The pipeline's, once it uses it.
+    pipeline::Stamp at;  ///< When that was.
   };
   /// A request that the pipeline is working on.
   struct Pending {
     std::weak_ptr<Session> session;
     std::uint64_t id = 0;
     struct Rezero {};
-    std::variant<Rezero, hal::Light, CalibrationChange> what;
+    struct Reference {};
+    std::variant<Rezero, hal::Light, CalibrationChange, Reference> what;
   };
   using Who = std::pair<std::shared_ptr<Session>, std::uint64_t>;
 
@@ -64,6 +67,7 @@ class Commands : public std::enable_shared_from_this<Commands> {
   void set_light(const Who& who, const v1::SetLight& request);
   void rezero(const Who& who, bool force);
   void get_status(const Who& who);
+  void ping(const Who& who);
   /// False, with the answer sent, when the pipeline cannot take another command.
   [[nodiscard]] bool submit(const Who& who, decltype(pipeline::Command::what) command,
                             decltype(Pending::what) what);
@@ -76,6 +80,9 @@ class Commands : public std::enable_shared_from_this<Commands> {
   /// Reads and checks on the worker; then the pipeline uses it, then keep_calibration().
   void change_calibration(const Who& who, CalibrationChange change);
   void keep_calibration(const Pending& pending, const CalibrationChange& change);
+  void tell_calibration(const CalibrationChange& change, std::optional<std::uint64_t> number);
+  void get_reference(const Who& who);
+  void send_reference(const Who& who, std::shared_ptr<const pipeline::ReferenceCopy> reference);
   /// Runs `work` on the worker and then `done`(its result) here.
   template <typename Work, typename Done>
   void on_worker(Work work, Done done);

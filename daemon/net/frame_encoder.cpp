@@ -3,12 +3,13 @@
 #include <google/protobuf/io/coded_stream.h>
 
 #include <algorithm>
-#include <limits>
+#include <string_view>
+#include <utility>
+#include <vector>
 
+#include "daemon/net/depth_maps.hpp"
 #include "daemon/net/messages.hpp"
-#include "daemon/recon/model.hpp"
 #include "hal/base/clock.hpp"
-#include "proto/depth_encoding.hpp"
 #include "proto/dtact.pb.h"
 #include "proto/framing.hpp"
 
@@ -17,38 +18,58 @@ namespace {
 
 using google::protobuf::io::CodedOutputStream;
 
-// Tags of the protobuf encoding: field number × 8 + wire type (0 varint, 2 length-delimited).
-constexpr std::uint8_t kServerMessageFrame = v1::ServerMessage::kFrameFieldNumber * 8 + 2;
-constexpr std::uint8_t kFrameDropped = v1::Frame::kDroppedFieldNumber * 8 + 0;
-constexpr std::uint8_t kFrameTimes = v1::Frame::kTimesFieldNumber * 8 + 2;
-constexpr std::uint8_t kTimesEncode = v1::StageTimes::kEncodeNsFieldNumber * 8 + 0;
-static_assert(kFrameDropped < 128 && kFrameTimes < 128, "the tags are one byte each");
+constexpr std::uint32_t kVarint = 0;
+constexpr std::uint32_t kBytes = 2;  // length-delimited
+
+/// A tag of the protobuf encoding.
+constexpr std::uint32_t tag(int field, std::uint32_t wire_type) {
+  return static_cast<std::uint32_t>(field) * 8 + wire_type;
+}
 
 // Two client buffers of each kind in flight are the usual; more only costs memory.
 constexpr std::size_t kKeptBuffers = 16;
-// Room for an envelope.
-constexpr std::size_t kMaxBody = wire::kMaxMessage - 64;
+// Room for an envelope, the times, and the tags and lengths of the maps.
+constexpr std::size_t kMaxBody = wire::kMaxMessage - 256;
 
-void append_encode_time(std::int64_t ns, std::string& body) {
-  const auto time = static_cast<std::uint32_t>(
-      std::clamp<std::int64_t>(ns, 0, std::numeric_limits<std::uint32_t>::max()));
-  std::array<std::uint8_t, 8> field{kFrameTimes, 0, kTimesEncode};
-  const auto* end = CodedOutputStream::WriteVarint32ToArray(time, field.data() + 3);
-  const auto size = static_cast<std::size_t>(end - field.data());
-  field[1] = static_cast<std::uint8_t>(size - 2);
-  body.append(reinterpret_cast<const char*>(field.data()), size);
+void append_varint(std::uint64_t value, std::string& out) {
+  std::array<std::uint8_t, 10> bytes;  // NOLINT(cppcoreguidelines-pro-type-member-init)
+  const auto* end = CodedOutputStream::WriteVarint64ToArray(value, bytes.data());
+  out.append(reinterpret_cast<const char*>(bytes.data()),
+             static_cast<std::size_t>(end - bytes.data()));
+}
+
+/// A message field that begins with `head` and ends with the bytes field `field` of it: protobuf
+/// would copy the bytes twice.
+void append_message(int number, std::string_view head, int field, std::string_view bytes,
+                    std::string& out) {
+  const auto last = tag(field, kBytes);
+  append_varint(tag(number, kBytes), out);
+  append_varint(head.size() + CodedOutputStream::VarintSize32(last) +
+                    CodedOutputStream::VarintSize64(bytes.size()) + bytes.size(),
+                out);
+  out.append(head);
+  append_varint(last, out);
+  append_varint(bytes.size(), out);
+  out.append(bytes);
+}
+
+std::string_view text_of(const std::vector<std::uint8_t>& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace
 
 FrameEnvelope::FrameEnvelope(std::size_t body_size, std::uint64_t dropped) noexcept {
+  constexpr auto kDropped = tag(v1::Frame::kDroppedFieldNumber, kVarint);
+  constexpr auto kFrame = tag(v1::ServerMessage::kFrameFieldNumber, kBytes);
+  static_assert(kDropped < 128 && kFrame < 128, "the tags are one byte each");
   if (dropped != 0) {
-    tail[0] = kFrameDropped;
+    tail[0] = kDropped;
     const auto* end = CodedOutputStream::WriteVarint64ToArray(dropped, tail.data() + 1);
     tail_size = static_cast<std::size_t>(end - tail.data());
   }
   std::uint8_t* const message = head.data() + wire::kLengthSize;
-  message[0] = kServerMessageFrame;
+  message[0] = kFrame;
   const auto* end = CodedOutputStream::WriteVarint64ToArray(body_size + tail_size, message + 1);
   head_size = static_cast<std::size_t>(end - head.data());
   const auto length = wire::encode_length(head_size - wire::kLengthSize + body_size + tail_size);
@@ -58,14 +79,18 @@ FrameEnvelope::FrameEnvelope(std::size_t body_size, std::uint64_t dropped) noexc
 struct FrameEncoder::Impl {
   std::string frame_id;
   const pipeline::DepthFrame* frame = nullptr;
-  wire::DeltaZstdEncoder delta_zstd;
+  std::optional<std::uint64_t> calibration;
+  DepthMaps maps;
   v1::Frame message;
-  std::array<std::array<std::shared_ptr<const EncodedFrame>, 2>, 3> done;
+  std::string head;
+  std::vector<std::pair<FrameKind, std::shared_ptr<const EncodedFrame>>> done;
   std::vector<std::shared_ptr<EncodedFrame>> buffers;
 
   std::shared_ptr<EncodedFrame> free_buffer();
-  void add_depth(v1::DepthEncoding encoding);
-  void add_luma();
+  bool write(const FrameKind& kind, std::string& body);
+  void append_luma(int encoding, std::string& body);
+  void append_jpeg(std::string& body);
+  void append_times(std::int64_t encode_ns, std::string& body) const;
 };
 
 /// A buffer that no client holds any more. One thread owns them all, so use_count() is exact.
@@ -78,31 +103,58 @@ std::shared_ptr<EncodedFrame> FrameEncoder::Impl::free_buffer() {
   return buffer;
 }
 
-void FrameEncoder::Impl::add_depth(v1::DepthEncoding encoding) {
-  auto& depth = *message.mutable_depth();
-  depth.set_encoding(encoding);
-  depth.set_width(static_cast<std::uint32_t>(frame->width));
-  depth.set_height(static_cast<std::uint32_t>(frame->height));
-  depth.set_mm_per_px(frame->mm_per_px);
-  depth.set_um_per_unit(1);
-  depth.set_decimation(static_cast<std::uint32_t>(frame->decimation));
-  depth.set_uncertainty_um(frame->uncertainty_um);
-  depth.set_untrusted_value(recon::kUntrusted);
-  if (encoding == v1::DEPTH_DELTA_ZSTD) {
-    delta_zstd.encode(frame->depth_um, static_cast<std::size_t>(frame->width),
-                      *depth.mutable_data());
-  } else {
-    wire::encode_int16(frame->depth_um, *depth.mutable_data());
+/// All but the times. False when it is too large.
+bool FrameEncoder::Impl::write(const FrameKind& kind, std::string& body) {
+  message.Clear();
+  fill(*frame, message);
+  message.set_frame_id(frame_id);
+  if (calibration) message.set_calibration(*calibration);
+  const DepthMaps::Map* depth = nullptr;
+  if (kind.depth != v1::DEPTH_NONE && frame->has_depth) {
+    depth = maps.get(kind.depth, kind.spec, kind.contact_box);
   }
+  const bool luma = kind.luma != v1::LUMA_NONE && frame->has_luma;
+  const bool jpeg = kind.jpeg && frame->has_jpeg;
+  std::size_t size = message.ByteSizeLong();
+  if (depth != nullptr) size += depth->head.size() + depth->data.size();
+  if (luma) size += frame->luma.size();
+  if (jpeg) size += frame->jpeg.size();
+  if (size > kMaxBody) return false;
+  message.SerializeToString(&body);
+  if (depth != nullptr) {
+    append_message(v1::Frame::kDepthFieldNumber, depth->head, v1::DepthMap::kDataFieldNumber,
+                   depth->data, body);
+  }
+  if (luma) append_luma(kind.luma, body);
+  if (jpeg) append_jpeg(body);
+  return true;
 }
 
-void FrameEncoder::Impl::add_luma() {
-  auto& luma = *message.mutable_luma();
-  luma.set_encoding(v1::LUMA_GREY8);
+void FrameEncoder::Impl::append_luma(int encoding, std::string& body) {
+  v1::LumaMap luma;
+  luma.set_encoding(static_cast<v1::LumaEncoding>(encoding));
   luma.set_width(static_cast<std::uint32_t>(frame->luma_width));
   luma.set_height(static_cast<std::uint32_t>(frame->luma_height));
-  luma.mutable_data()->assign(reinterpret_cast<const char*>(frame->luma.data()),
-                              frame->luma.size());
+  luma.SerializeToString(&head);
+  append_message(v1::Frame::kLumaFieldNumber, head, v1::LumaMap::kDataFieldNumber,
+                 text_of(frame->luma), body);
+}
+
+void FrameEncoder::Impl::append_jpeg(std::string& body) {
+  v1::JpegImage jpeg;
+  jpeg.set_width(static_cast<std::uint32_t>(frame->jpeg_width));
+  jpeg.set_height(static_cast<std::uint32_t>(frame->jpeg_height));
+  jpeg.SerializeToString(&head);
+  append_message(v1::Frame::kJpegFieldNumber, head, v1::JpegImage::kDataFieldNumber,
+                 text_of(frame->jpeg), body);
+}
+
+void FrameEncoder::Impl::append_times(std::int64_t encode_ns, std::string& body) const {
+  v1::StageTimes times;
+  fill(frame->times, encode_ns, times);
+  append_varint(tag(v1::Frame::kTimesFieldNumber, kBytes), body);
+  append_varint(times.ByteSizeLong(), body);
+  times.AppendToString(&body);
 }
 
 FrameEncoder::FrameEncoder(std::string frame_id) : impl_(std::make_unique<Impl>()) {
@@ -110,32 +162,29 @@ FrameEncoder::FrameEncoder(std::string frame_id) : impl_(std::make_unique<Impl>(
 }
 FrameEncoder::~FrameEncoder() = default;
 
-void FrameEncoder::begin(const pipeline::DepthFrame& frame) noexcept {
+void FrameEncoder::begin(const pipeline::DepthFrame& frame,
+                         std::optional<std::uint64_t> calibration) {
   impl_->frame = &frame;
-  impl_->done = {};
+  impl_->calibration = calibration;
+  impl_->maps.begin(frame);
+  impl_->done.clear();
 }
 
-std::shared_ptr<const EncodedFrame> FrameEncoder::encode(FrameKind kind) {
-  auto& done =
-      impl_->done.at(static_cast<std::size_t>(kind.depth)).at(static_cast<std::size_t>(kind.luma));
-  if (done != nullptr) return done;
+std::shared_ptr<const EncodedFrame> FrameEncoder::encode(const FrameKind& kind) {
+  for (const auto& [asked, encoded] : impl_->done) {
+    if (asked == kind) return encoded;
+  }
   const std::int64_t start_ns = base::system_clock().monotonic_ns();
-  const auto& frame = *impl_->frame;
-  auto& message = impl_->message;
-  message.Clear();
-  fill(frame, message);
-  message.set_frame_id(impl_->frame_id);
-  if (kind.depth != 0 && frame.has_depth)
-    impl_->add_depth(static_cast<v1::DepthEncoding>(kind.depth));
-  if (kind.luma != 0 && frame.has_luma) impl_->add_luma();
-  if (message.ByteSizeLong() > kMaxBody) return nullptr;
   auto buffer = impl_->free_buffer();
-  message.SerializeToString(&buffer->body);
+  if (!impl_->write(kind, buffer->body)) {
+    impl_->done.emplace_back(kind, nullptr);
+    return nullptr;
+  }
   const std::int64_t took_ns = base::system_clock().monotonic_ns() - start_ns;
-  append_encode_time(took_ns, buffer->body);
+  impl_->append_times(took_ns, buffer->body);
   times_.add(took_ns);
-  done = std::move(buffer);
-  return done;
+  impl_->done.emplace_back(kind, buffer);
+  return buffer;
 }
 
 }  // namespace dtact::net

@@ -4,19 +4,22 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
-#include <vector>
 
+#include "daemon/net/depth_view.hpp"
 #include "daemon/pipeline/depth_frame.hpp"
 #include "daemon/pipeline/histogram.hpp"
 
 namespace dtact::net {
 
-/// What a frame message is to hold; the values are the wire's DepthEncoding and LumaEncoding. Both
-/// 0: a summary.
+/// What a frame message is to hold. Nothing at all: a summary.
 struct FrameKind {
-  int depth = 0;  ///< 0 … 2
-  int luma = 0;   ///< 0 … 1
+  int depth = 0;  ///< dtact.v1.DepthEncoding; 0: none, and the next two say nothing.
+  DepthSpec spec = {};
+  bool contact_box = false;  ///< The region is where the contact is.
+  int luma = 0;              ///< dtact.v1.LumaEncoding
+  bool jpeg = false;
   bool operator==(const FrameKind&) const = default;
 };
 
@@ -37,9 +40,9 @@ struct FrameEnvelope {
   std::size_t tail_size = 0;
 };
 
-/// Encodes a frame once for each kind that is asked for. `times.encode_ns` is this very encoding's
-/// own time: it is measured around the serialisation and appended to the body as a second `times`,
-/// which parsers merge with the first.
+/// Encodes a frame once for each kind that is asked for, and its maps once for each choice among
+/// them, whatever else is in the message. `times.encode_ns` is this very encoding's own time:
+/// `times` is written last.
 class FrameEncoder {
  public:
   explicit FrameEncoder(std::string frame_id);
@@ -47,11 +50,13 @@ class FrameEncoder {
   FrameEncoder(const FrameEncoder&) = delete;
   FrameEncoder& operator=(const FrameEncoder&) = delete;
 
-  /// Begins another frame. `frame` must stay as it is until the next call.
-  void begin(const pipeline::DepthFrame& frame) noexcept;
+  /// Begins another frame, measured by the calibration of this number. `frame` must stay as it is
+  /// until the next call.
+  void begin(const pipeline::DepthFrame& frame,
+             std::optional<std::uint64_t> calibration = std::nullopt);
   /// The frame as `kind`; the same buffer when asked again. Maps the frame does not have are left
   /// out. Null when it would exceed the wire's cap.
-  [[nodiscard]] std::shared_ptr<const EncodedFrame> encode(FrameKind kind);
+  [[nodiscard]] std::shared_ptr<const EncodedFrame> encode(const FrameKind& kind);
 
   /// What each encoding took; its count is that of encodings, not of clients.
   [[nodiscard]] const pipeline::Histogram& times() const noexcept { return times_; }

@@ -99,10 +99,13 @@ void Hub::on_frame(const pipeline::DepthFrame& frame) {
   const std::uint64_t missed = seen_frame_ ? frame.skipped - skipped_ : 0;
   skipped_ = frame.skipped;
   seen_frame_ = true;
-  encoder_.begin(frame);
+  encoder_.begin(frame, calibration_number(frame.calibration));
+  // Calibrations come into use in the order of their keys.
+  if (frame.calibration) numbers_.erase(numbers_.begin(), numbers_.lower_bound(*frame.calibration));
   for (const auto& session : sessions_) {
-    if (!session->is_due(missed)) continue;
-    auto encoded = encoder_.encode(session->subscription().kind);
+    const auto kind = session->due(frame.camera.timestamp_ns, missed);
+    if (!kind) continue;
+    auto encoded = encoder_.encode(*kind);
     if (encoded != nullptr) {
       session->send_frame(std::move(encoded));
     } else if (!std::exchange(told_too_large_, true)) {
@@ -126,10 +129,17 @@ void Hub::admit(const std::shared_ptr<Session>& session) {
   }
 }
 
-void Hub::broadcast(const v1::ServerMessage& message) {
+void Hub::broadcast(const v1::ServerMessage& event) {
   for (const auto& session : sessions_) {
-    if (session->greeted()) session->send(message);
+    if (session->greeted() && session->subscription().events()) session->send(event);
   }
+}
+
+std::optional<std::uint64_t> Hub::calibration_number(std::optional<std::uint64_t> key) const {
+  if (!key) return std::nullopt;
+  const auto found = numbers_.find(*key);
+  if (found == numbers_.end()) return std::nullopt;
+  return found->second;
 }
 
 void Hub::update_want() {
@@ -137,11 +147,11 @@ void Hub::update_want() {
   for (const auto& session : sessions_) {
     if (!session->greeted()) continue;
     wanted.contact = true;
-    const auto& subscription = session->subscription();
-    if (!subscription.active) continue;
+    const auto parts = session->subscription().parts();
     // A summary tells of the contact, which comes from the depth.
-    wanted.depth = wanted.depth || subscription.kind.depth != 0 || subscription.kind == FrameKind{};
-    wanted.luma = wanted.luma || subscription.kind.luma != 0;
+    wanted.depth |= (parts & (Subscription::kDepth | Subscription::kSummary)) != 0;
+    wanted.luma |= (parts & Subscription::kLuma) != 0;
+    wanted.jpeg |= (parts & Subscription::kJpeg) != 0;
   }
   port_.want(wanted);
 }
@@ -151,6 +161,10 @@ std::vector<pipeline::StageStatistics> Hub::stages() const {
   return {pipeline::summarise("handover", handover_),
           pipeline::summarise("encode", encoder_.times())};
 }
+
+// What it is told by is all that every camera has: a USB camera's port, a sensor's place on its
+// bus.
+std::string Hub::serial() const { return port_.status().camera.identity; }
 
 void Hub::on_request(const std::shared_ptr<Session>& session, const v1::ClientMessage& message) {
   handlers_.request(session, message);

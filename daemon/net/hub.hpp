@@ -2,8 +2,11 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "daemon/net/frame_encoder.hpp"
@@ -34,8 +37,12 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
 
   /// A new client: started, or refused when there are max_clients.
   void admit(const std::shared_ptr<Session>& session);
-  /// To every client that has been greeted.
-  void broadcast(const v1::ServerMessage& message);
+  /// To every client that has been greeted and wants events.
+  void broadcast(const v1::ServerMessage& event);
+  /// What the calibration is called on the wire that the pipeline knows by this key.
+  void number_calibration(std::uint64_t key, std::uint64_t number) { numbers_[key] = number; }
+  [[nodiscard]] std::optional<std::uint64_t> calibration_number(
+      std::optional<std::uint64_t> key) const;
   /// After a client's subscription changed: tells the pipeline what all of them together want.
   void update_want();
   [[nodiscard]] const std::vector<std::shared_ptr<Session>>& sessions() const noexcept {
@@ -49,6 +56,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
 
   void on_request(const std::shared_ptr<Session>& session,
                   const v1::ClientMessage& message) override;
+  [[nodiscard]] std::string serial() const override;
   void on_greeted() override { update_want(); }
   void on_closed(const Session& session) override;
 
@@ -66,7 +74,8 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   pipeline::Histogram handover_;  ///< From published until fetched here.
   Handlers handlers_;
   std::vector<std::shared_ptr<Session>> sessions_;
-  std::vector<std::shared_ptr<Session>> refused_;  ///< Being told why.
+  std::vector<std::shared_ptr<Session>> refused_;   ///< Being told why.
+  std::map<std::uint64_t, std::uint64_t> numbers_;  ///< By key, of those still in use.
   bool seen_frame_ = false;
   std::uint64_t skipped_ = 0;  ///< DepthFrame::skipped of the last frame.
   bool told_too_large_ = false;

@@ -67,6 +67,20 @@ v1::TimestampMeaning to_wire(hal::TimestampMeaning meaning) {
   return v1::TIMESTAMP_UNSPECIFIED;
 }
 
+v1::ContactAbsence to_wire(pipeline::ContactAbsence absence) {
+  switch (absence) {
+    case pipeline::ContactAbsence::none:
+      return v1::CONTACT_ABSENCE_NONE;
+    case pipeline::ContactAbsence::uncalibrated:
+      return v1::CONTACT_ABSENCE_UNCALIBRATED;
+    case pipeline::ContactAbsence::referencing:
+      return v1::CONTACT_ABSENCE_REFERENCING;
+    case pipeline::ContactAbsence::unasked:
+      return v1::CONTACT_ABSENCE_UNASKED;
+  }
+  return v1::CONTACT_ABSENCE_NONE;
+}
+
 const char* name_of(hal::CameraState state) {
   switch (state) {
     case hal::CameraState::streaming:
@@ -130,8 +144,9 @@ void fill_camera(const hal::CameraInfo& info, const hal::CameraReport& report,
 
 }  // namespace
 
-void fill(const hal::Light& light, v1::LightState& out) {
+void fill(const hal::Light& light, std::optional<std::int64_t> since_ns, v1::LightState& out) {
   out.set_brightness(light.brightness);
+  if (since_ns) out.set_since_ns(*since_ns);
   for (const auto& led : light.leds) {
     auto& to = *out.add_leds();
     to.set_r(led.r);
@@ -159,16 +174,22 @@ void fill(const pipeline::DepthFrame& frame, v1::Frame& out) {
   out.set_ready_ns(frame.camera.ready_ns);
   out.set_published_ns(frame.done_ns);
   fill_health(frame.health, out);
-  fill(frame.light, *out.mutable_light());
-  fill(frame.contact, *out.mutable_contact());
-  auto& times = *out.mutable_times();
-  times.set_decode_ns(clamp_ns(frame.times.decode_ns));
-  times.set_rectify_ns(clamp_ns(frame.times.rectify_ns));
-  times.set_smooth_ns(clamp_ns(frame.times.smooth_ns));
-  times.set_list_ns(clamp_ns(frame.times.list_ns));
-  times.set_activity_ns(clamp_ns(frame.times.activity_ns));
-  times.set_inspect_ns(clamp_ns(frame.times.inspect_ns));
-  times.set_publish_ns(clamp_ns(frame.times.publish_ns));
+  fill(frame.light, frame.light_since_ns, *out.mutable_light());
+  out.set_contact_absence(to_wire(frame.contact_absence));
+  if (frame.contact_absence == pipeline::ContactAbsence::none) {
+    fill(frame.contact, *out.mutable_contact());
+  }
+}
+
+void fill(const pipeline::StageTimes& times, std::int64_t encode_ns, v1::StageTimes& out) {
+  out.set_decode_ns(clamp_ns(times.decode_ns));
+  out.set_rectify_ns(clamp_ns(times.rectify_ns));
+  out.set_smooth_ns(clamp_ns(times.smooth_ns));
+  out.set_list_ns(clamp_ns(times.list_ns));
+  out.set_activity_ns(clamp_ns(times.activity_ns));
+  out.set_inspect_ns(clamp_ns(times.inspect_ns));
+  out.set_publish_ns(clamp_ns(times.publish_ns));
+  out.set_encode_ns(clamp_ns(encode_ns));
 }
 
 void fill(const pipeline::Status& status, v1::Status& out) {
@@ -179,7 +200,7 @@ void fill(const pipeline::Status& status, v1::Status& out) {
   out.mutable_ring()->set_backend(status.ring.backend);
   out.mutable_ring()->set_identity(status.ring.identity);
   out.mutable_ring()->set_message(status.ring_message);
-  fill(status.light, *out.mutable_light());
+  fill(status.light, status.light_since_ns, *out.mutable_light());
   if (status.calibration != nullptr) {
     fill(summarise(*status.calibration), *out.mutable_calibration());
   }
@@ -228,7 +249,14 @@ void fill(const pipeline::StageStatistics& stage, v1::StagePercentiles& out) {
   out.set_max_us(stage.max_us);
 }
 
+void fill(const pipeline::Stamp& at, v1::Event& out) {
+  out.set_sequence(at.sequence);
+  out.set_monotonic_ns(at.monotonic_ns);
+  out.set_wall_ns(at.wall_ns);
+}
+
 bool fill(const pipeline::Event& event, v1::Event& out) {
+  std::visit([&out](const auto& what) { fill(what.at, out); }, event);
   if (const auto* contact = std::get_if<pipeline::ContactChanged>(&event)) {
     auto& to = *out.mutable_contact();
     to.set_sequence(contact->at.sequence);
@@ -236,7 +264,7 @@ bool fill(const pipeline::Event& event, v1::Event& out) {
     fill(contact->contact, *to.mutable_contact());
     to.mutable_contact()->set_touching(contact->touching);
   } else if (const auto* light = std::get_if<pipeline::LightChanged>(&event)) {
-    fill(light->light, *out.mutable_light());
+    fill(light->light, light->since_ns, *out.mutable_light());
   } else if (const auto* reference = std::get_if<pipeline::ReferenceTaken>(&event)) {
     out.mutable_reference()->set_sequence(reference->at.sequence);
     out.mutable_reference()->set_restored(reference->restored);

@@ -21,11 +21,12 @@ struct NetConfig {
   /// interface. It may come later than the daemon, as by DHCP. There is no authentication: whoever
   /// can connect can command.
   std::string address = wire::kDefaultAddress;
-  std::uint16_t port = wire::kDefaultPort;        ///< 0: any free one, see Server::port().
-  std::size_t max_clients = 32;                   ///< More are refused with a sentence.
-  std::string frame_id = "dtact_surface";         ///< Name of the surface frame in every message.
-  std::string program = "dtactd";                 ///< "dtactd 0.1.0": in the handshake.
-  std::string version;                            ///< "0.1.0": in status.
+  std::uint16_t port = wire::kDefaultPort;  ///< 0: any free one, see Server::port().
+  std::size_t max_clients = 32;             ///< More are refused with a sentence.
+  std::string frame_id = "dtact_surface";   ///< Name of the surface frame in every message.
+  std::string name;                         ///< The daemon's own, in the handshake and status.
+  std::string program = "dtactd";           ///< "dtactd 0.1.0": in the handshake.
+  std::string version;                      ///< "0.1.0": in status.
   std::chrono::milliseconds hello_timeout{5000};  ///< A client silent for so long is let go.
   /// Longest time without progress of unacknowledged or unaccepted data (TCP_USER_TIMEOUT), after
   /// which a client counts as dead: a pulled cable, or a program that stopped reading.

@@ -23,10 +23,11 @@ std::string framed(const v1::ServerMessage& message) {
 
 }  // namespace
 
-bool Outbox::push(const v1::ServerMessage& message) {
-  if (control_.size() >= kMaxMessages || control_bytes_ > kMaxBytes) return false;
-  control_.push_back(framed(message));
-  control_bytes_ += control_.back().size();
+bool Outbox::push(const v1::ServerMessage& message, bool first) {
+  if (control_count() >= kMaxMessages || control_bytes_ > kMaxBytes) return false;
+  std::string bytes = framed(message);
+  control_bytes_ += bytes.size();
+  control_.insert(first ? control_.begin() : control_.end(), std::move(bytes));
   if (!writing_) write_next();
   return true;
 }
@@ -44,7 +45,7 @@ void Outbox::finish() {
 }
 
 std::string Outbox::backlog() const {
-  return fmt::format("{} answers and events ({} bytes)", control_.size(), control_bytes_);
+  return fmt::format("{} answers and events ({} bytes)", control_count(), control_bytes_);
 }
 
 void Outbox::write_next() {
@@ -55,11 +56,13 @@ void Outbox::write_next() {
 
 void Outbox::write_control() {
   writing_ = true;
-  transport_.write({asio::buffer(control_.front())},
+  sending_control_ = std::move(control_.front());
+  control_.pop_front();
+  transport_.write({asio::buffer(sending_control_)},
                    [this, held = owner_.hold()](const error_code& error, std::size_t size) {
                      if (closed_) return;
-                     control_bytes_ -= control_.front().size();
-                     control_.pop_front();
+                     control_bytes_ -= sending_control_.size();
+                     sending_control_.clear();
                      on_written(error, size);
                    });
 }

@@ -41,9 +41,11 @@ class Outbox {
 
   Outbox(Transport& transport, Owner& owner) : transport_(transport), owner_(owner) {}
 
-  /// An answer or event. False when too much lies unread: backlog() says how much.
-  [[nodiscard]] bool push(const v1::ServerMessage& message);
+  /// An answer or event; `first`: before all others that wait. False when too much lies unread:
+  /// backlog() says how much.
+  [[nodiscard]] bool push(const v1::ServerMessage& message, bool first = false);
   void push(std::shared_ptr<const EncodedFrame> frame);
+  [[nodiscard]] bool frame_waits() const noexcept { return frame_ != nullptr; }
   /// The waiting frame is not wanted any more.
   void drop_frame() noexcept { frame_.reset(); }
   /// Sends what is queued, then ends the sending side. Nothing may be pushed after it.
@@ -71,7 +73,13 @@ class Outbox {
 
   Transport& transport_;
   Owner& owner_;
+  /// Answers and events with their lengths that are not sent.
+  [[nodiscard]] std::size_t control_count() const noexcept {
+    return control_.size() + (sending_control_.empty() ? 0 : 1);
+  }
+
   std::deque<std::string> control_;  ///< Answers and events with their lengths.
+  std::string sending_control_;      ///< The one that is being sent.
   std::size_t control_bytes_ = 0;
   std::shared_ptr<const EncodedFrame> frame_;    ///< The frame that goes next.
   std::shared_ptr<const EncodedFrame> sending_;  ///< The frame that is being sent.

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "proto/dtact.pb.h"
+#include "proto/features.hpp"
 
 namespace dtact::net {
 namespace {
@@ -89,16 +90,17 @@ void Session::on_message(const std::string& bytes) {
   if (message.id() == 0) {
     return end_with(0, v1::ERROR_BAD_MESSAGE, "the request has id 0: ids begin with 1");
   }
-  if (message.request_case() == v1::ClientMessage::REQUEST_NOT_SET) {
-    return end_with(message.id(), v1::ERROR_BAD_MESSAGE,
-                    "the message has no request that this daemon knows: set one, or update dtactd");
-  }
   if (state_ == State::fresh) {
     if (!message.has_hello()) {
       return end_with(message.id(), v1::ERROR_VERSION,
                       "the first message was not Hello: send it to agree on a version");
     }
     return on_hello(message.id(), message.hello());
+  }
+  if (message.request_case() == v1::ClientMessage::REQUEST_NOT_SET) {
+    return reply_error(message.id(), v1::ERROR_UNSUPPORTED,
+                       "the message has no request that this daemon knows: ask only for what "
+                       "HelloReply.features lists, or update dtactd");
   }
   if (message.has_hello()) {
     return reply_error(message.id(), v1::ERROR_INVALID,
@@ -122,6 +124,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   timer_.cancel();
   state_ = State::greeted;
   program_ = printable(hello.program());
+  minor_ = hello.minor();
   config_.log(LogLevel::info, fmt::format("client {} ({}) connected", peer().address, program_));
   v1::ServerMessage message;
   message.mutable_reply()->set_id(id);
@@ -129,14 +132,19 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   reply.set_major(wire::kMajor);
   reply.set_minor(wire::kMinor);
   reply.set_program(config_.program);
+  for (const char* feature : wire::kFeatures) reply.add_features(feature);
+  reply.set_rights(v1::RIGHTS_CONTROL);
+  reply.set_name(config_.name);
   auto& frame = *reply.mutable_surface_frame();
   frame.set_frame_id(config_.frame_id);
   frame.set_right_handed(true);
   frame.set_mirrored_from_outside(true);
   frame.set_origin("centre");
   frame.set_axes("x right, y down, z towards the object, as the camera sees it");
+  const auto host = host_.lock();
+  if (host != nullptr) reply.set_serial(host->serial());
   send(message);
-  if (const auto host = host_.lock()) host->on_greeted();
+  if (host != nullptr) host->on_greeted();
 }
 
 void Session::reply_error(std::uint64_t id, int error_code_, const std::string& sentence) {
@@ -158,27 +166,25 @@ void Session::end_with(std::uint64_t id, int error_code_, const std::string& sen
   outbox_.finish();
 }
 
-void Session::send(const v1::ServerMessage& message) {
+void Session::send(const v1::ServerMessage& message, bool first) {
   if (state_ == State::closed || state_ == State::ending) return;
-  if (!outbox_.push(message)) {
+  if (!outbox_.push(message, first)) {
     close(fmt::format("{} lay unread", outbox_.backlog()), LogLevel::warning);
   }
 }
 
-void Session::subscribe(const Subscription& subscription) noexcept {
+void Session::subscribe(const Subscription& subscription) {
   subscription_ = subscription;
-  offered_ = 0;
-  if (!subscription_.active) outbox_.drop_frame();
+  outbox_.drop_frame();
 }
 
-bool Session::is_due(std::uint64_t missed) noexcept {
-  if (state_ != State::greeted || !subscription_.active) return false;
-  // The first frame is due, then every n-th.
-  const auto due = [this] { return (offered_ + subscription_.every - 1) / subscription_.every; };
-  const std::uint64_t before = due();
-  offered_ += missed;
-  outbox_.count_dropped(due() - before);
-  return offered_++ % subscription_.every == 0;
+std::optional<FrameKind> Session::due(std::int64_t timestamp_ns, std::uint64_t missed) {
+  if (state_ != State::greeted) return std::nullopt;
+  const Subscription::Due due = subscription_.next(timestamp_ns, missed);
+  outbox_.count_dropped(due.missed);
+  if (due.parts == 0) return std::nullopt;
+  waiting_ = due.parts | (outbox_.frame_waits() ? waiting_ : Subscription::Parts{0});
+  return subscription_.kind(waiting_);
 }
 
 void Session::send_frame(std::shared_ptr<const EncodedFrame> frame) {

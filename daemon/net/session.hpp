@@ -4,11 +4,13 @@
 #include <boost/asio/steady_timer.hpp>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "daemon/net/frame_encoder.hpp"
 #include "daemon/net/net_config.hpp"
 #include "daemon/net/outbox.hpp"
+#include "daemon/net/subscription.hpp"
 #include "daemon/net/transport.hpp"
 #include "proto/framing.hpp"
 
@@ -30,6 +32,8 @@ class SessionHost {
   SessionHost& operator=(const SessionHost&) = delete;
   virtual ~SessionHost() = default;
 
+  /// The camera's, as far as it tells one.
+  [[nodiscard]] virtual std::string serial() const = 0;
   /// The handshake is over: events and, once subscribed, frames flow.
   virtual void on_greeted() = 0;
   /// A request after the handshake, its id checked. Every one is owed exactly one reply.
@@ -37,13 +41,6 @@ class SessionHost {
                           const v1::ClientMessage& message) = 0;
   /// The connection has ended; nothing more comes of this session.
   virtual void on_closed(const Session& session) = 0;
-};
-
-/// What a client wants, see dtact.v1.Subscribe.
-struct Subscription {
-  bool active = false;
-  FrameKind kind;
-  std::uint32_t every = 1;  ///< Every n-th frame.
 };
 
 /// One client: handshake and requests in; answers, events and frames out through its outbox. A
@@ -58,15 +55,17 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   /// Instead of start(): says why and ends.
   void refuse(int error_code, const std::string& sentence);
 
-  /// Answers and events.
-  void send(const v1::ServerMessage& message);
+  /// Answers and events. `first`: before all that waits.
+  void send(const v1::ServerMessage& message, bool first = false);
   void reply_error(std::uint64_t id, int error_code, const std::string& sentence);
   /// A frame of this client's kind.
   void send_frame(std::shared_ptr<const EncodedFrame> frame);
-  /// One more frame came out of the pipeline, after `missed` that nobody fetched. True when this
-  /// client is to get it.
-  [[nodiscard]] bool is_due(std::uint64_t missed) noexcept;
-  void subscribe(const Subscription& subscription) noexcept;
+  /// One more frame came out of the pipeline, after `missed` that nobody fetched. What this client
+  /// is to get of it, if anything: with what waited to be sent of the one before, which it
+  /// replaces.
+  [[nodiscard]] std::optional<FrameKind> due(std::int64_t timestamp_ns, std::uint64_t missed);
+  /// Replaces the subscription, and the frame that waits by the old one.
+  void subscribe(const Subscription& subscription);
   /// Ends the connection now. The host is told.
   void close(const std::string& reason, LogLevel level = LogLevel::info);
 
@@ -74,6 +73,8 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   [[nodiscard]] bool greeted() const noexcept { return state_ == State::greeted; }
   [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
   [[nodiscard]] const std::string& program() const noexcept { return program_; }
+  /// Of the version that the client speaks.
+  [[nodiscard]] std::uint32_t minor_version() const noexcept { return minor_; }
   [[nodiscard]] const Outbox& outbox() const noexcept { return outbox_; }
 
  private:
@@ -100,9 +101,10 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   const NetConfig& config_;
   std::weak_ptr<SessionHost> host_;
   std::string program_;
+  std::uint32_t minor_ = 0;
   State state_ = State::fresh;
   Subscription subscription_;
-  std::uint64_t offered_ = 0;  ///< Frames of the pipeline since the subscription, for `every`.
+  Subscription::Parts waiting_ = 0;  ///< What the frame holds that waits to be sent.
 
   std::array<char, 16384> input_{};
   wire::MessageDecoder decoder_;

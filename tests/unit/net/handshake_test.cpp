@@ -174,7 +174,18 @@ TEST(Malformed, AnUnknownRequestIsAnsweredByItsId) {
   client.send_bytes("\0\0\0\5\x08\x07\xfa\x01\x00"s);  // id 7, field 31 of a later version, empty
   const auto reply = client.reply();
   EXPECT_EQ(reply.id(), 7U);
-  EXPECT_EQ(reply.error().code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_UNSUPPORTED);
+  EXPECT_THAT(reply.error().message(), HasSubstr("HelloReply.features"));
+  v1::ClientMessage known;
+  known.mutable_get_status();
+  EXPECT_TRUE(client.request(known).has_status()) << "the connection stays";
+}
+
+TEST(Malformed, AnUnknownRequestIsNoHello) {
+  const Rig rig;
+  RawClient client(rig.tcp_port());
+  client.send_bytes("\0\0\0\5\x08\x07\xfa\x01\x00"s);
+  EXPECT_EQ(client.reply().error().code(), v1::ERROR_VERSION);
   EXPECT_TRUE(client.ends());
 }
 

@@ -30,7 +30,7 @@ ROOMS = {
     "daemon/pipeline/untouched": ["hal", "hal/base", "hal/image", "daemon/recon", "daemon/calibration", "daemon/pipeline"],
     "daemon/pipeline/depth": ["hal", "hal/base", "daemon/recon", "daemon/pipeline", "daemon/pipeline/untouched"],
     "daemon/pipeline": ["hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth"],
-    "daemon/net": ["hal", "hal/base", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
+    "daemon/net": ["hal", "hal/base", "hal/image", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/v4l2", "hal/ws2812"],
     "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "hal/toml", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net"],
     "daemon": ["daemon/app", "daemon/app/doctor"],

@@ -1,0 +1,72 @@
+#include "daemon/net/depth_maps.hpp"
+
+#include "daemon/net/contact_box.hpp"
+#include "daemon/recon/model.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::net {
+
+void DepthMaps::begin(const pipeline::DepthFrame& frame) noexcept {
+  frame_ = &frame;
+  views_made_ = 0;
+  encoded_made_ = 0;
+}
+
+const DepthMaps::View& DepthMaps::view(const DepthSpec& spec, bool contact_box) {
+  for (std::size_t i = 0; i < views_made_; ++i) {
+    if (views_[i].spec == spec && views_[i].contact_box == contact_box) return views_[i];
+  }
+  if (views_made_ == views_.size()) views_.emplace_back();
+  View& view = views_[views_made_++];
+  view.spec = spec;
+  view.contact_box = contact_box;
+  view.made.reset();
+  DepthSpec where = spec;
+  if (contact_box) {
+    where.region = net::contact_box(*frame_);
+    if (!where.region) return view;
+  }
+  view.made = view.viewer.view(*frame_, where);
+  return view;
+}
+
+const DepthMaps::Map* DepthMaps::get(int encoding, const DepthSpec& spec, bool contact_box) {
+  const View& seen = view(spec, contact_box);
+  if (!seen.made) return nullptr;
+  for (std::size_t i = 0; i < encoded_made_; ++i) {
+    if (encoded_[i].view == &seen && encoded_[i].encoding == encoding) return &encoded_[i].map;
+  }
+  if (encoded_made_ == encoded_.size()) encoded_.emplace_back();
+  Encoded& encoded = encoded_[encoded_made_++];
+  encoded.view = &seen;
+  encoded.encoding = encoding;
+  encode(*seen.made, encoding, encoded.map);
+  return &encoded.map;
+}
+
+void DepthMaps::encode(const DepthView& view, int encoding, Map& map) {
+  v1::DepthMap head;
+  head.set_encoding(static_cast<v1::DepthEncoding>(encoding));
+  head.set_width(static_cast<std::uint32_t>(view.width));
+  head.set_height(static_cast<std::uint32_t>(view.height));
+  head.set_mm_per_px(view.mm_per_px);
+  head.set_um_per_unit(view.um_per_unit);
+  head.set_untrusted_value(recon::kUntrusted);
+  head.set_decimation(static_cast<std::uint32_t>(view.decimation));
+  head.set_uncertainty_um(frame_->uncertainty_um);
+  head.set_x(static_cast<std::uint32_t>(view.x));
+  head.set_y(static_cast<std::uint32_t>(view.y));
+  head.set_full_width(static_cast<std::uint32_t>(view.full_width));
+  head.set_full_height(static_cast<std::uint32_t>(view.full_height));
+  head.SerializeToString(&map.head);
+  switch (encoding) {
+    case v1::DEPTH_DELTA_ZSTD:
+      delta_zstd_.encode(view.values, static_cast<std::size_t>(view.width), map.data);
+      break;
+    default:
+      wire::encode_int16(view.values, map.data);
+      break;
+  }
+}
+
+}  // namespace dtact::net

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <cstdint>
+#include <variant>
+
+#include "daemon/net/frame_encoder.hpp"
+#include "daemon/net/refusal.hpp"
+
+namespace dtact::v1 {
+class Subscribe;
+}
+
+namespace dtact::net {
+
+/// At most so many a second, as even as the frames allow: of each period's frames the one nearest
+/// to its time is let through, so that neither the camera's jitter nor a rate that is no whole
+/// fraction of the camera's makes it more or fewer. A pause is not made up for.
+class RateLimit {
+ public:
+  /// 0: no limit.
+  explicit RateLimit(double hz = 0);
+
+  [[nodiscard]] bool limits() const noexcept { return period_ns_ > 0; }
+  /// The frame of this moment is let through. `spacing_ns`: since the one before, let through or
+  /// not; 0 = there was none.
+  [[nodiscard]] bool admits(std::int64_t timestamp_ns, std::int64_t spacing_ns) noexcept;
+
+ private:
+  std::int64_t period_ns_;
+  std::int64_t next_ns_ = INT64_MIN;
+};
+
+/// What a client wants and when it is due, see dtact.v1.Subscribe.
+class Subscription {
+ public:
+  /// Nothing but events.
+  Subscription() = default;
+  /// The request, or why not. `map`: pixels of the calibration's depth map at full resolution; 0 =
+  /// not known. `minor`: of the version that the client speaks.
+  struct Map {
+    std::uint32_t width = 0;
+    std::uint32_t height = 0;
+  };
+  [[nodiscard]] static std::variant<Subscription, Refusal> from(const v1::Subscribe& request,
+                                                                std::uint32_t minor, Map map);
+
+  /// Parts of a frame message. A set of bits.
+  using Parts = std::uint8_t;
+  static constexpr Parts kSummary = 1;
+  static constexpr Parts kDepth = 2;
+  static constexpr Parts kLuma = 4;
+  static constexpr Parts kJpeg = 8;
+
+  struct Due {
+    Parts parts = 0;           ///< 0: no message.
+    std::uint64_t missed = 0;  ///< Messages that were due before.
+  };
+  /// One more frame came out of the pipeline, after `missed` that nobody fetched.
+  [[nodiscard]] Due next(std::int64_t timestamp_ns, std::uint64_t missed) noexcept;
+
+  /// All that is asked for.
+  [[nodiscard]] Parts parts() const noexcept { return parts_; }
+  [[nodiscard]] bool events() const noexcept { return events_; }
+  /// The message that holds these parts.
+  [[nodiscard]] FrameKind kind(Parts parts) const;
+
+ private:
+  Parts parts_ = 0;
+  FrameKind kind_;
+  std::uint32_t every_ = 1;
+  RateLimit summary_;
+  RateLimit depth_;
+  RateLimit luma_;
+  RateLimit jpeg_;
+  bool events_ = true;
+  bool unlimited_ = false;     ///< One part at least comes with every frame that `every_` leaves.
+  std::uint64_t offered_ = 0;  ///< Frames of the pipeline, for `every_`.
+  std::int64_t last_ns_ = 0;   ///< Of the last frame that `every_` left.
+};
+
+}  // namespace dtact::net

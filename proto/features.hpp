@@ -1,0 +1,14 @@
+#pragma once
+
+#include <array>
+
+namespace dtact::wire {
+
+/// What a daemon can do beyond version 1.0, as HelloReply.features lists it; proto/README.md says
+/// what each stands for. A client asks for what is listed and does not compare versions.
+inline constexpr std::array kFeatures = {
+    "contact_absence", "decimation", "events", "jpeg",   "ping",
+    "rates",           "reference",  "region", "stamps", "units",
+};
+
+}  // namespace dtact::wire
