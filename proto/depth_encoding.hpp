@@ -2,49 +2,42 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "proto/dtact.pb.h"
+#include "proto/encodings/delta_zstd.hpp"
+#include "proto/encodings/int16.hpp"
+#include "proto/encodings/predict_zstd.hpp"
+#include "proto/encodings/rvl.hpp"
+
 namespace dtact::wire {
 
-/// Most pixels of a map on the wire: its int16 form has to fit a message.
-inline constexpr std::size_t kMaxPixels = std::size_t{8} << 20U;
+/// Whether maps can be sent so: dtact.v1.DepthEncoding without DEPTH_NONE.
+[[nodiscard]] bool is_depth_encoding(v1::DepthEncoding encoding) noexcept;
 
-/// DEPTH_INT16: `depth` row-major as little-endian int16. Replaces `out`.
-void encode_int16(std::span<const std::int16_t> depth, std::string& out);
-
-/// The reverse. False when the map has no pixels or too many, or `bytes` is not exactly
-/// 2 × width × height long; `depth` is then unspecified.
-[[nodiscard]] bool decode_int16(std::string_view bytes, std::size_t width, std::size_t height,
-                                std::vector<std::int16_t>& depth);
-
-/// DEPTH_DELTA_ZSTD: each pixel minus its left neighbour (the first of a row minus 0), modulo
-/// 65536, as little-endian 16 bits, row-major; one zstd frame (RFC 8878) with its content size.
-/// Holds the compressor's tables and scratch, so that steady use does not allocate. One thread at a
-/// time.
-class DeltaZstdEncoder {
+/// Encodes maps in any of the encodings. Holds scratch for those that were used, so that steady use
+/// does not allocate. One thread at a time.
+class DepthEncoder {
  public:
-  DeltaZstdEncoder();
-  ~DeltaZstdEncoder();
-  DeltaZstdEncoder(DeltaZstdEncoder&&) noexcept;
-  DeltaZstdEncoder& operator=(DeltaZstdEncoder&&) noexcept;
-
-  /// `depth`: row-major, a whole number of rows of `width` pixels. Replaces `out`. Level 1: the
-  /// differences of a smooth map are small already, and higher levels cost more than they save.
-  /// Throws std::runtime_error with zstd's own word (out of memory).
-  void encode(std::span<const std::int16_t> depth, std::size_t width, std::string& out);
+  /// `depth`: row-major, a whole number of rows of `width` pixels. Replaces `out`. Throws
+  /// std::invalid_argument for DEPTH_NONE, an unknown encoding or part of a row.
+  void encode(v1::DepthEncoding encoding, std::span<const std::int16_t> depth, std::size_t width,
+              std::string& out);
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  DeltaZstdEncoder delta_zstd_;
+  RvlEncoder rvl_;
+  PredictZstdEncoder predict_zstd_;
 };
 
-/// The reverse. False when the map has no pixels or too many, or `bytes` is not one whole zstd
-/// frame of exactly 2 × width × height bytes; `depth` is then unspecified.
-[[nodiscard]] bool decode_delta_zstd(std::string_view bytes, std::size_t width, std::size_t height,
-                                     std::vector<std::int16_t>& depth);
+/// The reverse, of foreign bytes. False for an unknown encoding, a map without pixels or with too
+/// many, or `bytes` that are not exactly a map of this size; `depth` is then unspecified. Never
+/// allocates more than some bytes for each pixel of the announced size.
+[[nodiscard]] bool decode_depth(v1::DepthEncoding encoding, std::string_view bytes,
+                                std::size_t width, std::size_t height,
+                                std::vector<std::int16_t>& depth);
 
 }  // namespace dtact::wire

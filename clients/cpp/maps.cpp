@@ -19,18 +19,9 @@ namespace {
 
 std::vector<std::int16_t> values_of(const v1::DepthMap& map) {
   std::vector<std::int16_t> values;
-  bool ok = false;
-  switch (map.encoding()) {
-    case v1::DEPTH_INT16:
-      ok = wire::decode_int16(map.data(), map.width(), map.height(), values);
-      break;
-    case v1::DEPTH_DELTA_ZSTD:
-      ok = wire::decode_delta_zstd(map.data(), map.width(), map.height(), values);
-      break;
-    default:
-      break;
+  if (!wire::decode_depth(map.encoding(), map.data(), map.width(), map.height(), values)) {
+    refuse("depth");
   }
-  if (!ok) refuse("depth");
   return values;
 }
 

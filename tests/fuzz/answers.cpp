@@ -16,11 +16,12 @@ void read(const v1::DepthMap& map) {
   require(values.size() == pixels && client::millimetres_of(map).size() == pixels,
           "a depth map has as many values as pixels");
   // What was decoded can be encoded, and comes back.
-  wire::DeltaZstdEncoder encoder;
+  wire::DepthEncoder encoder;
   std::string bytes;
-  encoder.encode(values, map.width(), bytes);
+  encoder.encode(map.encoding(), values, map.width(), bytes);
   std::vector<std::int16_t> again;
-  require(wire::decode_delta_zstd(bytes, map.width(), map.height(), again) && again == values,
+  require(wire::decode_depth(map.encoding(), bytes, map.width(), map.height(), again) &&
+              again == values,
           "a depth map survives its encoding");
 }
 

@@ -113,11 +113,7 @@ v1::ServerMessage frame(v1::DepthEncoding encoding) {
   map.set_um_per_unit(1);
   map.set_untrusted_value(INT16_MIN);
   map.set_decimation(1);
-  if (encoding == v1::DEPTH_INT16) {
-    wire::encode_int16(depth, *map.mutable_data());
-  } else {
-    wire::DeltaZstdEncoder().encode(depth, 3, *map.mutable_data());
-  }
+  wire::DepthEncoder().encode(encoding, depth, 3, *map.mutable_data());
   frame.mutable_luma()->set_encoding(v1::LUMA_GREY8);
   frame.mutable_luma()->set_width(2);
   frame.mutable_luma()->set_height(2);

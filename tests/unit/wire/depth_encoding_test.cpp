@@ -1,9 +1,14 @@
+// All depth encodings side by side, on the golden vectors of tests/golden/depth and on arbitrary
+// maps.
 #include "proto/depth_encoding.hpp"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <zstd.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -11,114 +16,125 @@
 namespace dtact::wire {
 namespace {
 
-using testing::ElementsAreArray;
-using namespace std::string_literals;
+constexpr auto kEncodings = {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD, v1::DEPTH_RVL,
+                             v1::DEPTH_PREDICT_ZSTD};
 
-// Two rows of four pixels, with steps that wrap around in both directions.
-const std::vector<std::int16_t> kMap = {0, 1, 3, -2, 1000, 1000, -32768, 7};
-const std::string kMapBytes = "\x00\x00\x01\x00\x03\x00\xfe\xff\xe8\x03\xe8\x03\x00\x80\x07\x00"s;
-// By hand: 0 1 2 −5 | 1000 0 31768 (−33768 + 65536) 32775, little-endian.
-const std::string kDifferences =
-    "\x00\x00\x01\x00\x02\x00\xfb\xff\xe8\x03\x00\x00\x18\x7c\x07\x80"s;
-// Those differences through the zstd command line, `zstd -1 --no-check`.
-const std::string kZstd =
-    "\x28\xb5\x2f\xfd\x20\x10\x81\x00\x00"
-    "\x00\x00\x01\x00\x02\x00\xfb\xff\xe8\x03\x00\x00\x18\x7c\x07\x80"s;
-
-TEST(Int16, IsLittleEndian) {
-  std::string bytes = "left over";
-  encode_int16(kMap, bytes);
-  EXPECT_EQ(bytes, kMapBytes);
-}
-
-TEST(Int16, ComesBack) {
-  std::vector<std::int16_t> map;
-  ASSERT_TRUE(decode_int16(kMapBytes, 4, 2, map));
-  EXPECT_THAT(map, ElementsAreArray(kMap));
-}
-
-TEST(Int16, RefusesOtherSizes) {
-  std::vector<std::int16_t> map;
-  EXPECT_FALSE(decode_int16(kMapBytes, 4, 1, map));
-  EXPECT_FALSE(decode_int16(kMapBytes, 5, 2, map));
-  EXPECT_FALSE(decode_int16(kMapBytes.substr(1), 4, 2, map));
-  EXPECT_FALSE(decode_int16("", 0, 0, map));
-  EXPECT_FALSE(decode_int16("", 4, 0, map));
-  // 2³² × 2³² wraps to nothing in 64 bits.
-  EXPECT_FALSE(decode_int16("", std::size_t{1} << 32U, std::size_t{1} << 32U, map));
-}
-
-TEST(DeltaZstd, CompressesLeftNeighbourDifferences) {
-  std::string bytes = "left over";
-  DeltaZstdEncoder encoder;
-  encoder.encode(kMap, 4, bytes);
-  std::string plain(100, '?');
-  const std::size_t size = ZSTD_decompress(plain.data(), plain.size(), bytes.data(), bytes.size());
-  ASSERT_EQ(ZSTD_isError(size), 0U);
-  plain.resize(size);
-  EXPECT_EQ(plain, kDifferences);
-}
-
-TEST(DeltaZstd, ReadsWhatTheCommandLineWrote) {
-  std::vector<std::int16_t> map;
-  ASSERT_TRUE(decode_delta_zstd(kZstd, 4, 2, map));
-  EXPECT_THAT(map, ElementsAreArray(kMap));
-}
-
-TEST(DeltaZstd, ComesBackFromALargeMapTwice) {
-  std::vector<std::int16_t> map(800 * 600);
-  for (std::size_t i = 0; i < map.size(); ++i) {
-    map[i] = i % 97 == 0 ? INT16_MIN : static_cast<std::int16_t>(i * i % 1999);
-  }
-  DeltaZstdEncoder encoder;
+std::string bytes_of(const std::string& hex) {
   std::string bytes;
+  for (std::size_t i = 0; i < hex.size(); i += 2) {
+    bytes.push_back(static_cast<char>(std::stoi(hex.substr(i, 2), nullptr, 16)));
+  }
+  return bytes;
+}
+
+/// What a frame holds; other encodings' bytes as they are.
+std::string content_of(v1::DepthEncoding encoding, const std::string& bytes) {
+  if (encoding != v1::DEPTH_DELTA_ZSTD && encoding != v1::DEPTH_PREDICT_ZSTD) return bytes;
+  std::string content(zstd_content_size(bytes).value(), '?');
+  EXPECT_TRUE(zstd_decompress(bytes, std::as_writable_bytes(std::span(content))));
+  return content;
+}
+
+/// A file of tests/golden/depth; make.py there says what its lines are.
+struct Golden {
+  std::string name;
+  std::map<std::string, std::string> lines;
+
+  [[nodiscard]] std::size_t width() const { return std::stoul(lines.at("width")); }
+  [[nodiscard]] std::size_t height() const { return std::stoul(lines.at("height")); }
+  [[nodiscard]] std::string sent(v1::DepthEncoding encoding) const {
+    std::string key = v1::DepthEncoding_Name(encoding).substr(std::string("DEPTH_").size());
+    std::ranges::transform(key, key.begin(), [](unsigned char c) { return std::tolower(c); });
+    return bytes_of(lines.at(key));
+  }
+};
+
+std::vector<Golden> read_golden() {
+  std::vector<Golden> all;
+  const auto folder = std::filesystem::path(DTACT_SOURCE_DIR) / "tests/golden/depth";
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() != ".txt") continue;
+    Golden golden{entry.path().stem(), {}};
+    std::ifstream file(entry.path());
+    for (std::string key, value; file >> key >> value;) golden.lines[key] = value;
+    all.push_back(golden);
+  }
+  return all;
+}
+
+TEST(DepthGolden, IsThere) { EXPECT_EQ(read_golden().size(), 10U); }
+
+TEST(DepthGolden, DecodesToTheMap) {
+  for (const Golden& golden : read_golden()) {
+    std::vector<std::int16_t> map;
+    ASSERT_TRUE(decode_int16(golden.sent(v1::DEPTH_INT16), golden.width(), golden.height(), map));
+    for (const auto encoding : kEncodings) {
+      std::vector<std::int16_t> decoded;
+      EXPECT_TRUE(
+          decode_depth(encoding, golden.sent(encoding), golden.width(), golden.height(), decoded))
+          << golden.name << ' ' << encoding;
+      EXPECT_EQ(decoded, map) << golden.name << ' ' << encoding;
+    }
+  }
+}
+
+TEST(DepthGolden, IsWhatIsEncoded) {
+  DepthEncoder encoder;
+  for (const Golden& golden : read_golden()) {
+    std::vector<std::int16_t> map;
+    ASSERT_TRUE(decode_int16(golden.sent(v1::DEPTH_INT16), golden.width(), golden.height(), map));
+    for (const auto encoding : kEncodings) {
+      std::string bytes;
+      encoder.encode(encoding, map, golden.width(), bytes);
+      EXPECT_EQ(content_of(encoding, bytes), content_of(encoding, golden.sent(encoding)))
+          << golden.name << ' ' << encoding;
+    }
+  }
+}
+
+TEST(DepthEncoding, AllEncodingsAgreeOnArbitraryMaps) {
+  std::mt19937 random(11);
+  const auto below = [&](unsigned limit) { return static_cast<unsigned>(random() % limit); };
+  DepthEncoder encoder;
+  for (int round = 0; round < 400; ++round) {
+    const std::size_t width = 1 + below(60);
+    const std::size_t height = 1 + below(20);
+    const unsigned zeros = below(11);  // tenths of the pixels
+    const unsigned reach = 1U << below(17);
+    std::vector<std::int16_t> map;
+    for (std::size_t i = 0; i < width * height; ++i) {
+      const auto value = static_cast<std::int16_t>(below(reach) - reach / 2);
+      map.push_back(below(10) < zeros ? std::int16_t{0} : value);
+    }
+    for (const auto encoding : kEncodings) {
+      std::string bytes;
+      encoder.encode(encoding, map, width, bytes);
+      std::vector<std::int16_t> back;
+      ASSERT_TRUE(decode_depth(encoding, bytes, width, height, back)) << encoding;
+      ASSERT_EQ(back, map) << encoding;
+    }
+  }
+}
+
+TEST(DepthEncoding, KnowsWhichThereAre) {
+  EXPECT_FALSE(is_depth_encoding(v1::DEPTH_NONE));
+  for (const auto encoding : kEncodings) EXPECT_TRUE(is_depth_encoding(encoding));
+  EXPECT_FALSE(is_depth_encoding(static_cast<v1::DepthEncoding>(5)));
+}
+
+TEST(DepthEncoding, RefusesOthersAndPartsOfRows) {
+  const std::vector<std::int16_t> map(6);
+  DepthEncoder encoder;
+  std::string bytes;
+  EXPECT_THROW(encoder.encode(v1::DEPTH_NONE, map, 3, bytes), std::invalid_argument);
+  EXPECT_THROW(encoder.encode(static_cast<v1::DepthEncoding>(5), map, 3, bytes),
+               std::invalid_argument);
+  for (const auto encoding : kEncodings) {
+    EXPECT_THROW(encoder.encode(encoding, map, 4, bytes), std::invalid_argument);
+  }
   std::vector<std::int16_t> back;
-  for (int time = 0; time < 2; ++time) {
-    encoder.encode(map, 800, bytes);
-    ASSERT_TRUE(decode_delta_zstd(bytes, 800, 600, back));
-    EXPECT_EQ(back, map);
-  }
-}
-
-TEST(DeltaZstd, AFlatMapIsSmall) {
-  const std::vector<std::int16_t> map(800 * 600, 0);
-  std::string bytes;
-  DeltaZstdEncoder().encode(map, 800, bytes);
-  EXPECT_LT(bytes.size(), 1000U);
-}
-
-TEST(DeltaZstd, MovesAndStillWorks) {
-  DeltaZstdEncoder first;
-  DeltaZstdEncoder second(std::move(first));
-  std::string bytes;
-  second.encode(kMap, 4, bytes);
-  std::vector<std::int16_t> map;
-  EXPECT_TRUE(decode_delta_zstd(bytes, 4, 2, map));
-}
-
-TEST(DeltaZstd, EncodesOnlyWholeRows) {
-  std::string bytes;
-  DeltaZstdEncoder encoder;
-  EXPECT_THROW(encoder.encode(kMap, 3, bytes), std::invalid_argument);
-  EXPECT_THROW(encoder.encode(kMap, 0, bytes), std::invalid_argument);
-}
-
-TEST(DeltaZstd, RefusesOtherSizes) {
-  std::vector<std::int16_t> map;
-  EXPECT_FALSE(decode_delta_zstd(kZstd, 4, 1, map));
-  EXPECT_FALSE(decode_delta_zstd(kZstd, 4, 3, map));
-  EXPECT_FALSE(decode_delta_zstd(kZstd, 0, 2, map));
-  EXPECT_FALSE(decode_delta_zstd(kZstd, 1U << 31U, 1U << 31U, map));
-}
-
-TEST(DeltaZstd, RefusesDamage) {
-  std::vector<std::int16_t> map;
-  EXPECT_FALSE(decode_delta_zstd("", 4, 2, map));
-  EXPECT_FALSE(decode_delta_zstd("not zstd at all", 4, 2, map));
-  EXPECT_FALSE(decode_delta_zstd(kZstd + "more", 4, 2, map));
-  for (std::size_t size = 0; size < kZstd.size(); ++size) {
-    EXPECT_FALSE(decode_delta_zstd(kZstd.substr(0, size), 4, 2, map)) << size;
-  }
+  EXPECT_FALSE(decode_depth(v1::DEPTH_NONE, "", 1, 1, back));
+  EXPECT_FALSE(decode_depth(static_cast<v1::DepthEncoding>(5), "\1", 1, 1, back));
 }
 
 }  // namespace
