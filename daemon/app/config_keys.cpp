@@ -138,6 +138,7 @@ std::vector<Key> bind_keys(Config& c) {
       integer("net.max_clients", c.net.max_clients, 1, 1024, ""),
       integer("net.fifo_priority", c.net.fifo_priority, 0, 99, "(0 = normal scheduling)"),
       text("net.frame_id", c.net.frame_id, "a name in quotes"),
+      text("net.name", c.net.name, "a name in quotes"),
       milliseconds("net.hello_timeout_ms", c.net.hello_timeout, 100, 600000),
       milliseconds("net.dead_after_ms", c.net.dead_after, 1000, 600000),
   };

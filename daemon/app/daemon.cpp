@@ -1,8 +1,11 @@
 #include "daemon/app/daemon.hpp"
 
 #include <fmt/format.h>
+#include <limits.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
@@ -73,6 +76,8 @@ net::NetConfig make_net_config(const Config& config) {
   net::NetConfig net = config.net;
   net.program = "dtactd " DTACT_VERSION;
   net.version = DTACT_VERSION;
+  std::array<char, HOST_NAME_MAX + 1> host{};
+  if (net.name.empty() && ::gethostname(host.data(), host.size() - 1) == 0) net.name = host.data();
   net.log = [](net::LogLevel level, const std::string& message) {
     spdlog::log(level == net::LogLevel::info ? spdlog::level::info : spdlog::level::warn, "{}",
                 message);

@@ -59,14 +59,7 @@ void DepthMaps::encode(const DepthView& view, int encoding, Map& map) {
   head.set_full_width(static_cast<std::uint32_t>(view.full_width));
   head.set_full_height(static_cast<std::uint32_t>(view.full_height));
   head.SerializeToString(&map.head);
-  switch (encoding) {
-    case v1::DEPTH_DELTA_ZSTD:
-      delta_zstd_.encode(view.values, static_cast<std::size_t>(view.width), map.data);
-      break;
-    default:
-      wire::encode_int16(view.values, map.data);
-      break;
-  }
+  encoder_.encode(head.encoding(), view.values, static_cast<std::size_t>(view.width), map.data);
 }
 
 }  // namespace dtact::net

@@ -48,7 +48,7 @@ class DepthMaps {
   std::size_t views_made_ = 0;
   std::deque<Encoded> encoded_;
   std::size_t encoded_made_ = 0;
-  wire::DeltaZstdEncoder delta_zstd_;
+  wire::DepthEncoder encoder_;
 };
 
 }  // namespace dtact::net

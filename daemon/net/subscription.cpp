@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "proto/depth_encoding.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -16,7 +17,7 @@ namespace {
 Refusal invalid(std::string sentence) { return {v1::ERROR_INVALID, std::move(sentence)}; }
 
 std::optional<Refusal> check_encodings(const v1::Subscribe& request) {
-  if (!v1::DepthEncoding_IsValid(request.depth()) || request.depth() > v1::DEPTH_DELTA_ZSTD) {
+  if (request.depth() != v1::DEPTH_NONE && !wire::is_depth_encoding(request.depth())) {
     return Refusal{
         v1::ERROR_UNSUPPORTED,
         fmt::format("subscribe.depth: this daemon does not know encoding {}: ask for one "
@@ -85,7 +86,8 @@ bool RateLimit::admits(std::int64_t timestamp_ns, std::int64_t spacing_ns) noexc
     if (timestamp_ns + near_ns < next_ns_) return false;
   }
   const std::int64_t earliest_ns = timestamp_ns + period_ns_;
-  const bool on_time = next_ns_ != INT64_MIN && timestamp_ns - next_ns_ < spacing_ns;
+  const bool on_time =
+      next_ns_ != INT64_MIN && timestamp_ns - next_ns_ < std::min(spacing_ns, period_ns_);
   next_ns_ = on_time ? next_ns_ + period_ns_ : earliest_ns;
   return true;
 }

@@ -107,7 +107,7 @@ class SteppedLoop {
       frame.meaning = hal::TimestampMeaning::start_of_exposure;
       frame.flags = std::exchange(flags, hal::kFrameNormal);
       toy_paint(scene, frame.sequence, pixels.data());
-      out = hal::Frame(*this, 0, {pixels.data(), kToyWidth, kToyHeight, kToyWidth}, frame);
+      out = hal::Frame(*this, 0, {pixels.data(), kToyWidth, kToyHeight, kToyWidth}, frame, jpeg);
       return hal::GrabStatus::ok;
     }
     void give_back(int /*index*/) noexcept override {}
@@ -120,6 +120,7 @@ class SteppedLoop {
     double slower = 1;                        ///< Times the period that its mode promises.
     std::int64_t delay_ns = 0;                ///< From a frame's timestamp to its arrival.
     std::uint64_t sequence = 0;
+    std::vector<std::uint8_t> jpeg;  ///< Lent with every frame, whatever it shows.
     std::vector<std::uint8_t> pixels =
         std::vector<std::uint8_t>(std::size_t{kToyWidth} * kToyHeight + hal::kLumaPadding);
   };
@@ -142,6 +143,7 @@ class SteppedLoop {
     pipeline::DepthFrame frame;
     frame.depth_um.resize(std::size_t{kToyWidth} * kToyHeight);
     frame.luma.resize(frame.depth_um.size());
+    frame.jpeg.resize(100);
     return frame;
   }
 };

@@ -4,6 +4,8 @@
 #include <memory>
 #include <string>
 
+#include "hal/base/clock.hpp"
+#include "hal/image/png.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/rig.hpp"
 
@@ -45,7 +47,131 @@ TEST(Subscribe, RefusesUnknownEncodings) {
   client.hello();
   v1::ClientMessage message;
   message.mutable_subscribe()->set_depth(static_cast<v1::DepthEncoding>(9));
-  expect_invalid(client, message, "depth encoding 9");
+  const auto reply = client.request(message);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_UNSUPPORTED);
+  EXPECT_THAT(reply.error().message(), HasSubstr("encoding 9"));
+  message.mutable_subscribe()->set_depth(v1::DEPTH_NONE);
+  message.mutable_subscribe()->set_luma_hz(2000);
+  expect_invalid(client, message, "subscribe.luma_hz: 2000");
+}
+
+TEST(Ping, TellsTheTime) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  message.mutable_ping();
+  auto& clock = base::system_clock();
+  const std::int64_t before = clock.monotonic_ns();
+  const std::int64_t wall_before = clock.wall_ns();
+  const auto pong = client.request(message).pong();
+  EXPECT_GE(pong.monotonic_ns(), before);
+  EXPECT_LE(pong.monotonic_ns(), clock.monotonic_ns());
+  EXPECT_GE(pong.wall_ns(), wall_before);
+}
+
+v1::ClientMessage get_reference() {
+  v1::ClientMessage message;
+  message.mutable_get_reference();
+  return message;
+}
+
+TEST(GetReference, SendsTheImageAsPng) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([](const pipeline::Command& command) {
+      auto copy = std::make_shared<pipeline::ReferenceCopy>();
+      copy->width = 3;
+      copy->height = 2;
+      copy->image_q8 = {0, 1, 256, 25600, 65280, 65535};
+      copy->light.brightness = 128;
+      copy->sequence = 41;
+      CommandDone done{command.ticket, Outcome::done, ""};
+      done.reference = std::move(copy);
+      return done;
+    });
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto reference = client.request(get_reference()).reference();
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  EXPECT_TRUE(std::holds_alternative<pipeline::CopyReference>(command->what));
+  const auto image = image::decode_png_grey16(reference.png(), "reference");
+  EXPECT_EQ(image.width, 3);
+  EXPECT_EQ(image.height, 2);
+  EXPECT_EQ(image.pixels, (std::vector<std::uint16_t>{0, 1, 256, 25600, 65280, 65535}));
+  EXPECT_EQ(reference.light().brightness(), 128U);
+  EXPECT_EQ(reference.sequence(), 41U);
+  EXPECT_EQ(reference.calibration(), 1U) << "the store's current one";
+}
+
+TEST(GetReference, SaysWhyThereIsNone) {
+  Outcome outcome = Outcome::uncalibrated;
+  Rig rig({}, [&outcome](FakePort& port) {
+    port.answer([&outcome](const pipeline::Command& command) {
+      return CommandDone{command.ticket, outcome, "ask again"};
+    });
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(client.request(get_reference()).error().code(), v1::ERROR_UNCALIBRATED);
+  outcome = Outcome::no_reference;
+  EXPECT_EQ(client.request(get_reference()).error().code(), v1::ERROR_BUSY);
+  rig.port.set_full(true);
+  EXPECT_EQ(client.request(get_reference()).error().code(), v1::ERROR_BUSY);
+}
+
+TEST(SetLight, TellsSinceWhenFramesAreExposedUnderIt) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([](const pipeline::Command& command) {
+      CommandDone done{command.ticket, Outcome::done, ""};
+      done.light_since_ns = 123;
+      return done;
+    });
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_EQ(client.request(brightness(100)).light().since_ns(), 123);
+  rig.port.emit(pipeline::LightChanged{{}, {4, 5, 6}, 7});
+  const auto event = client.event();
+  EXPECT_EQ(event.light().since_ns(), 7);
+  EXPECT_EQ(event.sequence(), 4U);
+  EXPECT_EQ(event.monotonic_ns(), 5);
+  EXPECT_EQ(event.wall_ns(), 6);
+}
+
+TEST(Status, TellsNameSerialAndWhatEachClientTook) {
+  NetConfig config;
+  config.name = "gripper";
+  Rig rig(config);
+  pipeline::Status status;
+  status.camera.identity = "usb-1.2";
+  status.light_since_ns = 9;
+  rig.port.set_status(status);
+  RawClient client(rig.tcp_port());
+  v1::ClientMessage message;
+  message.mutable_hello()->set_major(1);
+  const auto hello = client.request(message);
+  EXPECT_EQ(hello.hello().minor(), 1U);
+  EXPECT_EQ(hello.hello().name(), "gripper");
+  EXPECT_EQ(hello.hello().serial(), "usb-1.2");
+  EXPECT_EQ(hello.hello().rights(), v1::RIGHTS_CONTROL);
+  EXPECT_THAT(hello.hello().features(),
+              testing::ElementsAre("contact_absence", "decimation", "events", "jpeg", "ping",
+                                   "predict_zstd", "rates", "reference", "region", "rvl", "stamps",
+                                   "units"));
+  v1::ClientMessage get;
+  get.mutable_get_status();
+  const auto told = client.request(get).status();
+  EXPECT_EQ(told.name(), "gripper");
+  EXPECT_EQ(told.serial(), "usb-1.2");
+  EXPECT_EQ(told.light().since_ns(), 9);
+  ASSERT_EQ(told.clients_size(), 1);
+  EXPECT_EQ(told.clients(0).rights(), v1::RIGHTS_CONTROL);
+  v1::ServerMessage answer;
+  *answer.mutable_reply() = hello;
+  EXPECT_EQ(told.clients(0).sent_bytes(), answer.ByteSizeLong() + 4) << "with its length";
+  EXPECT_EQ(told.clients(0).waiting_bytes(), 0U);
 }
 
 TEST(SetLight, ChangesOnlyWhatIsSet) {

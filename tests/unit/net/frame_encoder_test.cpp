@@ -1,7 +1,13 @@
 #include "daemon/net/frame_encoder.hpp"
 
 #include <gmock/gmock.h>
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/wire_format_lite.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
 
 #include "proto/dtact.pb.h"
 #include "tests/unit/net/fake_port.hpp"
@@ -134,6 +140,150 @@ TEST(FrameEncoder, LeavesRoomForTheEnvelope) {
       EXPECT_LE(encoded->body.size() + 5 + 11, 16'777'216U) << pixels;
     }
   }
+}
+
+/// The field numbers of a message, in the order in which they come.
+std::vector<int> fields_of(const std::string& bytes) {
+  google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(bytes.data()),
+                                            static_cast<int>(bytes.size()));
+  std::vector<int> fields;
+  while (const std::uint32_t tag = in.ReadTag()) {
+    fields.push_back(static_cast<int>(tag >> 3U));
+    EXPECT_TRUE(google::protobuf::internal::WireFormatLite::SkipField(&in, tag));
+  }
+  return fields;
+}
+
+// Some decoders do not merge a message field that comes twice (protobuf.js before 2026).
+TEST(FrameEncoder, WritesEveryFieldOnce) {
+  FrameEncoder encoder("f");
+  auto frame = make_frame(1);
+  frame.has_jpeg = true;
+  frame.jpeg = {0xff, 0xd8, 0xff, 0xd9};
+  frame.health.set(pipeline::Health::starting);
+  encoder.begin(frame, 7);
+  FrameKind all = kind(1, 1);
+  all.jpeg = true;
+  auto fields = fields_of(encoder.encode(all)->body);
+  EXPECT_EQ(fields.back(), v1::Frame::kTimesFieldNumber) << "what it took is known last";
+  std::ranges::sort(fields);
+  EXPECT_TRUE(std::ranges::adjacent_find(fields) == fields.end());
+}
+
+TEST(FrameEncoder, CarriesWhatIsNewIn11) {
+  FrameEncoder encoder("f");
+  auto frame = make_frame(3);
+  frame.light_since_ns = 77;
+  frame.contact.touching = true;
+  frame.has_jpeg = true;
+  frame.jpeg_width = 8;
+  frame.jpeg_height = 4;
+  frame.jpeg = {0xff, 0xd8, 0xff, 0xd9};
+  encoder.begin(frame, 7);
+  v1::Frame message;
+  ASSERT_TRUE(message.ParseFromString(encoder.encode({.jpeg = true})->body));
+  EXPECT_EQ(message.light().since_ns(), 77);
+  EXPECT_EQ(message.calibration(), 7U);
+  EXPECT_EQ(message.contact_absence(), v1::CONTACT_ABSENCE_NONE);
+  EXPECT_TRUE(message.contact().touching());
+  EXPECT_EQ(message.jpeg().width(), 8U);
+  EXPECT_EQ(message.jpeg().height(), 4U);
+  EXPECT_EQ(message.jpeg().data(), "\xff\xd8\xff\xd9");
+  EXPECT_FALSE(message.has_depth());
+  EXPECT_FALSE(message.has_luma());
+
+  frame.light_since_ns.reset();
+  frame.contact_absence = pipeline::ContactAbsence::referencing;
+  encoder.begin(frame);
+  ASSERT_TRUE(message.ParseFromString(encoder.encode({})->body));
+  EXPECT_FALSE(message.light().has_since_ns());
+  EXPECT_FALSE(message.has_calibration());
+  EXPECT_FALSE(message.has_contact()) << "not measured is not nothing pressed";
+  EXPECT_EQ(message.contact_absence(), v1::CONTACT_ABSENCE_REFERENCING);
+  frame.contact_absence = pipeline::ContactAbsence::uncalibrated;
+  encoder.begin(frame);
+  ASSERT_TRUE(message.ParseFromString(encoder.encode({})->body));
+  EXPECT_EQ(message.contact_absence(), v1::CONTACT_ABSENCE_UNCALIBRATED);
+  frame.contact_absence = pipeline::ContactAbsence::unasked;
+  encoder.begin(frame);
+  ASSERT_TRUE(message.ParseFromString(encoder.encode({})->body));
+  EXPECT_EQ(message.contact_absence(), v1::CONTACT_ABSENCE_UNASKED);
+}
+
+TEST(FrameEncoder, MakesTheMapThatIsAskedFor) {
+  FrameEncoder encoder("f");
+  auto frame = make_frame(1);  // 8×4
+  for (std::size_t i = 0; i < frame.depth_um.size(); ++i) {
+    frame.depth_um[i] = static_cast<std::int16_t>(10 * i);
+  }
+  encoder.begin(frame);
+  FrameKind asked = kind(v1::DEPTH_INT16, 0);
+  asked.spec = {.decimation = 2, .um_per_unit = 5, .region = DepthRegion{2, 1, 3, 2}};
+  v1::Frame message;
+  ASSERT_TRUE(message.ParseFromString(encoder.encode(asked)->body));
+  const auto& depth = message.depth();
+  EXPECT_EQ(depth.decimation(), 2U);
+  EXPECT_EQ(depth.um_per_unit(), 5.0);
+  EXPECT_EQ(depth.mm_per_px(), 0.1);
+  EXPECT_EQ(depth.x(), 1U);
+  EXPECT_EQ(depth.y(), 0U);
+  EXPECT_EQ(depth.width(), 2U);
+  EXPECT_EQ(depth.height(), 2U);
+  EXPECT_EQ(depth.full_width(), 4U);
+  EXPECT_EQ(depth.full_height(), 2U);
+  // Means of 20 30 100 110, 40 50 120 130, 180 190 260 270 and 200 210 280 290, by 5.
+  EXPECT_EQ(depth.data(), std::string("\x0d\0\x11\0\x2d\0\x31\0", 8));
+}
+
+TEST(FrameEncoder, OfTheContactsBoxSendsNoMapWhileNothingTouches) {
+  FrameEncoder encoder("f");
+  auto frame = make_frame(1, 100, 80);
+  frame.contact_um = 100;
+  FrameKind asked = kind(v1::DEPTH_RVL, 0);
+  asked.contact_box = true;
+  encoder.begin(frame);
+  v1::Frame message;
+  ASSERT_TRUE(message.ParseFromString(encoder.encode(asked)->body));
+  EXPECT_FALSE(message.has_depth());
+  EXPECT_TRUE(message.has_contact());
+  frame.contact.touching = true;
+  frame.depth_um[30 * 100 + 40] = 500;
+  encoder.begin(frame);
+  ASSERT_TRUE(message.ParseFromString(encoder.encode(asked)->body));
+  EXPECT_EQ(message.depth().encoding(), v1::DEPTH_RVL);
+  EXPECT_EQ(message.depth().x(), 24U);
+  EXPECT_EQ(message.depth().y(), 14U);
+  EXPECT_EQ(message.depth().width(), 33U);
+  EXPECT_EQ(message.depth().height(), 33U);
+  EXPECT_EQ(message.depth().full_width(), 100U);
+}
+
+TEST(FrameEncoder, SharesWhatIsTheSameWhicheverOrderItIsAskedFor) {
+  FrameEncoder encoder("f");
+  const auto frame = make_frame(1, 64, 64);
+  FrameKind halved = kind(v1::DEPTH_INT16, 0);
+  halved.spec.decimation = 2;
+  FrameKind packed = halved;
+  packed.depth = v1::DEPTH_PREDICT_ZSTD;
+  FrameKind with_luma = halved;
+  with_luma.luma = 1;
+  for (int round = 0; round < 3; ++round) {
+    encoder.begin(frame);
+    v1::Frame first;
+    v1::Frame second;
+    v1::Frame whole;
+    v1::Frame third;
+    ASSERT_TRUE(first.ParseFromString(encoder.encode(halved)->body));
+    ASSERT_TRUE(whole.ParseFromString(encoder.encode(kind(1, 0))->body));
+    ASSERT_TRUE(second.ParseFromString(encoder.encode(packed)->body));
+    ASSERT_TRUE(third.ParseFromString(encoder.encode(with_luma)->body));
+    EXPECT_EQ(first.depth().SerializeAsString(), third.depth().SerializeAsString());
+    EXPECT_EQ(second.depth().encoding(), v1::DEPTH_PREDICT_ZSTD);
+    EXPECT_EQ(second.depth().width(), 32U);
+    EXPECT_EQ(whole.depth().width(), 64U);
+    EXPECT_EQ(third.luma().width(), 64U);
+  }
+  EXPECT_EQ(encoder.times().count(), 12U);
 }
 
 }  // namespace

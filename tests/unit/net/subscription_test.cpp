@@ -1,0 +1,235 @@
+#include "daemon/net/subscription.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "proto/dtact.pb.h"
+
+namespace dtact::net {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr double kPeriodNs = 1e9 / 60;
+
+/// The n-th frame of a camera of 60 frames a second, some time after its machine's start.
+std::int64_t at(int frame) { return 1'000'000'000 + std::llround(frame * kPeriodNs); }
+
+/// 'x' for each of so many frames that is let through; `jitter_ns` back and forth in turn.
+std::string let_through(double hz, int frames, std::int64_t jitter_ns = 0) {
+  RateLimit limit(hz);
+  std::string pattern;
+  std::int64_t last_ns = 0;
+  for (int i = 0; i < frames; ++i) {
+    const std::int64_t now_ns = at(i) + (i % 2 == 0 ? jitter_ns : -jitter_ns);
+    pattern += limit.admits(now_ns, i == 0 ? 0 : now_ns - last_ns) ? 'x' : '.';
+    last_ns = now_ns;
+  }
+  return pattern;
+}
+
+TEST(RateLimit, LetsEveryFrameThroughWithoutOne) {
+  EXPECT_EQ(let_through(0, 6), "xxxxxx");
+  EXPECT_EQ(let_through(1000, 6), "xxxxxx");
+  EXPECT_EQ(let_through(60, 6), "xxxxxx");
+}
+
+TEST(RateLimit, OfAWholeFractionTakesEveryNthFrame) {
+  EXPECT_EQ(let_through(30, 8), "x.x.x.x.");
+  EXPECT_EQ(let_through(20, 9), "x..x..x..");
+  EXPECT_EQ(let_through(10, 13), "x.....x.....x");
+}
+
+TEST(RateLimit, OfAnyOtherRateTakesTheNearestFrames) {
+  EXPECT_EQ(let_through(45, 12), "xx.xxx.xxx.x");
+  EXPECT_EQ(let_through(25, 13), "x.x..x.x..x.x");  // 5 of 12
+}
+
+TEST(RateLimit, JitterMakesItNeitherMoreNorUneven) {
+  EXPECT_EQ(let_through(30, 8, 2'500'000), "x.x.x.x.");
+  EXPECT_EQ(let_through(30, 8, -2'500'000), "x.x.x.x.");
+}
+
+TEST(RateLimit, IsNeverExceededOverALongTime) {
+  for (const double hz : {0.5, 7.0, 24.0, 29.97, 45.0, 59.0}) {
+    const std::string pattern = let_through(hz, 6001, 2'000'000);  // 100 s
+    EXPECT_NEAR(static_cast<double>(std::count(pattern.begin(), pattern.end(), 'x')), 100 * hz + 1,
+                1)
+        << hz;
+  }
+}
+
+TEST(RateLimit, APauseIsNotMadeUpFor) {
+  RateLimit limit(1);
+  EXPECT_TRUE(limit.admits(at(0), 0));
+  EXPECT_TRUE(limit.admits(at(600), at(600) - at(0)));
+  for (int i = 601; i < 657; ++i) EXPECT_FALSE(limit.admits(at(i), at(i) - at(i - 1))) << i;
+  EXPECT_TRUE(limit.admits(at(660), at(1) - at(0)));
+}
+
+Subscription made(const v1::Subscribe& request, std::uint32_t minor = 1) {
+  auto result = Subscription::from(request, minor, {});
+  return std::get<Subscription>(std::move(result));
+}
+
+/// The parts of so many frames at 60 a second: d, l, j, s for each, '.' for no message.
+std::string parts_of(Subscription subscription, int frames) {
+  std::string text;
+  for (int i = 0; i < frames; ++i) {
+    const auto parts = subscription.next(at(i), 0).parts;
+    text += i == 0 ? "" : " ";
+    if (parts == 0) text += '.';
+    if ((parts & Subscription::kDepth) != 0) text += 'd';
+    if ((parts & Subscription::kLuma) != 0) text += 'l';
+    if ((parts & Subscription::kJpeg) != 0) text += 'j';
+    if ((parts & Subscription::kSummary) != 0) text += 's';
+  }
+  return text;
+}
+
+TEST(Subscription, SendsEachPartAtItsOwnRate) {
+  v1::Subscribe request;
+  request.set_depth(v1::DEPTH_INT16);
+  request.set_depth_hz(30);
+  request.set_luma(v1::LUMA_GREY8);
+  request.set_luma_hz(20);
+  request.set_jpeg(true);
+  request.set_jpeg_hz(10);
+  EXPECT_EQ(parts_of(made(request), 7), "dlj . d l d . dlj");
+  request.set_summary(true);
+  EXPECT_EQ(parts_of(made(request), 7), "dljs s ds ls ds s dljs");
+}
+
+TEST(Subscription, LimitsWhatEveryLeaves) {
+  v1::Subscribe request;
+  request.set_depth(v1::DEPTH_INT16);
+  request.set_every(2);
+  request.set_depth_hz(15);
+  EXPECT_EQ(parts_of(made(request), 9), "d . . . d . . . d");
+}
+
+TEST(Subscription, OfALimitedPartNoFrameIsMissed) {
+  v1::Subscribe request;
+  request.set_depth(v1::DEPTH_INT16);
+  request.set_depth_hz(30);
+  Subscription limited = made(request);
+  EXPECT_EQ(limited.next(at(0), 0).missed, 0U);
+  EXPECT_EQ(limited.next(at(4), 3).missed, 0U);
+  request.set_summary(true);
+  Subscription every = made(request);
+  EXPECT_EQ(every.next(at(0), 0).missed, 0U);
+  EXPECT_EQ(every.next(at(4), 3).missed, 3U);
+}
+
+TEST(Subscription, OfNothingIsNeverDue) {
+  EXPECT_EQ(parts_of(made({}), 3), ". . .");
+  EXPECT_TRUE(made({}).events());
+  v1::Subscribe request;
+  request.set_events(false);
+  EXPECT_FALSE(made(request).events());
+  request.set_events(true);
+  EXPECT_TRUE(made(request).events());
+}
+
+// 1.0 said "without maps", 1.1 "also without maps".
+TEST(Subscription, AnOldClientsSummaryIsInsteadOfTheMaps) {
+  v1::Subscribe request;
+  request.set_depth(v1::DEPTH_INT16);
+  request.set_luma(v1::LUMA_GREY8);
+  request.set_summary(true);
+  EXPECT_EQ(parts_of(made(request, 0), 2), "s s");
+  EXPECT_EQ(parts_of(made(request, 1), 2), "dls dls");
+}
+
+TEST(Subscription, KindsHoldWhatIsDueOnly) {
+  v1::Subscribe request;
+  request.set_depth(v1::DEPTH_DELTA_ZSTD);
+  request.set_luma(v1::LUMA_GREY8);
+  request.set_decimation(2);
+  request.set_um_per_unit(5);
+  request.mutable_box()->set_x(10);
+  request.mutable_box()->set_y(20);
+  request.mutable_box()->set_width(30);
+  request.mutable_box()->set_height(40);
+  const Subscription subscription = made(request);
+  EXPECT_EQ(
+      subscription.kind(Subscription::kDepth),
+      (FrameKind{
+          .depth = 2,
+          .spec = {.decimation = 2, .um_per_unit = 5, .region = DepthRegion{10, 20, 30, 40}}}));
+  EXPECT_EQ(subscription.kind(Subscription::kLuma), (FrameKind{.luma = 1}));
+  EXPECT_EQ(subscription.kind(Subscription::kSummary), FrameKind{});
+  request.set_contact_box(true);
+  EXPECT_EQ(
+      made(request).kind(Subscription::kDepth),
+      (FrameKind{.depth = 2, .spec = {.decimation = 2, .um_per_unit = 5}, .contact_box = true}));
+}
+
+void expect_refused(const v1::Subscribe& request, v1::ErrorCode code, const std::string& part) {
+  const auto result = Subscription::from(request, 1, {.width = 580, .height = 580});
+  const auto* refusal = std::get_if<Refusal>(&result);
+  ASSERT_NE(refusal, nullptr) << part;
+  EXPECT_EQ(refusal->code, code) << part;
+  EXPECT_THAT(refusal->sentence, HasSubstr(part));
+}
+
+TEST(Subscription, RefusesRatesOutOfRangeByName) {
+  for (const double hz :
+       {-1.0, 0.009, 1000.1, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    v1::Subscribe request;
+    request.set_depth_hz(hz);
+    expect_refused(request, v1::ERROR_INVALID, "subscribe.depth_hz");
+    request.Clear();
+    request.set_luma_hz(hz);
+    expect_refused(request, v1::ERROR_INVALID, "subscribe.luma_hz");
+    request.Clear();
+    request.set_jpeg_hz(hz);
+    expect_refused(request, v1::ERROR_INVALID, "subscribe.jpeg_hz");
+    request.Clear();
+    request.set_summary_hz(hz);
+    expect_refused(request, v1::ERROR_INVALID, "subscribe.summary_hz");
+  }
+  v1::Subscribe request;
+  for (const double hz : {0.0, 0.01, 1000.0}) {
+    request.set_depth_hz(hz);
+    EXPECT_EQ(Subscription::from(request, 1, {}).index(), 0U) << hz;
+  }
+}
+
+TEST(Subscription, RefusesOtherDecimationsUnitsAndBoxes) {
+  v1::Subscribe request;
+  request.set_decimation(3);
+  expect_refused(request, v1::ERROR_INVALID, "subscribe.decimation: 3");
+  request.Clear();
+  request.set_um_per_unit(3);
+  expect_refused(request, v1::ERROR_INVALID, "subscribe.um_per_unit: 3");
+  request.Clear();
+  request.mutable_box()->set_height(1);
+  expect_refused(request, v1::ERROR_INVALID, "subscribe.box: 0x1");
+  request.mutable_box()->set_width(1);
+  request.mutable_box()->set_height(0);
+  expect_refused(request, v1::ERROR_INVALID, "subscribe.box: 1x0");
+  request.mutable_box()->set_height(1);
+  request.mutable_box()->set_x(580);
+  expect_refused(request, v1::ERROR_INVALID, "580x580");
+  request.mutable_box()->set_x(579);
+  EXPECT_EQ(Subscription::from(request, 1, {.width = 580, .height = 580}).index(), 0U);
+}
+
+TEST(Subscription, DoesNotSupportUnknownEncodings) {
+  v1::Subscribe request;
+  request.set_depth(static_cast<v1::DepthEncoding>(9));
+  expect_refused(request, v1::ERROR_UNSUPPORTED,
+                 "subscribe.depth: this daemon does not know encoding 9");
+  request.set_depth(v1::DEPTH_NONE);
+  request.set_luma(static_cast<v1::LumaEncoding>(9));
+  expect_refused(request, v1::ERROR_UNSUPPORTED, "subscribe.luma");
+}
+
+}  // namespace
+}  // namespace dtact::net
