@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <deque>
@@ -12,6 +13,7 @@
 
 #include "hal/base/clock.hpp"
 #include "hal/live/device_error.hpp"
+#include "tests/fakes/jpeg_maker.hpp"
 
 namespace dtact::hal::live {
 namespace {
@@ -32,6 +34,7 @@ class LendingSource final : public Source {
     f.bytes_per_line = kSide;
     f.full_range = full_range;
     f.lendable = true;
+    f.encoding = encoding;
     return f;
   }
   void wait(std::int64_t deadline_ns) noexcept override {
@@ -42,7 +45,7 @@ class LendingSource final : public Source {
     if (filled.empty()) return DequeueStatus::none;
     out.index = filled.front();
     filled.pop_front();
-    out.payload = std::span(memory[static_cast<std::size_t>(out.index)]).first(kPixels);
+    out.payload = std::span(memory[static_cast<std::size_t>(out.index)]).first(bytes);
     out.sequence = sequence++;
     out.timestamp_ns = base::system_clock().monotonic_ns();
     return DequeueStatus::filled;
@@ -61,12 +64,21 @@ class LendingSource final : public Source {
     filled.push_back(index);
   }
 
+  void fill(int index, const std::vector<std::uint8_t>& jpeg) {
+    std::ranges::copy(jpeg, memory[static_cast<std::size_t>(index)].begin());
+    bytes = jpeg.size();
+    filled.push_back(index);
+  }
+
+  static constexpr std::size_t kRoom = 1024;
+  Encoding encoding = Encoding::grey;
+  std::size_t bytes = kPixels;  // of every payload
   bool full_range = true;
   bool broken = false;
   bool stopped = false;
   std::atomic<bool> moved{false};  // asked for by another thread
   std::shared_ptr<bool> destroyed = std::make_shared<bool>(false);
-  std::array<std::array<std::uint8_t, kPixels + kLumaPadding>, 3> memory{};
+  std::array<std::array<std::uint8_t, kRoom>, 3> memory{};
   std::deque<int> filled;
   std::vector<int> home;  // what came back
   std::uint32_t sequence = 0;
@@ -104,6 +116,29 @@ TEST(LiveCamera, LendsFullRangeLumaWithoutACopy) {
   EXPECT_EQ(rig.source->home, (std::vector<int>{0, 1}));  // the one before, and the one skipped
   frame.reset();
   EXPECT_EQ(rig.source->home, (std::vector<int>{0, 1, 2}));
+}
+
+TEST(LiveCamera, LendsTheJpegWithTheFrame) {
+  const std::vector<std::uint8_t> jpeg = fakes::make_jpeg(
+      {.width = kSide, .height = kSide, .colour = false}, [](int, int) { return 120; });
+  ASSERT_LE(jpeg.size(), LendingSource::kRoom);
+  Rig rig;
+  rig.source->encoding = Encoding::jpeg;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, jpeg);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.jpeg().data(), rig.source->memory[0].data());
+  EXPECT_EQ(frame.jpeg().size(), jpeg.size());
+  EXPECT_NEAR(frame.luma().row(3)[3], 120, 2);
+  EXPECT_TRUE(rig.source->home.empty()) << "the driver must not write over it";
+  rig.source->fill(1, jpeg);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.jpeg().data(), rig.source->memory[1].data());
+  EXPECT_EQ(rig.source->home, (std::vector<int>{0}));
+  frame.reset();
+  EXPECT_EQ(rig.source->home, (std::vector<int>{0, 1}));
+  EXPECT_TRUE(frame.jpeg().empty());
 }
 
 TEST(LiveCamera, CopiesWhatMustBeExpanded) {
