@@ -212,6 +212,33 @@ TEST_F(LightDriverTest, StopsWhileItsQueuesAreFull) {
   EXPECT_EQ(notes.size(), 16U);
 }
 
+TEST_F(LightDriverTest, TellsSinceWhenFramesAreExposedUnderALight) {
+  exchange.sequence = 41;
+  driver.start();
+  EXPECT_EQ(driver.light_since_ns(), std::nullopt)
+      << "no frame yet: nobody knows how it is stamped";
+  exchange.light_lag_ns = 1000;
+  take_notes();
+  ASSERT_EQ(notes.size(), 2U);
+  EXPECT_EQ(driver.light_since_ns(), notes[1].at_ns + 1000);
+  const std::int64_t wall_before = base::system_clock().wall_ns();
+  ASSERT_TRUE(driver.submit(7, dimmed(100)));
+  const auto done = std::get<CommandDone>(next().value());
+  const auto changed = std::get<LightChanged>(next().value());
+  take_notes();
+  ASSERT_EQ(notes.size(), 4U);
+  EXPECT_EQ(done.light_since_ns, notes[3].at_ns + 1000);
+  EXPECT_EQ(changed.since_ns, notes[3].at_ns + 1000);
+  EXPECT_EQ(changed.at.monotonic_ns, notes[3].at_ns);
+  EXPECT_EQ(changed.at.sequence, 41U);
+  EXPECT_GE(changed.at.wall_ns, wall_before - 1'000'000);
+  EXPECT_LE(changed.at.wall_ns, base::system_clock().wall_ns());
+  ring.broken = true;
+  ASSERT_TRUE(driver.submit(8, dimmed(50)));
+  ASSERT_TRUE(next());
+  EXPECT_EQ(driver.light_since_ns(), std::nullopt) << "what it shows is not known";
+}
+
 }  // namespace
 }  // namespace dtact::pipeline
 // NOLINTEND(bugprone-unchecked-optional-access)

@@ -67,7 +67,7 @@ class CaptureThread : public ::testing::Test {
     fakes::FakeRing::Handle ring;
     Pipeline pipeline(std::move(camera), std::make_unique<fakes::FakeRing>(ring),
                       fakes::toy_calibration(), config);
-    pipeline.want({.contact = true, .depth = true, .luma = true});
+    pipeline.want({.contact = true, .depth = true, .luma = true, .jpeg = true});
     pipeline.start();
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (grabbed < frames && std::chrono::steady_clock::now() < deadline) {
@@ -78,7 +78,8 @@ class CaptureThread : public ::testing::Test {
       }
       pipeline.want({.contact = true,
                      .depth = true,
-                     .luma = commands_ % 2 == 0});  // whole frames and parts of them
+                     .luma = commands_ % 2 == 0,  // whole frames and parts of them
+                     .jpeg = true});
       if (grabbed > kEvery * (commands_ + 1)) commands_ += pipeline.submit(next()) ? 1U : 0U;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
@@ -91,7 +92,7 @@ class CaptureThread : public ::testing::Test {
 
  private:
   [[nodiscard]] Command next() const {
-    switch (commands_ % 3) {
+    switch (commands_ % 4) {
       case 0:
         return {commands_, Rezero{true}};
       case 1: {
@@ -99,6 +100,8 @@ class CaptureThread : public ::testing::Test {
         light.brightness = 250;
         return {commands_, SetLight{light}};
       }
+      case 2:
+        return {commands_, CopyReference{}};
       default:
         return {commands_, UseCalibration{fakes::toy_calibration()}};
     }

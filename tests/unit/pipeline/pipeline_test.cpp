@@ -161,6 +161,18 @@ TEST_F(PipelineTest, HalvedLightReadsTheSameDepthAfterANewReference) {
   EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.1);
 }
 
+TEST_F(PipelineTest, HandsOutTheUntouchedImage) {
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_fresh());
+  const CommandDone done = ask(CopyReference{});
+  EXPECT_EQ(done.outcome, Outcome::done);
+  ASSERT_NE(done.reference, nullptr);
+  EXPECT_EQ(done.reference->width, fakes::kToyWidth);
+  EXPECT_EQ(done.reference->height, fakes::kToyHeight);
+  EXPECT_EQ(done.reference->light.brightness, 255);
+  EXPECT_EQ(done.reference.use_count(), 2) << "the event's list and ours: the pipeline let it go";
+}
+
 TEST_F(PipelineTest, FramesOfALightChangeCarryNoDepth) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());

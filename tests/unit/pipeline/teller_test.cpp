@@ -49,6 +49,30 @@ TEST_F(TellerTest, TellsChangesOnly) {
   EXPECT_FALSE(std::get<ContactChanged>(next().value()).touching);
 }
 
+// A reference is being taken while something is held: nobody knows that it was lost.
+TEST_F(TellerTest, AFrameThatWasNotMeasuredTellsNothingOfContact) {
+  teller.contact(frame(true, 1));
+  ASSERT_TRUE(next());
+  DepthFrame blind = frame(false, 2);
+  for (const ContactAbsence why :
+       {ContactAbsence::referencing, ContactAbsence::uncalibrated, ContactAbsence::unasked}) {
+    blind.contact_absence = why;
+    teller.contact(blind);
+    EXPECT_FALSE(next());
+  }
+  teller.contact(frame(true, 3));
+  EXPECT_FALSE(next()) << "held all the time";
+  DepthFrame lost = frame(false, 4);
+  lost.camera.timestamp_ns = 5;
+  lost.wall_ns = 6;
+  teller.contact(lost);
+  const auto told = std::get<ContactChanged>(next().value());
+  EXPECT_FALSE(told.touching);
+  EXPECT_EQ(told.at.sequence, 4U);
+  EXPECT_EQ(told.at.monotonic_ns, 5);
+  EXPECT_EQ(told.at.wall_ns, 6);
+}
+
 TEST_F(TellerTest, TheFirstStateIsAlwaysTold) {
   (void)teller.state(State::settling, {}, {.monotonic_ns = 0});
   (void)teller.state(State::settling, {}, {.monotonic_ns = 0});

@@ -186,6 +186,25 @@ TEST(LightTimeline, FramesBelongToTheLightTheyWereExposedUnder) {
   EXPECT_EQ(timeline.light_at(200 * kMs).brightness, 3);
 }
 
+TEST(LightTimeline, KnowsSinceWhenAnExposureShowsALightAlone) {
+  hal::Light dim;
+  dim.brightness = 100;
+  LightTimeline timeline({}, 2, kPeriod);
+  EXPECT_EQ(timeline.since_at(50 * kMs), std::nullopt) << "who knows what was before the start";
+  timeline.change_begins({}, 100 * kMs);
+  EXPECT_EQ(timeline.since_at(100 * kMs), std::nullopt) << "still writing";
+  timeline.change_ends({}, 101 * kMs, false);
+  EXPECT_EQ(timeline.since_at(99 * kMs), std::nullopt);
+  EXPECT_EQ(timeline.since_at(100 * kMs), 121 * kMs);  // 101 + 2 periods
+  timeline.change_begins(dim, 200 * kMs);
+  EXPECT_EQ(timeline.since_at(199 * kMs), 121 * kMs);
+  EXPECT_EQ(timeline.since_at(200 * kMs), std::nullopt);
+  timeline.change_ends({}, 201 * kMs, true);
+  EXPECT_EQ(timeline.since_at(300 * kMs), std::nullopt) << "a failed write may have shown anything";
+  EXPECT_EQ(stamp_lag_ns(hal::TimestampMeaning::start_of_exposure, kPeriod), 0);
+  EXPECT_EQ(stamp_lag_ns(hal::TimestampMeaning::end_of_frame, kPeriod), kPeriod);
+}
+
 TEST(LightTimeline, AFailedWriteLeavesTheOldLight) {
   const hal::Light bright;
   hal::Light dim;
