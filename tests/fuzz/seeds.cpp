@@ -77,7 +77,19 @@ void add_requests(const Corpus& corpus) {
        })},
       {"list_calibrations", request([](M& m) { m.mutable_list_calibrations(); })},
       {"activate_calibration",
-       request([](M& m) { m.mutable_activate_calibration()->set_number(0); })}};
+       request([](M& m) { m.mutable_activate_calibration()->set_number(0); })},
+      {"subscribe_1_1", request([](M& m) {
+         m.mutable_subscribe()->set_depth(v1::DEPTH_RVL);
+         m.mutable_subscribe()->set_jpeg(true);
+         m.mutable_subscribe()->set_depth_hz(30);
+         m.mutable_subscribe()->set_decimation(2);
+         m.mutable_subscribe()->set_um_per_unit(5);
+         m.mutable_subscribe()->mutable_box()->set_width(3);
+         m.mutable_subscribe()->mutable_box()->set_height(2);
+         m.mutable_subscribe()->set_events(false);
+       })},
+      {"get_reference", request([](M& m) { m.mutable_get_reference(); })},
+      {"ping", request([](M& m) { m.mutable_ping(); })}};
   std::string stream;
   std::string session = "\x01";
   for (const auto& [name, message] : all) {
