@@ -107,6 +107,47 @@ TEST(Stream, CompressedDepthIsTheSameDepth) {
   EXPECT_TRUE(met);
 }
 
+TEST(Stream, SendsWhatASubscriptionOfVersion11AsksFor) {
+  const Sensor sensor;
+  client::Client client = sensor.connect();
+  v1::Subscribe subscription;
+  subscription.set_depth(v1::DEPTH_PREDICT_ZSTD);
+  subscription.set_depth_hz(30);
+  subscription.set_decimation(2);
+  subscription.set_um_per_unit(5);
+  subscription.mutable_box()->set_x(100);
+  subscription.mutable_box()->set_y(60);
+  subscription.mutable_box()->set_width(200);
+  subscription.mutable_box()->set_height(300);
+  subscription.set_summary(true);
+  client.subscribe(subscription);
+  int frames = 0;
+  std::vector<std::int64_t> depth_ns;
+  ASSERT_TRUE(read_until(client, [&](const Item& item) {
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    if (frame == nullptr || !frame->has_contact()) return false;
+    EXPECT_EQ(frame->contact_absence(), v1::CONTACT_ABSENCE_NONE);
+    EXPECT_TRUE(frame->has_calibration());
+    EXPECT_EQ(frame->calibration(), 0U) << "the one of the configuration";
+    EXPECT_LE(frame->light().since_ns(), frame->monotonic_ns());
+    if (frame->has_depth()) {
+      const v1::DepthMap& depth = frame->depth();
+      EXPECT_EQ(depth.decimation(), 2U);
+      EXPECT_EQ(depth.um_per_unit(), 5.0);
+      EXPECT_EQ(depth.x(), 50U);
+      EXPECT_EQ(depth.y(), 30U);
+      EXPECT_EQ(depth.full_width(), kCropSide / 2);
+      EXPECT_EQ(client::values_of(depth).size(), 100U * 150U);
+      depth_ns.push_back(frame->monotonic_ns());
+    }
+    return ++frames == 240;
+  }));
+  // 30 a second, one more for the first, whatever the load.
+  const double seconds = static_cast<double>(depth_ns.back() - depth_ns.front()) / 1e9;
+  EXPECT_LE(static_cast<double>(depth_ns.size()), 30 * seconds + 2);
+  EXPECT_GT(depth_ns.size(), 60U);
+}
+
 TEST(Stream, EndsCleanlyOnSigtermWhileStreaming) {
   const Sensor sensor;
   client::Client client = sensor.connect();
