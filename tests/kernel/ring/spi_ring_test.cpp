@@ -90,9 +90,9 @@ TEST_F(SpiRing, TheControllerReceivesTheColours) {
 TEST_F(SpiRing, ACommandReachesTheWire) {
   Ws2812Config config = quiet();
   config.spi_check_rate = false;
-  pipeline::EventFd wake;
+  const pipeline::Exchange exchange{pipeline::DepthFrame{}};
   hal::Light light = rainbow();
-  pipeline::LightDriver driver(open_spi_ring(config), light, base::system_clock(), wake);
+  pipeline::LightDriver driver(open_spi_ring(config), light, base::system_clock(), exchange);
   driver.start();
   std::vector<double> took_ms;
   for (int i = 1; i <= 50; ++i) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
@@ -171,6 +172,8 @@ TEST_F(ReplayTest, JpegIsDecodedFrameByFrame) {
   ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
   EXPECT_EQ(first.luma().row(49)[99], 10);  // still whole: two buffers
   EXPECT_EQ(frame.luma().row(49)[99], 20);
+  EXPECT_TRUE(std::ranges::equal(frame.jpeg(), jpeg_bytes(20), {}, {},
+                                 [](char byte) { return static_cast<std::uint8_t>(byte); }));
 }
 
 TEST_F(ReplayTest, ADamagedJpegIsADamagedFrame) {

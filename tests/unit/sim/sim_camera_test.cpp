@@ -96,6 +96,11 @@ TEST_F(SimCameraTest, EveryOutputDecodesToNearlyTheSameLuma) {
     ASSERT_NEAR(compressed[i], expected[i], 8);
   }
   EXPECT_NEAR(mean_grey(c), mean_grey(a), 0.1);
+  EXPECT_TRUE(a.jpeg().empty());
+  EXPECT_TRUE(b.jpeg().empty());
+  ASSERT_GT(c.jpeg().size(), 4U);
+  EXPECT_EQ(c.jpeg()[0], 0xff);
+  EXPECT_EQ(c.jpeg()[1], 0xd8);
   EXPECT_EQ(luma.info().pixel_format, "GREY");
   EXPECT_EQ(yuyv.info().pixel_format, "YUYV");
   EXPECT_EQ(mjpeg.info().pixel_format, "MJPEG");
