@@ -136,6 +136,8 @@ v1::ServerMessage frame(v1::DepthEncoding encoding) {
 void add_answers(const Corpus& corpus) {
   corpus.add("answers", "frame_int16", frame(v1::DEPTH_INT16).SerializeAsString());
   corpus.add("answers", "frame_delta_zstd", frame(v1::DEPTH_DELTA_ZSTD).SerializeAsString());
+  corpus.add("answers", "frame_rvl", frame(v1::DEPTH_RVL).SerializeAsString());
+  corpus.add("answers", "frame_predict_zstd", frame(v1::DEPTH_PREDICT_ZSTD).SerializeAsString());
   v1::ServerMessage message;
   message.mutable_reply()->set_id(3);
   auto& status = *message.mutable_reply()->mutable_status();
@@ -158,6 +160,30 @@ void add_answers(const Corpus& corpus) {
   corpus.add("answers", "event_state", message.SerializeAsString());
   message.mutable_event()->mutable_contact()->mutable_contact()->set_x_mm(1.5);
   corpus.add("answers", "event_contact", message.SerializeAsString());
+}
+
+/// A map of a pressed slope with untouched and untrusted parts, as depth_maps.cpp and, in each
+/// encoding, as depth_decoders.cpp take it.
+void add_depth(const Corpus& corpus, const std::string& name, std::size_t width,
+               std::size_t height) {
+  std::vector<std::int16_t> map;
+  for (std::size_t y = 0; y < height; ++y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      const auto pressed = static_cast<std::int16_t>(20 * x + x * y % 7);
+      map.push_back(x < width / 3 ? std::int16_t{0} : x * y % 41 == 40 ? INT16_MIN : pressed);
+    }
+  }
+  wire::DepthEncoder encoder;
+  std::string bytes;
+  for (const auto encoding :
+       {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD, v1::DEPTH_RVL, v1::DEPTH_PREDICT_ZSTD}) {
+    encoder.encode(encoding, map, width, bytes);
+    const std::string head{static_cast<char>(width), 0, static_cast<char>(height), 0,
+                           static_cast<char>(encoding)};
+    corpus.add("depth_decoders", name + '_' + std::to_string(encoding), head + bytes);
+  }
+  encoder.encode(v1::DEPTH_INT16, map, width, bytes);
+  corpus.add("depth_maps", name, static_cast<char>(width - 1) + bytes);
 }
 
 void add_calibrations(const Corpus& corpus) {
@@ -245,6 +271,8 @@ int main(int argc, char** argv) {
   const dtact::fuzz::Corpus corpus(argv[1]);
   dtact::fuzz::add_requests(corpus);
   dtact::fuzz::add_answers(corpus);
+  dtact::fuzz::add_depth(corpus, "small", 5, 3);
+  dtact::fuzz::add_depth(corpus, "large", 60, 41);
   dtact::fuzz::add_calibrations(corpus);
   dtact::fuzz::add_pictures(corpus);
   return 0;

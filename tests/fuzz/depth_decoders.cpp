@@ -1,0 +1,50 @@
+// The four depth encodings as a daemon may send them: two bytes each of width and height, one of
+// the encoding, then what is decoded. What decodes has as many values as pixels, and every encoding
+// of it decodes to the same.
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/depth_encoding.hpp"
+#include "tests/fuzz/fuzz.hpp"
+
+namespace dtact::fuzz {
+namespace {
+
+constexpr std::size_t kHead = 5;
+/// Larger maps are decoded and no more, so that an input takes milliseconds.
+constexpr std::size_t kMostPixels = 100'000;
+
+void encode_again(v1::DepthEncoding sent, std::string_view bytes,
+                  const std::vector<std::int16_t>& map, std::size_t width) {
+  static wire::DepthEncoder encoder;
+  for (const auto encoding :
+       {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD, v1::DEPTH_RVL, v1::DEPTH_PREDICT_ZSTD}) {
+    std::string again;
+    encoder.encode(encoding, map, width, again);
+    std::vector<std::int16_t> back;
+    require(wire::decode_depth(encoding, again, width, map.size() / width, back) && back == map,
+            "every encoding of a map decodes to it");
+    // zstd may say the same in many ways.
+    const bool one_way = encoding == v1::DEPTH_INT16 || encoding == v1::DEPTH_RVL;
+    require(encoding != sent || !one_way || again == bytes, "a map has one int16 and one RVL form");
+  }
+}
+
+}  // namespace
+}  // namespace dtact::fuzz
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace dtact;
+  if (size < fuzz::kHead) return 0;
+  const std::size_t width = data[0] + 256U * data[1];
+  const std::size_t height = data[2] + 256U * data[3];
+  const auto encoding = static_cast<v1::DepthEncoding>(data[4]);
+  const std::string_view bytes(reinterpret_cast<const char*>(data) + fuzz::kHead,
+                               size - fuzz::kHead);
+  std::vector<std::int16_t> map;
+  if (!wire::decode_depth(encoding, bytes, width, height, map)) return 0;
+  fuzz::require(map.size() == width * height, "a depth map has as many values as pixels");
+  if (map.size() <= fuzz::kMostPixels) fuzz::encode_again(encoding, bytes, map, width);
+  return 0;
+}
