@@ -126,14 +126,21 @@ bool take_escapes(const std::uint8_t* joined, std::span<const std::uint8_t> seco
   return escapes.at_end();
 }
 
-/// Running sums along the row, on top of the row above.
+/// Running sums along the row, on top of the row above. In three loops, of which only the one in
+/// the middle has to go a pixel at a time.
 void add_up(std::int16_t* row, const std::int16_t* above, std::size_t width) noexcept {
-  std::uint16_t sum = 0;
   for (std::size_t x = 0; x < width; ++x) {
     const auto zigzag = static_cast<std::uint16_t>(row[x]);
-    sum = static_cast<std::uint16_t>(sum + ((zigzag >> 1U) ^ -(zigzag & 1U)));
-    row[x] = static_cast<std::int16_t>(sum + static_cast<std::uint16_t>(above[x]));
+    row[x] = static_cast<std::int16_t>((zigzag >> 1U) ^ -(zigzag & 1U));
   }
+  unsigned sum = 0;
+  for (std::size_t x = 0; x < width; ++x) {
+    sum += static_cast<std::uint16_t>(row[x]);
+    row[x] = static_cast<std::int16_t>(sum);
+  }
+  for (std::size_t x = 0; x < width; ++x)
+    row[x] =
+        static_cast<std::int16_t>(static_cast<unsigned>(row[x]) + static_cast<unsigned>(above[x]));
 }
 
 }  // namespace
