@@ -16,6 +16,7 @@
 #include <exception>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -84,15 +85,17 @@ Measured measure(const Recording& recording, const net::DepthSpec& spec, v1::Dep
   Measured measured;
   for (const auto& frame : recording.frames) {
     for (int run = -2; run < runs; ++run) {
-      net::DepthView view;
-      const double view_ms = cpu_ms([&] { view = viewer.view(frame, spec).value(); });
-      const auto width = static_cast<std::size_t>(view.width);
-      const auto height = static_cast<std::size_t>(view.height);
+      std::optional<net::DepthView> view;
+      const double view_ms = cpu_ms([&] { view = viewer.view(frame, spec); });
+      if (!view) throw std::runtime_error(recording.name + ": the map is smaller than a block");
+      const auto width = static_cast<std::size_t>(view->width);
+      const auto height = static_cast<std::size_t>(view->height);
       bool decoded = false;
-      const double encode_ms = cpu_ms([&] { encoder.encode(encoding, view.values, width, bytes); });
+      const double encode_ms =
+          cpu_ms([&] { encoder.encode(encoding, view->values, width, bytes); });
       const double decode_ms =
           cpu_ms([&] { decoded = wire::decode_depth(encoding, bytes, width, height, back); });
-      if (!decoded || !std::ranges::equal(back, view.values)) {
+      if (!decoded || !std::ranges::equal(back, view->values)) {
         throw std::runtime_error(fmt::format("{}: encoding {} does not give the map back",
                                              recording.name, static_cast<int>(encoding)));
       }

@@ -9,6 +9,8 @@
 
 #include "daemon/recon/model.hpp"
 
+// ASSERT_TRUE is a check that clang-tidy does not follow.
+// NOLINTBEGIN(bugprone-unchecked-optional-access)
 namespace dtact::net {
 namespace {
 
@@ -267,3 +269,4 @@ TEST(DepthView, IsTheDefinitionOnArbitraryMaps) {
 
 }  // namespace
 }  // namespace dtact::net
+// NOLINTEND(bugprone-unchecked-optional-access)

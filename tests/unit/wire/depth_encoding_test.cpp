@@ -30,7 +30,7 @@ std::string bytes_of(const std::string& hex) {
 /// What a frame holds; other encodings' bytes as they are.
 std::string content_of(v1::DepthEncoding encoding, const std::string& bytes) {
   if (encoding != v1::DEPTH_DELTA_ZSTD && encoding != v1::DEPTH_PREDICT_ZSTD) return bytes;
-  std::string content(zstd_content_size(bytes).value(), '?');
+  std::string content(zstd_content_size(bytes).value_or(0), '?');
   EXPECT_TRUE(zstd_decompress(bytes, std::as_writable_bytes(std::span(content))));
   return content;
 }

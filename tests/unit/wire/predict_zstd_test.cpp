@@ -102,24 +102,23 @@ TEST(PredictZstd, ANoisyBallIsFarBelowItsDifferences) {
   // A slope with noise as smooth as the reconstruction's filter leaves it: 14,211 bytes. Without
   // its entropy code zstd would need half a byte a pixel, 32,768; delta + zstd takes 35,224.
   std::mt19937 random(3);
-  constexpr int kSide = 256;
-  std::vector<double> noise((kSide + 16) * (kSide + 16));
+  constexpr std::size_t kSide = 256;
+  constexpr std::size_t kStride = kSide + 16;
+  std::vector<double> noise(kStride * kStride);
   for (double& value : noise) value = static_cast<double>(random() % 1000) / 1000 - 0.5;
-  for (const int step : {1, kSide + 16}) {
+  for (const std::size_t step : {std::size_t{1}, kStride}) {
     for (int round = 0; round < 6; ++round) {
-      for (std::size_t i = 0; i + 16 * static_cast<std::size_t>(step) < noise.size(); ++i) {
-        noise[i] = (noise[i] + noise[i + static_cast<std::size_t>(step)] +
-                    noise[i + 2 * static_cast<std::size_t>(step)]) /
-                   3;
+      for (std::size_t i = 0; i + 16 * step < noise.size(); ++i) {
+        noise[i] = (noise[i] + noise[i + step] + noise[i + 2 * step]) / 3;
       }
     }
   }
   std::vector<std::int16_t> map;
-  for (int y = 0; y < kSide; ++y) {
-    for (int x = 0; x < kSide; ++x) {
-      const double r2 = (x - 128) * (x - 128) + (y - 128) * (y - 128);
-      map.push_back(static_cast<std::int16_t>(std::lround(
-          1200 - r2 / 14 + 100 * noise[static_cast<std::size_t>(y * (kSide + 16) + x)])));
+  for (std::size_t y = 0; y < kSide; ++y) {
+    for (std::size_t x = 0; x < kSide; ++x) {
+      const double r = std::hypot(static_cast<double>(x) - 128, static_cast<double>(y) - 128);
+      map.push_back(
+          static_cast<std::int16_t>(std::lround(1200 - r * r / 14 + 100 * noise[y * kStride + x])));
     }
   }
   std::string bytes;
