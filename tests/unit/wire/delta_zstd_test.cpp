@@ -92,6 +92,8 @@ TEST(DeltaZstd, RefusesDamage) {
   EXPECT_FALSE(decode_delta_zstd("", 4, 2, map));
   EXPECT_FALSE(decode_delta_zstd("not zstd at all", 4, 2, map));
   EXPECT_FALSE(decode_delta_zstd(kZstd + "more", 4, 2, map));
+  // RFC 8878, 3.1.2: a skippable frame without content.
+  EXPECT_FALSE(decode_delta_zstd(kZstd + "\x50\x2a\x4d\x18\0\0\0\0"s, 4, 2, map));
   for (std::size_t size = 0; size < kZstd.size(); ++size) {
     EXPECT_FALSE(decode_delta_zstd(kZstd.substr(0, size), 4, 2, map)) << size;
   }

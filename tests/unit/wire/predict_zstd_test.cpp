@@ -156,9 +156,19 @@ TEST(PredictZstd, RefusesDamage) {
   EXPECT_FALSE(decode_predict_zstd("", 4, 2, map));
   EXPECT_FALSE(decode_predict_zstd("not zstd at all", 4, 2, map));
   EXPECT_FALSE(decode_predict_zstd(frame + "more", 4, 2, map));
+  // RFC 8878, 3.1.2: a skippable frame without content.
+  EXPECT_FALSE(decode_predict_zstd(frame + "\x50\x2a\x4d\x18\0\0\0\0"s, 4, 2, map));
   for (std::size_t size = 0; size < frame.size(); ++size) {
     EXPECT_FALSE(decode_predict_zstd(frame.substr(0, size), 4, 2, map)) << size;
   }
+}
+
+TEST(PredictZstd, DoesNotBelieveAnySizeThatAFrameStates) {
+  // RFC 8878, 3.1.1.1: one segment, its content's size in eight bytes.
+  std::vector<std::int16_t> map;
+  const std::string head = "\x28\xb5\x2f\xfd\xe0"s;
+  EXPECT_FALSE(decode_predict_zstd(head + "\0\0\0\0\0\1\0\0"s, 4, 2, map));  // a terabyte
+  EXPECT_FALSE(decode_predict_zstd(head + "\0\0\0\0\0\0\0\x7f"s, 4, 2, map));
 }
 
 TEST(PredictZstd, RefusesWhatNoEncoderWrites) {
