@@ -83,10 +83,11 @@ TEST(ClientLibrary, SaysWhatToDoWhenTheHostIsUnknown) {
   EXPECT_THROW((void)Client(o), client::ConnectionError);
 }
 
-TEST(ClientLibrary, StreamsBothEncodings) {
+TEST(ClientLibrary, StreamsEveryEncoding) {
   Rig rig;
   Client client(options(rig));
-  for (const auto encoding : {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD}) {
+  for (const auto encoding :
+       {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD, v1::DEPTH_RVL, v1::DEPTH_PREDICT_ZSTD}) {
     v1::Subscribe both;
     both.set_depth(encoding);
     both.set_luma(v1::LUMA_GREY8);
