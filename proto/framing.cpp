@@ -4,6 +4,12 @@
 #include <stdexcept>
 
 namespace dtact::wire {
+namespace {
+
+/// Memory that is kept for the next message, bytes: requests without files are smaller.
+constexpr std::size_t kKept = 4096;
+
+}  // namespace
 
 std::array<std::uint8_t, kLengthSize> encode_length(std::size_t size) {
   if (size > kMaxMessage) {
@@ -35,12 +41,19 @@ void MessageDecoder::take_body(std::string_view& input) {
   input.remove_prefix(taken);
 }
 
+void MessageDecoder::begin() noexcept {
+  complete_ = false;
+  head_size_ = 0;
+  message_.clear();
+}
+
+void MessageDecoder::release() {
+  begin();
+  if (message_.capacity() > kKept) std::string().swap(message_);
+}
+
 MessageDecoder::Result MessageDecoder::feed(std::string_view& input) {
-  if (complete_) {
-    complete_ = false;
-    head_size_ = 0;
-    message_.clear();
-  }
+  if (complete_) begin();
   if (!take_length(input)) return Result::need_more;
   if (length_ > cap_) return Result::too_large;
   take_body(input);

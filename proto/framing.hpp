@@ -10,6 +10,8 @@ namespace dtact::wire {
 
 /// Longest message either side accepts, bytes, without its length.
 inline constexpr std::size_t kMaxMessage = std::size_t{16} << 20U;
+/// The same before Hello, which is all that an unknown peer may send.
+inline constexpr std::size_t kMaxBeforeHello = 1024;
 /// Bytes of the length that goes before every message.
 inline constexpr std::size_t kLengthSize = 4;
 
@@ -35,10 +37,18 @@ class MessageDecoder {
 
   /// The message that feed() completed; empty is a valid message. Valid until the next feed().
   [[nodiscard]] const std::string& message() const noexcept { return message_; }
+  /// Lets go of the message that feed() completed, and of its memory when it was a large one.
+  void release();
+  /// For the messages that begin from here on.
+  void set_cap(std::size_t cap) noexcept { cap_ = cap; }
+  [[nodiscard]] std::size_t cap() const noexcept { return cap_; }
+  /// Bytes of memory that the message takes so far.
+  [[nodiscard]] std::size_t held() const noexcept { return message_.capacity(); }
   /// The length that was too large, bytes.
   [[nodiscard]] std::size_t announced() const noexcept { return length_; }
 
  private:
+  void begin() noexcept;
   [[nodiscard]] bool take_length(std::string_view& input) noexcept;
   void take_body(std::string_view& input);
 

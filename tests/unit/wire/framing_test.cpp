@@ -89,6 +89,28 @@ TEST(MessageDecoder, TakesTheCapAndRefusesOneMore) {
   EXPECT_EQ(above.feed(input), Result::too_large);
 }
 
+TEST(MessageDecoder, GivesTheMemoryOfALargeMessageBack) {
+  MessageDecoder decoder;
+  const std::string stream = "\0\x10\0\0"s + std::string(1U << 20U, 'x') + "\0\0\0\1y"s;
+  std::string_view input = stream;
+  ASSERT_EQ(decoder.feed(input), Result::message);
+  EXPECT_GE(decoder.held(), 1U << 20U);
+  decoder.release();
+  EXPECT_LE(decoder.held(), 4096U);
+  ASSERT_EQ(decoder.feed(input), Result::message);
+  EXPECT_EQ(decoder.message(), "y");
+}
+
+TEST(MessageDecoder, TakesAnotherCapForTheNextMessage) {
+  MessageDecoder decoder(2);
+  const std::string stream = "\0\0\0\2ab\0\0\0\3cde"s;
+  std::string_view input = stream;
+  ASSERT_EQ(decoder.feed(input), Result::message);
+  decoder.set_cap(3);
+  ASSERT_EQ(decoder.feed(input), Result::message);
+  EXPECT_EQ(decoder.message(), "cde");
+}
+
 TEST(MessageDecoder, RefusesAboveSixteenMebibytesByDefault) {
   MessageDecoder at_cap;
   std::string stream = "\x01\0\0\0"s;
