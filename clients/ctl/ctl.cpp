@@ -3,6 +3,7 @@
 #include "clients/ctl/cameras.hpp"
 #include "clients/ctl/hand_over.hpp"
 #include "clients/ctl/online.hpp"
+#include "clients/ctl/secrets.hpp"
 
 namespace dtact::ctl {
 
@@ -17,6 +18,8 @@ int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostre
   add_calibration(app, context);
   add_snapshot(app, context);
   add_cameras(app, context);
+  add_cert(app, context);
+  add_token(app, context);
   add_handed_over(app, arguments);
   return cli::run(app, arguments, out, error);
 }

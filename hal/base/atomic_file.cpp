@@ -26,7 +26,8 @@ void sync_folder(const std::filesystem::path& folder) {
   if (::fsync(fd.get()) != 0 && errno != EINVAL) fail(errno, "cannot sync folder", path);
 }
 
-void write_file_atomically(const std::filesystem::path& path, std::string_view content) {
+void write_file_atomically(const std::filesystem::path& path, std::string_view content,
+                           mode_t mode) {
   std::string temporary = path.string() + ".XXXXXX";
   UniqueFd fd(::mkostemp(temporary.data(), O_CLOEXEC));
   if (!fd) fail(errno, "cannot write", path);
@@ -42,8 +43,8 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
     }
     content.remove_prefix(static_cast<std::size_t>(n));
   }
-  // mkostemp makes the file private; what replaces a readable file is readable too.
-  if (::fchmod(fd.get(), 0644) != 0) give_up(errno);
+  // mkostemp makes the file private.
+  if (::fchmod(fd.get(), mode) != 0) give_up(errno);
   if (::fsync(fd.get()) != 0) give_up(errno);
   fd.reset();
   if (std::rename(temporary.c_str(), path.c_str()) != 0) give_up(errno);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -7,8 +9,9 @@
 namespace dtact::base {
 
 /// Replaces `path` by write, fsync, rename, so that at any moment it is the old file or the new one
-/// as a whole. Throws std::system_error naming the path.
-void write_file_atomically(const std::filesystem::path& path, std::string_view content);
+/// as a whole, readable as `mode` says and never by more. Throws std::system_error naming the path.
+void write_file_atomically(const std::filesystem::path& path, std::string_view content,
+                           mode_t mode = 0644);
 
 /// The whole file. Throws std::system_error naming the path; refuses more than `limit` bytes.
 [[nodiscard]] std::string read_file(const std::filesystem::path& path,
