@@ -28,8 +28,8 @@ struct NetConfig {
   std::string program = "dtactd";           ///< "dtactd 0.1.0": in the handshake.
   std::string version;                      ///< "0.1.0": in status.
   std::chrono::milliseconds hello_timeout{5000};  ///< A client silent for so long is let go.
-  /// Longest time without progress of unacknowledged or unaccepted data (TCP_USER_TIMEOUT), after
-  /// which a client counts as dead: a pulled cable, or a program that stopped reading.
+  /// A peer whose machine has not answered for so long is dead: a pulled cable. One that answers and
+  /// only does not read is not.
   std::chrono::milliseconds dead_after{30000};
   /// SCHED_FIFO priority of the thread that runs the network part, below the capture thread's; 0 =
   /// normal scheduling. Whoever owns the thread sets it, …

@@ -4,8 +4,11 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 
+#include <boost/asio/error.hpp>
 #include <boost/asio/write.hpp>
 #include <utility>
+
+#include "daemon/net/tcp_watch.hpp"
 
 namespace dtact::net {
 namespace {
@@ -19,20 +22,13 @@ using boost::system::error_code;
 /// enough to keep a gigabit link busy for a millisecond, the time in which this thread runs again.
 constexpr int kNotSentLowWater = 128 * 1024;
 
-void prepare(tcp::socket& socket, std::chrono::milliseconds dead_after) {
-  const auto set = [&socket](int level, int option, int value) {
-    // Each is an improvement and none a condition: without it the connection is only slower to
-    // answer or to be found dead.
-    (void)::setsockopt(socket.native_handle(), level, option, &value, sizeof value);
+void prepare(tcp::socket& socket) {
+  const auto set = [&socket](int option, int value) {
+    // Each is an improvement and none a condition: without it the connection is only slower.
+    (void)::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof value);
   };
-  set(IPPROTO_TCP, TCP_NODELAY, 1);
-  set(IPPROTO_TCP, TCP_NOTSENT_LOWAT, kNotSentLowWater);
-  set(IPPROTO_TCP, TCP_USER_TIMEOUT, static_cast<int>(dead_after.count()));
-  // An idle client has nothing unacknowledged: probe it, so that a vanished one is let go.
-  set(SOL_SOCKET, SO_KEEPALIVE, 1);
-  set(IPPROTO_TCP, TCP_KEEPIDLE, 15);
-  set(IPPROTO_TCP, TCP_KEEPINTVL, 5);
-  set(IPPROTO_TCP, TCP_KEEPCNT, 3);
+  set(TCP_NODELAY, 1);
+  set(TCP_NOTSENT_LOWAT, kNotSentLowWater);
 }
 
 std::string describe(const tcp::socket& socket) {
@@ -44,11 +40,24 @@ std::string describe(const tcp::socket& socket) {
 
 class TcpTransport : public Transport {
  public:
-  TcpTransport(tcp::socket socket, std::string endpoint)
-      : Transport({describe(socket), std::move(endpoint)}), socket_(std::move(socket)) {}
+  TcpTransport(tcp::socket socket, std::string endpoint, std::chrono::milliseconds dead_after)
+      : Transport({describe(socket), std::move(endpoint)}),
+        socket_(std::move(socket)),
+        watch_(std::make_shared<TcpWatch>(executor(), socket_.native_handle(), dead_after)) {
+    watch_->start([this] {
+      dead_ = true;
+      error_code ignored;
+      socket_.cancel(ignored);
+    });
+  }
+  ~TcpTransport() override { watch_->stop(); }
 
   void read_some(asio::mutable_buffer into, Done done) override {
-    socket_.async_read_some(into, std::move(done));
+    socket_.async_read_some(into,
+                            [this, done = std::move(done)](error_code error, std::size_t size) {
+                              if (dead_) error = asio::error::timed_out;
+                              done(error, size);
+                            });
   }
   void write(const Parts& parts, Done done) override {
     asio::async_write(socket_, parts, std::move(done));
@@ -58,6 +67,7 @@ class TcpTransport : public Transport {
     socket_.shutdown(tcp::socket::shutdown_send, ignored);
   }
   void close() override {
+    watch_->stop();
     error_code ignored;
     socket_.close(ignored);
   }
@@ -65,14 +75,16 @@ class TcpTransport : public Transport {
 
  private:
   tcp::socket socket_;
+  std::shared_ptr<TcpWatch> watch_;
+  bool dead_ = false;
 };
 
 }  // namespace
 
 std::unique_ptr<Transport> over_tcp(tcp::socket socket, std::string endpoint,
                                     std::chrono::milliseconds dead_after) {
-  prepare(socket, dead_after);
-  return std::make_unique<TcpTransport>(std::move(socket), std::move(endpoint));
+  prepare(socket);
+  return std::make_unique<TcpTransport>(std::move(socket), std::move(endpoint), dead_after);
 }
 
 }  // namespace dtact::net

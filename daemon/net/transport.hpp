@@ -48,7 +48,8 @@ class Transport {
 };
 
 /// Plain TCP, with the socket's options set: answers at once, frames that do not queue up in the
-/// kernel, and a peer found dead after `dead_after`.
+/// kernel, and a peer that is gone found after `dead_after`, one that only does not read kept
+/// (TcpWatch): reading then ends with asio::error::timed_out.
 [[nodiscard]] std::unique_ptr<Transport> over_tcp(boost::asio::ip::tcp::socket socket,
                                                   std::string endpoint,
                                                   std::chrono::milliseconds dead_after);

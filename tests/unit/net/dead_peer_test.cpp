@@ -1,0 +1,182 @@
+// A client that stops reading is kept, one that is gone is not.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <net/if.h>
+#include <sched.h>
+#include <sys/ioctl.h>
+
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <thread>
+
+#include "daemon/net/tcp_watch.hpp"
+#include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::net::test {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::HasSubstr;
+using testing::Not;
+using Clock = PeerJudge::Clock;
+
+constexpr int kSmallBuffer = 4096;
+constexpr milliseconds kDeadAfter{3000};
+
+/// The judge of a connection that is as old as `Clock`, with thirty seconds.
+class Judged : public ::testing::Test {
+ protected:
+  bool alive(seconds now, TcpProgress progress) {
+    return judge_.alive(progress, Clock::time_point(now));
+  }
+  PeerJudge judge_{seconds(30), Clock::time_point()};
+};
+
+TEST_F(Judged, IsAliveWhileItTakesWhatItIsSent) {
+  for (int s = 0; s < 600; s += 2) {
+    ASSERT_TRUE(alive(seconds(s), {true, static_cast<std::uint64_t>(s + 1), milliseconds(2900)}));
+    ASSERT_EQ(judge_.user_timeout(), seconds(30));
+  }
+}
+
+TEST_F(Judged, IsAliveThoughItHasSaidNothingForHours) {
+  EXPECT_TRUE(alive(seconds(7200), {false, 5, seconds(7200)}));
+  // Then something is sent, and the look comes before the answer.
+  EXPECT_TRUE(alive(seconds(7202), {true, 5, seconds(7202)}));
+}
+
+TEST_F(Judged, IsAliveWhileItAnswersProbesAndTakesNothing) {
+  EXPECT_TRUE(alive(seconds(0), {false, 5, seconds(0)}));
+  for (int s = 2; s < 3600; s += 2) {
+    ASSERT_TRUE(alive(seconds(s), {true, 5, seconds(s % 22)})) << s;
+    // Ever later, so that the kernel never comes so far.
+    ASSERT_EQ(judge_.user_timeout(), seconds(s) + milliseconds(11'250));
+  }
+}
+
+TEST_F(Judged, IsGoneWhenItAnswersNoMore) {
+  EXPECT_TRUE(alive(seconds(0), {false, 5, seconds(0)}));
+  EXPECT_TRUE(alive(seconds(22), {true, 5, seconds(22)}));
+  EXPECT_FALSE(alive(seconds(23), {true, 5, seconds(23)}));
+}
+
+TEST_F(Judged, IsGoneWhenItAnswersNoMoreAfterItStoppedReading) {
+  EXPECT_TRUE(alive(seconds(0), {false, 5, seconds(0)}));
+  EXPECT_TRUE(alive(seconds(300), {true, 5, seconds(1)}));
+  EXPECT_FALSE(alive(seconds(322), {true, 5, seconds(23)}));
+}
+
+/// Frames that the client has missed, once it reads again.
+std::uint64_t missed(RawClient& client) {
+  return client.frame().dropped() + client.frame().dropped();
+}
+
+void publish_for(Rig& rig, milliseconds time, std::uint64_t& sequence) {
+  const auto end = Clock::now() + time;
+  while (Clock::now() < end) {
+    rig.port.publish(make_frame(++sequence, 800, 600));
+    std::this_thread::sleep_for(milliseconds(20));
+  }
+}
+
+// NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send for constants
+// To the kernel a program that was stopped is one that does not read.
+TEST(StoppedReader, IsKeptAndToldWhatItMissed) {
+  NetConfig config;
+  config.dead_after = kDeadAfter;
+  Rig rig(config);
+  RawClient stopped(rig.tcp_port(), kSmallBuffer);
+  stopped.hello();
+  stopped.subscribe(v1::DEPTH_INT16);
+  std::uint64_t sequence = 0;
+  // TCP_USER_TIMEOUT alone ends it after kDeadAfter.
+  publish_for(rig, 3 * kDeadAfter, sequence);
+  rig.port.emit(pipeline::ReferenceTaken{1, false});
+  EXPECT_THAT(rig.log(), Not(HasSubstr("disconnected")));
+  EXPECT_GT(missed(stopped), 10U);
+  v1::ClientMessage get;
+  get.mutable_get_status();
+  EXPECT_TRUE(stopped.request(get).has_status());
+}
+
+/// The thread gets a network of its own, in which only loopback is up, and goes back at the end.
+class OwnNetwork {
+ public:
+  OwnNetwork() : before_(::open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC)) {
+    made_ = ::unshare(CLONE_NEWNET) == 0;
+    if (!made_) return;
+    control_ = base::UniqueFd(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    up(true);
+  }
+  ~OwnNetwork() {
+    if (made_) (void)::setns(before_.get(), CLONE_NEWNET);
+  }
+  OwnNetwork(const OwnNetwork&) = delete;
+  OwnNetwork& operator=(const OwnNetwork&) = delete;
+
+  [[nodiscard]] bool made() const { return made_; }
+  /// Not up: whatever is sent vanishes, and nobody says so.
+  void up(bool on) const {
+    ifreq request{};
+    std::strcpy(request.ifr_name, "lo");
+    request.ifr_flags = static_cast<short>(on ? IFF_UP | IFF_RUNNING : 0);
+    if (::ioctl(control_.get(), SIOCSIFFLAGS, &request) != 0) throw std::runtime_error("lo");
+  }
+
+ private:
+  base::UniqueFd before_;
+  bool made_ = false;
+  base::UniqueFd control_;
+};
+
+class DeadPeer : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!network_.made()) {
+      GTEST_SKIP() << "no network namespace can be made here: " << std::strerror(errno);
+    }
+    config_.dead_after = kDeadAfter;
+  }
+  OwnNetwork network_;
+  NetConfig config_;
+};
+
+TEST_F(DeadPeer, IsLetGoInTheMiddleOfFrames) {
+  Rig rig(config_);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  client.subscribe(v1::DEPTH_INT16);
+  rig.port.publish(make_frame(1, 800, 600));
+  EXPECT_EQ(client.frame().sequence(), 1U);
+  network_.up(false);
+  rig.port.publish(make_frame(2, 800, 600));
+  EXPECT_TRUE(rig.wait_log("disconnected: Connection timed out"));
+}
+
+TEST_F(DeadPeer, IsLetGoAfterItStoppedReading) {
+  Rig rig(config_);
+  RawClient client(rig.tcp_port(), kSmallBuffer);
+  client.hello();
+  client.subscribe(v1::DEPTH_INT16);
+  std::uint64_t sequence = 0;
+  publish_for(rig, 2 * kDeadAfter, sequence);
+  ASSERT_THAT(rig.log(), Not(HasSubstr("disconnected")));
+  network_.up(false);
+  EXPECT_TRUE(rig.wait_log("disconnected: Connection timed out"));
+}
+
+TEST_F(DeadPeer, IsLetGoWhileNothingIsSent) {
+  Rig rig(config_);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  network_.up(false);
+  EXPECT_TRUE(rig.wait_log("disconnected: "));
+}
+// NOLINTEND(misc-const-correctness)
+
+}  // namespace
+}  // namespace dtact::net::test
