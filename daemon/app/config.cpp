@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "daemon/app/config_keys.hpp"
+#include "daemon/net/security.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::app {
@@ -153,6 +154,7 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
         "none)",
         power.line, power.name));
   }
+  net::check_security(loaded.config.net);
   loaded.origins = std::move(assembly).origins();
   return loaded;
 }

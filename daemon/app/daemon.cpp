@@ -1,7 +1,9 @@
 #include "daemon/app/daemon.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <limits.h>
+#include <malloc.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -74,6 +76,8 @@ std::shared_ptr<const calibration::Calibration> load_calibration(const fs::path&
 
 net::NetConfig make_net_config(const Config& config) {
   net::NetConfig net = config.net;
+  const fs::path run = runtime_directory();
+  if (net.unix_socket.empty() && !run.empty()) net.unix_socket = run / "dtactd.sock";
   net.program = "dtactd " DTACT_VERSION;
   net.version = DTACT_VERSION;
   std::array<char, HOST_NAME_MAX + 1> host{};
@@ -85,9 +89,19 @@ net::NetConfig make_net_config(const Config& config) {
   return net;
 }
 
+/// Memory of large messages goes back when they are done with. Without this glibc keeps up to twice
+/// the largest that ever came (mallopt(3), dynamic mmap threshold), locked into memory with the
+/// rest. Buffers of frames stay below and are used again without a page fault.
+void give_large_blocks_back() {
+  constexpr int kLarge = 4 << 20;
+  (void)::mallopt(M_MMAP_THRESHOLD, kLarge);
+  (void)::mallopt(M_TRIM_THRESHOLD, kLarge);
+}
+
 }  // namespace
 
 void run_daemon(const Config& config) {
+  give_large_blocks_back();
   asio::io_context io(1);
   // Before any thread starts, so that every thread leaves the signals to this one.
   asio::signal_set signals(io, SIGTERM, SIGINT);
@@ -125,9 +139,12 @@ void run_daemon(const Config& config) {
     server.stop();
   });
 
+  // Once for each, so that a line ends with one address.
+  for (const std::string& address : server.addresses()) {
+    spdlog::info("dtactd {}, listening on {}", DTACT_VERSION, address);
+  }
   const std::string listening =
-      fmt::format("listening on {}:{}", config.net.address, server.port());
-  spdlog::info("dtactd {}, {}", DTACT_VERSION, listening);
+      fmt::format("listening on {}", fmt::join(server.addresses(), " and "));
   notify_ready(listening);
   io.run();
   pipeline.stop();

@@ -19,9 +19,16 @@ unsigned long long watchdog_interval_us() {
 }
 void notify_alive() { sd_notify(0, "WATCHDOG=1"); }
 
-std::string state_directory() {
-  const char* folder = std::getenv("STATE_DIRECTORY");
+namespace {
+
+std::string folder_in(const char* variable) {
+  const char* folder = std::getenv(variable);
   return folder == nullptr ? std::string() : std::string(folder);
 }
+
+}  // namespace
+
+std::string state_directory() { return folder_in("STATE_DIRECTORY"); }
+std::string runtime_directory() { return folder_in("RUNTIME_DIRECTORY"); }
 
 }  // namespace dtact::app

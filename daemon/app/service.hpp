@@ -16,5 +16,7 @@ void notify_alive();
 
 /// The unit's state folder ($STATE_DIRECTORY), or empty.
 [[nodiscard]] std::string state_directory();
+/// The unit's folder below /run ($RUNTIME_DIRECTORY), or empty.
+[[nodiscard]] std::string runtime_directory();
 
 }  // namespace dtact::app

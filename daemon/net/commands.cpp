@@ -209,10 +209,18 @@ void Commands::get_status(const Who& who) {
     client.set_program(session->program());
     client.set_sent(session->outbox().sent());
     client.set_dropped(session->outbox().dropped());
-    client.set_rights(v1::RIGHTS_CONTROL);
+    client.set_rights(static_cast<v1::Rights>(session->rights()));
     client.set_endpoint(session->peer().endpoint);
     client.set_sent_bytes(session->outbox().sent_bytes());
     client.set_waiting_bytes(session->outbox().waiting_bytes());
+  }
+  for (const auto& endpoint : hub_.endpoints()) {
+    auto& out = *status.add_endpoints();
+    out.set_address(endpoint.address);
+    out.set_tls(endpoint.tls);
+    out.set_token(endpoint.token);
+    out.set_insecure(endpoint.insecure);
+    out.set_fingerprint(endpoint.fingerprint);
   }
   status.set_version(config_.version);
   status.set_name(config_.name);

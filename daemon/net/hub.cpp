@@ -3,9 +3,12 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/post.hpp>
 #include <cerrno>
+#include <map>
+#include <string_view>
 #include <system_error>
 
 #include "daemon/net/messages.hpp"
@@ -19,8 +22,22 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-/// Refused clients that are told why at the same time; more are only closed.
-constexpr std::size_t kMaxRefused = 16;
+/// The oldest stranger from where most of them are; null unless there are too many.
+std::shared_ptr<Session> one_too_many(const std::vector<std::shared_ptr<Session>>& sessions) {
+  std::map<std::string_view, std::size_t> hosts;
+  std::size_t strangers = 0;
+  for (const auto& session : sessions) {
+    if (!session->stranger()) continue;
+    ++strangers;
+    ++hosts[session->peer().host];
+  }
+  if (strangers <= Hub::kMaxStrangers) return nullptr;
+  const auto most = std::max_element(
+      hosts.begin(), hosts.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+  return *std::find_if(sessions.begin(), sessions.end(), [&](const auto& session) {
+    return session->stranger() && hosts[session->peer().host] == most->second;
+  });
+}
 
 /// The hub's own descriptor of the pipeline's eventfd: Asio closes what it watches.
 int duplicate(int fd) {
@@ -51,10 +68,8 @@ void Hub::start(Handlers handlers) {
 void Hub::stop() {
   error_code ignored;
   events_.close(ignored);
-  for (auto* list : {&sessions_, &refused_}) {
-    const auto sessions = std::exchange(*list, {});
-    for (const auto& session : sessions) session->close("the daemon ends");
-  }
+  const auto sessions = std::exchange(sessions_, {});
+  for (const auto& session : sessions) session->close("the daemon ends");
   port_.want({});
 }
 
@@ -117,16 +132,11 @@ void Hub::on_frame(const pipeline::DepthFrame& frame) {
 }
 
 void Hub::admit(const std::shared_ptr<Session>& session) {
-  if (sessions_.size() < config_.max_clients) {
-    sessions_.push_back(session);
-    session->start();
-  } else if (refused_.size() < kMaxRefused) {
-    refused_.push_back(session);
-    session->refuse(v1::ERROR_BUSY,
-                    fmt::format("{} clients are connected and no more are allowed: end one or "
-                                "raise the daemon's max_clients",
-                                sessions_.size()));
+  sessions_.push_back(session);
+  if (const auto other = one_too_many(sessions_)) {
+    other->close("too many connections wait for Hello", LogLevel::warning);
   }
+  session->start();
 }
 
 void Hub::broadcast(const v1::ServerMessage& event) {
@@ -176,7 +186,6 @@ void Hub::on_closed(const Session& session) {
     const auto self = weak.lock();
     if (self == nullptr) return;
     const auto is_gone = [gone](const auto& other) { return other.get() == gone; };
-    std::erase_if(self->refused_, is_gone);
     if (std::erase_if(self->sessions_, is_gone) > 0) self->update_want();
   });
 }

@@ -11,6 +11,7 @@
 
 #include "daemon/net/frame_encoder.hpp"
 #include "daemon/net/net_config.hpp"
+#include "daemon/net/security.hpp"
 #include "daemon/net/session.hpp"
 #include "daemon/pipeline/port.hpp"
 
@@ -35,7 +36,12 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   /// Ends every connection and stops watching the pipeline.
   void stop();
 
-  /// A new client: started, or refused when there are max_clients.
+  /// Connections that have not said Hello at one time. They are strangers: whoever comes after
+  /// that takes the place of the oldest from where most of them are, so that a flood from one
+  /// address leaves room for those from others.
+  static constexpr std::size_t kMaxStrangers = 64;
+
+  /// A new connection.
   void admit(const std::shared_ptr<Session>& session);
   /// To every client that has been greeted and wants events.
   void broadcast(const v1::ServerMessage& event);
@@ -48,6 +54,10 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   [[nodiscard]] const std::vector<std::shared_ptr<Session>>& sessions() const noexcept {
     return sessions_;
   }
+
+  /// Where the daemon listens, for status.
+  void set_endpoints(std::vector<EndpointInfo> endpoints) { endpoints_ = std::move(endpoints); }
+  [[nodiscard]] const std::vector<EndpointInfo>& endpoints() const noexcept { return endpoints_; }
 
   /// Percentiles of what happens to a frame on this thread.
   [[nodiscard]] std::vector<pipeline::StageStatistics> stages() const;
@@ -73,8 +83,8 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   FrameEncoder encoder_;
   pipeline::Histogram handover_;  ///< From published until fetched here.
   Handlers handlers_;
-  std::vector<std::shared_ptr<Session>> sessions_;
-  std::vector<std::shared_ptr<Session>> refused_;   ///< Being told why.
+  std::vector<std::shared_ptr<Session>> sessions_;  ///< Oldest first.
+  std::vector<EndpointInfo> endpoints_;
   std::map<std::uint64_t, std::uint64_t> numbers_;  ///< By key, of those still in use.
   bool seen_frame_ = false;
   std::uint64_t skipped_ = 0;  ///< DepthFrame::skipped of the last frame.

@@ -1,40 +1,48 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/ssl/context.hpp>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "daemon/net/net_config.hpp"
 #include "daemon/net/transport.hpp"
 
 namespace dtact::net {
 
-/// Takes connections and hands each to `on_connection`.
-class Listener : public std::enable_shared_from_this<Listener> {
+/// Takes connections at one endpoint and hands each to its `on_connection`.
+class Listener {
  public:
   using OnConnection = std::function<void(std::unique_ptr<Transport>)>;
 
-  /// Binds and listens, also on an address that no interface has yet: clients can connect once one
-  /// has. Throws std::runtime_error naming address, port and remedy.
-  Listener(boost::asio::io_context& io, const NetConfig& config, OnConnection on_connection);
+  Listener() = default;
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+  virtual ~Listener() = default;
 
-  void start() { accept(); }
-  void stop();
-  [[nodiscard]] std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
-
- private:
-  void accept();
-  void retry_later(const std::string& reason);
-
-  const NetConfig& config_;
-  boost::asio::ip::tcp::acceptor acceptor_;
-  std::string endpoint_;  ///< Where it listens, as Endpoint.address says it.
-  boost::asio::steady_timer timer_;
-  OnConnection on_connection_;
-  bool told_ = false;  ///< The present trouble has been logged.
+  virtual void start() = 0;
+  virtual void stop() = 0;
+  /// As Endpoint.address.
+  [[nodiscard]] virtual const std::string& address() const = 0;
+  /// 0 for a Unix socket.
+  [[nodiscard]] virtual std::uint16_t port() const = 0;
 };
+
+/// Binds config.address and listens, also on an address that no interface has yet: clients can
+/// connect once one has. Throws std::runtime_error naming address, port and remedy. What is passed
+/// by reference or pointer must outlive it; without `tls` it speaks plain TCP.
+[[nodiscard]] std::shared_ptr<Listener> listen_tcp(boost::asio::io_context& io,
+                                                   const NetConfig& config,
+                                                   boost::asio::ssl::context* tls,
+                                                   Listener::OnConnection on_connection);
+
+/// Binds config.unix_socket, open to every user of this machine: Peer.trusted says who needs no
+/// token. Takes the place of a socket that nobody listens on any more, and removes its own at the
+/// end. Throws std::runtime_error naming path and remedy, also when another program listens there.
+[[nodiscard]] std::shared_ptr<Listener> listen_unix(boost::asio::io_context& io,
+                                                    const NetConfig& config,
+                                                    Listener::OnConnection on_connection);
 
 }  // namespace dtact::net

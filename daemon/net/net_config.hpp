@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <string>
 
@@ -18,18 +19,28 @@ using Log = std::function<void(LogLevel, const std::string&)>;
 /// Settings of the network part.
 struct NetConfig {
   /// IPv4 or IPv6 address to listen on. "0.0.0.0" or "::" (which takes IPv4 too) for every
-  /// interface. It may come later than the daemon, as by DHCP. There is no authentication: whoever
-  /// can connect can command.
+  /// interface; empty for no TCP. It may come later than the daemon, as by DHCP.
   std::string address = wire::kDefaultAddress;
   std::uint16_t port = wire::kDefaultPort;  ///< 0: any free one, see Server::port().
-  std::size_t max_clients = 32;             ///< More are refused with a sentence.
-  std::string frame_id = "dtact_surface";   ///< Name of the surface frame in every message.
-  std::string name;                         ///< The daemon's own, in the handshake and status.
-  std::string program = "dtactd";           ///< "dtactd 0.1.0": in the handshake.
-  std::string version;                      ///< "0.1.0": in status.
+  /// An address beyond this machine may do without TLS or a token, see check_security().
+  bool insecure = false;
+  std::filesystem::path unix_socket;  ///< For clients on this machine; empty: none.
+  /// PEM files; with them TCP speaks TLS only. Both or none.
+  std::filesystem::path tls_certificate;
+  std::filesystem::path tls_key;
+  /// See Tokens. With it every client needs a token, but for Peer.trusted; without it none does.
+  std::filesystem::path token_file;
+  std::size_t max_clients = 32;              ///< More are refused with a sentence.
+  std::size_t max_clients_per_address = 16;  ///< The same for each Peer.host.
+  /// Of one client, and as many at once after a rest. A request counts once for each 64 kB of it.
+  int max_requests_per_s = 500;
+  std::string frame_id = "dtact_surface";         ///< Name of the surface frame in every message.
+  std::string name;                               ///< The daemon's own, in the handshake and status.
+  std::string program = "dtactd";                 ///< "dtactd 0.1.0": in the handshake.
+  std::string version;                            ///< "0.1.0": in status.
   std::chrono::milliseconds hello_timeout{5000};  ///< A client silent for so long is let go.
-  /// A peer whose machine has not answered for so long is dead: a pulled cable. One that answers and
-  /// only does not read is not.
+  /// A peer whose machine has not answered for so long is dead: a pulled cable. One that answers
+  /// and only does not read is not.
   std::chrono::milliseconds dead_after{30000};
   /// SCHED_FIFO priority of the thread that runs the network part, below the capture thread's; 0 =
   /// normal scheduling. Whoever owns the thread sets it, …

@@ -51,7 +51,7 @@ std::string Outbox::backlog() const {
 void Outbox::write_next() {
   if (!control_.empty()) return write_control();
   if (frame_ != nullptr) return write_frame();
-  if (finishing_) transport_.shutdown_send();
+  if (finishing_) transport_.shutdown_send(owner_.hold());
 }
 
 void Outbox::write_control() {

@@ -1,31 +1,82 @@
 #include "daemon/net/server.hpp"
 
+#include <fmt/format.h>
+
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/thread_pool.hpp>
+#include <stdexcept>
+#include <utility>
 
+#include "daemon/net/admission.hpp"
 #include "daemon/net/commands.hpp"
 #include "daemon/net/hub.hpp"
+#include "daemon/net/limited_log.hpp"
 #include "daemon/net/listener.hpp"
+#include "daemon/net/security.hpp"
+#include "daemon/net/tls.hpp"
 
 namespace dtact::net {
+
+namespace {
+
+std::unique_ptr<Tls> make_tls(const NetConfig& config) {
+  if (config.tls_certificate.empty()) return nullptr;
+  return std::make_unique<Tls>(config.tls_certificate, config.tls_key);
+}
+
+NetConfig checked(NetConfig config) {
+  check_security(config);
+  if (is_insecure(config)) {
+    config.log(
+        LogLevel::warning,
+        fmt::format("net.insecure: whoever can reach {} may {} the sensor, since there is no "
+                    "{}",
+                    config.address, config.token_file.empty() ? "watch and command" : "watch",
+                    config.token_file.empty() ? "token" : "TLS to keep a token secret"));
+  }
+  config.log = limited(std::move(config.log));
+  return config;
+}
+
+}  // namespace
 
 struct Server::Impl {
   Impl(boost::asio::io_context& io, NetConfig settings, pipeline::Port& port,
        CalibrationStore& store)
-      : config(std::move(settings)),
+      : config(checked(std::move(settings))),
+        tls(make_tls(config)),
+        admission(config),
         worker(1),
         hub(std::make_shared<Hub>(io, config, port)),
-        commands(std::make_shared<Commands>(io, worker, config, *hub, port, store)),
-        listener(
-            std::make_shared<Listener>(io, config, [this](std::unique_ptr<Transport> transport) {
-              hub->admit(std::make_shared<Session>(std::move(transport), config, hub));
-            })) {}
+        commands(std::make_shared<Commands>(io, worker, config, *hub, port, store)) {
+    const auto admit = [this](std::unique_ptr<Transport> transport) {
+      hub->admit(std::make_shared<Session>(std::move(transport), config, admission, hub));
+    };
+    const bool token = !config.token_file.empty();
+    std::vector<EndpointInfo> endpoints;
+    if (!config.unix_socket.empty()) {
+      listeners.push_back(listen_unix(io, config, admit));
+      endpoints.push_back({listeners.back()->address(), false, token, false, ""});
+    }
+    if (!config.address.empty()) {
+      listeners.push_back(listen_tcp(io, config, tls ? &tls->context : nullptr, admit));
+      endpoints.push_back({listeners.back()->address(), tls != nullptr, token, is_insecure(config),
+                           tls ? tls->fingerprint : ""});
+    }
+    if (listeners.empty()) {
+      throw std::runtime_error(
+          "net.address and net.unix_socket are empty, so that nobody could connect: set one");
+    }
+    hub->set_endpoints(std::move(endpoints));
+  }
 
   NetConfig config;
+  std::unique_ptr<Tls> tls;
+  Admission admission;
   boost::asio::thread_pool worker;
   std::shared_ptr<Hub> hub;
   std::shared_ptr<Commands> commands;
-  std::shared_ptr<Listener> listener;
+  std::vector<std::shared_ptr<Listener>> listeners;
 };
 
 Server::Server(boost::asio::io_context& io, NetConfig config, pipeline::Port& port,
@@ -38,15 +89,21 @@ Server::Server(boost::asio::io_context& io, NetConfig config, pipeline::Port& po
        },
        [&commands](const pipeline::CommandDone& done) { commands.on_done(done); },
        [&commands](const hal::Light& light) { commands.on_light(light); }});
-  impl_->listener->start();
+  for (const auto& listener : impl_->listeners) listener->start();
 }
 
 Server::~Server() { stop(); }
 
-std::uint16_t Server::port() const { return impl_->listener->port(); }
+std::vector<std::string> Server::addresses() const {
+  std::vector<std::string> all;
+  for (const auto& listener : impl_->listeners) all.push_back(listener->address());
+  return all;
+}
+
+std::uint16_t Server::port() const { return impl_->listeners.back()->port(); }
 
 void Server::stop() {
-  impl_->listener->stop();
+  for (const auto& listener : impl_->listeners) listener->stop();
   impl_->hub->stop();
 }
 

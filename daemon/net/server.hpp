@@ -2,6 +2,8 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "daemon/net/net_config.hpp"
 
@@ -22,7 +24,8 @@ class CalibrationStore;
 class Server {
  public:
   /// Listens from here on; clients are served once `io` runs. `io`, `port` and `store` must outlive
-  /// the server. Throws std::runtime_error naming address, port and remedy.
+  /// the server. Throws std::runtime_error naming the setting, file, address or port and the
+  /// remedy.
   Server(boost::asio::io_context& io, NetConfig config, pipeline::Port& port,
          CalibrationStore& store);
   /// As stop(). `io` must not be running.
@@ -30,7 +33,9 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  /// The TCP port it listens on.
+  /// Where it listens, as Endpoint.address; a Unix socket first, TCP last.
+  [[nodiscard]] std::vector<std::string> addresses() const;
+  /// The TCP port it listens on; 0 without TCP.
   [[nodiscard]] std::uint16_t port() const;
   /// Takes no more clients and ends every connection; then `io` has no work of ours left and run()
   /// returns. On the thread that runs `io`, or while none does.

@@ -18,6 +18,15 @@ using boost::system::error_code;
 
 /// How long an ending connection may take to fetch its last answer.
 constexpr std::chrono::milliseconds kLinger{2000};
+/// How long whoever sends a wrong token waits for the answer.
+constexpr std::chrono::milliseconds kDenial{500};
+/// How long a large message may take to arrive: the longest at 1.1 Mbit/s.
+constexpr std::chrono::milliseconds kArrival{120'000};
+/// Bytes of a message that count neither as large nor as a second request.
+constexpr std::size_t kSmall = 64 * 1024;
+/// Bytes read at once, before Hello and after it.
+constexpr std::size_t kInputBeforeHello = 1024;
+constexpr std::size_t kInput = 16384;
 
 std::string printable(std::string text) {
   std::replace_if(
@@ -25,24 +34,46 @@ std::string printable(std::string text) {
   return text;
 }
 
+/// Whether RIGHTS_VIEW is enough. A request that this daemon does not know harms nobody.
+bool is_for_viewers(v1::ClientMessage::RequestCase request) {
+  switch (request) {
+    case v1::ClientMessage::kSetLight:
+    case v1::ClientMessage::kRezero:
+    case v1::ClientMessage::kUploadCalibration:
+    case v1::ClientMessage::kActivateCalibration:
+      return false;
+    case v1::ClientMessage::kHello:
+    case v1::ClientMessage::kSubscribe:
+    case v1::ClientMessage::kGetStatus:
+    case v1::ClientMessage::kGetCalibration:
+    case v1::ClientMessage::kListCalibrations:
+    case v1::ClientMessage::kGetReference:
+    case v1::ClientMessage::kPing:
+    case v1::ClientMessage::REQUEST_NOT_SET:
+      return true;
+  }
+  return true;
+}
+
 }  // namespace
 
 Session::Session(std::unique_ptr<Transport> transport, const NetConfig& config,
-                 std::weak_ptr<SessionHost> host)
+                 Admission& admission, std::weak_ptr<SessionHost> host)
     : transport_(std::move(transport)),
       outbox_(*transport_, *this),
       timer_(transport_->executor()),
       config_(config),
-      host_(std::move(host)) {}
+      admission_(admission),
+      host_(std::move(host)),
+      requests_(config.max_requests_per_s, config.max_requests_per_s) {}
 
 void Session::start() {
   arm_timer(config_.hello_timeout, "no Hello came");
-  read();
-}
-
-void Session::refuse(int error_code_, const std::string& sentence) {
-  end_with(0, error_code_, sentence);
-  read();
+  transport_->handshake([self = shared_from_this()](const error_code& error) {
+    if (self->state_ == State::closed) return;
+    if (!error) return self->read();
+    self->close(fmt::format("no TLS: {}", error.message()), LogLevel::warning);
+  });
 }
 
 void Session::arm_timer(std::chrono::milliseconds after, const char* reason) {
@@ -53,6 +84,7 @@ void Session::arm_timer(std::chrono::milliseconds after, const char* reason) {
 }
 
 void Session::read() {
+  input_.resize(rights_ ? kInput : kInputBeforeHello);
   transport_->read_some(asio::buffer(input_),
                         [self = shared_from_this()](const error_code& error, std::size_t size) {
                           if (self->state_ == State::closed) return;
@@ -65,25 +97,47 @@ void Session::read() {
 
 void Session::take(std::string_view input) {
   while (state_ == State::fresh || state_ == State::greeted) {
-    switch (decoder_.feed(input)) {
-      case wire::MessageDecoder::Result::need_more:
-        return;
-      case wire::MessageDecoder::Result::message:
-        on_message(decoder_.message());
-        break;
-      case wire::MessageDecoder::Result::too_large:
-        end_with(0, v1::ERROR_TOO_LARGE,
-                 fmt::format("a message of {} bytes was announced, at most {} are allowed: check "
-                             "that the client speaks dtact.proto with big-endian lengths",
-                             decoder_.announced(), wire::kMaxMessage));
-        break;
+    const auto result = decoder_.feed(input);
+    if (result == wire::MessageDecoder::Result::too_large) {
+      return end_with(
+          0, v1::ERROR_TOO_LARGE,
+          fmt::format("a message of {} bytes was announced, at most {} are allowed{}: "
+                      "check that the client speaks dtact.proto with big-endian "
+                      "lengths",
+                      decoder_.announced(), decoder_.cap(), rights_ ? "" : " before Hello"));
     }
+    if (!has_room()) {
+      return end_with(0, v1::ERROR_FLOOD,
+                      fmt::format("the large messages of all clients together would take more than "
+                                  "{} bytes: send it again when others are through",
+                                  Admission::kMaxIncoming));
+    }
+    if (result == wire::MessageDecoder::Result::need_more) return;
+    on_message();
   }
 }
 
-void Session::on_message(const std::string& bytes) {
+bool Session::has_room() {
+  const std::size_t now = decoder_.held() > kSmall ? decoder_.held() : 0;
+  const std::size_t before = std::exchange(held_, now);
+  if (before == 0 && now > 0) arm_timer(kArrival, "a large message did not arrive in time");
+  if (before > 0 && now == 0) timer_.cancel();
+  return admission_.hold(before, now);
+}
+
+void Session::on_message() {
+  const double cost = 1.0 + static_cast<double>(decoder_.message().size() / kSmall);
+  if (!requests_.take(cost)) {
+    return end_with(0, v1::ERROR_FLOOD,
+                    fmt::format("more than {} requests a second came, each 64 kB of one counted: "
+                                "send them more slowly or raise the daemon's max_requests_per_s",
+                                config_.max_requests_per_s));
+  }
   v1::ClientMessage message;
-  if (!message.ParseFromString(bytes)) {
+  const bool parsed = message.ParseFromString(decoder_.message());
+  decoder_.release();
+  (void)has_room();  // less than before
+  if (!parsed) {
     return end_with(0, v1::ERROR_BAD_MESSAGE,
                     "that was not a ClientMessage: check the client's copy of dtact.proto");
   }
@@ -106,6 +160,11 @@ void Session::on_message(const std::string& bytes) {
     return reply_error(message.id(), v1::ERROR_INVALID,
                        "hello: sent already; it is the first message only");
   }
+  if (rights_ == Rights::view && !is_for_viewers(message.request_case())) {
+    return reply_error(message.id(), v1::ERROR_DENIED,
+                       "this client's token allows viewing only: connect with one that allows "
+                       "control");
+  }
   if (const auto host = host_.lock()) host->on_request(shared_from_this(), message);
 }
 
@@ -121,11 +180,24 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
                        fmt::format("hello.program: {} bytes, at most {} are allowed",
                                    hello.program().size(), wire::kMaxProgramName));
   }
+  if (hello.token().size() > wire::kMaxToken) {
+    return reply_error(id, v1::ERROR_INVALID,
+                       fmt::format("hello.token: {} bytes, at most {} are allowed",
+                                   hello.token().size(), wire::kMaxToken));
+  }
+  const auto verdict = admission_.enter(peer(), hello.token());
+  if (verdict.error_code == v1::ERROR_DENIED) return deny(id, verdict.sentence);
+  // It is the connection that is refused, as by daemons that said so before Hello: id 0.
+  if (!verdict.rights) return end_with(0, verdict.error_code, verdict.sentence);
+  rights_ = verdict.rights;
   timer_.cancel();
   state_ = State::greeted;
+  decoder_.set_cap(wire::kMaxMessage);
   program_ = printable(hello.program());
   minor_ = hello.minor();
-  config_.log(LogLevel::info, fmt::format("client {} ({}) connected", peer().address, program_));
+  config_.log(LogLevel::info,
+              fmt::format("client {} ({}) connected{}{}", peer().address, program_,
+                          verdict.token_name.empty() ? "" : " as ", verdict.token_name));
   v1::ServerMessage message;
   message.mutable_reply()->set_id(id);
   auto& reply = *message.mutable_reply()->mutable_hello();
@@ -133,7 +205,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   reply.set_minor(wire::kMinor);
   reply.set_program(config_.program);
   for (const char* feature : wire::kFeatures) reply.add_features(feature);
-  reply.set_rights(v1::RIGHTS_CONTROL);
+  reply.set_rights(static_cast<v1::Rights>(*rights_));
   reply.set_name(config_.name);
   auto& frame = *reply.mutable_surface_frame();
   frame.set_frame_id(config_.frame_id);
@@ -145,6 +217,14 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   if (host != nullptr) reply.set_serial(host->serial());
   send(message);
   if (host != nullptr) host->on_greeted();
+}
+
+void Session::deny(std::uint64_t id, const std::string& sentence) {
+  state_ = State::denied;
+  timer_.expires_after(kDenial);
+  timer_.async_wait([self = shared_from_this(), id, sentence](const error_code& error) {
+    if (!error && self->state_ == State::denied) self->end_with(id, v1::ERROR_DENIED, sentence);
+  });
 }
 
 void Session::reply_error(std::uint64_t id, int error_code_, const std::string& sentence) {
@@ -162,12 +242,22 @@ void Session::end_with(std::uint64_t id, int error_code_, const std::string& sen
   // Closing at once, with bytes unread, would reset the connection and take the answer with it: so
   // the sending side ends first, and what still comes is read and thrown away for a while.
   state_ = State::ending;
+  decoder_.release();
+  (void)has_room();
   arm_timer(kLinger, "ended");
   outbox_.finish();
 }
 
 void Session::send(const v1::ServerMessage& message, bool first) {
   if (state_ == State::closed || state_ == State::ending) return;
+  const std::size_t size = message.ByteSizeLong();
+  if (size > wire::kMaxMessage) {
+    return reply_error(
+        message.reply().id(), v1::ERROR_TOO_LARGE,
+        fmt::format("the answer has {} bytes, at most {} are allowed: what was asked "
+                    "for cannot be sent whole",
+                    size, wire::kMaxMessage));
+  }
   if (!outbox_.push(message, first)) {
     close(fmt::format("{} lay unread", outbox_.backlog()), LogLevel::warning);
   }
@@ -195,6 +285,8 @@ void Session::close(const std::string& reason, LogLevel level) {
   if (state_ == State::closed) return;
   const bool known = state_ == State::greeted;
   state_ = State::closed;
+  if (rights_) admission_.leave(peer());
+  (void)admission_.hold(std::exchange(held_, 0), 0);
   transport_->close();
   timer_.cancel();
   outbox_.close();

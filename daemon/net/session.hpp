@@ -1,16 +1,18 @@
 #pragma once
 
-#include <array>
 #include <boost/asio/steady_timer.hpp>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "daemon/net/admission.hpp"
 #include "daemon/net/frame_encoder.hpp"
 #include "daemon/net/net_config.hpp"
 #include "daemon/net/outbox.hpp"
 #include "daemon/net/subscription.hpp"
+#include "daemon/net/token_bucket.hpp"
 #include "daemon/net/transport.hpp"
 #include "proto/framing.hpp"
 
@@ -47,13 +49,11 @@ class SessionHost {
 /// client whose outbox takes no more is disconnected. All on the network thread.
 class Session : public std::enable_shared_from_this<Session>, private Outbox::Owner {
  public:
-  Session(std::unique_ptr<Transport> transport, const NetConfig& config,
+  Session(std::unique_ptr<Transport> transport, const NetConfig& config, Admission& admission,
           std::weak_ptr<SessionHost> host);
 
-  /// Waits for Hello.
+  /// Waits for the handshake and Hello.
   void start();
-  /// Instead of start(): says why and ends.
-  void refuse(int error_code, const std::string& sentence);
 
   /// Answers and events. `first`: before all that waits.
   void send(const v1::ServerMessage& message, bool first = false);
@@ -71,6 +71,10 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
 
   [[nodiscard]] const Subscription& subscription() const noexcept { return subscription_; }
   [[nodiscard]] bool greeted() const noexcept { return state_ == State::greeted; }
+  /// It has not been let in, and may never be.
+  [[nodiscard]] bool stranger() const noexcept { return !rights_ && state_ != State::closed; }
+  /// Once it is greeted.
+  [[nodiscard]] Rights rights() const { return rights_.value(); }
   [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
   [[nodiscard]] const std::string& program() const noexcept { return program_; }
   /// Of the version that the client speaks.
@@ -80,6 +84,7 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
  private:
   enum class State : std::uint8_t {
     fresh,    ///< Hello has not come.
+    denied,   ///< It came without a right; the answer waits, what comes is thrown away.
     greeted,  ///< Requests and frames flow.
     ending,   ///< What is queued is sent, what comes is thrown away, then the connection ends.
     closed
@@ -88,8 +93,12 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   void arm_timer(std::chrono::milliseconds after, const char* reason);
   void read();
   void take(std::string_view input);
-  void on_message(const std::string& bytes);
+  /// Whether the messages of all clients leave room for what this one has sent of its own.
+  [[nodiscard]] bool has_room();
+  void on_message();
   void on_hello(std::uint64_t id, const v1::Hello& hello);
+  /// Answers after a while, so that guessing takes its time, and ends.
+  void deny(std::uint64_t id, const std::string& sentence);
   /// Sends an error as the last answer and ends.
   void end_with(std::uint64_t id, int error_code, const std::string& sentence);
   std::shared_ptr<void> hold() override { return shared_from_this(); }
@@ -99,6 +108,7 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   Outbox outbox_;
   boost::asio::steady_timer timer_;
   const NetConfig& config_;
+  Admission& admission_;
   std::weak_ptr<SessionHost> host_;
   std::string program_;
   std::uint32_t minor_ = 0;
@@ -106,8 +116,11 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   Subscription subscription_;
   Subscription::Parts waiting_ = 0;  ///< What the frame holds that waits to be sent.
 
-  std::array<char, 16384> input_{};
-  wire::MessageDecoder decoder_;
+  std::optional<Rights> rights_;  ///< Once it is let in.
+  TokenBucket requests_;
+  std::vector<char> input_;
+  wire::MessageDecoder decoder_{wire::kMaxBeforeHello};
+  std::size_t held_ = 0;  ///< Bytes of a large message, as `admission_` has them.
 };
 
 }  // namespace dtact::net

@@ -4,6 +4,8 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+#include <boost/asio/ssl/context.hpp>
 #include <boost/system/error_code.hpp>
 #include <chrono>
 #include <functional>
@@ -14,8 +16,14 @@ namespace dtact::net {
 
 /// Who is at the other end, and by which way it came.
 struct Peer {
-  std::string address;   ///< For logs and status: "192.168.1.7:40312".
+  std::string address;   ///< For logs and status: "192.168.1.7:40312", "pid 811 (uid 1000)".
   std::string endpoint;  ///< The Endpoint.address it came by.
+  /// What limits for each address count: the IPv4 address, the first half of an IPv6 one, which is
+  /// what one network has at least, or the user.
+  std::string host;
+  /// The kernel says that it is root, the daemon's own user or of the daemon's group: it needs no
+  /// token.
+  bool trusted = false;
 };
 
 /// One connection, whatever it runs over: what a Session reads from and writes to. All calls and
@@ -32,12 +40,15 @@ class Transport {
   Transport& operator=(const Transport&) = delete;
   virtual ~Transport() = default;
 
+  /// Before anything else.
+  virtual void handshake(std::function<void(const boost::system::error_code&)> done) = 0;
   /// At least one byte, or an error; asio::error::eof when the peer sends nothing more.
   virtual void read_some(boost::asio::mutable_buffer into, Done done) = 0;
   /// All of the parts, or an error. What they point to must stay until then.
   virtual void write(const Parts& parts, Done done) = 0;
-  /// Nothing more is sent; the peer sees the end after what was written.
-  virtual void shutdown_send() = 0;
+  /// Nothing more is sent; the peer sees the end after what was written. `held` is kept until that
+  /// is done.
+  virtual void shutdown_send(std::shared_ptr<void> held) = 0;
   virtual void close() = 0;
   [[nodiscard]] virtual boost::asio::any_io_executor executor() = 0;
 
@@ -47,11 +58,17 @@ class Transport {
   Peer peer_;
 };
 
-/// Plain TCP, with the socket's options set: answers at once, frames that do not queue up in the
-/// kernel, and a peer that is gone found after `dead_after`, one that only does not read kept
-/// (TcpWatch): reading then ends with asio::error::timed_out.
+/// TCP, with the socket's options set: answers at once, frames that do not queue up in the kernel,
+/// and a peer that is gone found after `dead_after`, one that only does not read kept (TcpWatch):
+/// reading then ends with asio::error::timed_out. Without `tls` plain; it must outlive the
+/// transport.
 [[nodiscard]] std::unique_ptr<Transport> over_tcp(boost::asio::ip::tcp::socket socket,
                                                   std::string endpoint,
-                                                  std::chrono::milliseconds dead_after);
+                                                  std::chrono::milliseconds dead_after,
+                                                  boost::asio::ssl::context* tls);
+
+/// A Unix socket; the peer is who it was when it connected (SO_PEERCRED).
+[[nodiscard]] std::unique_ptr<Transport> over_unix(
+    boost::asio::local::stream_protocol::socket socket, std::string endpoint);
 
 }  // namespace dtact::net

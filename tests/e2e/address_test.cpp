@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <filesystem>
 #include <functional>
 #include <string>
 
@@ -62,8 +63,8 @@ class LateAddress : public ::testing::Test {
   void serves_once_it_comes(const std::string& address, const std::function<void()>& bring) {
     const TempFolder state;
     DaemonProcess daemon({"--set", "camera.backend=null", "--set", "ring.backend=null", "--set",
-                          "net.address=" + address, "--set", "net.port=0", "--set",
-                          "state_dir=" + state.path().string()});
+                          "net.address=" + address, "--set", "net.insecure=true", "--set",
+                          "net.port=0", "--set", "state_dir=" + state.path().string()});
     EXPECT_NE(daemon.log().find("no interface has the address " + address + " yet"),
               std::string::npos)
         << daemon.log();
@@ -93,6 +94,20 @@ TEST_F(LateAddress, OfIpv4) {
 TEST_F(LateAddress, OfIpv6) {
   if (::access("/proc/net/if_inet6", F_OK) != 0) GTEST_SKIP() << "this kernel has no IPv6";
   serves_once_it_comes(kIpv6, [this] { bring_ipv6(); });
+}
+
+TEST(LocalSocket, LiesInTheFolderOfTheUnit) {
+  const TempFolder folder;
+  DaemonProcess daemon({"--set", "camera.backend=null", "--set", "ring.backend=null", "--set",
+                        "net.port=0", "--set", "state_dir=" + folder.path().string()},
+                       {{"RUNTIME_DIRECTORY", folder.path().string()}});
+  const auto socket = folder.path() / "dtactd.sock";
+  EXPECT_TRUE(std::filesystem::is_socket(socket));
+  EXPECT_NE(daemon.log().find("listening on " + socket.string()), std::string::npos)
+      << daemon.log();
+  const client::Client client(client::Options{.port = daemon.port()});
+  EXPECT_EQ(daemon.stop(SIGTERM), 0);
+  EXPECT_FALSE(std::filesystem::exists(socket));
 }
 
 }  // namespace

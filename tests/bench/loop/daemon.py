@@ -61,7 +61,7 @@ class Daemon:
         self.log_name = os.path.join(folder, "dtactd.log")
         self.settings = {
             "camera.backend": "replay", "ring.backend": "null", "camera.fps": float(FPS),
-            "net.port": 0, "net.max_clients": 128,
+            "net.port": 0, "net.max_clients": 128, "net.max_clients_per_address": 128,
             "state_dir": os.path.join(folder, "state"),
             "calibration": os.path.join(folder, "calibration"), **settings}
 

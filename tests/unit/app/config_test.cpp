@@ -164,6 +164,23 @@ TEST_F(ConfigFile, EnvironmentSetsTheLogLevel) {
   ::unsetenv("DTACTD_LOG");
 }
 
+TEST_F(ConfigFile, OpensTheNetworkOnlyWithTlsAndTokens) {
+  EXPECT_THAT(error("[net]\naddress = '0.0.0.0'\n"),
+              AllOf(HasSubstr("net.tls_certificate"), HasSubstr("net.token_file"),
+                    HasSubstr("net.insecure = true")));
+  EXPECT_TRUE(load("[net]\naddress = '0.0.0.0'\ninsecure = true\n").net.insecure);
+  const Config config = load(
+      "[net]\naddress = '::'\ntls_certificate = 'a.crt'\ntls_key = 'a.key'\n"
+      "token_file = '/etc/tokens'\nunix_socket = '/run/s'\nmax_clients_per_address = 3\n"
+      "max_requests_per_s = 7\n");
+  EXPECT_EQ(config.net.tls_certificate, folder_ / "a.crt");
+  EXPECT_EQ(config.net.tls_key, folder_ / "a.key");
+  EXPECT_EQ(config.net.token_file, "/etc/tokens");
+  EXPECT_EQ(config.net.unix_socket, "/run/s");
+  EXPECT_EQ(config.net.max_clients_per_address, 3U);
+  EXPECT_EQ(config.net.max_requests_per_s, 7);
+}
+
 TEST_F(ConfigFile, PrintedConfigSaysWhereAValueCameFromAndLoadsAgain) {
   base::write_file_atomically(folder_ / "c.toml", "[camera]\nwidth = 640\n");
   std::ostringstream out;

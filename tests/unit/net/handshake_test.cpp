@@ -123,7 +123,7 @@ TEST(Handshake, RefusesMoreThanMaxClients) {
   auto first = std::make_unique<RawClient>(rig.tcp_port());
   first->hello();
   RawClient second(rig.tcp_port());
-  const auto reply = second.reply();
+  const auto reply = second.say_hello();
   EXPECT_EQ(reply.id(), 0U);
   EXPECT_EQ(reply.error().code(), v1::ERROR_BUSY);
   EXPECT_THAT(reply.error().message(), HasSubstr("max_clients"));

@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "hal/base/unique_fd.hpp"
 #include "proto/dtact.pb.h"
@@ -35,6 +36,8 @@ class RawClient {
       throw std::runtime_error("cannot connect");
     }
   }
+  /// Over a socket that is connected.
+  explicit RawClient(base::UniqueFd connected) : fd_(std::move(connected)) {}
 
   void send_bytes(std::string_view bytes) {
     while (!bytes.empty()) {
@@ -108,11 +111,15 @@ class RawClient {
     send(message);
     return reply();
   }
-  void hello() {
+  void hello(const std::string& token = {}) {
+    if (!say_hello(token).has_hello()) throw std::runtime_error("no hello");
+  }
+  v1::Reply say_hello(const std::string& token = {}) {
     v1::ClientMessage message;
     message.mutable_hello()->set_major(1);
     message.mutable_hello()->set_program("raw");
-    if (!request(message).has_hello()) throw std::runtime_error("no hello");
+    message.mutable_hello()->set_token(token);
+    return request(message);
   }
   void subscribe(v1::DepthEncoding depth, v1::LumaEncoding luma = v1::LUMA_NONE,
                  std::uint32_t every = 1, bool summary = false) {

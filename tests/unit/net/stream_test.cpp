@@ -78,6 +78,7 @@ TEST(Stream, EncodesWhatEachClientAskedFor) {
 TEST(Stream, EncodesOnceForSixtyFourClients) {
   NetConfig config;
   config.max_clients = 64;
+  config.max_clients_per_address = 64;
   Rig rig(config);
   std::vector<std::unique_ptr<RawClient>> clients;
   for (int i = 0; i < 64; ++i) {

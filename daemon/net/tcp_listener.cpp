@@ -1,12 +1,15 @@
-#include "daemon/net/listener.hpp"
-
 #include <fmt/format.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/v6_only.hpp>
 #include <cerrno>
 #include <stdexcept>
+#include <utility>
+
+#include "daemon/net/accept_loop.hpp"
+#include "daemon/net/listener.hpp"
 
 namespace dtact::net {
 namespace {
@@ -90,48 +93,34 @@ std::string describe(const tcp::endpoint& endpoint) {
                      endpoint.port());
 }
 
+class TcpListener : public Listener {
+ public:
+  TcpListener(asio::io_context& io, const NetConfig& config, asio::ssl::context* tls,
+              OnConnection on_connection)
+      : loop_(std::make_shared<AcceptLoop<tcp>>(
+            listen(io, endpoint_of(config), config.log), config.log,
+            [this, tls, dead_after = config.dead_after,
+             on_connection = std::move(on_connection)](tcp::socket socket) {
+              on_connection(over_tcp(std::move(socket), address_, dead_after, tls));
+            })),
+        address_(describe(loop_->acceptor().local_endpoint())) {}
+
+  void start() override { loop_->accept(); }
+  void stop() override { loop_->stop(); }
+  const std::string& address() const override { return address_; }
+  std::uint16_t port() const override { return loop_->acceptor().local_endpoint().port(); }
+
+ private:
+  std::shared_ptr<AcceptLoop<tcp>> loop_;
+  std::string address_;
+};
+
 }  // namespace
 
-Listener::Listener(asio::io_context& io, const NetConfig& config, OnConnection on_connection)
-    : config_(config),
-      acceptor_(listen(io, endpoint_of(config), config.log)),
-      endpoint_(describe(acceptor_.local_endpoint())),
-      timer_(io),
-      on_connection_(std::move(on_connection)) {}
-
-void Listener::stop() {
-  error_code ignored;
-  acceptor_.close(ignored);
-  timer_.cancel();
-}
-
-void Listener::accept() {
-  acceptor_.async_accept([weak = weak_from_this()](const error_code& error, tcp::socket socket) {
-    const auto self = weak.lock();
-    if (self == nullptr || !self->acceptor_.is_open()) return;
-    // A client that left before it was accepted is no trouble of ours.
-    if (error && error != asio::error::connection_aborted) {
-      return self->retry_later(error.message());
-    }
-    self->told_ = false;
-    if (!error) {
-      self->on_connection_(over_tcp(std::move(socket), self->endpoint_, self->config_.dead_after));
-    }
-    self->accept();
-  });
-}
-
-/// Without descriptors every accept fails at once: wait instead of spinning, and say it once.
-void Listener::retry_later(const std::string& reason) {
-  if (!std::exchange(told_, true)) {
-    config_.log(LogLevel::warning,
-                fmt::format("cannot accept clients: {}; trying again every second", reason));
-  }
-  timer_.expires_after(std::chrono::seconds(1));
-  timer_.async_wait([weak = weak_from_this()](const error_code& error) {
-    const auto self = weak.lock();
-    if (!error && self != nullptr && self->acceptor_.is_open()) self->accept();
-  });
+std::shared_ptr<Listener> listen_tcp(asio::io_context& io, const NetConfig& config,
+                                     asio::ssl::context* tls,
+                                     Listener::OnConnection on_connection) {
+  return std::make_shared<TcpListener>(io, config, tls, std::move(on_connection));
 }
 
 }  // namespace dtact::net

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <utility>
+
+#include "daemon/net/net_config.hpp"
+#include "daemon/net/token_bucket.hpp"
+
+namespace dtact::net {
+
+/// `log` with at most 100 lines at once and 10 a second, so that strangers cannot fill the journal.
+/// The next line says how many were left out.
+[[nodiscard]] inline Log limited(Log log) {
+  struct State {
+    Log log;
+    TokenBucket lines{10, 100};
+    unsigned long left_out = 0;
+  };
+  return [state = std::make_shared<State>(State{std::move(log)})](LogLevel level,
+                                                                  const std::string& text) {
+    if (!state->lines.take(1)) {
+      ++state->left_out;
+      return;
+    }
+    const auto left_out = std::exchange(state->left_out, 0);
+    state->log(level,
+               left_out == 0 ? text : fmt::format("{} ({} lines left out before)", text, left_out));
+  };
+}
+
+}  // namespace dtact::net

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <cstdint>
+
+namespace dtact::net {
+
+/// What a connection may do; the values are those of dtact.v1.Rights.
+enum class Rights : std::uint8_t {
+  view = 1,    ///< Subscribe, Ping and all that begins with Get and List.
+  control = 2  ///< Everything.
+};
+
+}  // namespace dtact::net

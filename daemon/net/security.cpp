@@ -1,0 +1,43 @@
+#include "daemon/net/security.hpp"
+
+#include <fmt/format.h>
+
+#include <boost/asio/ip/address.hpp>
+#include <stdexcept>
+
+namespace dtact::net {
+
+bool reaches_beyond(const NetConfig& config) {
+  boost::system::error_code error;
+  const auto address = boost::asio::ip::make_address(config.address, error);
+  return !error && !address.is_loopback();
+}
+
+bool is_insecure(const NetConfig& config) {
+  return reaches_beyond(config) && (config.tls_certificate.empty() || config.token_file.empty());
+}
+
+void check_security(const NetConfig& config) {
+  if (config.tls_certificate.empty() != config.tls_key.empty()) {
+    throw std::runtime_error(fmt::format(
+        "net.tls_certificate = \"{}\" and net.tls_key = \"{}\": set both or none; dtactctl cert "
+        "makes a pair",
+        config.tls_certificate.string(), config.tls_key.string()));
+  }
+  if (!is_insecure(config) || config.insecure) return;
+  std::string missing;
+  if (config.tls_certificate.empty()) {
+    missing = "net.tls_certificate and net.tls_key (dtactctl cert makes a pair)";
+  }
+  if (config.token_file.empty()) {
+    if (!missing.empty()) missing += " and ";
+    missing += "net.token_file (dtactctl token --new control prints a line for it)";
+  }
+  throw std::runtime_error(
+      fmt::format("net.address = \"{}\" opens the sensor to other machines, which needs TLS and a "
+                  "token: set {}; or net.insecure = true, if whoever can reach it may watch and "
+                  "command; or net.address = \"127.0.0.1\"",
+                  config.address, missing));
+}
+
+}  // namespace dtact::net

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+
+#include "daemon/net/net_config.hpp"
+
+namespace dtact::net {
+
+/// See dtact.v1.Endpoint.
+struct EndpointInfo {
+  std::string address;
+  bool tls = false;
+  bool token = false;
+  bool insecure = false;
+  std::string fingerprint;
+};
+
+/// Whether the TCP address is one that other machines reach; not when it is no address.
+[[nodiscard]] bool reaches_beyond(const NetConfig& config);
+/// Such an address without TLS or without a token, see Endpoint.insecure.
+[[nodiscard]] bool is_insecure(const NetConfig& config);
+
+/// Throws std::runtime_error, naming the keys and the remedies, when the settings would open the
+/// daemon to the network without TLS and token and do not say that this is meant, or name half a
+/// TLS pair.
+void check_security(const NetConfig& config);
+
+}  // namespace dtact::net

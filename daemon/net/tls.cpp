@@ -1,0 +1,98 @@
+#include "daemon/net/tls.hpp"
+
+#include <fmt/format.h>
+#include <openssl/err.h>
+#include <openssl/ssl.h>
+#include <openssl/x509.h>
+#include <openssl/x509err.h>
+
+#include <boost/asio/buffer.hpp>
+#include <memory>
+#include <stdexcept>
+
+#include "daemon/net/private_file.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "proto/fingerprint.hpp"
+
+namespace dtact::net {
+namespace {
+
+namespace asio = boost::asio;
+namespace ssl = asio::ssl;
+using boost::system::error_code;
+
+constexpr const char* kMakeOne = "dtactctl cert makes a pair";
+
+[[noreturn]] void fail(const std::filesystem::path& file, const std::string& why) {
+  throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
+}
+
+std::string read_certificate(const std::filesystem::path& file) {
+  try {
+    return base::read_file(file, 1U << 20U);
+  } catch (const std::exception& e) {
+    throw std::runtime_error(fmt::format("the TLS certificate: {}; {}", e.what(), kMakeOne));
+  }
+}
+
+void use_certificate(ssl::context& context, const std::filesystem::path& file) {
+  error_code error;
+  context.use_certificate_chain(asio::buffer(read_certificate(file)), error);
+  if (error) {
+    fail(file, fmt::format("is no PEM certificate ({}); {}", error.message(), kMakeOne));
+  }
+}
+
+bool is_mismatch(const error_code& error) {
+  const auto code = static_cast<unsigned long>(error.value());
+  return ERR_GET_LIB(code) == ERR_LIB_X509 && ERR_GET_REASON(code) == X509_R_KEY_VALUES_MISMATCH;
+}
+
+void use_key(ssl::context& context, const std::filesystem::path& file,
+             const std::filesystem::path& certificate) {
+  const std::string text = read_private_file(file, "the TLS key");
+  const auto asked = std::make_shared<bool>(false);
+  // Without it OpenSSL asks whoever sits at the terminal.
+  context.set_password_callback([asked](std::size_t, ssl::context::password_purpose) {
+    *asked = true;
+    return std::string();
+  });
+  error_code error;
+  context.use_private_key(asio::buffer(text), ssl::context::pem, error);
+  if (*asked) {
+    fail(file, fmt::format("wants a pass phrase, which nobody could type at start: openssl pkey "
+                           "-in {} takes it away",
+                           file.string()));
+  }
+  // A key of the certificate's kind is compared as it is taken, one of another kind only when
+  // asked.
+  if (is_mismatch(error) || (!error && ::SSL_CTX_check_private_key(context.native_handle()) != 1)) {
+    fail(file, fmt::format("does not belong to the certificate {}: name the two files of one "
+                           "pair; {}",
+                           certificate.string(), kMakeOne));
+  }
+  if (error) fail(file, fmt::format("is no PEM key ({}); {}", error.message(), kMakeOne));
+}
+
+void check_dates(const X509* certificate, const std::filesystem::path& file) {
+  if (::X509_cmp_current_time(::X509_get0_notAfter(certificate)) < 0) {
+    fail(file, fmt::format("has expired, or this machine's clock is wrong (date); {}", kMakeOne));
+  }
+}
+
+}  // namespace
+
+Tls::Tls(const std::filesystem::path& certificate, const std::filesystem::path& key)
+    : context(ssl::context::tls_server) {
+  SSL_CTX* native = context.native_handle();
+  ::SSL_CTX_set_min_proto_version(native, TLS1_2_VERSION);
+  ::SSL_CTX_set_options(native, SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_TICKET | SSL_OP_NO_COMPRESSION);
+  ::SSL_CTX_set_session_cache_mode(native, SSL_SESS_CACHE_OFF);
+  use_certificate(context, certificate);
+  use_key(context, key, certificate);
+  const X509* leaf = ::SSL_CTX_get0_certificate(native);
+  check_dates(leaf, certificate);
+  fingerprint = wire::fingerprint(*leaf);
+}
+
+}  // namespace dtact::net

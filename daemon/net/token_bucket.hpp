@@ -1,0 +1,33 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+
+namespace dtact::net {
+
+/// So much a second, and as much at once as `burst` after a rest.
+class TokenBucket {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  TokenBucket(double per_second, double burst, Clock::time_point now = Clock::now())
+      : per_second_(per_second), burst_(burst), left_(burst), then_(now) {}
+
+  /// False, and nothing is taken, when there is not so much left.
+  [[nodiscard]] bool take(double cost, Clock::time_point now = Clock::now()) {
+    left_ =
+        std::min(burst_, left_ + per_second_ * std::chrono::duration<double>(now - then_).count());
+    then_ = now;
+    if (left_ < cost) return false;
+    left_ -= cost;
+    return true;
+  }
+
+ private:
+  double per_second_;
+  double burst_;
+  double left_;
+  Clock::time_point then_;
+};
+
+}  // namespace dtact::net

@@ -1,0 +1,98 @@
+#include "daemon/net/tokens.hpp"
+
+#include <fmt/format.h>
+#include <openssl/crypto.h>
+#include <openssl/sha.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "proto/defaults.hpp"
+
+namespace dtact::net {
+namespace {
+
+std::vector<std::string_view> words_of(std::string_view line) {
+  std::vector<std::string_view> words;
+  constexpr const char* kSpace = " \t\r";
+  for (;;) {
+    const std::size_t begin = line.find_first_not_of(kSpace);
+    if (begin == std::string_view::npos) return words;
+    line.remove_prefix(begin);
+    const std::size_t size = std::min(line.find_first_of(kSpace), line.size());
+    words.push_back(line.substr(0, size));
+    line.remove_prefix(size);
+  }
+}
+
+bool is_printable(std::string_view word) {
+  return std::all_of(word.begin(), word.end(), [](char c) { return c > ' ' && c < 0x7f; });
+}
+
+/// What is wrong with a line of these words; empty: nothing.
+std::string wrong_with(const std::vector<std::string_view>& words) {
+  if (words.size() < 2 || words.size() > 3 || (words[0] != "view" && words[0] != "control")) {
+    return "a line is \"view TOKEN NAME\" or \"control TOKEN NAME\", the name may be left out: "
+           "dtactctl token --new view prints one";
+  }
+  if (!std::all_of(words.begin(), words.end(), is_printable)) {
+    return "only printable ASCII characters are allowed";
+  }
+  const std::size_t size = words[1].size();
+  if (size < Tokens::kLeastBytes || size > wire::kMaxToken) {
+    return fmt::format(
+        "the token has {} bytes, allowed are {} to {}: dtactctl token --new {} "
+        "prints one",
+        size, Tokens::kLeastBytes, wire::kMaxToken, words[0]);
+  }
+  return {};
+}
+
+}  // namespace
+
+Tokens::Tokens(std::string_view text, const std::string& file) {
+  for (unsigned line = 1; !text.empty(); ++line) {
+    const std::size_t size = std::min(text.find('\n'), text.size());
+    const auto words = words_of(text.substr(0, size));
+    text.remove_prefix(std::min(size + 1, text.size()));
+    if (words.empty() || words[0].front() == '#') continue;
+    std::string wrong = wrong_with(words);
+    Entry entry;
+    if (wrong.empty()) {
+      entry = {digest_of(words[1]),
+               {words[0] == "view" ? Rights::view : Rights::control,
+                std::string(words.size() == 3 ? words[2] : std::string_view())}};
+      if (entry_of(entry.digest) != nullptr) wrong = "the same token stands on a line above";
+    }
+    if (!wrong.empty()) throw std::runtime_error(fmt::format("{}:{}: {}", file, line, wrong));
+    entries_.push_back(std::move(entry));
+  }
+  if (entries_.empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: holds no token, so that nobody could connect: dtactctl token --new control prints one",
+        file));
+  }
+}
+
+std::optional<Tokens::Grant> Tokens::find(std::string_view token) const {
+  const Entry* entry = entry_of(digest_of(token));
+  if (entry == nullptr) return std::nullopt;
+  return entry->grant;
+}
+
+Tokens::Digest Tokens::digest_of(std::string_view token) {
+  Digest digest;
+  ::SHA256(reinterpret_cast<const unsigned char*>(token.data()), token.size(), digest.data());
+  return digest;
+}
+
+const Tokens::Entry* Tokens::entry_of(const Digest& digest) const {
+  const Entry* found = nullptr;
+  // All of them, so that the time does not tell which one was meant.
+  for (const Entry& entry : entries_) {
+    if (::CRYPTO_memcmp(entry.digest.data(), digest.data(), digest.size()) == 0) found = &entry;
+  }
+  return found;
+}
+
+}  // namespace dtact::net

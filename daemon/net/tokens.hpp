@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "daemon/net/rights.hpp"
+
+namespace dtact::net {
+
+/// Who may come in, by the token in Hello. Keeps digests, not the tokens.
+class Tokens {
+ public:
+  /// Shorter ones can be guessed.
+  static constexpr std::size_t kLeastBytes = 16;
+
+  struct Grant {
+    Rights rights = Rights::view;
+    std::string name;  ///< What the file calls it, for the log; may be empty.
+  };
+
+  /// A line for each token: "view TOKEN" or "control TOKEN", with a name behind it or not;
+  /// printable ASCII, separated by spaces; empty lines, and such as begin with '#', are passed
+  /// over. `file` names the text in errors. Throws std::runtime_error with file, line and remedy,
+  /// never with a token; a text without any token is an error, too.
+  Tokens(std::string_view text, const std::string& file);
+
+  /// Takes equally long whatever is asked, right or wrong.
+  [[nodiscard]] std::optional<Grant> find(std::string_view token) const;
+
+ private:
+  using Digest = std::array<unsigned char, 32>;
+  struct Entry {
+    Digest digest{};
+    Grant grant;
+  };
+
+  static Digest digest_of(std::string_view token);
+  [[nodiscard]] const Entry* entry_of(const Digest& digest) const;
+
+  std::vector<Entry> entries_;
+};
+
+}  // namespace dtact::net

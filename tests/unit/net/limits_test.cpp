@@ -1,0 +1,219 @@
+// What clients may take of the daemon, and what it does with those that want more.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/net/admission.hpp"
+#include "daemon/net/hub.hpp"
+#include "daemon/net/limited_log.hpp"
+#include "daemon/net/token_bucket.hpp"
+#include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::net::test {
+namespace {
+
+using testing::HasSubstr;
+using namespace std::string_literals;
+using std::chrono::milliseconds;
+
+v1::ClientMessage get_status() {
+  v1::ClientMessage message;
+  message.mutable_get_status();
+  return message;
+}
+
+/// A connection from another address of this machine than 127.0.0.1, all of which reach it.
+base::UniqueFd connected_from(const char* from, std::uint16_t port) {
+  base::UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  ::inet_pton(AF_INET, from, &address.sin_addr);
+  const auto* generic = reinterpret_cast<const sockaddr*>(&address);
+  if (::bind(fd.get(), generic, sizeof address) != 0) throw std::runtime_error("cannot bind");
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  address.sin_port = htons(port);
+  if (::connect(fd.get(), generic, sizeof address) != 0) throw std::runtime_error("cannot connect");
+  return fd;
+}
+
+TEST(TokenBucket, FillsUpToItsBurst) {
+  const TokenBucket::Clock::time_point start;
+  TokenBucket bucket(10, 3, start);
+  EXPECT_TRUE(bucket.take(2, start));
+  EXPECT_TRUE(bucket.take(1, start));
+  EXPECT_FALSE(bucket.take(1, start));
+  EXPECT_FALSE(bucket.take(1, start + milliseconds(99)));
+  EXPECT_TRUE(bucket.take(1, start + milliseconds(100)));
+  EXPECT_FALSE(bucket.take(4, start + std::chrono::hours(1)));
+  EXPECT_TRUE(bucket.take(3, start + std::chrono::hours(1)));
+}
+
+TEST(LimitedLog, SaysHowManyLinesItLeftOut) {
+  std::vector<std::string> lines;
+  const Log log = limited([&lines](LogLevel, const std::string& text) { lines.push_back(text); });
+  for (int i = 0; i < 5000; ++i) log(LogLevel::info, "x");
+  // 100, and those whose time came meanwhile; the last ones that were left out are not told yet.
+  EXPECT_GE(lines.size(), 100U);
+  EXPECT_LT(lines.size(), 5000U);
+  EXPECT_EQ(lines.front(), "x");
+}
+
+// NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send for constants
+TEST(BeforeHello, TakesAKilobyteAndNoMore) {
+  const Rig rig;
+  RawClient longest(rig.tcp_port());
+  longest.send_bytes("\0\0\4\0"s + std::string(1024, '\xff'));
+  EXPECT_EQ(longest.reply().error().code(), v1::ERROR_BAD_MESSAGE);
+  RawClient longer(rig.tcp_port());
+  longer.send_bytes("\0\0\4\1"s);
+  const auto reply = longer.reply();
+  EXPECT_EQ(reply.error().code(), v1::ERROR_TOO_LARGE);
+  EXPECT_THAT(reply.error().message(),
+              HasSubstr("1025 bytes was announced, at most 1024 are allowed before Hello"));
+  EXPECT_TRUE(longer.ends());
+}
+
+TEST(BeforeHello, AFloodLeavesRoomForOthers) {
+  const Rig rig;
+  std::vector<std::unique_ptr<RawClient>> flood;
+  RawClient early{connected_from("127.0.0.2", rig.tcp_port())};
+  for (std::size_t i = 0; i < 3 * Hub::kMaxStrangers; ++i) {
+    flood.push_back(std::make_unique<RawClient>(rig.tcp_port()));
+  }
+  // One who came before, from elsewhere, has kept its place.
+  EXPECT_NO_THROW(early.hello());
+  RawClient late(rig.tcp_port());
+  EXPECT_NO_THROW(late.hello());
+  EXPECT_TRUE(flood.front()->ends());
+  EXPECT_NO_THROW(flood.back()->hello());
+}
+
+TEST(BeforeHello, AFloodFromEverywhereTakesTheOldestOnesPlace) {
+  const Rig rig;
+  RawClient oldest{connected_from("127.0.9.9", rig.tcp_port())};
+  std::vector<std::unique_ptr<RawClient>> flood;
+  for (std::size_t i = 0; i < Hub::kMaxStrangers; ++i) {
+    const std::string from = "127.0.0." + std::to_string(i + 2);
+    flood.push_back(std::make_unique<RawClient>(connected_from(from.c_str(), rig.tcp_port())));
+  }
+  EXPECT_TRUE(oldest.ends());
+  for (auto& client : {flood.front().get(), flood[8].get()}) EXPECT_NO_THROW(client->hello());
+}
+
+TEST(Admission, CountsClientsOfEachAddress) {
+  NetConfig config;
+  config.max_clients_per_address = 2;
+  Rig rig(config);
+  RawClient a(rig.tcp_port());
+  auto b = std::make_unique<RawClient>(rig.tcp_port());
+  a.hello();
+  b->hello();
+  RawClient c(rig.tcp_port());
+  const auto reply = c.say_hello();
+  EXPECT_EQ(reply.error().code(), v1::ERROR_BUSY);
+  EXPECT_THAT(reply.error().message(), HasSubstr("2 clients are connected from 127.0.0.1"));
+  EXPECT_TRUE(c.ends());
+  RawClient other{connected_from("127.0.0.2", rig.tcp_port())};
+  EXPECT_NO_THROW(other.hello());
+  b.reset();
+  ASSERT_TRUE(rig.wait_log("the client left"));
+  RawClient d(rig.tcp_port());
+  EXPECT_NO_THROW(d.hello());
+}
+
+TEST(Requests, TooManyASecondAreAFlood) {
+  NetConfig config;
+  config.max_requests_per_s = 20;
+  const Rig rig(config);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  RawClient other(rig.tcp_port());
+  other.hello();
+  auto request = get_status();
+  for (std::uint64_t id = 100; id < 5000; ++id) {
+    request.set_id(id);
+    client.send(request);
+  }
+  v1::Reply reply;
+  int served = 0;
+  do {
+    reply = client.reply();
+    served += reply.has_status() ? 1 : 0;
+  } while (reply.has_status());
+  EXPECT_GE(served, 19);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_FLOOD);
+  EXPECT_THAT(reply.error().message(), HasSubstr("more than 20 requests a second came"));
+  EXPECT_TRUE(client.ends());
+  EXPECT_TRUE(other.request(get_status()).has_status());
+}
+
+TEST(Requests, ALargeOneCountsAsMany) {
+  NetConfig config;
+  config.max_requests_per_s = 20;
+  const Rig rig(config, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  auto& upload = *message.mutable_upload_calibration();
+  upload.set_name("large");
+  upload.set_calibration_toml("toml");
+  upload.set_reference_png(std::string(21U << 16U, 'x'));
+  EXPECT_EQ(client.request(message).error().code(), v1::ERROR_FLOOD);
+}
+
+TEST(Incoming, IsBoundedForAllClientsTogether) {
+  const Rig rig;
+  // The last byte of sixteen mebibytes is missing. Memory at most doubles, so each takes all of it.
+  const std::string part = "\1\0\0\0"s + std::string((16U << 20U) - 1, 'x');
+  std::vector<std::unique_ptr<RawClient>> clients;
+  for (int i = 0; i < 3; ++i) {
+    clients.push_back(std::make_unique<RawClient>(rig.tcp_port()));
+    clients.back()->hello();
+    clients.back()->send_bytes(part);
+  }
+  const auto reply = clients[2]->reply();
+  EXPECT_EQ(reply.error().code(), v1::ERROR_FLOOD);
+  EXPECT_THAT(reply.error().message(), HasSubstr("33554432 bytes"));
+  EXPECT_TRUE(clients[2]->ends());
+  // Once a message is through its room is another's.
+  clients[0]->send_bytes("x");
+  EXPECT_EQ(clients[0]->reply().error().code(), v1::ERROR_BAD_MESSAGE);
+  RawClient next(rig.tcp_port());
+  next.hello();
+  next.send_bytes(part);
+  next.send_bytes("x");
+  EXPECT_EQ(next.reply().error().code(), v1::ERROR_BAD_MESSAGE);
+}
+
+TEST(Incoming, IsCountedOnceAndGivenBack) {
+  NetConfig config;
+  Admission admission(config);
+  constexpr std::size_t kAll = Admission::kMaxIncoming;
+  EXPECT_TRUE(admission.hold(0, kAll));
+  EXPECT_FALSE(admission.hold(0, 1));
+  EXPECT_TRUE(admission.hold(1, 0));
+  EXPECT_TRUE(admission.hold(kAll, 0));
+  EXPECT_TRUE(admission.hold(0, kAll));
+}
+
+TEST(Answers, AboveTheCapAreErrorsAndTheConnectionStays) {
+  Rig rig;
+  CalibrationFiles huge{.name = "huge", .toml = "toml", .png = std::string(17U << 20U, 'x')};
+  const std::uint64_t number = rig.store.keep(huge);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  message.mutable_get_calibration()->set_number(number);
+  const auto reply = client.request(message);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_TOO_LARGE);
+  EXPECT_THAT(reply.error().message(), HasSubstr("the answer has 178258"));
+  EXPECT_TRUE(client.request(get_status()).has_status());
+}
+// NOLINTEND(misc-const-correctness)
+
+}  // namespace
+}  // namespace dtact::net::test

@@ -1,0 +1,191 @@
+// Who may do what: tokens, addresses beyond this machine, and what status says of it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "daemon/net/security.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "tests/unit/calibration/sample.hpp"
+#include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::net::test {
+namespace {
+
+using calibration::TempFolder;
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr const char* kView = "0123456789abcdef";
+constexpr const char* kControl = "fedcba9876543210";
+
+/// A server that asks for tokens.
+class Guarded : public ::testing::Test {
+ protected:
+  Guarded() {
+    config_.token_file = folder_.path() / "tokens";
+    base::write_file_atomically(config_.token_file,
+                                "view 0123456789abcdef eye\ncontrol fedcba9876543210 hand\n", 0600);
+  }
+
+  TempFolder folder_;
+  NetConfig config_;
+};
+
+v1::ClientMessage message_of(void (*fill)(v1::ClientMessage&)) {
+  v1::ClientMessage message;
+  fill(message);
+  return message;
+}
+
+// NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send for constants
+TEST(Rights, AreEverythingWhereNoTokensAre) {
+  const Rig rig;
+  RawClient client(rig.tcp_port());
+  EXPECT_EQ(client.say_hello().hello().rights(), v1::RIGHTS_CONTROL);
+}
+
+TEST_F(Guarded, TellsWhatATokenAllows) {
+  Rig rig(config_);
+  RawClient viewer(rig.tcp_port());
+  EXPECT_EQ(viewer.say_hello(kView).hello().rights(), v1::RIGHTS_VIEW);
+  RawClient controller(rig.tcp_port());
+  EXPECT_EQ(controller.say_hello(kControl).hello().rights(), v1::RIGHTS_CONTROL);
+  EXPECT_TRUE(rig.wait_log("(raw) connected as eye"));
+}
+
+TEST_F(Guarded, RefusesAMissingAndAWrongToken) {
+  Rig rig(config_);
+  RawClient none(rig.tcp_port());
+  const auto reply = none.say_hello();
+  EXPECT_EQ(reply.id(), 1U);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_DENIED);
+  EXPECT_THAT(reply.error().message(), HasSubstr("asks for a token"));
+  EXPECT_TRUE(none.ends());
+  RawClient wrong(rig.tcp_port());
+  const auto other = wrong.say_hello("0123456789abcdeX");
+  EXPECT_EQ(other.error().code(), v1::ERROR_DENIED);
+  EXPECT_THAT(other.error().message(), HasSubstr("does not know the token"));
+  EXPECT_TRUE(wrong.ends());
+  EXPECT_THAT(rig.log(), Not(HasSubstr("0123456789abcdeX")));
+}
+
+TEST_F(Guarded, ServesOthersWhileOneWaitsForItsRefusal) {
+  const Rig rig(config_);
+  RawClient wrong(rig.tcp_port());
+  auto hello = message_of([](v1::ClientMessage& m) {
+    m.set_id(1);
+    m.mutable_hello()->set_major(1);
+  });
+  wrong.send(hello);
+  // What it sends behind is not looked at: not even as a second guess.
+  hello.set_id(2);
+  hello.mutable_hello()->set_token(kControl);
+  wrong.send(hello);
+  RawClient right(rig.tcp_port());
+  EXPECT_TRUE(right.say_hello(kView).has_hello());
+  const auto reply = wrong.reply();
+  EXPECT_EQ(reply.id(), 1U);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_DENIED);
+  EXPECT_TRUE(wrong.ends());
+}
+
+TEST_F(Guarded, LetsViewersViewAndNothingElse) {
+  const Rig rig(config_, answer_done);
+  RawClient viewer(rig.tcp_port());
+  viewer.hello(kView);
+  using M = v1::ClientMessage;
+  for (const auto& request :
+       {message_of([](M& m) { m.mutable_set_light()->set_brightness(3); }),
+        message_of([](M& m) { m.mutable_rezero(); }),
+        message_of([](M& m) { m.mutable_upload_calibration()->set_name("x"); }),
+        message_of([](M& m) { m.mutable_activate_calibration()->set_number(1); })}) {
+    const auto reply = viewer.request(request);
+    EXPECT_EQ(reply.error().code(), v1::ERROR_DENIED) << request.ShortDebugString();
+    EXPECT_THAT(reply.error().message(), HasSubstr("allows viewing only"));
+  }
+  EXPECT_TRUE(viewer.request(message_of([](M& m) { m.mutable_get_status(); })).has_status());
+  EXPECT_TRUE(viewer.request(message_of([](M& m) { m.mutable_get_calibration()->set_number(1); }))
+                  .has_calibration());
+  EXPECT_TRUE(
+      viewer.request(message_of([](M& m) { m.mutable_list_calibrations(); })).has_calibrations());
+  EXPECT_NO_THROW(viewer.subscribe(v1::DEPTH_INT16));
+  RawClient controller(rig.tcp_port());
+  controller.hello(kControl);
+  EXPECT_TRUE(controller.request(message_of([](M& m) { m.mutable_rezero(); })).has_done());
+}
+
+TEST_F(Guarded, TellsStatusOfItsEndpointsAndClients) {
+  const Rig rig(config_);
+  RawClient viewer(rig.tcp_port());
+  viewer.hello(kView);
+  const auto status =
+      viewer.request(message_of([](v1::ClientMessage& m) { m.mutable_get_status(); })).status();
+  const std::string address = "127.0.0.1:" + std::to_string(rig.tcp_port());
+  ASSERT_EQ(status.endpoints_size(), 1);
+  EXPECT_EQ(status.endpoints(0).address(), address);
+  EXPECT_FALSE(status.endpoints(0).tls());
+  EXPECT_TRUE(status.endpoints(0).token());
+  EXPECT_FALSE(status.endpoints(0).insecure());
+  ASSERT_EQ(status.clients_size(), 1);
+  EXPECT_EQ(status.clients(0).rights(), v1::RIGHTS_VIEW);
+  EXPECT_EQ(status.clients(0).endpoint(), address);
+  EXPECT_GT(status.clients(0).sent_bytes(), 0U);
+}
+
+TEST(Security, TellsWhereAnybodyMayCome) {
+  NetConfig config;
+  config.address = "0.0.0.0";
+  config.insecure = true;
+  Rig rig(config);
+  EXPECT_THAT(rig.log(),
+              HasSubstr("net.insecure: whoever can reach 0.0.0.0 may watch and command"));
+  RawClient client(rig.tcp_port());
+  client.hello();
+  const auto status =
+      client.request(message_of([](v1::ClientMessage& m) { m.mutable_get_status(); })).status();
+  ASSERT_EQ(status.endpoints_size(), 1);
+  EXPECT_TRUE(status.endpoints(0).insecure());
+}
+// NOLINTEND(misc-const-correctness)
+
+/// What the settings are refused with; empty when they are not.
+std::string refusal(const NetConfig& config) {
+  try {
+    check_security(config);
+    return {};
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+}
+
+TEST(Security, NeedsTlsAndATokenBeyondThisMachine) {
+  NetConfig config;
+  for (const char* here : {"127.0.0.1", "127.3.2.1", "::1", ""}) {
+    config.address = here;
+    EXPECT_EQ(refusal(config), "") << here;
+  }
+  for (const char* beyond : {"0.0.0.0", "::", "192.0.2.7", "2001:db8::7"}) {
+    config.address = beyond;
+    EXPECT_THAT(refusal(config),
+                AllOf(HasSubstr("net.address = \"" + std::string(beyond) + "\""),
+                      HasSubstr("dtactctl cert"), HasSubstr("dtactctl token --new control"),
+                      HasSubstr("net.insecure = true"), HasSubstr("\"127.0.0.1\"")));
+  }
+  config.token_file = "/etc/tokens";
+  EXPECT_THAT(refusal(config),
+              AllOf(HasSubstr("net.tls_certificate"), Not(HasSubstr("token_file"))));
+  config.tls_certificate = "/etc/crt";
+  EXPECT_THAT(refusal(config), HasSubstr("set both or none"));
+  config.tls_key = "/etc/key";
+  EXPECT_EQ(refusal(config), "");
+  config.token_file.clear();
+  EXPECT_THAT(refusal(config), AllOf(HasSubstr("net.token_file"), Not(HasSubstr("dtactctl cert"))));
+  config.insecure = true;
+  EXPECT_EQ(refusal(config), "");
+}
+
+}  // namespace
+}  // namespace dtact::net::test

@@ -1,0 +1,126 @@
+#include "daemon/net/tokens.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+#include "daemon/net/private_file.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "tests/unit/calibration/sample.hpp"
+
+namespace dtact::net::test {
+namespace {
+
+using calibration::TempFolder;
+using testing::HasSubstr;
+using testing::Not;
+
+/// What the text is refused with; empty when it is taken.
+std::string refusal(const std::string& text) {
+  try {
+    const Tokens tokens(text, "/etc/tokens");
+    return {};
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+}
+
+TEST(Tokens, GrantWhatTheirLineSays) {
+  const Tokens tokens(
+      "# for the gripper\n\n  control 0123456789abcdef arm_left\r\nview\tfedcba9876543210", "f");
+  EXPECT_EQ(tokens.find("0123456789abcdef")->rights, Rights::control);
+  EXPECT_EQ(tokens.find("0123456789abcdef")->name, "arm_left");
+  EXPECT_EQ(tokens.find("fedcba9876543210")->rights, Rights::view);
+  EXPECT_EQ(tokens.find("fedcba9876543210")->name, "");
+}
+
+TEST(Tokens, KnowNoOthers) {
+  const Tokens tokens("view 0123456789abcdef\n", "f");
+  for (const char* other :
+       {"", "0123456789abcde", "0123456789abcdef0", "0123456789abcdeF", "view 0123456789abcdef"}) {
+    EXPECT_FALSE(tokens.find(other).has_value()) << other;
+  }
+}
+
+TEST(Tokens, NameFileLineAndRemedy) {
+  EXPECT_THAT(refusal("# a\nmay 0123456789abcdef\n"), HasSubstr("/etc/tokens:2: a line is \"view"));
+  EXPECT_THAT(refusal("view\n"), HasSubstr("/etc/tokens:1: a line is"));
+  EXPECT_THAT(refusal("view 0123456789abcdef a b\n"), HasSubstr("/etc/tokens:1: a line is"));
+  EXPECT_THAT(refusal("view 0123456789abcde\n"),
+              HasSubstr("the token has 15 bytes, allowed are 16 to 256"));
+  EXPECT_THAT(refusal("view " + std::string(257, 'x')), HasSubstr("the token has 257 bytes"));
+  EXPECT_EQ(refusal("view " + std::string(256, 'x')), "");
+  EXPECT_THAT(refusal("view 0123456789abcdef\xc3\xa4\n"), HasSubstr("only printable ASCII"));
+  EXPECT_THAT(refusal("view 0123456789abcdef\ncontrol 0123456789abcdef\n"),
+              HasSubstr("/etc/tokens:2: the same token stands on a line above"));
+  EXPECT_THAT(refusal(""), HasSubstr("holds no token"));
+  EXPECT_THAT(refusal("#\n"), HasSubstr("dtactctl token --new control prints one"));
+}
+
+TEST(Tokens, AreNotToldInErrors) {
+  EXPECT_THAT(refusal("contrlo 0123456789abcdef\n"), Not(HasSubstr("0123456789abcdef")));
+  EXPECT_THAT(refusal("view 0123456789abcde\n"), Not(HasSubstr("0123456789abcde")));
+}
+
+std::string unreadable(const std::filesystem::path& path) {
+  try {
+    (void)read_private_file(path, "the token file");
+    return {};
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+}
+
+TEST(PrivateFile, IsReadWhenItIsPrivate) {
+  const TempFolder folder;
+  const auto path = folder.path() / "tokens";
+  base::write_file_atomically(path, "secret", 0600);
+  EXPECT_EQ(read_private_file(path, "the token file"), "secret");
+  base::write_file_atomically(path, "secret", 0400);
+  EXPECT_EQ(read_private_file(path, "the token file"), "secret");
+}
+
+TEST(PrivateFile, IsRefusedWhenOthersMayReadIt) {
+  const TempFolder folder;
+  const auto path = folder.path() / "tokens";
+  base::write_file_atomically(path, "secret", 0604);
+  EXPECT_EQ(unreadable(path), "the token file " + path.string() +
+                                  ": is open to others (mode 604): chmod 600 " + path.string());
+  base::write_file_atomically(path, "secret", 0602);
+  EXPECT_THAT(unreadable(path), HasSubstr("chmod 600"));
+}
+
+TEST(PrivateFile, OfAGroupIsRefusedUnlessItIsRoots) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a file to another group";
+  const TempFolder folder;
+  const auto path = folder.path() / "tokens";
+  base::write_file_atomically(path, "secret", 0640);
+  EXPECT_EQ(unreadable(path), "");
+  ASSERT_EQ(::chown(path.c_str(), 0, 1), 0);
+  EXPECT_THAT(unreadable(path), HasSubstr("is open to others (mode 640)"));
+}
+
+TEST(PrivateFile, NeitherWaitsForAPipeNorReadsDevices) {
+  const TempFolder folder;
+  const auto pipe = folder.path() / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THAT(unreadable(pipe), HasSubstr("is not a regular file"));
+  EXPECT_THAT(unreadable("/dev/zero"), HasSubstr("is not a regular file"));
+  EXPECT_THAT(unreadable(folder.path()), HasSubstr("is not a regular file"));
+  EXPECT_THAT(unreadable(folder.path() / "none"), HasSubstr("check the path"));
+}
+
+TEST(PrivateFile, IsBounded) {
+  const TempFolder folder;
+  const auto path = folder.path() / "tokens";
+  base::write_file_atomically(path, std::string(64 * 1024 + 1, '#'), 0600);
+  EXPECT_THAT(unreadable(path), HasSubstr("is larger than 65536 bytes"));
+}
+
+}  // namespace
+}  // namespace dtact::net::test
