@@ -56,6 +56,15 @@ void print_calibration(const v1::Status& status, std::ostream& out) {
   fmt::print(out, "calibration  {}\n", text_of(status.calibration()));
 }
 
+void print_endpoint(const v1::Endpoint& endpoint, std::ostream& out) {
+  fmt::print(out, "listens      {}{}{}{}\n", endpoint.address(), endpoint.tls() ? ", TLS" : "",
+             endpoint.token() ? ", token" : "",
+             endpoint.insecure() ? ", INSECURE: whoever can reach it is let in or listens" : "");
+  if (!endpoint.fingerprint().empty()) {
+    fmt::print(out, "             fingerprint {}\n", endpoint.fingerprint());
+  }
+}
+
 void print(const v1::Status& status, std::ostream& out) {
   fmt::print(out, "state        {}\nhealth       {}\n", client::name_of(status.state()),
              status.health().empty()
@@ -84,9 +93,10 @@ void print(const v1::Status& status, std::ostream& out) {
              usage.minor_faults(), usage.major_faults(), usage.waits(), usage.preemptions());
   for (const auto& refused : status.realtime_refused())
     fmt::print(out, "realtime     {}\n", refused);
+  for (const auto& endpoint : status.endpoints()) print_endpoint(endpoint, out);
   for (const auto& c : status.clients()) {
-    fmt::print(out, "client       {} {}, sent {}, dropped {}\n", c.address(), c.program(), c.sent(),
-               c.dropped());
+    fmt::print(out, "client       {} {}, sent {}, dropped {}{}\n", c.address(), c.program(),
+               c.sent(), c.dropped(), c.rights() == v1::RIGHTS_VIEW ? ", may view only" : "");
   }
   fmt::print(out, "version      {}, up {:.0f} s\n", status.version(), status.uptime_s());
 }

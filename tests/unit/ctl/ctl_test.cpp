@@ -84,6 +84,17 @@ TEST(Ctl, ReturnsThreeWithoutADaemon) {
                                   HasSubstr("systemctl status dtactd")));
 }
 
+TEST(Status, TellsWhereTheDaemonListens) {
+  net::NetConfig config;
+  config.address = "0.0.0.0";
+  config.insecure = true;
+  const Rig rig(config);
+  const auto result = ctl(rig, {"status"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_THAT(result.out, HasSubstr("listens      0.0.0.0:" + std::to_string(rig.tcp_port()) +
+                                    ", INSECURE: whoever can reach it"));
+}
+
 TEST(Status, IsPrinted) {
   Rig rig;
   pipeline::Status status;
