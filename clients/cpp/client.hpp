@@ -2,58 +2,88 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "clients/cpp/errors.hpp"
-#include "proto/defaults.hpp"
+#include "clients/cpp/export.hpp"
+#include "clients/cpp/options.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::client {
+
+class Session;
 
 /// The number of the calibration that the daemon's configuration names. Uploaded ones count from 1.
 inline constexpr std::uint64_t kConfiguredCalibration = 0;
 
 /// Depth as it is, of every frame.
-[[nodiscard]] v1::Subscribe depth_stream();
+DTACT_EXPORT [[nodiscard]] v1::Subscribe depth_stream();
 
-struct Options {
-  std::string host = wire::kDefaultAddress;  ///< Name or address.
-  std::uint16_t port = wire::kDefaultPort;
-  std::string program = "dtact C++ client";  ///< Shown by dtactctl status; at most 64 bytes.
-  std::chrono::milliseconds timeout{5000};   ///< Of the connection and of each request.
+/// The connection was lost and is there again, subscribed as before. What happened meanwhile was
+/// not seen: ask status() for what events would have told. Client::server() may be another daemon.
+struct Reconnected {
+  std::string reason;  ///< Why it was lost: a sentence.
+  std::chrono::milliseconds away{};
+  /// Of the last frame before; 0 = none. The camera's frames between it and the next one's were
+  /// missed; a sequence that is not greater is that of a daemon or camera that began anew.
+  std::uint64_t last_sequence = 0;
+};
+
+using Item = std::variant<v1::Frame, v1::Event, Reconnected>;
+
+/// What run() calls. Those left empty are not called.
+struct Handlers {
+  std::function<void(const v1::Frame&)> frame;
+  std::function<void(const v1::Event&)> event;
+  std::function<void(const Reconnected&)> reconnected;
 };
 
 /// A connection to dtactd. What it takes and gives are the messages of dtact.proto, where their
-/// fields are explained; maps.hpp reads the pixels of the maps. Calls wait; one thread at a time.
-/// After a ConnectionError the object is of no further use: whoever wants to go on makes another
-/// one.
-class Client {
+/// fields, units and signs are explained; maps.hpp reads the pixels of the maps.
+///
+/// Calls wait, on the caller's thread; the library has none of its own and no state outside of its
+/// objects. One thread at a time may use a Client; different Clients know nothing of each other.
+class DTACT_EXPORT Client {
  public:
-  /// Connects and agrees on the version. Throws ConnectionError or ProtocolError.
+  /// Connects, verifies the daemon where Options ask for it, and agrees on the version. Throws
+  /// Error for options that make no sense, ConnectionError or one of its kinds, and Refused when
+  /// the daemon denies the token. Tries once, also with Options::reconnect.
   explicit Client(const Options& options = {});
   ~Client();
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
 
-  /// Who answered.
+  /// Who answered. Renewed by a reconnection.
   [[nodiscard]] const v1::HelloReply& server() const noexcept;
+  /// What the daemon can do beyond version 1.0, by the names in proto/README.md: "ping", "rates".
+  [[nodiscard]] bool has_feature(const std::string& name) const;
   /// The daemon runs on this machine, so that its CLOCK_MONOTONIC is ours.
   [[nodiscard]] bool same_machine() const noexcept;
 
-  // Requests. Each throws Refused with the daemon's sentence, or a ConnectionError. Frames and
+  // Requests. Each throws Refused with the daemon's sentence or, for what this daemon is too old
+  // for, the library's own; TimeoutError; or a ConnectionError, after which it is not known whether
+  // the daemon has done it. None is sent twice. While a lost connection is to be made again, a
+  // request tries that once when the next attempt is due, and throws at once before. Frames and
   // events that arrive meanwhile are kept for next(): every event, and the newest few frames.
 
-  /// Replaces the subscription. Events come in any case.
+  /// Replaces the subscription, also for connections to come.
   void subscribe(const v1::Subscribe& subscription = depth_stream());
   /// Returns the light once the ring shows it.
   v1::LightState set_light(const v1::SetLight& change);
   /// Takes the present image as untouched; `force`: although something touches.
   void rezero(bool force = false);
   [[nodiscard]] v1::Status status();
+  /// The untouched image that depth is measured against: a 16-bit grey PNG of the camera's size,
+  /// 256 units a grey level.
+  [[nodiscard]] v1::ReferenceImage reference();
+  /// The daemon's clocks, nanoseconds.
+  v1::Pong ping();
   /// The files of one calibration; without a number, of the current one.
   [[nodiscard]] v1::CalibrationFiles calibration(
       std::optional<std::uint64_t> number = std::nullopt);
@@ -67,13 +97,23 @@ class Client {
   /// Makes one of calibrations() current. Returns once the daemon uses it and will start with it.
   void activate_calibration(std::uint64_t number);
 
-  /// The next frame or event; nothing when none came in time. Throws a ConnectionError.
-  [[nodiscard]] std::optional<std::variant<v1::Frame, v1::Event>> next(
-      std::chrono::milliseconds timeout);
+  /// The next frame, event or reconnection; nothing when none came in time. Without
+  /// Options::reconnect it throws a ConnectionError when the connection is lost. With it, it makes
+  /// the connection again, whose last attempt may last for Options::timeout beyond `timeout`, and
+  /// throws what more attempts cannot mend: ProtocolError, IdentityError, and Refused when the
+  /// daemon no longer grants the token or the subscription. Called again, it tries again.
+  [[nodiscard]] std::optional<Item> next(std::chrono::milliseconds timeout);
+  /// next() and the handler for it, again and again on this thread, until `stop` is requested,
+  /// which ends the wait at once. Handlers may use the client. Throws what next() and the handlers
+  /// throw.
+  void run(const Handlers& handlers, const std::stop_token& stop);
+  /// For an event loop of one's own: whenever this descriptor can be read, call next() with a
+  /// time-out of 0 until it returns nothing. −1 while the connection is lost: call next() now and
+  /// then, and ask for the descriptor again.
+  [[nodiscard]] int native_handle() const noexcept;
 
  private:
-  struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<Session> session_;
 };
 
 }  // namespace dtact::client

@@ -1,44 +1,47 @@
 #pragma once
 
 #include <array>
-#include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <chrono>
-#include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 
+#include "clients/cpp/channel.hpp"
+#include "clients/cpp/options.hpp"
 #include "proto/framing.hpp"
 
 namespace dtact::client {
 
-/// A TCP connection that carries messages, with deadlines. Not part of the library's interface.
+/// A connection that carries messages, with deadlines. Not part of the library's interface.
 class Connection {
  public:
-  using Deadline = std::chrono::steady_clock::time_point;
+  /// To the daemon that `options` names, verified where they ask for it. Throws Error,
+  /// ConnectionError or IdentityError naming the remedy.
+  Connection(const Options& options, const Limit& limit);
 
-  /// Throws ConnectionError naming the remedy. Looking a name up is not bounded by the deadline.
-  Connection(const std::string& host, std::uint16_t port, Deadline deadline);
-
-  /// One message with its length. Throws ConnectionError, TimeoutError.
-  void write(std::string_view message, Deadline deadline);
-  /// The next message, valid until the next call; null when none came in time. Throws
+  /// One message with its length. Throws ConnectionError, also when the limit comes first: half of
+  /// a message may be on its way then.
+  void write(std::string_view message, const Limit& limit);
+  /// The next message, valid until the next call; null when the limit came first. Throws
   /// ConnectionError, ProtocolError.
-  [[nodiscard]] const std::string* read(Deadline deadline);
+  [[nodiscard]] const std::string* read(const Limit& limit);
+
   /// The other end is on this machine.
-  [[nodiscard]] bool local() const noexcept { return local_; }
+  [[nodiscard]] bool local() const noexcept { return socket_.local; }
+  /// The other end is verified, or nothing that is sent leaves this machine.
+  [[nodiscard]] bool confidential() const noexcept { return encrypted_ || socket_.loopback; }
+  /// "gripper port 7377", for sentences.
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] int native_handle() const noexcept { return socket_.fd.get(); }
 
  private:
-  void connect(const boost::asio::ip::tcp::endpoint& endpoint, Deadline deadline,
-               boost::system::error_code& error);
-  /// False: the deadline passed first.
-  [[nodiscard]] bool wait(short events, Deadline deadline);
-  void send(std::string_view bytes, Deadline deadline);
+  Connection(const Options& options, const Address& address, const Limit& limit);
+  void send(std::string_view bytes, const Limit& limit);
 
-  std::string name_;  ///< "host port 7377", for messages.
-  boost::asio::io_context io_;
-  boost::asio::ip::tcp::socket socket_;
-  bool local_ = false;
+  std::string name_;
+  Socket socket_;
+  bool encrypted_;
+  bool heard_ = false;  ///< Anything at all.
+  std::unique_ptr<Channel> channel_;
   wire::MessageDecoder decoder_;
   std::array<char, 65536> buffer_{};
   std::string_view unread_;  ///< Part of buffer_.

@@ -3,40 +3,69 @@
 #include <stdexcept>
 #include <string>
 
+#include "clients/cpp/export.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::client {
 
 /// What all of the library's exceptions are. The text is a sentence for the user and names the
-/// remedy.
-class Error : public std::runtime_error {
+/// remedy. Thrown as such for options that make no sense.
+class DTACT_EXPORT Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// No connection, or it broke. The client is of no further use: make another one.
-class ConnectionError : public Error {
+/// No connection, or it broke. Without Options::reconnect the client is of no further use: make
+/// another one. With it the client tries again by itself, except after the two below.
+class DTACT_EXPORT ConnectionError : public Error {
  public:
   using Error::Error;
 };
 
-/// The daemon did not answer in time. The client is of no further use.
-class TimeoutError : public ConnectionError {
+/// The other side does not speak this wire, or another version of it.
+class DTACT_EXPORT ProtocolError : public ConnectionError {
  public:
   using ConnectionError::ConnectionError;
 };
 
-/// The other side does not speak this wire, or another version of it.
-class ProtocolError : public ConnectionError {
+/// Not the daemon that Options::tls asks for, or nothing that says so while a token is to be sent.
+class DTACT_EXPORT IdentityError : public ConnectionError {
+ public:
+  using ConnectionError::ConnectionError;
+};
+
+/// The daemon ended the connection and said why: too many clients (ERROR_BUSY), too many requests
+/// (ERROR_FLOOD), or one that it could not read.
+class DTACT_EXPORT EndedByDaemon : public ConnectionError {
+ public:
+  EndedByDaemon(v1::ErrorCode code, const std::string& sentence)
+      : ConnectionError(sentence), code_(code) {}
+  [[nodiscard]] v1::ErrorCode code() const noexcept { return code_; }
+
+ private:
+  v1::ErrorCode code_;
+};
+
+/// The daemon did not answer a request in time. The connection stays; the answer is passed over
+/// when it comes.
+class DTACT_EXPORT TimeoutError : public ConnectionError {
  public:
   using ConnectionError::ConnectionError;
 };
 
 /// The daemon refused a request. The connection goes on.
-class Refused : public Error {
+class DTACT_EXPORT Refused : public Error {
  public:
   Refused(v1::ErrorCode code, const std::string& sentence) : Error(sentence), code_(code) {}
   [[nodiscard]] v1::ErrorCode code() const noexcept { return code_; }
+  /// The token is missing, wrong, or its rights do not reach.
+  [[nodiscard]] bool denied() const noexcept { return code_ == v1::ERROR_DENIED; }
+  /// This daemon is too old for it; also found by the library itself, before anything is sent.
+  [[nodiscard]] bool unsupported() const noexcept { return code_ == v1::ERROR_UNSUPPORTED; }
+  /// The same request may be granted later without any change.
+  [[nodiscard]] bool worth_repeating() const noexcept {
+    return code_ == v1::ERROR_BUSY || code_ == v1::ERROR_CONTACT;
+  }
 
  private:
   v1::ErrorCode code_;

@@ -3,17 +3,19 @@
 #include <string>
 #include <vector>
 
+#include "clients/cpp/export.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::client {
 
 /// STATE_SERVING → "serving"; a value of a newer daemon → "13".
-[[nodiscard]] std::string name_of(v1::State state);
+DTACT_EXPORT [[nodiscard]] std::string name_of(v1::State state);
 /// TIMESTAMP_FIRST_PACKET → "first_packet".
-[[nodiscard]] std::string name_of(v1::TimestampMeaning meaning);
+DTACT_EXPORT [[nodiscard]] std::string name_of(v1::TimestampMeaning meaning);
 /// HEALTH_LIGHT_UNSETTLED → "light_unsettled".
-[[nodiscard]] std::string name_of(v1::Health condition);
+DTACT_EXPORT [[nodiscard]] std::string name_of(v1::Health condition);
 /// The `health` of a frame, an event or the status.
-[[nodiscard]] std::vector<std::string> names_of(const google::protobuf::RepeatedField<int>& health);
+DTACT_EXPORT [[nodiscard]] std::vector<std::string> names_of(
+    const google::protobuf::RepeatedField<int>& health);
 
 }  // namespace dtact::client

@@ -42,7 +42,7 @@ struct Sensor {
 };
 
 /// Reads until `done` says so of a frame or event. False when that takes longer than `patience`.
-using Item = std::variant<v1::Frame, v1::Event>;
+using client::Item;
 bool read_until(client::Client& client, const std::function<bool(const Item&)>& done,
                 std::chrono::seconds patience = std::chrono::seconds(30));
 

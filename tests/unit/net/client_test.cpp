@@ -4,12 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
-#include <functional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -17,6 +15,7 @@
 
 #include "clients/cpp/maps.hpp"
 #include "clients/cpp/names.hpp"
+#include "tests/unit/client/played_daemon.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/rig.hpp"
 
@@ -259,70 +258,18 @@ TEST(ClientLibrary, SaysWhyItWasRefused) {
   }
 }
 
-std::string framed(const v1::ServerMessage& message) {
-  const auto length = wire::encode_length(message.ByteSizeLong());
-  std::string bytes(reinterpret_cast<const char*>(length.data()), length.size());
-  message.AppendToString(&bytes);
-  return bytes;
-}
-
-/// A daemon that greets its one client and then does what a test wants.
-class PlayedDaemon {
- public:
-  using Send = std::function<bool(const v1::ServerMessage&)>;
-
-  explicit PlayedDaemon(std::function<void(int fd, const Send&)> play)
-      : listening_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address;
-    auto* const any = reinterpret_cast<sockaddr*>(&address);
-    if (::bind(listening_.get(), any, size) != 0 || ::listen(listening_.get(), 1) != 0 ||
-        ::getsockname(listening_.get(), any, &size) != 0) {
-      throw std::runtime_error("cannot listen");
-    }
-    options.port = ntohs(address.sin_port);
-    options.timeout = kPatience;
-    thread_ = std::thread([this, play = std::move(play)] {
-      const base::UniqueFd fd(::accept(listening_.get(), nullptr, nullptr));
-      const Send send = [&fd](const v1::ServerMessage& message) {
-        const std::string bytes = framed(message);
-        return ::send(fd.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) > 0;
-      };
-      std::array<char, 1024> hello{};
-      (void)::recv(fd.get(), hello.data(), hello.size(), 0);
-      v1::ServerMessage greeting;
-      greeting.mutable_reply()->set_id(1);
-      greeting.mutable_reply()->mutable_hello()->set_major(wire::kMajor);
-      (void)send(greeting);
-      play(fd.get(), send);
-    });
-  }
-  ~PlayedDaemon() { finish(); }
-  PlayedDaemon(const PlayedDaemon&) = delete;
-  PlayedDaemon& operator=(const PlayedDaemon&) = delete;
-
-  /// Waits until its play is over and the connection closed.
-  void finish() {
-    if (thread_.joinable()) thread_.join();
-  }
-
-  Options options;
-
- private:
-  base::UniqueFd listening_;
-  std::thread thread_;
-};
+using client::test::Peer;
+using client::test::PlayedDaemon;
 
 TEST(ClientLibrary, SaysTheReasonThatCameBeforeAReset) {
-  PlayedDaemon daemon([](int fd, const PlayedDaemon::Send& send) {
+  PlayedDaemon daemon({[](Peer& peer) {
+    peer.greet();
     v1::ServerMessage end;
     end.mutable_reply()->mutable_error()->set_message("too many answers lay unread");
-    (void)send(end);
+    peer.send(end);
     const linger now{1, 0};
-    ::setsockopt(fd, SOL_SOCKET, SO_LINGER, &now, sizeof now);
-  });
+    ::setsockopt(peer.fd(), SOL_SOCKET, SO_LINGER, &now, sizeof now);
+  }});
   Client client(daemon.options);
   daemon.finish();
   try {
@@ -335,16 +282,15 @@ TEST(ClientLibrary, SaysTheReasonThatCameBeforeAReset) {
 
 TEST(ClientLibrary, GivesUpOnAnAnswerThoughFramesCome) {
   // So many at once that the next always lies ready: sending them is faster than reading them.
-  PlayedDaemon daemon([](int fd, const PlayedDaemon::Send&) {
+  PlayedDaemon daemon({[](Peer& peer) {
+    peer.greet();
     v1::ServerMessage frame;
     frame.mutable_frame()->set_sequence(1);
     std::string frames;
-    for (int i = 0; i < 10'000; ++i) frames += framed(frame);
+    for (int i = 0; i < 10'000; ++i) frames += client::test::framed(frame);
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-    while (std::chrono::steady_clock::now() < end &&
-           ::send(fd, frames.data(), frames.size(), MSG_NOSIGNAL) > 0) {
-    }
-  });
+    while (std::chrono::steady_clock::now() < end) peer.send_bytes(frames);
+  }});
   daemon.options.timeout = std::chrono::seconds(1);
   Client client(daemon.options);
   EXPECT_THROW(client.rezero(), client::TimeoutError);

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "clients/cpp/backoff.hpp"
+#include "clients/cpp/client.hpp"
+#include "clients/cpp/connection.hpp"
+
+namespace dtact::client {
+
+/// A greeted connection with its subscription, both made again after a loss where Options ask for
+/// it. Not part of the library's interface.
+class Session {
+ public:
+  /// Throws what Client's constructor does.
+  explicit Session(const Options& options);
+
+  /// The answer to `message`, whose id is set here. Throws Refused, TimeoutError, ConnectionError.
+  v1::Reply request(v1::ClientMessage& message, std::chrono::milliseconds timeout);
+  /// The same, kept for the next connection.
+  void subscribe(const v1::Subscribe& subscription);
+  /// See Client::next().
+  std::optional<Item> next(const Limit& limit);
+
+  [[nodiscard]] const Options& options() const noexcept { return options_; }
+  [[nodiscard]] const v1::HelloReply& server() const noexcept { return server_; }
+  [[nodiscard]] bool local() const noexcept { return local_; }
+  [[nodiscard]] int native_handle() const noexcept {
+    return connection_ ? connection_->native_handle() : -1;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Loss {
+    std::string reason;
+    Clock::time_point since;
+    Clock::time_point retry_at;
+  };
+
+  void open(const Limit& limit);
+  /// One attempt, given up when `wake` can be read.
+  void reopen(int wake);
+  void lose(const std::string& reason);
+  [[nodiscard]] bool wait_for_turn(const Limit& limit) const;
+  v1::Reply exchange(v1::ClientMessage& message, const Limit& limit);
+  [[nodiscard]] std::optional<v1::ServerMessage> receive(const Limit& limit);
+  void keep(v1::ServerMessage& message);
+
+  Options options_;
+  std::unique_ptr<Connection> connection_;  ///< Null while it is lost.
+  v1::HelloReply server_;
+  bool local_ = false;
+  std::optional<v1::Subscribe> subscription_;
+  std::uint64_t next_id_ = 1;
+  std::uint64_t last_sequence_ = 0;
+  std::deque<Item> inbox_;
+  std::optional<Loss> loss_;
+  Clock::time_point opened_;
+  BackOff backoff_;
+};
+
+}  // namespace dtact::client
