@@ -32,11 +32,31 @@ void add_global_options(CLI::App& app, Context& context) {
   app.require_subcommand(1);
   app.fallthrough();  // global options may stand behind the command
   context.target.program = name;
-  app.add_option("--host", context.target.host, "Name or address of the daemon's machine")
+  client::Options& target = context.target;
+  app.add_option("--host", target.host,
+                 "Name or address of the daemon's machine, also with :PORT, or unix:/PATH")
       ->capture_default_str();
-  app.add_option("--port", context.target.port, "TCP port of the daemon")
+  app.add_option("--port", target.port, "TCP port of the daemon")
       ->capture_default_str()
       ->check(CLI::Range(1, 65535));
+  app.add_option_function<std::string>(
+         "--token-file",
+         [&target](const std::string& file) { target.token = client::read_token(file); },
+         "The token that the daemon asks for: the file's first line")
+      ->type_name("FILE");
+  const auto tls = [&target]() -> client::Tls& {
+    return target.tls.has_value() ? *target.tls : target.tls.emplace();
+  };
+  app.add_option_function<std::string>(
+         "--fingerprint", [tls](const std::string& digits) { tls().fingerprint = digits; },
+         "Use TLS, and only with the daemon of this certificate (dtactctl cert --show prints it)")
+      ->type_name("SHA256");
+  app.add_option_function<std::string>(
+         "--ca-file", [tls](const std::string& file) { tls().ca_file = file; },
+         "Use TLS, and only with a certificate signed by one of these")
+      ->type_name("FILE");
+  app.add_flag("--insecure", target.insecure,
+               "Send the token over plain TCP to another machine, where others may read it");
   app.add_flag("--json", context.json, "Print JSON, one object a line");
 }
 

@@ -16,8 +16,9 @@ struct Context {
   std::ostream& out;
 };
 
-/// --host, --port, --json and --version, allowed before and behind the command, of which there has
-/// to be one; the exit codes below the help. The daemon knows the program by its name and version.
+/// The daemon's address, token and certificate, --json and --version, allowed before and behind the
+/// command, of which there has to be one; the exit codes below the help. The daemon knows the
+/// program by its name and version.
 void add_global_options(CLI::App& app, Context& context);
 
 /// Parses `arguments` (without the program's own name), which runs the command. Help goes to `out`,

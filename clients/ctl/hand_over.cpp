@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <string_view>
 
 #include "clients/common/exit_codes.hpp"
 
@@ -13,13 +16,16 @@ namespace dtact::ctl {
 namespace {
 
 constexpr const char* kProgram = "dtact-calibrate";
+/// The global options that a word follows.
+constexpr std::array<std::string_view, 5> kWithValue{"--host", "--port", "--token-file",
+                                                     "--fingerprint", "--ca-file"};
 
 using Arguments = std::vector<std::string>;
 
 /// The first word from `place` on that is neither an option nor the value of a global one.
 Arguments::iterator word_from(Arguments& arguments, Arguments::iterator place) {
   while (place != arguments.end() && place->starts_with('-')) {
-    const bool has_value = *place == "--host" || *place == "--port";
+    const bool has_value = std::ranges::find(kWithValue, *place) != kWithValue.end();
     if (++place != arguments.end() && has_value) ++place;
   }
   return place;

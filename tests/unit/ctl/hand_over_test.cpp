@@ -23,6 +23,10 @@ TEST(HandOver, GlobalOptionsGoAlong) {
               ElementsAre("--host", "calibrate", "--port", "7", "--json", "depth"));
   EXPECT_THAT(for_calibrate({"calibrate", "--port", "7", "lens"}),
               ElementsAre("--port", "7", "lens"));
+  EXPECT_THAT(for_calibrate({"--token-file", "calibrate", "--insecure", "--fingerprint", "lens",
+                             "--ca-file", "depth", "calibrate", "depth"}),
+              ElementsAre("--token-file", "calibrate", "--insecure", "--fingerprint", "lens",
+                          "--ca-file", "depth", "depth"));
 }
 
 TEST(HandOver, OtherCommandsStayAsTheyAre) {
