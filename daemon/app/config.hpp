@@ -20,7 +20,7 @@ struct Config {
   std::string ring_scheme = "all";  ///< Which LEDs are lit at start (net/light_schemes.hpp).
   pipeline::PipelineConfig pipeline;
   net::NetConfig net;
-  std::string log_level = "info";  ///< "trace", "debug", "info", "warn", "error".
+  std::string log_level = "info";   ///< "trace", "debug", "info", "warn", "error".
   /// Folder to run with as long as none that was uploaded is current; empty = none.
   std::filesystem::path calibration;
   /// What outlives a restart: uploaded calibrations, the last good reference. Empty = systemd's

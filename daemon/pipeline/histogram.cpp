@@ -26,6 +26,7 @@ void Histogram::add(std::int64_t ns) noexcept {
   auto& count = counts_[bucket_of(static_cast<std::uint64_t>(value))];
   // One thread adds, so no read-modify-write is needed.
   count.store(count.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+  sum_.store(sum_.load(std::memory_order_relaxed) + value, std::memory_order_relaxed);
   if (value > max_.load(std::memory_order_relaxed)) max_.store(value, std::memory_order_relaxed);
 }
 
@@ -33,6 +34,20 @@ std::uint64_t Histogram::count() const noexcept {
   std::uint64_t sum = 0;
   for (const auto& count : counts_) sum += count.load(std::memory_order_relaxed);
   return sum;
+}
+
+std::uint64_t Histogram::cumulate(std::span<const std::int64_t> bounds_ns,
+                                  std::span<std::uint64_t> counts) const noexcept {
+  std::uint64_t seen = 0;
+  std::size_t bound = 0;
+  for (std::size_t i = 0; i < kBuckets; ++i) {
+    for (; bound < bounds_ns.size() && upper_end(i) > bounds_ns[bound]; ++bound) {
+      counts[bound] = seen;
+    }
+    seen += counts_[i].load(std::memory_order_relaxed);
+  }
+  for (; bound < bounds_ns.size(); ++bound) counts[bound] = seen;
+  return seen;
 }
 
 std::int64_t Histogram::percentile_ns(double share) const noexcept {

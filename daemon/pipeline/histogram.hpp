@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace dtact::pipeline {
 
@@ -22,6 +23,14 @@ class Histogram {
   [[nodiscard]] std::int64_t max_ns() const noexcept {
     return max_.load(std::memory_order_relaxed);
   }
+  [[nodiscard]] std::int64_t sum_ns() const noexcept {
+    return sum_.load(std::memory_order_relaxed);
+  }
+  /// How many values are at most each of the ascending `bounds_ns`, into `counts` of the same
+  /// length. A bucket that a bound cuts counts above it, so a count is that of a bound at most 3.2
+  /// % lower. Returns the count of all.
+  std::uint64_t cumulate(std::span<const std::int64_t> bounds_ns,
+                         std::span<std::uint64_t> counts) const noexcept;
 
  private:
   static constexpr int kSubBits = 5;
@@ -33,6 +42,7 @@ class Histogram {
 
   std::array<std::atomic<std::uint64_t>, kBuckets> counts_{};
   std::atomic<std::int64_t> max_{0};
+  std::atomic<std::int64_t> sum_{0};
 };
 
 }  // namespace dtact::pipeline

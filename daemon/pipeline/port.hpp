@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -92,11 +93,20 @@ struct StateChanged {
 };
 using Event = std::variant<CommandDone, ContactChanged, LightChanged, ReferenceTaken, StateChanged>;
 
+/// Where the times of a stage are counted up to, nanoseconds: 10 µs … 1 s.
+inline constexpr std::array<std::int64_t, 16> kStageBoundsNs = {
+    10'000,      20'000,      50'000,      100'000,      200'000,    500'000,
+    1'000'000,   2'000'000,   5'000'000,   10'000'000,   20'000'000, 50'000'000,
+    100'000'000, 200'000'000, 500'000'000, 1'000'000'000};
+
 struct StageStatistics {
   std::string stage;
   double p50_us = 0;
   double p99_us = 0;
   double max_us = 0;
+  std::uint64_t count = 0;
+  double sum_us = 0;
+  std::array<std::uint64_t, kStageBoundsNs.size()> within{};  ///< At most each of kStageBoundsNs.
 };
 
 /// What the kernel counted of a thread since its start.

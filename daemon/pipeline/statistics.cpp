@@ -10,9 +10,12 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 }  // namespace
 
 StageStatistics summarise(const char* stage, const Histogram& times) {
-  return {stage, static_cast<double>(times.percentile_ns(0.5)) / 1e3,
-          static_cast<double>(times.percentile_ns(0.99)) / 1e3,
-          static_cast<double>(times.max_ns()) / 1e3};
+  StageStatistics statistics{stage, static_cast<double>(times.percentile_ns(0.5)) / 1e3,
+                             static_cast<double>(times.percentile_ns(0.99)) / 1e3,
+                             static_cast<double>(times.max_ns()) / 1e3};
+  statistics.sum_us = static_cast<double>(times.sum_ns()) / 1e3;
+  statistics.count = times.cumulate(kStageBoundsNs, statistics.within);
+  return statistics;
 }
 
 void Statistics::add(const StageTimes& times, bool has_depth, std::int64_t ready_ns,

@@ -11,7 +11,7 @@
 
 namespace dtact::pipeline {
 
-/// The percentiles of one stage.
+/// The percentiles and counts of one stage.
 [[nodiscard]] StageStatistics summarise(const char* stage, const Histogram& times);
 
 /// How long each stage takes, how fast frames come, and what the thread that adds them costs the

@@ -180,5 +180,19 @@ TEST(Histogram, TakesTheExtremes) {
   EXPECT_EQ(histogram.max_ns(), (std::int64_t{1} << 40) - 1);
 }
 
+TEST(Histogram, CountsWhatIsWithinBounds) {
+  Histogram histogram;
+  histogram.add(5);
+  histogram.add(40);
+  histogram.add(1'000'000);
+  histogram.add(16'000'000);
+  std::array<std::uint64_t, 4> counts{};
+  // 1,000,000 lies in a bucket that the same bound cuts: it counts above.
+  EXPECT_EQ(histogram.cumulate(std::array<std::int64_t, 4>{5, 39, 1'000'000, 1'040'000}, counts),
+            4U);
+  EXPECT_EQ(counts, (std::array<std::uint64_t, 4>{1, 1, 2, 3}));
+  EXPECT_EQ(histogram.sum_ns(), 17'000'045);
+}
+
 }  // namespace
 }  // namespace dtact::pipeline
