@@ -197,10 +197,23 @@ void Commands::on_done(const pipeline::CommandDone& done) {
 
 void Commands::get_status(const Who& who) {
   auto message = reply_to(who.second);
-  auto& status = *message.mutable_reply()->mutable_status();
-  fill(port_.status(), status);
+  *message.mutable_reply()->mutable_status() = overview().status;
+  who.first->send(message);
+}
+
+Overview Commands::overview() const {
+  Overview overview;
+  pipeline::Status pipeline = port_.status();
+  v1::Status& status = overview.status;
+  fill(pipeline, status);
+  overview.stages = std::move(pipeline.stages);
+  overview.traffic = hub_.traffic();
+  overview.reference_taken_ns = hub_.reference_taken_ns();
   if (!config_.realtime_refused.empty()) status.add_realtime_refused(config_.realtime_refused);
-  for (const auto& stage : hub_.stages()) fill(stage, *status.add_stages());
+  for (auto& stage : hub_.stages()) {
+    fill(stage, *status.add_stages());
+    overview.stages.push_back(std::move(stage));
+  }
   status.set_encoded(hub_.encoded());
   for (const auto& session : hub_.sessions()) {
     if (!session->greeted()) continue;
@@ -227,7 +240,7 @@ void Commands::get_status(const Who& who) {
   status.set_serial(hub_.serial());
   const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - start_;
   status.set_uptime_s(uptime.count());
-  who.first->send(message);
+  return overview;
 }
 
 void Commands::ping(const Who& who) {

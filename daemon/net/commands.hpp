@@ -12,6 +12,7 @@
 
 #include "daemon/net/calibration_store.hpp"
 #include "daemon/net/net_config.hpp"
+#include "daemon/net/overview.hpp"
 #include "daemon/net/session.hpp"
 #include "daemon/pipeline/port.hpp"
 
@@ -41,6 +42,7 @@ class Commands : public std::enable_shared_from_this<Commands> {
   void on_done(const pipeline::CommandDone& done);
   /// The ring shows another light.
   void on_light(const hal::Light& light);
+  [[nodiscard]] Overview overview() const;
 
  private:
   /// An upload, or without one the activation of a number.

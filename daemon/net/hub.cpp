@@ -48,6 +48,12 @@ int duplicate(int fd) {
   return copy;
 }
 
+void add(const Session& session, Traffic& to) {
+  to.frames += session.outbox().sent();
+  to.dropped += session.outbox().dropped();
+  to.bytes += session.outbox().sent_bytes();
+}
+
 }  // namespace
 
 Hub::Hub(asio::io_context& io, const NetConfig& config, pipeline::Port& port)
@@ -105,6 +111,10 @@ void Hub::on_event(const pipeline::Event& event) {
   if (const auto* light = std::get_if<pipeline::LightChanged>(&event)) {
     handlers_.light(light->light);
   }
+  if (const auto* reference = std::get_if<pipeline::ReferenceTaken>(&event)) {
+    reference_taken_ns_.reset();
+    if (!reference->restored) reference_taken_ns_ = base::system_clock().monotonic_ns();
+  }
   v1::ServerMessage message;
   if (fill(event, *message.mutable_event())) broadcast(message);
 }
@@ -132,6 +142,7 @@ void Hub::on_frame(const pipeline::DepthFrame& frame) {
 }
 
 void Hub::admit(const std::shared_ptr<Session>& session) {
+  ++gone_.connections;
   sessions_.push_back(session);
   if (const auto other = one_too_many(sessions_)) {
     other->close("too many connections wait for Hello", LogLevel::warning);
@@ -166,6 +177,12 @@ void Hub::update_want() {
   port_.want(wanted);
 }
 
+Traffic Hub::traffic() const {
+  Traffic all = gone_;
+  for (const auto& session : sessions_) add(*session, all);
+  return all;
+}
+
 std::vector<pipeline::StageStatistics> Hub::stages() const {
   if (encoded() == 0) return {};
   return {pipeline::summarise("handover", handover_),
@@ -186,7 +203,12 @@ void Hub::on_closed(const Session& session) {
     const auto self = weak.lock();
     if (self == nullptr) return;
     const auto is_gone = [gone](const auto& other) { return other.get() == gone; };
-    if (std::erase_if(self->sessions_, is_gone) > 0) self->update_want();
+    const auto left = std::ranges::find_if(self->sessions_, is_gone);
+    if (left == self->sessions_.end()) return;
+    add(**left, self->gone_);
+    if (!(*left)->let_in()) ++self->gone_.refused;
+    self->sessions_.erase(left);
+    self->update_want();
   });
 }
 

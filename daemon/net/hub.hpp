@@ -11,6 +11,7 @@
 
 #include "daemon/net/frame_encoder.hpp"
 #include "daemon/net/net_config.hpp"
+#include "daemon/net/overview.hpp"
 #include "daemon/net/security.hpp"
 #include "daemon/net/session.hpp"
 #include "daemon/pipeline/port.hpp"
@@ -61,6 +62,13 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
 
   /// Percentiles of what happens to a frame on this thread.
   [[nodiscard]] std::vector<pipeline::StageStatistics> stages() const;
+  /// All clients together since start, those that left included.
+  [[nodiscard]] Traffic traffic() const;
+  /// When the untouched image in use was taken, CLOCK_MONOTONIC; nothing while there is none, and
+  /// for one of an earlier run.
+  [[nodiscard]] std::optional<std::int64_t> reference_taken_ns() const noexcept {
+    return reference_taken_ns_;
+  }
   /// Frame messages encoded since start.
   [[nodiscard]] std::uint64_t encoded() const noexcept { return encoder_.times().count(); }
 
@@ -89,6 +97,8 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   bool seen_frame_ = false;
   std::uint64_t skipped_ = 0;  ///< DepthFrame::skipped of the last frame.
   bool told_too_large_ = false;
+  Traffic gone_;  ///< Of the clients that left, and all connections.
+  std::optional<std::int64_t> reference_taken_ns_;
 };
 
 }  // namespace dtact::net

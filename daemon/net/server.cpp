@@ -94,6 +94,8 @@ Server::Server(boost::asio::io_context& io, NetConfig config, pipeline::Port& po
 
 Server::~Server() { stop(); }
 
+Overview Server::overview() const { return impl_->commands->overview(); }
+
 std::vector<std::string> Server::addresses() const {
   std::vector<std::string> all;
   for (const auto& listener : impl_->listeners) all.push_back(listener->address());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/net/net_config.hpp"
+#include "daemon/net/overview.hpp"
 
 namespace boost::asio {
 class io_context;
@@ -33,6 +34,8 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
+  /// What GetStatus answers, and what else is counted. On the thread that runs `io`.
+  [[nodiscard]] Overview overview() const;
   /// Where it listens, as Endpoint.address; a Unix socket first, TCP last.
   [[nodiscard]] std::vector<std::string> addresses() const;
   /// The TCP port it listens on; 0 without TCP.

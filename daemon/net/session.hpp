@@ -71,6 +71,8 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
 
   [[nodiscard]] const Subscription& subscription() const noexcept { return subscription_; }
   [[nodiscard]] bool greeted() const noexcept { return state_ == State::greeted; }
+  /// It said Hello, with a right token where one is needed, and there was room.
+  [[nodiscard]] bool let_in() const noexcept { return rights_.has_value(); }
   /// It has not been let in, and may never be.
   [[nodiscard]] bool stranger() const noexcept { return !rights_ && state_ != State::closed; }
   /// Once it is greeted.

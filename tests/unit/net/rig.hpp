@@ -2,6 +2,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -98,6 +99,11 @@ class Rig {
     if (!thread_.joinable()) return;
     boost::asio::post(io_, [this] { server_->stop(); });
     thread_.join();
+  }
+  [[nodiscard]] Overview overview() {
+    std::promise<Overview> told;
+    boost::asio::post(io_, [&] { told.set_value(server_->overview()); });
+    return told.get_future().get();
   }
   [[nodiscard]] std::uint16_t tcp_port() const { return server_->port(); }
   [[nodiscard]] std::string log() {

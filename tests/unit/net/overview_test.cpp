@@ -1,0 +1,71 @@
+// What the daemon counts over all clients.
+#include <gtest/gtest.h>
+
+#include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::net::test {
+namespace {
+
+TEST(Overview, CountsClientsThatLeftToo) {
+  NetConfig config;
+  config.max_clients = 1;
+  Rig rig(config);
+  {
+    RawClient client(rig.tcp_port());
+    client.hello();
+    client.subscribe(v1::DEPTH_INT16);
+    rig.port.publish(make_frame(1));
+    EXPECT_EQ(client.frame().sequence(), 1U);
+    v1::ClientMessage status;
+    status.mutable_get_status();
+    (void)client.request(status);  // after it the frame is counted
+    RawClient too_many(rig.tcp_port());
+    EXPECT_TRUE(too_many.ends());
+    const Overview now = rig.overview();
+    EXPECT_EQ(now.status.clients_size(), 1);
+    EXPECT_EQ(now.traffic.connections, 2U);
+    EXPECT_EQ(now.traffic.refused, 1U);
+    EXPECT_EQ(now.traffic.frames, 1U);
+    EXPECT_GT(now.traffic.bytes, 0U);
+  }
+  ASSERT_TRUE(rig.wait_log("disconnected"));
+  const Overview later = rig.overview();
+  EXPECT_EQ(later.status.clients_size(), 0);
+  EXPECT_EQ(later.traffic.frames, 1U);
+  EXPECT_EQ(later.traffic.connections, 2U);
+}
+
+TEST(Overview, CountsStagesOfTheNetworkToo) {
+  Rig rig;
+  pipeline::Status status;
+  status.stages = {{"total", 3, 9, 20}};
+  rig.port.set_status(status);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  client.subscribe(v1::DEPTH_INT16);
+  rig.port.publish(make_frame(1));
+  (void)client.frame();
+  const Overview overview = rig.overview();
+  ASSERT_EQ(overview.stages.size(), 3U);
+  EXPECT_EQ(overview.stages[0].stage, "total");
+  EXPECT_EQ(overview.stages[2].stage, "encode");
+  EXPECT_EQ(overview.stages[2].count, 1U);
+}
+
+TEST(Overview, KnowsWhenTheReferenceWasTaken) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  EXPECT_FALSE(rig.overview().reference_taken_ns.has_value());
+  rig.port.emit(pipeline::ReferenceTaken{.restored = false});
+  (void)client.event();
+  EXPECT_TRUE(rig.overview().reference_taken_ns.has_value());
+  rig.port.emit(
+      pipeline::ReferenceTaken{.restored = true});  // of an earlier run: how old, nobody knows
+  (void)client.event();
+  EXPECT_FALSE(rig.overview().reference_taken_ns.has_value());
+}
+
+}  // namespace
+}  // namespace dtact::net::test
