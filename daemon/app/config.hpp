@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/metrics/endpoint.hpp"
 #include "daemon/net/net_config.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "hal/config.hpp"
@@ -20,6 +21,7 @@ struct Config {
   std::string ring_scheme = "all";  ///< Which LEDs are lit at start (net/light_schemes.hpp).
   pipeline::PipelineConfig pipeline;
   net::NetConfig net;
+  metrics::EndpointConfig metrics;  ///< Port 0: none.
   std::string log_level = "info";   ///< "trace", "debug", "info", "warn", "error".
   /// Folder to run with as long as none that was uploaded is current; empty = none.
   std::filesystem::path calibration;

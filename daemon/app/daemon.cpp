@@ -13,6 +13,7 @@
 #include <csignal>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -21,10 +22,14 @@
 #include "daemon/app/service.hpp"
 #include "daemon/app/watchdog.hpp"
 #include "daemon/calibration/calibration.hpp"
+#include "daemon/metrics/endpoint.hpp"
+#include "daemon/metrics/temperatures.hpp"
+#include "daemon/metrics/text.hpp"
 #include "daemon/net/calibration_store.hpp"
 #include "daemon/net/light_schemes.hpp"
 #include "daemon/net/server.hpp"
 #include "daemon/pipeline/pipeline.hpp"
+#include "hal/base/clock.hpp"
 #include "hal/base/rt_thread.hpp"
 #include "hal/registry.hpp"
 #include "version.hpp"
@@ -98,6 +103,18 @@ void give_large_blocks_back() {
   (void)::mallopt(M_TRIM_THRESHOLD, kLarge);
 }
 
+/// Nothing when none is configured.
+std::optional<metrics::Endpoint> serve_metrics(asio::io_context& io,
+                                               const metrics::EndpointConfig& config,
+                                               const net::Server& server) {
+  if (config.port == 0) return std::nullopt;
+  spdlog::info("metrics on http://{}:{}/metrics", config.address, config.port);
+  return std::optional<metrics::Endpoint>(std::in_place, io, config, [&server] {
+    return metrics::text(server.overview(), metrics::temperatures(),
+                         base::system_clock().monotonic_ns());
+  });
+}
+
 }  // namespace
 
 void run_daemon(const Config& config) {
@@ -125,6 +142,7 @@ void run_daemon(const Config& config) {
     if (!net.realtime_refused.empty()) spdlog::warn("{}", net.realtime_refused);
   }
   net::Server server(io, std::move(net), pipeline, store);
+  auto metrics = serve_metrics(io, config.metrics, server);
   pipeline.start();
   for (const std::string& refused : pipeline.status().realtime) spdlog::warn("{}", refused);
 
@@ -136,6 +154,7 @@ void run_daemon(const Config& config) {
     notify_stopping();
     watchdog.stop();
     give_way.stop();
+    if (metrics) metrics->stop();
     server.stop();
   });
 

@@ -31,8 +31,10 @@ ROOMS = {
     "daemon/pipeline/depth": ["hal", "hal/base", "daemon/recon", "daemon/pipeline", "daemon/pipeline/untouched"],
     "daemon/pipeline": ["hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth"],
     "daemon/net": ["hal", "hal/base", "hal/image", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
+    # The text alone is made of what the network part gives; nothing includes it but the assembly.
+    "daemon/metrics": ["proto", "daemon/pipeline", "daemon/net"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/v4l2", "hal/ws2812"],
-    "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "hal/toml", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net"],
+    "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "hal/toml", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net", "daemon/metrics"],
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
