@@ -16,6 +16,9 @@ inline constexpr std::uint16_t kDefaultPort = 7377;
 /// Where the daemon listens, and clients connect to, unless told otherwise: this machine only.
 inline constexpr const char* kDefaultAddress = "127.0.0.1";
 
+/// What the daemon is announced as in multicast DNS (RFC 6763).
+inline constexpr const char* kServiceType = "_dtact._tcp";
+
 /// Longest program name in Hello, bytes.
 inline constexpr std::size_t kMaxProgramName = 64;
 

@@ -21,6 +21,7 @@ struct Config {
   std::string ring_scheme = "all";  ///< Which LEDs are lit at start (net/light_schemes.hpp).
   pipeline::PipelineConfig pipeline;
   net::NetConfig net;
+  bool announce = true;             ///< To the network, where it listens beyond loopback.
   metrics::EndpointConfig metrics;  ///< Port 0: none.
   std::string log_level = "info";   ///< "trace", "debug", "info", "warn", "error".
   /// Folder to run with as long as none that was uploaded is current; empty = none.

@@ -148,6 +148,7 @@ std::vector<Key> bind_keys(Config& c) {
       text("net.name", c.net.name, "a name in quotes"),
       milliseconds("net.hello_timeout_ms", c.net.hello_timeout, 100, 600000),
       milliseconds("net.dead_after_ms", c.net.dead_after, 1000, 600000),
+      boolean("net.announce", c.announce),
 
       choice("metrics.address", c.metrics.address, {"127.0.0.1", "::1"}),
       integer("metrics.port", c.metrics.port, 0, 65535, "(0 = no metrics)"),

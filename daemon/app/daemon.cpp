@@ -9,6 +9,7 @@
 
 #include <array>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
 #include <filesystem>
@@ -18,6 +19,7 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/announce/announcer.hpp"
 #include "daemon/app/give_way.hpp"
 #include "daemon/app/service.hpp"
 #include "daemon/app/watchdog.hpp"
@@ -115,6 +117,28 @@ std::optional<metrics::Endpoint> serve_metrics(asio::io_context& io,
   });
 }
 
+/// Nothing where only this machine can connect.
+std::optional<announce::Announcer> announce_service(asio::io_context& io, const Config& config,
+                                                    const net::Server& server) {
+  if (!config.announce || !announce::is_reachable(config.net.address)) return std::nullopt;
+  const auto ask = [&address = config.net.address, &server] {
+    const v1::Status status = server.overview().status;
+    announce::Facts facts{DTACT_VERSION, status.serial(), false, false};
+    for (const auto& endpoint : status.endpoints()) {
+      facts.tls = facts.tls || endpoint.tls();
+      facts.token = facts.token || endpoint.token();
+    }
+    announce::Service service;
+    service.name = status.name().empty() ? asio::ip::host_name() : status.name();
+    service.port = server.port();
+    service.txt = announce::txt_of(facts);
+    announce::restrict_to(address, service);
+    return service;
+  };
+  return std::optional<announce::Announcer>(
+      std::in_place, io, ask, [](const std::string& line) { spdlog::info("{}", line); });
+}
+
 }  // namespace
 
 void run_daemon(const Config& config) {
@@ -142,6 +166,7 @@ void run_daemon(const Config& config) {
     if (!net.realtime_refused.empty()) spdlog::warn("{}", net.realtime_refused);
   }
   net::Server server(io, std::move(net), pipeline, store);
+  auto announced = announce_service(io, config, server);
   auto metrics = serve_metrics(io, config.metrics, server);
   pipeline.start();
   for (const std::string& refused : pipeline.status().realtime) spdlog::warn("{}", refused);
@@ -154,6 +179,7 @@ void run_daemon(const Config& config) {
     notify_stopping();
     watchdog.stop();
     give_way.stop();
+    if (announced) announced->stop();
     if (metrics) metrics->stop();
     server.stop();
   });

@@ -33,8 +33,9 @@ ROOMS = {
     "daemon/net": ["hal", "hal/base", "hal/image", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
     # The text alone is made of what the network part gives; nothing includes it but the assembly.
     "daemon/metrics": ["proto", "daemon/pipeline", "daemon/net"],
+    "daemon/announce": ["proto"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/v4l2", "hal/ws2812"],
-    "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "hal/toml", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net", "daemon/metrics"],
+    "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "hal/toml", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/net", "daemon/metrics", "daemon/announce"],
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],

@@ -13,8 +13,9 @@ FITS = ["dtact::calibration::fit_chain", "dtact::calibration::find_contact",
 # of the project that it must not contain.
 RULES = {
     "dtactd": (["core"], [], FITS),
-    # OpenSSL it may: it speaks TLS to the daemon and makes certificates.
-    "dtactctl": ([], ["tomlplusplus", "hwy", "systemd", "gpiod", "camera", "spdlog"],
+    # OpenSSL it may: it speaks TLS to the daemon and makes certificates. libsystemd it may: it asks Avahi over
+    # D-Bus.
+    "dtactctl": ([], ["tomlplusplus", "hwy", "gpiod", "camera", "spdlog"],
                  FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
     "dtact-calibrate": (["core", "imgproc", "calib3d"],
                         ["systemd", "gpiod", "camera", "spdlog", "jpeg"], []),

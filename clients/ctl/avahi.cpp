@@ -1,0 +1,206 @@
+#include "clients/ctl/avahi.hpp"
+
+#include <fmt/format.h>
+#include <net/if.h>
+#include <systemd/sd-bus.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <tuple>
+
+#include "clients/common/exit_codes.hpp"
+#include "proto/defaults.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using std::chrono::steady_clock;
+
+// Avahi's D-Bus interface: avahi-daemon/org.freedesktop.Avahi.{Server,ServiceBrowser}.xml of its
+// source.
+constexpr const char* kAvahi = "org.freedesktop.Avahi";
+constexpr const char* kServer = "org.freedesktop.Avahi.Server";
+constexpr const char* kBrowser = "org.freedesktop.Avahi.ServiceBrowser";
+constexpr std::int32_t kAny = -1;  // interface or protocol
+
+struct Unref {
+  void operator()(sd_bus* bus) const noexcept { sd_bus_flush_close_unref(bus); }
+  void operator()(sd_bus_message* message) const noexcept { sd_bus_message_unref(message); }
+};
+using Bus = std::unique_ptr<sd_bus, Unref>;
+using Message = std::unique_ptr<sd_bus_message, Unref>;
+
+class Error {
+ public:
+  Error() = default;
+  ~Error() { sd_bus_error_free(&error_); }
+  Error(const Error&) = delete;
+  Error& operator=(const Error&) = delete;
+  sd_bus_error* get() { return &error_; }
+  [[nodiscard]] std::string text(int result) const {
+    return error_.message != nullptr ? error_.message : std::strerror(-result);
+  }
+
+ private:
+  sd_bus_error error_ = SD_BUS_ERROR_NULL;
+};
+
+[[noreturn]] void fail(const std::string& reason) {
+  throw cli::Failure(cli::kFailed,
+                     fmt::format("this machine has no avahi-daemon to ask ({}): apt-get install "
+                                 "avahi-daemon, or name the daemon's machine with --host",
+                                 reason));
+}
+
+/// One instance of the service, on one interface and protocol.
+struct Instance {
+  std::int32_t interface = kAny;
+  std::int32_t protocol = kAny;
+  std::string name;
+  std::string domain;
+};
+
+/// What the browser has told.
+struct Told {
+  std::vector<Instance> instances;
+  bool all = false;
+};
+
+int on_signal(sd_bus_message* message, void* told_, sd_bus_error*) {
+  auto& told = *static_cast<Told*>(told_);
+  if (sd_bus_message_is_signal(message, kBrowser, "ItemNew") > 0) {
+    Instance one;
+    const char* name = nullptr;
+    const char* type = nullptr;
+    const char* domain = nullptr;
+    if (sd_bus_message_read(message, "iisss", &one.interface, &one.protocol, &name, &type,
+                            &domain) >= 0) {
+      one.name = name;
+      one.domain = domain;
+      told.instances.push_back(std::move(one));
+    }
+  } else if (sd_bus_message_is_signal(message, kBrowser, "AllForNow") > 0 ||
+             sd_bus_message_is_signal(message, kBrowser, "Failure") > 0) {
+    told.all = true;
+  }
+  return 0;
+}
+
+/// Others on the network write it, and it goes to a terminal.
+std::string harmless(std::string text) {
+  std::ranges::replace_if(text, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return text;
+}
+
+Bus open_bus() {
+  sd_bus* opened = nullptr;
+  if (const int result = sd_bus_open_system(&opened); result < 0) {
+    fail(fmt::format("no system bus: {}", std::strerror(-result)));
+  }
+  return Bus(opened);
+}
+
+std::vector<Instance> list_instances(sd_bus* bus, std::chrono::milliseconds patience) {
+  Told told;
+  Error error;
+  // Before the browser, which tells at once what it knows.
+  int result =
+      sd_bus_match_signal(bus, nullptr, kAvahi, nullptr, kBrowser, nullptr, on_signal, &told);
+  if (result >= 0) {
+    result = sd_bus_call_method(bus, kAvahi, "/", kServer, "ServiceBrowserNew", error.get(),
+                                nullptr, "iissu", kAny, kAny, wire::kServiceType, "", 0U);
+  }
+  if (result < 0) fail(error.text(result));
+  const auto end = steady_clock::now() + patience;
+  while (!told.all && steady_clock::now() < end) {
+    if (sd_bus_process(bus, nullptr) > 0) continue;
+    const auto left =
+        std::chrono::duration_cast<std::chrono::microseconds>(end - steady_clock::now());
+    if (left.count() > 0) sd_bus_wait(bus, static_cast<std::uint64_t>(left.count()));
+  }
+  return std::move(told.instances);
+}
+
+std::vector<std::string> read_strings(sd_bus_message* message) {
+  std::vector<std::string> all;
+  if (sd_bus_message_enter_container(message, 'a', "ay") < 0) return all;
+  const void* bytes = nullptr;
+  std::size_t size = 0;
+  while (sd_bus_message_read_array(message, 'y', &bytes, &size) > 0) {
+    all.emplace_back(static_cast<const char*>(bytes), size);
+  }
+  return all;
+}
+
+/// Nothing when the daemon left meanwhile.
+std::optional<cli::FoundDaemon> resolve(sd_bus* bus, const Instance& instance) {
+  Error error;
+  sd_bus_message* answer = nullptr;
+  if (sd_bus_call_method(bus, kAvahi, "/", kServer, "ResolveService", error.get(), &answer,
+                         "iisssiu", instance.interface, instance.protocol, instance.name.c_str(),
+                         wire::kServiceType, instance.domain.c_str(), instance.protocol, 0U) < 0) {
+    return std::nullopt;
+  }
+  const Message message(answer);
+  std::int32_t interface = 0;
+  std::int32_t protocol = 0;
+  std::array<const char*, 5> texts{};  // name, type, domain, host, address
+  std::uint16_t port = 0;
+  if (sd_bus_message_read(answer, "iissssisq", &interface, &protocol, &texts[0], &texts[1],
+                          &texts[2], &texts[3], &protocol, &texts[4], &port) < 0) {
+    return std::nullopt;
+  }
+  cli::FoundDaemon found;
+  found.set_name(harmless(texts[0]));
+  found.set_host(harmless(texts[3]));
+  found.set_address(texts[4]);
+  found.set_port(port);
+  // A link-local address means something on one interface only.
+  std::array<char, IF_NAMESIZE> device{};
+  if (found.address().starts_with("fe80:") &&
+      ::if_indextoname(static_cast<unsigned>(interface), device.data()) != nullptr) {
+    found.mutable_address()->append("%").append(device.data());
+  }
+  read_txt(read_strings(answer), found);
+  return found;
+}
+
+}  // namespace
+
+void read_txt(const std::vector<std::string>& txt, cli::FoundDaemon& to) {
+  for (const auto& one : txt) {
+    const auto split = one.find('=');
+    if (split == std::string::npos) continue;
+    const std::string key = one.substr(0, split);
+    std::string value = one.substr(split + 1);
+    // Unlike names, these need not be UTF-8, and the network may say anything.
+    std::ranges::replace_if(value, [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
+    if (key == "version") to.set_version(value);
+    if (key == "serial") to.set_serial(value);
+    if (key == "tls") to.set_tls(value == "1");
+    if (key == "token") to.set_token(value == "1");
+  }
+}
+
+std::vector<cli::FoundDaemon> browse(std::chrono::milliseconds patience) {
+  const Bus bus = open_bus();
+  std::vector<cli::FoundDaemon> all;
+  for (const auto& instance : list_instances(bus.get(), patience)) {
+    if (auto found = resolve(bus.get(), instance)) all.push_back(*std::move(found));
+  }
+  // On several interfaces it may be the same.
+  const auto key = [](const cli::FoundDaemon& one) {
+    return std::tie(one.name(), one.address(), one.host());
+  };
+  const auto same = [&](const auto& a, const auto& b) {
+    return key(a) == key(b) && a.port() == b.port();
+  };
+  std::ranges::sort(all, [&](const auto& a, const auto& b) { return key(a) < key(b); });
+  all.erase(std::unique(all.begin(), all.end(), same), all.end());
+  return all;
+}
+
+}  // namespace dtact::ctl
