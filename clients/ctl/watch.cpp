@@ -4,15 +4,20 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/interruptible.hpp"
 #include "clients/common/json.hpp"
 #include "clients/cpp/names.hpp"
+#include "clients/ctl/depth_picture.hpp"
 #include "clients/ctl/online.hpp"
+#include "clients/ctl/screen.hpp"
 #include "clients/ctl/watch_meter.hpp"
 #include "hal/base/clock.hpp"
 
@@ -25,7 +30,21 @@ struct WatchOptions {
   double seconds = 0;  ///< 0: until Ctrl-C
   double min_fps = 0;
   bool summary = false;
+  bool draw = false;
 };
+
+/// Eyes need no more of each, and a thin link carries it.
+constexpr double kDrawnFps = 20;
+
+v1::Subscribe drawn_stream(client::Client& client) {
+  const double every = std::ceil(client.status().camera().fps() / kDrawnFps);
+  v1::Subscribe subscription;
+  subscription.set_depth(v1::DEPTH_DELTA_ZSTD);
+  subscription.set_every(static_cast<std::uint32_t>(std::max(1.0, every)));
+  if (client.has_feature("decimation")) subscription.set_decimation(4);
+  if (client.has_feature("units")) subscription.set_um_per_unit(5);
+  return subscription;
+}
 
 class Watch {
  public:
@@ -37,7 +56,8 @@ class Watch {
 
   void run() {
     const cli::Interruptible while_watching;
-    v1::Subscribe subscription = client::depth_stream();
+    if (options_.draw) screen_.emplace();
+    v1::Subscribe subscription = options_.draw ? drawn_stream(client_) : client::depth_stream();
     subscription.set_summary(options_.summary);
     client_.subscribe(subscription);
     start_ns_ = now();
@@ -80,6 +100,7 @@ class Watch {
       meter->add(frame, now_ns, client_.same_machine(), counts);
     }
     last_ = std::move(frame);
+    if (screen_ && last_.has_depth()) draw();
     if (last_.has_depth()) last_.mutable_depth()->clear_data();
   }
 
@@ -91,6 +112,22 @@ class Watch {
       show_status();
     }
     interval_.reset();
+  }
+
+  void draw() {
+    const Canvas canvas = screen_->canvas();
+    if (canvas.columns < kLeastColumns || canvas.rows < kLeastRows) {
+      return screen_->show({fmt::format("at least {} x {}, please", kLeastColumns, kLeastRows)});
+    }
+    // The line may need two of a narrow terminal.
+    const Canvas above{canvas.columns, canvas.rows - 1, canvas.palette};
+    std::vector<std::string> lines = picture_of(last_, full_scale_mm(all_.deepest_mm()), above);
+    const auto width = static_cast<std::size_t>(canvas.columns);
+    std::size_t end = below_.size() <= width ? below_.size() : below_.rfind("  ", width);
+    end = std::min(end, below_.size());
+    lines.push_back(below_.substr(0, std::min(end, width)));
+    lines.push_back(below_.substr(end, width));
+    screen_->show(lines);
   }
 
   void show_status() {
@@ -108,6 +145,11 @@ class Watch {
       context_.out << text << std::flush;
       return;
     }
+    if (screen_) {
+      below_ = text.substr(0, text.size() - 1);
+      if (interval_.frames() == 0) screen_->show({below_});
+      return;
+    }
     winsize size{};
     const bool known = ::ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1;
     const std::size_t width = known ? std::size_t{size.ws_col} - 1 : 120;
@@ -115,7 +157,11 @@ class Watch {
   }
 
   void finish() {
-    if (terminal_) context_.out << '\n';
+    if (screen_) {
+      screen_.reset();
+    } else if (terminal_) {
+      context_.out << '\n';
+    }
     const std::int64_t end_ns = now();
     const double fps = all_.rate_until(end_ns);
     const double seconds = static_cast<double>(end_ns - start_ns_) * 1e-9;
@@ -154,6 +200,8 @@ class Watch {
   WatchOptions options_;
   bool terminal_;
   client::Client client_;
+  std::optional<Screen> screen_;  ///< Drawn on, when asked for.
+  std::string below_;             ///< The line under the picture.
   std::int64_t start_ns_ = 0;
   WatchMeter interval_;
   WatchMeter all_;
@@ -171,13 +219,23 @@ void add_watch(CLI::App& app, Context& context) {
   const auto options = std::make_shared<WatchOptions>();
   command->add_option("--seconds", options->seconds, "End by itself after so long")
       ->check(CLI::PositiveNumber);
+  auto* min_fps =
+      command
+          ->add_option("--min-fps", options->min_fps,
+                       "Exit with 4 when depth came slower, counted from the first depth frame on")
+          ->check(CLI::NonNegativeNumber);
+  auto* summary = command->add_flag("--summary", options->summary,
+                                    "Fetch contact and health only, without the depth maps");
   command
-      ->add_option("--min-fps", options->min_fps,
-                   "Exit with 4 when depth came slower, counted from the first depth frame on")
-      ->check(CLI::NonNegativeNumber);
-  command->add_flag("--summary", options->summary,
-                    "Fetch contact and health only, without the depth maps");
-  command->callback([&context, options] { Watch(context, *options).run(); });
+      ->add_flag("--draw", options->draw,
+                 "Draw the depth in the terminal's colours, at most 20 times a second")
+      ->excludes(min_fps)
+      ->excludes(summary);
+  command->callback([&context, options] {
+    if (options->draw && context.json)
+      throw cli::Failure(cli::kUsage, "--draw and --json exclude each other");
+    Watch(context, *options).run();
+  });
 }
 
 }  // namespace dtact::ctl
