@@ -13,6 +13,7 @@ int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostre
   cli::add_global_options(app, context);
   add_status(app, context);
   add_watch(app, context);
+  add_bench(app, context);
   add_find(app, context);
   add_led(app, context);
   add_rezero(app, context);

@@ -10,6 +10,7 @@ using cli::Context;
 
 void add_status(CLI::App& app, Context& context);
 void add_watch(CLI::App& app, Context& context);
+void add_bench(CLI::App& app, Context& context);
 void add_find(CLI::App& app, Context& context);
 void add_led(CLI::App& app, Context& context);
 void add_rezero(CLI::App& app, Context& context);

@@ -93,6 +93,7 @@ TEST(Completion, KnowsEveryOptionOfEveryCommand) {
                   {"status"},
                   {"cameras"},
                   {"watch"},
+                  {"bench"},
                   {"find"},
                   {"led"},
                   {"rezero"},
