@@ -1,0 +1,87 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <atomic>
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/e2e/sensor.hpp"
+
+namespace dtact::e2e {
+
+/// What a process holds, as the kernel counts it.
+struct Held {
+  std::int64_t resident_kib = 0;  ///< VmRSS; with ONFAULT that is also what is locked.
+  std::int64_t peak_kib = 0;      ///< VmHWM, since forget_peak().
+  int descriptors = 0;
+};
+[[nodiscard]] Held held_by(pid_t pid);
+void forget_peak(pid_t pid);
+
+/// A client that does nothing but stream depth, on a thread of its own.
+class HonestClient {
+ public:
+  explicit HonestClient(client::Client client);
+  ~HonestClient();
+  HonestClient(const HonestClient&) = delete;
+  HonestClient& operator=(const HonestClient&) = delete;
+
+  /// Waits for so many frames more. False when the connection broke or none came for a minute.
+  [[nodiscard]] bool receives(std::size_t frames) const;
+  /// From capture to here of all frames since the last call, 99th percentile, milliseconds.
+  [[nodiscard]] double take_p99_ms();
+  /// Why the connection ended; empty while it lives.
+  [[nodiscard]] std::string broken() const;
+
+ private:
+  void run();
+
+  client::Client client_;
+  mutable std::mutex mutex_;
+  std::vector<std::int64_t> delays_ns_;
+  std::string broken_;
+  std::atomic<std::size_t> frames_{0};
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+/// A daemon on the simulated sensor with an honest client, before and after something hostile.
+class Besieged {
+ public:
+  Besieged();
+
+  [[nodiscard]] std::uint16_t port() const { return sensor_.daemon->port(); }
+  [[nodiscard]] const Sensor& sensor() const { return sensor_; }
+  [[nodiscard]] pid_t pid() const { return sensor_.daemon->pid(); }
+  [[nodiscard]] HonestClient& honest() { return honest_; }
+
+  /// As noted by begin().
+  [[nodiscard]] const Held& before() const { return before_; }
+
+  /// Notes how things are, from a second of peace.
+  void begin();
+  /// Asserts that nothing of the attack is left: memory, descriptors, the honest client, service
+  /// for newcomers. Prints what it cost; a loaded machine misses frames by itself, so that is no
+  /// failure.
+  void end(const std::string& attack);
+
+ private:
+  struct Missed {
+    std::uint64_t lost = 0;
+    std::uint64_t skipped = 0;
+    std::uint64_t replaced = 0;
+  };
+  [[nodiscard]] Missed missed() const;
+
+  Sensor sensor_;
+  HonestClient honest_;
+  Held before_;
+  Missed missed_before_;
+  double idle_p99_ms_ = 0;
+};
+
+}  // namespace dtact::e2e
