@@ -15,7 +15,9 @@ ROOMS = {
     "hal/luma": ["hal", "hal/base"],
     "hal/mjpeg": ["hal", "hal/base", "hal/luma"],
     "hal/null": ["hal", "hal/base"],
-    "hal/replay": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mjpeg"],
+    # A container for recordings: neither devices nor tactile sensing.
+    "hal/mcap": ["hal/base"],
+    "hal/replay": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mcap", "hal/mjpeg"],
     "hal/sim": ["hal", "hal/base", "hal/image", "hal/toml", "hal/luma", "hal/mjpeg"],
     "hal/live": ["hal", "hal/base", "hal/luma", "hal/mjpeg"],
     "hal/v4l2": ["hal", "hal/base", "hal/live"],
@@ -40,13 +42,16 @@ ROOMS = {
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
     "clients/common": ["proto", "clients/cpp"],
+    "clients/recording": ["hal/mcap", "proto", "clients/cpp"],
     "clients/calibrate/fit": ["hal/image", "daemon/recon", "daemon/calibration"],
     "clients/calibrate/lens": ["daemon/recon"],
     "clients/calibrate/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/lens"],
     "clients/calibrate/guided": ["hal/base", "hal/image", "hal/toml", "proto", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
-    "clients/calibrate": ["clients/common", "clients/cpp", "clients/calibrate/guided", "clients/calibrate/offline"],
+    # Depth of a recording, made by what makes it in the daemon.
+    "clients/calibrate/reprocess": ["hal", "hal/image", "hal/mcap", "hal/mjpeg", "proto", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/cpp", "clients/recording"],
+    "clients/calibrate": ["clients/common", "clients/cpp", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
     # A daemon's administration: neither a fit nor OpenCV.
-    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/common", "clients/cpp"],
+    "clients/ctl": ["hal/base", "hal/image", "hal/mcap", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
 }
 # Only standard headers and Highway may stand in angle brackets here.
 STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}

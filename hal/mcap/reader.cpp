@@ -1,0 +1,390 @@
+#include "hal/mcap/reader.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "hal/base/unique_fd.hpp"
+
+namespace dtact::mcap {
+namespace {
+
+/// Before a message's data.
+constexpr std::uint64_t kMessageHead = 22;
+
+/// Somewhere in the file messages lie: in a chunk, or one outside of any.
+struct Place {
+  std::uint64_t offset = 0;  ///< Of the record.
+  bool chunk = true;
+};
+
+Schema take_schema(Cursor fields) {
+  Schema schema;
+  schema.id = fields.take<std::uint16_t>();
+  schema.name = fields.string();
+  schema.encoding = fields.string();
+  schema.data = fields.string();
+  return schema;
+}
+
+Channel take_channel(Cursor fields) {
+  Channel channel;
+  channel.id = fields.take<std::uint16_t>();
+  channel.schema = fields.take<std::uint16_t>();
+  channel.topic = fields.string();
+  channel.message_encoding = fields.string();
+  channel.metadata = fields.map();
+  return channel;
+}
+
+Message take_message(Cursor fields) {
+  Message message;
+  message.channel = fields.take<std::uint16_t>();
+  message.sequence = fields.take<std::uint32_t>();
+  message.log_time = fields.take<std::uint64_t>();
+  message.publish_time = fields.take<std::uint64_t>();
+  message.data = fields.rest();
+  return message;
+}
+
+/// The bytes of a zstd stream, which must be `size`. Grows as they come: what is announced costs
+/// nothing.
+std::string decompress(std::string_view bytes, std::uint64_t size, const Cursor& where) {
+  constexpr std::size_t kStep = std::size_t{1} << 20U;
+  const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(),
+                                                                        ZSTD_freeDCtx);
+  std::string out;
+  ZSTD_inBuffer in{bytes.data(), bytes.size(), 0};
+  for (;;) {
+    const std::size_t begin = out.size();
+    out.resize(static_cast<std::size_t>(std::min<std::uint64_t>(size, begin + kStep)));
+    ZSTD_outBuffer buffer{out.data(), out.size(), begin};
+    const std::size_t left = ZSTD_decompressStream(context.get(), &buffer, &in);
+    if (ZSTD_isError(left) != 0U) {
+      where.fail(fmt::format("a chunk does not decompress: {}", ZSTD_getErrorName(left)));
+    }
+    const bool stuck = buffer.pos == begin && in.pos == in.size;
+    out.resize(buffer.pos);
+    if (in.pos == in.size && (left == 0 || stuck || out.size() == size)) break;
+    if (out.size() == size && buffer.pos == begin) break;
+  }
+  if (out.size() != size || in.pos != in.size) {
+    where.fail(fmt::format("a chunk announces {} bytes and holds {}", size, out.size()));
+  }
+  return out;
+}
+
+}  // namespace
+
+struct Reader::Impl {
+  explicit Impl(const std::filesystem::path& path)
+      : name(path.string()), fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    struct stat status{};
+    if (!fd || ::fstat(fd.get(), &status) != 0) {
+      throw std::system_error(errno, std::generic_category(), name);
+    }
+    size = status.st_size > 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
+  }
+
+  [[nodiscard]] std::string load(std::uint64_t offset, std::uint64_t length) const;
+  /// The fields of the record at `offset`, of this kind.
+  [[nodiscard]] std::string load_record(std::uint64_t offset, Op expected) const;
+  [[nodiscard]] Cursor cursor(std::string_view bytes, std::uint64_t offset) const {
+    return {bytes, name, offset};
+  }
+  [[noreturn]] void fail(std::uint64_t offset, std::string_view what) const {
+    cursor({}, offset).fail(what);
+  }
+
+  void open();
+  void read_summary(std::uint64_t footer);
+  void scan();
+  void add_scanned(Op op, std::uint64_t offset, std::uint64_t length);
+  void add(const Cursor::Record& record);
+  void add_attachment(std::uint64_t offset);
+  void add_metadata(std::uint64_t offset);
+  /// The records of the chunk at `offset`, decompressed and checked.
+  [[nodiscard]] std::string load_chunk(std::uint64_t offset) const;
+
+  std::string name;
+  base::UniqueFd fd;
+  std::uint64_t size = 0;
+  std::string damage;
+  std::map<std::uint16_t, Schema> schemas;
+  std::map<std::uint16_t, Channel> channels;
+  std::vector<Place> places;
+  std::vector<AttachmentPlace> attachments;
+  std::vector<Metadata> metadata;
+};
+
+std::string Reader::Impl::load(std::uint64_t offset, std::uint64_t length) const {
+  if (offset > size || length > size - offset) {
+    fail(offset, fmt::format("{} bytes are announced, the file ends at {}", length, size));
+  }
+  if (length > kMostRecord) {
+    fail(offset, fmt::format("a record of {} bytes, at most {} are read", length, kMostRecord));
+  }
+  std::string bytes(static_cast<std::size_t>(length), '\0');
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t got = ::pread(fd.get(), bytes.data() + done, bytes.size() - done,
+                                static_cast<off_t>(offset + done));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) throw std::system_error(errno, std::generic_category(), name);
+    if (got == 0) fail(offset + done, "the file became shorter");
+    done += static_cast<std::size_t>(got);
+  }
+  return bytes;
+}
+
+std::string Reader::Impl::load_record(std::uint64_t offset, Op expected) const {
+  const std::string head = load(offset, kRecordHead);
+  Cursor fields = cursor(head, offset);
+  if (static_cast<Op>(fields.take<std::uint8_t>()) != expected) {
+    fail(offset, "here should be a record of another kind");
+  }
+  return load(offset + kRecordHead, fields.take<std::uint64_t>());
+}
+
+void Reader::Impl::open() {
+  if (size < kMagic.size() || load(0, kMagic.size()) != kMagic) {
+    throw Error(name + ": is no MCAP file");
+  }
+  const std::uint64_t tail = kRecordHead + kFooterLength + kMagic.size();
+  std::string why = "ends without a summary";
+  if (size >= kMagic.size() + tail && load(size - kMagic.size(), kMagic.size()) == kMagic) {
+    try {
+      read_summary(size - tail);
+      if (!places.empty()) return;
+      why.clear();  // whole, but nothing in it is indexed
+    } catch (const Error& e) {
+      why = e.what();
+    }
+  }
+  schemas.clear();
+  channels.clear();
+  attachments.clear();
+  metadata.clear();
+  scan();
+  if (damage.empty()) damage = std::exchange(why, {});
+}
+
+void Reader::Impl::read_summary(std::uint64_t footer) {
+  const std::string fields = load_record(footer, Op::footer);
+  Cursor end = cursor(fields, footer + kRecordHead);
+  const auto begin = end.take<std::uint64_t>();
+  (void)end.take<std::uint64_t>();
+  const auto expected = end.take<std::uint32_t>();
+  if (begin == 0) return;
+  if (begin > footer) fail(footer, "the summary begins behind its end");
+  const std::uint64_t counted = footer + kRecordHead + 16;  // up to the CRC
+  const std::string summary = load(begin, counted - begin);
+  if (expected != 0 && crc32(summary) != expected) fail(begin, "the summary's CRC is wrong");
+  Cursor records =
+      cursor(std::string_view(summary).substr(0, summary.size() - kRecordHead - 16), begin);
+  while (records.left() > 0) {
+    const auto record = records.record();
+    Cursor entry = cursor(record.fields, record.offset + kRecordHead);
+    switch (record.op) {
+      case Op::chunk_index: {
+        (void)entry.bytes(16);
+        const auto offset = entry.take<std::uint64_t>();
+        if (offset >= begin) entry.fail("a chunk lies behind the data");
+        places.push_back({offset, true});
+        break;
+      }
+      case Op::attachment_index:
+        add_attachment(entry.take<std::uint64_t>());
+        break;
+      case Op::metadata_index:
+        add_metadata(entry.take<std::uint64_t>());
+        break;
+      default:
+        add(record);
+    }
+  }
+  std::ranges::sort(places, {}, &Place::offset);
+  std::ranges::sort(attachments, {}, &AttachmentPlace::offset);
+}
+
+void Reader::Impl::add(const Cursor::Record& record) {
+  const Cursor fields = cursor(record.fields, record.offset + kRecordHead);
+  if (record.op == Op::schema) {
+    Schema schema = take_schema(fields);
+    if (schema.id == 0) return;  // invalid, and to be ignored
+    const auto [known, added] = schemas.emplace(schema.id, schema);
+    if (!added && known->second != schema) fields.fail("two schemas have one id");
+  } else if (record.op == Op::channel) {
+    Channel channel = take_channel(fields);
+    const auto [known, added] = channels.emplace(channel.id, channel);
+    if (!added && known->second != channel) fields.fail("two channels have one id");
+  }
+}
+
+void Reader::Impl::add_attachment(std::uint64_t offset) {
+  const std::string record = load_record(offset, Op::attachment);
+  Cursor fields = cursor(record, offset + kRecordHead);
+  AttachmentPlace place;
+  place.log_time = fields.take<std::uint64_t>();
+  place.create_time = fields.take<std::uint64_t>();
+  place.name = fields.string();
+  place.media_type = fields.string();
+  place.offset = offset;
+  attachments.push_back(std::move(place));
+}
+
+void Reader::Impl::add_metadata(std::uint64_t offset) {
+  const std::string record = load_record(offset, Op::metadata);
+  Cursor fields = cursor(record, offset + kRecordHead);
+  std::string key = fields.string();
+  metadata.push_back({std::move(key), fields.map()});
+}
+
+/// Goes through the data. What is damaged or cut off ends it, and is told in `damage`.
+void Reader::Impl::scan() {
+  std::uint64_t offset = kMagic.size();
+  try {
+    for (;;) {
+      if (offset == size) fail(offset, "the file ends without a summary");
+      const std::string head = load(offset, kRecordHead);
+      Cursor fields = cursor(head, offset);
+      const auto op = static_cast<Op>(fields.take<std::uint8_t>());
+      const auto length = fields.take<std::uint64_t>();
+      if (op == Op::data_end || op == Op::footer) return;
+      if (length > size - offset - kRecordHead) {
+        fail(offset, fmt::format("the file ends at {} within a record", size));
+      }
+      add_scanned(op, offset, length);
+      offset += kRecordHead + length;
+    }
+  } catch (const Error& e) {
+    damage = e.what();
+  }
+}
+
+void Reader::Impl::add_scanned(Op op, std::uint64_t offset, std::uint64_t length) {
+  switch (op) {
+    case Op::schema:
+    case Op::channel: {
+      const std::string fields = load(offset + kRecordHead, length);
+      add({op, fields, offset});
+      break;
+    }
+    case Op::message:
+      if (length < kMessageHead) fail(offset, "a message without its head");
+      places.push_back({offset, false});
+      break;
+    case Op::chunk: {
+      const std::string records = load_chunk(offset);
+      Cursor inside = cursor(records, offset);
+      while (inside.left() > 0) add(inside.record());
+      places.push_back({offset, true});
+      break;
+    }
+    case Op::attachment:
+      add_attachment(offset);
+      break;
+    case Op::metadata:
+      add_metadata(offset);
+      break;
+    default:
+      // Indexes of what is read anyway, and what a later version of the format knows.
+      if (static_cast<int>(op) == 0) fail(offset, "no record begins with 0");
+  }
+}
+
+std::string Reader::Impl::load_chunk(std::uint64_t offset) const {
+  const std::string record = load_record(offset, Op::chunk);
+  Cursor fields = cursor(record, offset + kRecordHead);
+  (void)fields.bytes(16);  // first and last time
+  const auto length = fields.take<std::uint64_t>();
+  const auto expected = fields.take<std::uint32_t>();
+  const std::string compression = fields.string();
+  const std::string_view bytes = fields.bytes(fields.take<std::uint64_t>());
+  if (length > kMostRecord) {
+    fields.fail(fmt::format("a chunk of {} bytes, at most {} are read", length, kMostRecord));
+  }
+  std::string records;
+  if (compression == "zstd") {
+    records = decompress(bytes, length, fields);
+  } else if (compression.empty()) {
+    if (bytes.size() != length) fields.fail("a chunk's two sizes differ");
+    records = bytes;
+  } else {
+    fields.fail(
+        fmt::format("a chunk is compressed by \"{}\": only zstd is read; `mcap compress "
+                    "--compression zstd` makes it so",
+                    compression.substr(0, 16)));
+  }
+  if (expected != 0 && crc32(records) != expected) fields.fail("a chunk's CRC is wrong");
+  return records;
+}
+
+Reader::Reader(const std::filesystem::path& path) : impl_(std::make_unique<Impl>(path)) {
+  impl_->open();
+}
+
+Reader::~Reader() = default;
+
+const std::string& Reader::damage() const noexcept { return impl_->damage; }
+const std::map<std::uint16_t, Schema>& Reader::schemas() const noexcept { return impl_->schemas; }
+const std::map<std::uint16_t, Channel>& Reader::channels() const noexcept {
+  return impl_->channels;
+}
+const std::vector<AttachmentPlace>& Reader::attachments() const noexcept {
+  return impl_->attachments;
+}
+const std::vector<Metadata>& Reader::metadata() const noexcept { return impl_->metadata; }
+
+Attachment Reader::attachment(const AttachmentPlace& place) const {
+  const std::string record = impl_->load_record(place.offset, Op::attachment);
+  Cursor fields = impl_->cursor(record, place.offset + kRecordHead);
+  Attachment attachment;
+  attachment.log_time = fields.take<std::uint64_t>();
+  attachment.create_time = fields.take<std::uint64_t>();
+  attachment.name = fields.string();
+  attachment.media_type = fields.string();
+  attachment.data = fields.bytes(fields.take<std::uint64_t>());
+  const std::uint32_t counted = crc32(fields.taken());
+  if (const auto expected = fields.take<std::uint32_t>(); expected != 0 && counted != expected) {
+    fields.fail("an attachment's CRC is wrong");
+  }
+  return attachment;
+}
+
+void Reader::read(const std::set<std::string>& topics,
+                  const std::function<bool(const Channel&, const Message&)>& take) const {
+  // False: enough.
+  const auto offer = [&](const Cursor::Record& record) {
+    const Cursor fields = impl_->cursor(record.fields, record.offset + kRecordHead);
+    const Message message = take_message(fields);
+    const auto channel = impl_->channels.find(message.channel);
+    if (channel == impl_->channels.end()) {
+      fields.fail(
+          fmt::format("a message of channel {}, which is not in the file", message.channel));
+    }
+    return !topics.contains(channel->second.topic) || take(channel->second, message);
+  };
+  for (const Place& place : impl_->places) {
+    if (place.chunk) {
+      const std::string records = impl_->load_chunk(place.offset);
+      Cursor inside = impl_->cursor(records, place.offset);
+      while (inside.left() > 0) {
+        const auto record = inside.record();
+        if (record.op == Op::message && !offer(record)) return;
+      }
+    } else {
+      const std::string fields = impl_->load_record(place.offset, Op::message);
+      if (!offer({Op::message, fields, place.offset})) return;
+    }
+  }
+}
+
+}  // namespace dtact::mcap

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "hal/mcap/bytes.hpp"
+#include "hal/mcap/format.hpp"
+
+namespace dtact::mcap {
+
+/// Where an attachment lies; `name` and times as in Attachment.
+struct AttachmentPlace {
+  std::uint64_t log_time = 0;
+  std::uint64_t create_time = 0;
+  std::string name;
+  std::string media_type;
+  std::uint64_t offset = 0;  ///< Of the record.
+};
+
+/// Reads an MCAP file, of our writer or another's: by its summary or, where there is none or a
+/// damaged one, by going through all of it up to the first damage, which is how a file of a killed
+/// writer is read. Holds one chunk in memory. One thread.
+class Reader {
+ public:
+  /// Throws Error when the file is no MCAP, std::system_error when it cannot be read.
+  explicit Reader(const std::filesystem::path& path);
+  ~Reader();
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
+
+  /// Empty when the file is whole; else where it ends or is damaged: what is read is up to there.
+  [[nodiscard]] const std::string& damage() const noexcept;
+  [[nodiscard]] const std::map<std::uint16_t, Schema>& schemas() const noexcept;
+  [[nodiscard]] const std::map<std::uint16_t, Channel>& channels() const noexcept;
+  /// In the order of the file.
+  [[nodiscard]] const std::vector<AttachmentPlace>& attachments() const noexcept;
+  [[nodiscard]] const std::vector<Metadata>& metadata() const noexcept;
+
+  /// Throws Error.
+  [[nodiscard]] Attachment attachment(const AttachmentPlace& place) const;
+
+  /// All messages of these topics in the order of the file (each writer's own; nearly that of their
+  /// times), until `take` returns false. What a message views is valid during the call. Throws
+  /// Error when a chunk is damaged, after the messages before it.
+  void read(const std::set<std::string>& topics,
+            const std::function<bool(const Channel&, const Message&)>& take) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dtact::mcap

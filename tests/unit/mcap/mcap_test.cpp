@@ -1,0 +1,314 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "hal/base/atomic_file.hpp"
+#include "hal/mcap/reader.hpp"
+#include "hal/mcap/writer.hpp"
+
+namespace dtact::mcap {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+using testing::ThrowsMessage;
+
+// Both were made by a few lines of Python (struct, zlib) from the specification, not by this code.
+
+/// A schema, a channel, an attachment, a metadata record and their summary; no message.
+constexpr const char* kWritten =
+    "894d434150300d0a010c0000000000000000000000040000007465737403190000000000000001000100000053"
+    "0800000070726f746f62756602000000000104240000000000000001000100020000002f740800000070726f74"
+    "6f6275660a000000010000006b0100000076093500000000000000070000000000000005000000000000000500"
+    "0000612e7478740a000000746578742f706c61696e02000000000000006869320a8c4d0c130000000000000001"
+    "0000006d0a000000010000007801000000790f040000000000000016fdaae80319000000000000000100010000"
+    "00530800000070726f746f62756602000000000104240000000000000001000100020000002f74080000007072"
+    "6f746f6275660a000000010000006b01000000760a3f000000000000006c000000000000003e00000000000000"
+    "07000000000000000500000000000000020000000000000005000000612e7478740a000000746578742f706c61"
+    "696e0d1500000000000000aa000000000000001c00000000000000010000006d0b2e0000000000000000000000"
+    "0000000001000100000001000000010000000000000000000000000000000000000000000000000000000e1100"
+    "00000000000003d30000000000000022000000000000000e110000000000000004f5000000000000002d000000"
+    "000000000e11000000000000000a220100000000000048000000000000000e11000000000000000d6a01000000"
+    "0000001e000000000000000e11000000000000000b880100000000000037000000000000000214000000000000"
+    "00d300000000000000bf01000000000000886d56cf894d434150300d0a";
+/// What this writer never makes: no summary, a chunk of zstd (one raw block) that holds its
+/// channel, one without compression and CRC, a message outside of chunks, a record of a later
+/// version.
+constexpr const char* kScanned =
+    "894d434150300d0a0109000000000000000000000001000000780698000000000000000a000000000000001400"
+    "0000000000006300000000000000197da7df040000007a7374646c0000000000000028b52ffd20631903000416"
+    "0000000000000000000000020000002f74040000006a736f6e000000000519000000000000000000010000000a"
+    "0000000000000009000000000000006f6e65051900000000000000000002000000140000000000000013000000"
+    "0000000074776f064c000000000000001e000000000000001e0000000000000024000000000000000000000000"
+    "0000002400000000000000051b000000000000000000030000001e000000000000001d00000000000000746872"
+    "6565051a0000000000000000000400000028000000000000002700000000000000666f75727f05000000000000"
+    "006c617465720f0400000000000000000000000214000000000000000000000000000000000000000000000000"
+    "000000894d434150300d0a";
+
+std::string from_hex(std::string_view hex) {
+  std::string bytes;
+  for (std::size_t i = 0; i < hex.size(); i += 2) {
+    unsigned value = 0;
+    std::from_chars(hex.data() + i, hex.data() + i + 2, value, 16);
+    bytes += static_cast<char>(value);
+  }
+  return bytes;
+}
+
+std::string to_hex(std::string_view bytes) {
+  constexpr const char* kDigits = "0123456789abcdef";
+  std::string hex;
+  for (const char c : bytes) {
+    const auto byte = static_cast<unsigned char>(c);
+    hex += kDigits[byte / 16];
+    hex += kDigits[byte % 16];
+  }
+  return hex;
+}
+
+/// Takes everything up to `room` bytes.
+class MemorySink final : public Sink {
+ public:
+  void append(std::string_view more) override {
+    if (bytes.size() + more.size() > room) {
+      throw std::system_error(ENOSPC, std::generic_category(), "full");
+    }
+    bytes += more;
+  }
+  void sync() override { synced = bytes.size(); }
+
+  std::string bytes;
+  std::size_t synced = 0;
+  std::size_t room = std::string::npos;
+};
+
+class Mcap : public testing::Test {
+ protected:
+  Mcap() { fs::create_directories(folder_); }
+
+ public:
+  ~Mcap() override { fs::remove_all(folder_); }
+
+ protected:
+  [[nodiscard]] fs::path file() const { return folder_ / "a.mcap"; }
+  void write(const std::string& bytes) const { std::ofstream(file(), std::ios::binary) << bytes; }
+  /// All messages of "/t" as (sequence, log time, data).
+  using Read = std::vector<std::tuple<std::uint32_t, std::uint64_t, std::string>>;
+  static Read read(const Reader& reader) {
+    Read all;
+    reader.read({"/t"}, [&](const Channel& channel, const Message& message) {
+      EXPECT_EQ(channel.topic, "/t");
+      all.emplace_back(message.sequence, message.log_time, message.data);
+      return true;
+    });
+    return all;
+  }
+  /// Three chunks of ten messages of a hundred bytes each, on two topics in turn.
+  static void add_messages(Writer& writer) {
+    const auto schema = writer.add_schema("S", "protobuf", "descriptor");
+    const auto t = writer.add_channel(schema, "/t", "protobuf");
+    const auto u = writer.add_channel(0, "/u", "json");
+    for (std::uint32_t i = 0; i < 30; ++i) {
+      writer.add(Message{i % 2 == 0 ? t : u, i, 1000 + i, 900 + i, std::string(100, 'a')});
+      if (i % 10 == 9) writer.flush();
+    }
+  }
+
+ private:
+  fs::path folder_ =
+      fs::path(testing::TempDir()) /
+      (std::string("dtact_mcap_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+TEST_F(Mcap, WritesTheFormat) {
+  MemorySink sink;
+  Writer writer(sink, {.library = "test"});
+  const auto schema = writer.add_schema("S", "protobuf", std::string("\0\1", 2));
+  EXPECT_EQ(schema, 1);
+  EXPECT_EQ(writer.add_channel(schema, "/t", "protobuf", {{"k", "v"}}), 1);
+  writer.add(Attachment{7, 5, "a.txt", "text/plain", "hi"});
+  writer.add(Metadata{"m", {{"x", "y"}}});
+  writer.finish();
+  EXPECT_EQ(to_hex(sink.bytes), kWritten);
+  EXPECT_EQ(writer.bytes(), 614U);
+  EXPECT_EQ(sink.synced, 614U);
+}
+
+TEST_F(Mcap, ReadsTheFormat) {
+  write(from_hex(kWritten));
+  const Reader reader(file());
+  EXPECT_EQ(reader.damage(), "");
+  EXPECT_EQ(reader.schemas().at(1), (Schema{1, "S", "protobuf", std::string("\0\1", 2)}));
+  EXPECT_EQ(reader.channels().at(1), (Channel{1, 1, "/t", "protobuf", {{"k", "v"}}}));
+  ASSERT_THAT(reader.attachments(), SizeIs(1));
+  const Attachment attachment = reader.attachment(reader.attachments()[0]);
+  EXPECT_EQ(attachment.name, "a.txt");
+  EXPECT_EQ(attachment.media_type, "text/plain");
+  EXPECT_EQ(attachment.log_time, 7U);
+  EXPECT_EQ(attachment.create_time, 5U);
+  EXPECT_EQ(attachment.data, "hi");
+  ASSERT_THAT(reader.metadata(), SizeIs(1));
+  EXPECT_EQ(reader.metadata()[0].values.at("x"), "y");
+  EXPECT_THAT(read(reader), IsEmpty());
+}
+
+TEST_F(Mcap, ReadsWhatOthersWrite) {
+  write(from_hex(kScanned));
+  const Reader reader(file());
+  EXPECT_EQ(reader.damage(), "");
+  EXPECT_THAT(read(reader), ElementsAre(std::tuple(1, 10, "one"), std::tuple(2, 20, "two"),
+                                        std::tuple(3, 30, "three"), std::tuple(4, 40, "four")));
+}
+
+TEST_F(Mcap, ReadsBackWhatItWrote) {
+  MemorySink sink;
+  Writer writer(sink);
+  add_messages(writer);
+  writer.finish();
+  // A hundred equal bytes a message: compressed indeed.
+  EXPECT_LT(sink.bytes.size(), 2500U);
+  write(sink.bytes);
+  const Reader reader(file());
+  EXPECT_EQ(reader.damage(), "");
+  const Read messages = read(reader);
+  ASSERT_THAT(messages, SizeIs(15));
+  EXPECT_EQ(messages[14], std::tuple(28U, 1028U, std::string(100, 'a')));
+  int taken = 0;
+  reader.read({"/t", "/u"}, [&](const Channel&, const Message&) { return ++taken < 7; });
+  EXPECT_EQ(taken, 7);
+}
+
+TEST_F(Mcap, WritesAChunkWhenItIsFull) {
+  MemorySink sink;
+  Writer writer(sink, {.chunk_bytes = 1000});
+  const auto channel = writer.add_channel(0, "/t", "json");
+  const auto empty = writer.bytes();
+  for (std::uint32_t i = 0; i < 7; ++i)
+    writer.add(Message{channel, i, i, i, std::string(100, 'x')});
+  EXPECT_EQ(writer.bytes(), empty);
+  EXPECT_EQ(writer.open_bytes(), 7 * 131U);
+  writer.add(Message{channel, 7, 7, 7, std::string(100, 'x')});
+  EXPECT_GT(writer.bytes(), empty);
+  EXPECT_EQ(writer.open_bytes(), 0U);
+  EXPECT_EQ(sink.synced, sink.bytes.size());
+  EXPECT_THROW(writer.add(Message{9, 0, 0, 0, ""}), std::invalid_argument);
+}
+
+// The file of a killed writer, cut at every byte: every whole chunk is read.
+TEST_F(Mcap, ReadsACutFileUpToItsLastWholeChunk) {
+  MemorySink sink;
+  Writer writer(sink);
+  add_messages(writer);
+  const std::size_t data = sink.bytes.size();
+  writer.finish();
+  std::size_t before = 0;
+  for (std::size_t length = kMagic.size(); length < sink.bytes.size(); ++length) {
+    write(sink.bytes.substr(0, length));
+    const Reader reader(file());
+    EXPECT_NE(reader.damage(), "") << length;
+    const std::size_t messages = read(reader).size();
+    EXPECT_TRUE(messages == before || messages == before + 5) << length;
+    before = messages;
+    if (length == data) {
+      EXPECT_EQ(messages, 15U);
+      EXPECT_THAT(reader.damage(),
+                  HasSubstr("byte " + std::to_string(data) + ": the file ends without a summary"));
+    }
+  }
+}
+
+TEST_F(Mcap, AFullDiskLosesTheOpenChunkOnly) {
+  MemorySink sink;
+  Writer writer(sink);
+  add_messages(writer);
+  const auto channel = writer.add_channel(0, "/v", "json");
+  sink.room = sink.bytes.size() + 1000;
+  std::string noise;
+  for (unsigned i = 0; i < 5000; ++i) noise += static_cast<char>(i * i * 2654435761U >> 13U);
+  writer.add(Message{channel, 0, 2000, 2000, noise});
+  EXPECT_THROW(writer.flush(), std::system_error);
+  EXPECT_EQ(writer.open_bytes(), 0U);
+  writer.finish();  // fits into what is left
+  write(sink.bytes);
+  const Reader reader(file());
+  EXPECT_EQ(reader.damage(), "");
+  EXPECT_THAT(read(reader), SizeIs(15));
+}
+
+TEST_F(Mcap, SaysWhereAFileIsDamaged) {
+  const auto failure = [this](std::string bytes) {
+    write(bytes);
+    return [this] { (void)read(Reader(file())); };
+  };
+  EXPECT_THAT(failure("\x89PNG"), ThrowsMessage<Error>(HasSubstr("is no MCAP file")));
+  EXPECT_THAT(failure(""), ThrowsMessage<Error>(HasSubstr("is no MCAP file")));
+  MemorySink sink;
+  Writer writer(sink);
+  const auto channel = writer.add_channel(0, "/t", "json");
+  const auto begin = writer.bytes();
+  writer.add(Message{channel, 1, 1, 1, "one"});
+  writer.finish();
+  // The last byte of the compressed records.
+  std::string flipped = sink.bytes;
+  const std::size_t index = flipped.find(std::string("\x07\x16\0\0\0\0\0\0\0", 9));
+  ASSERT_NE(index, std::string::npos);
+  flipped[index - 1] = static_cast<char>(flipped[index - 1] ^ 1);
+  EXPECT_THAT(failure(flipped),
+              ThrowsMessage<Error>(AllOf(HasSubstr("a.mcap: byte "), HasSubstr("chunk"))));
+  // Its announced size.
+  std::string huge = sink.bytes;
+  huge[begin + kRecordHead + 16 + 7] = '\x7f';
+  EXPECT_THAT(failure(huge), ThrowsMessage<Error>(HasSubstr("at most 268435456 are read")));
+  // A byte of the summary: the data are gone through instead.
+  std::string summary = sink.bytes;
+  summary[summary.size() - 60] = static_cast<char>(summary[summary.size() - 60] ^ 1);
+  write(summary);
+  const Reader reader(file());
+  EXPECT_THAT(reader.damage(), HasSubstr("the summary's CRC is wrong"));
+  EXPECT_THAT(read(reader), SizeIs(1));
+  EXPECT_THROW(Reader(file().string() + "x"), std::system_error);
+}
+
+TEST_F(Mcap, RefusesLz4BySayingWhatToDo) {
+  std::string bytes = from_hex(kScanned);
+  bytes.replace(bytes.find("zstd"), 4, "lz4x");
+  write(bytes);
+  EXPECT_THAT(Reader(file()).damage(), HasSubstr("only zstd is read"));
+}
+
+TEST_F(Mcap, AFileIsNotReplacedUnasked) {
+  write("mine");
+  EXPECT_THROW(FileSink(file(), false), std::system_error);
+  EXPECT_EQ(base::read_file(file()), "mine");
+  {
+    FileSink sink(file(), true);
+    sink.append("yours");
+    sink.sync();
+  }
+  EXPECT_EQ(base::read_file(file()), "yours");
+}
+
+// /dev/full refuses every byte.
+TEST_F(Mcap, NamesTheFileThatTakesNoMore) {
+  FileSink sink("/dev/full", true);
+  EXPECT_THAT([&] { sink.append("x"); },
+              ThrowsMessage<std::system_error>(
+                  AllOf(HasSubstr("/dev/full"), HasSubstr("No space left on device"))));
+}
+
+}  // namespace
+}  // namespace dtact::mcap
