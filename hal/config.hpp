@@ -18,7 +18,7 @@ struct SimConfig {
 
 /// Recorded frames.
 struct ReplayConfig {
-  std::filesystem::path folder;  ///< PNG or JPEG frames, played in the order of their names.
+  std::filesystem::path folder;  ///< PNG or JPEG frames in the order of their names; or .mcap.
   bool loop = true;
   bool paced = true;  ///< false: as fast as they are asked for.
 };

@@ -22,12 +22,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kTimestamps = "timestamps.csv";
 constexpr int kMostPixels = 16384;  // of a side: what luma buffers and the decoder take
-/// Between the first and the last frame: a year. Longer ones are another unit, and would overflow.
-constexpr std::int64_t kLongestNs = std::int64_t{366} * 24 * 3600 * 1'000'000'000;
-
-[[noreturn]] void fail(const fs::path& where, const std::string& what) {
-  throw std::runtime_error(fmt::format("{}: {}", where.string(), what));
-}
 
 std::string lower_extension(const fs::path& file) {
   std::string extension = file.extension().string();
@@ -48,7 +42,7 @@ std::vector<fs::path> frames_in(const fs::path& folder) {
   }
   if (error) {
     fail(folder, fmt::format("cannot read the recording ({}): set camera.replay.folder to a folder "
-                             "of PNG or JPEG frames",
+                             "of PNG or JPEG frames, or to an .mcap file",
                              error.message()));
   }
   if (png.empty() && jpeg.empty()) {
@@ -86,18 +80,6 @@ void add_png(Recording& recording, const fs::path& file) {
     std::copy_n(image.pixels.data() + std::ptrdiff_t{y} * image.width, image.width, buffer.row(y));
   }
   recording.images.push_back(std::move(buffer));
-}
-
-void add_jpeg(Recording& recording, const fs::path& file, mjpeg::GreyDecoder& decoder) {
-  std::string payload = base::read_file(file);
-  mjpeg::Size size;
-  const auto status = decoder.read_size(
-      {reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size()}, size);
-  if (status != mjpeg::Status::ok) {
-    fail(file, fmt::format("{}: remove the file", mjpeg::describe(status)));
-  }
-  check_size(recording, size.width, size.height, file);
-  recording.payloads.push_back(std::move(payload));
 }
 
 std::map<std::string, std::int64_t> read_timestamps(const fs::path& file) {
@@ -149,7 +131,25 @@ std::vector<std::int64_t> offsets_of(const std::vector<fs::path>& files, const f
 
 }  // namespace
 
-Recording load_recording(const fs::path& folder) {
+void fail(const fs::path& where, const std::string& what) {
+  throw std::runtime_error(fmt::format("{}: {}", where.string(), what));
+}
+
+void add_jpeg(Recording& recording, std::string payload, mjpeg::GreyDecoder& decoder,
+              const fs::path& name) {
+  mjpeg::Size size;
+  const auto status = decoder.read_size(
+      {reinterpret_cast<const std::uint8_t*>(payload.data()), payload.size()}, size);
+  if (status != mjpeg::Status::ok) {
+    fail(name, fmt::format("{}: remove it", mjpeg::describe(status)));
+  }
+  check_size(recording, size.width, size.height, name);
+  recording.payloads.push_back(std::move(payload));
+}
+
+Recording load_recording(const fs::path& path) {
+  if (lower_extension(path) == ".mcap" && !fs::is_directory(path)) return load_mcap(path);
+  const fs::path& folder = path;
   const std::vector<fs::path> files = frames_in(folder);
   Recording recording;
   mjpeg::GreyDecoder decoder(1, 1);  // for headers only
@@ -160,7 +160,7 @@ Recording load_recording(const fs::path& folder) {
       const luma::LumaBuffer& added = recording.images.back();
       bytes += static_cast<std::size_t>(added.stride()) * static_cast<std::size_t>(added.height());
     } else {
-      add_jpeg(recording, file, decoder);
+      add_jpeg(recording, base::read_file(file), decoder, file);
       bytes += recording.payloads.back().size();
     }
     if (bytes > kMostBytes) {

@@ -7,13 +7,15 @@
 #include <vector>
 
 #include "hal/luma/luma_buffer.hpp"
+#include "hal/mjpeg/grey_decoder.hpp"
 
 namespace dtact::hal::replay {
 
 /// A folder of frames in memory: *.png, decoded, or *.jpg and *.jpeg, as they are; never both. They
 /// are in the order of their names. `timestamps.csv` beside them, if there, says when each was
 /// taken: lines of "file name,nanoseconds", rising, one for each frame, after an optional first
-/// line that names the columns.
+/// line that names the columns. Or the camera's JPEGs of an MCAP file (dtactctl record): the
+/// messages of its one channel of foxglove.CompressedImage, with their log times, in their order.
 struct Recording {
   int width = 0;                         ///< Pixels, of every frame.
   int height = 0;                        ///< Pixels.
@@ -31,8 +33,22 @@ struct Recording {
 /// Recordings that need more memory than this are refused (PNG: about 2,100 frames of 800×600).
 inline constexpr std::size_t kMostBytes = std::size_t{1} << 30U;
 
-/// Reads the whole folder. Throws std::runtime_error naming the file (and line) and the remedy: no
-/// frames, both kinds, different sizes, an unreadable file, too much memory, bad timestamps.
-[[nodiscard]] Recording load_recording(const std::filesystem::path& folder);
+/// Reads the whole folder, or a file whose name ends in .mcap; of one that is not whole, what is
+/// there. Throws std::runtime_error naming the file (and line) and the remedy: no frames, both
+/// kinds, different sizes, an unreadable file, too much memory, bad timestamps.
+[[nodiscard]] Recording load_recording(const std::filesystem::path& path);
+
+/// Between the first and the last frame: a year. Longer ones are another unit, and would overflow.
+inline constexpr std::int64_t kLongestNs = std::int64_t{366} * 24 * 3600 * 1'000'000'000;
+
+// The parts that both kinds of recordings share.
+
+/// Throws std::runtime_error naming `where`.
+[[noreturn]] void fail(const std::filesystem::path& where, const std::string& what);
+/// Appends a JPEG, whose header must be whole and have the size of those before it.
+void add_jpeg(Recording& recording, std::string payload, mjpeg::GreyDecoder& decoder,
+              const std::filesystem::path& name);
+/// The file of that name, whatever it ends in.
+[[nodiscard]] Recording load_mcap(const std::filesystem::path& file);
 
 }  // namespace dtact::hal::replay

@@ -1,11 +1,12 @@
-// A recording: timestamps.csv, then its frames, with a line "--" between each. What is accepted
-// plays to its end.
+// A recording: timestamps.csv, then its frames, with a line "--" between each; or an MCAP file.
+// What is accepted plays to its end.
 #include <unistd.h>
 
 #include <chrono>
 #include <fstream>
 #include <stdexcept>
 
+#include "hal/mcap/format.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "tests/fakes/fake_clock.hpp"
 #include "tests/fuzz/fuzz.hpp"
@@ -33,8 +34,14 @@ class Folder {
     fs::remove_all(path_, ignored);
   }
 
-  void lay_out(const std::vector<std::string>& parts) const {
+  /// Returns what camera.replay.folder is to be.
+  [[nodiscard]] fs::path lay_out(std::string_view input) const {
     for (const auto& entry : fs::directory_iterator(path_)) fs::remove(entry);
+    if (input.starts_with(mcap::kMagic)) {
+      write("a.mcap", input);
+      return path_ / "a.mcap";
+    }
+    const auto parts = split(input, "\n--\n", 1 + kMostFrames);
     if (!parts.front().empty()) write("timestamps.csv", parts.front());
     for (std::size_t i = 1; i < parts.size(); ++i) {
       if (parts[i].starts_with("\x89PNG")) {
@@ -43,11 +50,11 @@ class Folder {
         write(fmt::format("{}.jpg", i), parts[i]);
       }
     }
+    return path_;
   }
-  [[nodiscard]] const fs::path& path() const { return path_; }
 
  private:
-  void write(const std::string& name, const std::string& content) const {
+  void write(const std::string& name, std::string_view content) const {
     std::ofstream(path_ / name, std::ios::binary) << content;
   }
 
@@ -67,7 +74,8 @@ void play(const hal::CameraConfig& config) {
     const auto status = camera.grab(frame, std::chrono::hours(24 * 365));
     // A gap of more than a year is waited for in vain.
     if (status == hal::GrabStatus::ended || status == hal::GrabStatus::timeout) break;
-    require(++grabs <= kMostFrames, "a recording ends");
+    // A message of an MCAP file has 31 bytes at least.
+    require(++grabs <= 65536 / 31, "a recording ends");
     if (status != hal::GrabStatus::ok) continue;
     require(frame.luma().width == info.width && frame.luma().height == info.height,
             "every frame has the camera's size");
@@ -81,10 +89,8 @@ void play(const hal::CameraConfig& config) {
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace dtact;
   static const fuzz::Folder folder;
-  folder.lay_out(
-      fuzz::split({reinterpret_cast<const char*>(data), size}, "\n--\n", 1 + fuzz::kMostFrames));
   hal::CameraConfig config;
-  config.replay.folder = folder.path();
+  config.replay.folder = folder.lay_out({reinterpret_cast<const char*>(data), size});
   config.replay.loop = false;
   for (const bool paced : {false, true}) {
     config.replay.paced = paced;

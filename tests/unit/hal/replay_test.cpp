@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
+#include "hal/mcap/writer.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "tests/fakes/fake_clock.hpp"
 #include "tests/fakes/jpeg_maker.hpp"
@@ -253,6 +255,91 @@ TEST_F(ReplayTest, NeedsARate) {
   png("a.png", 10);
   config.fps = 0;
   EXPECT_NE(failure().find("camera.fps"), std::string::npos) << failure();
+}
+
+/// A message of foxglove.CompressedImage: format (3), data (2), and a time stamp (1) in between.
+std::string compressed_image(const std::string& format, const std::string& data) {
+  std::string bytes = "\x1a";
+  bytes += static_cast<char>(format.size());
+  bytes += format + std::string("\x0a\x02\x08\x07\x12", 5);
+  bytes += static_cast<char>(data.size() % 128 | 128);
+  bytes += static_cast<char>(data.size() / 128);
+  return bytes + data;
+}
+
+class ReplayMcap : public ReplayTest {
+ protected:
+  ReplayMcap() { config.replay.folder = folder / "press.MCAP"; }
+  struct Picture {
+    std::uint64_t ms;
+    std::string bytes;
+  };
+  /// A file of one camera's pictures; `topics` cameras, all of them on the last one.
+  void record(const std::vector<Picture>& pictures, std::size_t topics = 1) {
+    mcap::FileSink sink(config.replay.folder, true);
+    mcap::Writer writer(sink);
+    const auto other = writer.add_channel(0, "/other", "json");
+    const auto schema = writer.add_schema("foxglove.CompressedImage", "protobuf", "");
+    std::uint16_t channel = 0;
+    for (std::size_t i = 0; i < topics; ++i) {
+      channel = writer.add_channel(schema, "/camera" + std::to_string(i), "protobuf");
+    }
+    for (const Picture& picture : pictures) {
+      const std::uint64_t time = 1'700'000'000'000'000'000 + picture.ms * 1'000'000;
+      writer.add(mcap::Message{other, 0, time, time, "{}"});
+      if (channel != 0) writer.add(mcap::Message{channel, 0, time, time, picture.bytes});
+    }
+    writer.finish();
+  }
+  std::string picture(std::uint8_t grey, int width = 100) {
+    return compressed_image("jpeg", jpeg_bytes(grey, width));
+  }
+};
+
+TEST_F(ReplayMcap, PlaysTheCamerasJpegsAtTheirTimes) {
+  record({{0, picture(10)}, {10, picture(20)}, {40, picture(30)}});
+  ReplayCamera& camera = open();
+  EXPECT_EQ(camera.info().pixel_format, "MJPEG");
+  EXPECT_EQ(camera.info().width, 100);
+  EXPECT_DOUBLE_EQ(camera.info().fps, 50);
+  camera.start();
+  const std::vector<std::pair<std::int64_t, int>> expected = {
+      {0, 10}, {10, 20}, {40, 30}, {60, 10}, {70, 20}};
+  for (const auto& [ms, grey] : expected) {
+    ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
+    EXPECT_EQ(frame.info().timestamp_ns, kStart + ms * kMs);
+    EXPECT_EQ(frame.luma().row(49)[99], grey);
+  }
+}
+
+TEST_F(ReplayMcap, PlaysWhatAKilledRecorderLeft) {
+  record({{0, picture(10)}, {10, picture(20)}});
+  const std::string whole = base::read_file(config.replay.folder);
+  base::write_file_atomically(config.replay.folder, whole.substr(0, whole.size() - 40));
+  EXPECT_DOUBLE_EQ(open().info().fps, 100);
+}
+
+TEST_F(ReplayMcap, SaysWhatIsWrong) {
+  using testing::HasSubstr;
+  EXPECT_THAT(failure(), HasSubstr("press.MCAP"));
+  record({});
+  EXPECT_THAT(failure(), HasSubstr("holds no frame"));
+  record({{0, picture(10)}}, 0);
+  EXPECT_THAT(failure(), HasSubstr("holds no channel of foxglove.CompressedImage"));
+  record({{0, picture(10)}}, 2);
+  EXPECT_THAT(failure(), HasSubstr("holds two cameras, /camera0 and /camera1"));
+  record({{0, picture(10)}, {0, picture(20)}});
+  EXPECT_THAT(failure(), HasSubstr("/camera0, message 1: is not later than the frame before it"));
+  record({{5, picture(10)}, {0, picture(20)}});
+  EXPECT_THAT(failure(), HasSubstr("its time is before the first frame's"));
+  record({{0, picture(10)}, {5, picture(20, 200)}});
+  EXPECT_THAT(failure(), HasSubstr("message 1: is 200x50 pixels, the frames before it 100x50"));
+  record({{0, compressed_image("png", "x")}});
+  EXPECT_THAT(failure(), HasSubstr("its format is \"png\": only jpeg is played"));
+  record({{0, "\x12\x7f"}});
+  EXPECT_THAT(failure(), HasSubstr("is no foxglove.CompressedImage"));
+  record({{0, compressed_image("jpeg", "no picture")}});
+  EXPECT_THAT(failure(), HasSubstr("message 0"));
 }
 
 }  // namespace
