@@ -2,12 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 
 #include "clients/common/exit_codes.hpp"
+#include "hal/image/png.hpp"
 
 namespace dtact::cli {
 namespace {
@@ -21,19 +23,39 @@ void append_float(std::string& out, float value) {
 
 }  // namespace
 
-std::string encode_npy(const DepthImage& depth) {
-  std::string header = fmt::format(
-      "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, {}), }}", depth.height, depth.width);
+std::string npy_head(const std::string& shape) {
+  std::string header =
+      fmt::format("{{'descr': '<f4', 'fortran_order': False, 'shape': {}, }}", shape);
   // Magic, version, length and header fill whole 64 bytes, the last of which is a newline.
   constexpr std::size_t kBefore = 10;
-  header.append(63 - (kBefore + header.size()) % 64, ' ');
+  constexpr std::size_t kWhole = 128;
+  header.append(kWhole - 1 - kBefore - header.size(), ' ');
   header += '\n';
   std::string out("\x93NUMPY\x01\x00", 8);
   out += static_cast<char>(header.size() % 256);
   out += static_cast<char>(header.size() / 256);
-  out += header;
-  for (const float mm : depth.mm) append_float(out, mm);
+  return out + header;
+}
+
+std::string npy_values(std::span<const float> values) {
+  std::string out;
+  out.reserve(4 * values.size());
+  for (const float value : values) append_float(out, value);
   return out;
+}
+
+std::string encode_npy(const DepthImage& depth) {
+  return npy_head(fmt::format("({}, {})", depth.height, depth.width)) + npy_values(depth.mm);
+}
+
+std::string encode_micrometre_png(const DepthImage& depth) {
+  image::Grey16 picture{depth.width, depth.height, {}};
+  picture.pixels.reserve(depth.mm.size());
+  for (const float mm : depth.mm) {
+    const float um = std::isnan(mm) ? 0 : std::clamp(1000 * mm, 0.0F, 65535.0F);
+    picture.pixels.push_back(static_cast<std::uint16_t>(std::lround(um)));
+  }
+  return image::encode_png(picture);
 }
 
 std::string encode_ply(const DepthImage& depth) {

@@ -13,13 +13,20 @@ struct DepthImage {
   std::span<const float> mm;
 };
 
-/// NumPy's .npy, format 1.0: float32 little-endian, shape (height, width).
+/// The head of NumPy's .npy, format 1.0, for float32 little-endian: 128 bytes. `shape`: "(2, 3)".
+[[nodiscard]] std::string npy_head(const std::string& shape);
+/// The values as they follow it.
+[[nodiscard]] std::string npy_values(std::span<const float> values);
+/// Both, of shape (height, width).
 [[nodiscard]] std::string encode_npy(const DepthImage& depth);
 
 /// PLY, binary little-endian: a point for each trusted pixel, millimetres, in the surface's frame:
 /// origin at the middle of the map, x to the right, y down, z away from the camera, so a pressed
 /// point has negative z.
 [[nodiscard]] std::string encode_ply(const DepthImage& depth);
+
+/// A 16-bit PNG in micrometres: 0 where untrusted or less, 65535 where more.
+[[nodiscard]] std::string encode_micrometre_png(const DepthImage& depth);
 
 using DepthEncoder = std::string (*)(const DepthImage&);
 

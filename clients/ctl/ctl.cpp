@@ -1,6 +1,7 @@
 #include "clients/ctl/ctl.hpp"
 
 #include "clients/ctl/cameras.hpp"
+#include "clients/ctl/export.hpp"
 #include "clients/ctl/hand_over.hpp"
 #include "clients/ctl/online.hpp"
 #include "clients/ctl/secrets.hpp"
@@ -19,6 +20,8 @@ int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostre
   add_rezero(app, context);
   add_calibration(app, context);
   add_snapshot(app, context);
+  add_record(app, context);
+  add_export(app, context);
   add_cameras(app, context);
   add_cert(app, context);
   add_token(app, context);

@@ -16,5 +16,6 @@ void add_led(CLI::App& app, Context& context);
 void add_rezero(CLI::App& app, Context& context);
 void add_snapshot(CLI::App& app, Context& context);
 void add_calibration(CLI::App& app, Context& context);
+void add_record(CLI::App& app, Context& context);
 
 }  // namespace dtact::ctl

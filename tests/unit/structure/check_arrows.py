@@ -41,14 +41,14 @@ ROOMS = {
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
-    "clients/common": ["proto", "clients/cpp"],
+    "clients/common": ["hal/image", "proto", "clients/cpp"],
     "clients/recording": ["hal/mcap", "proto", "clients/cpp"],
     "clients/calibrate/fit": ["hal/image", "daemon/recon", "daemon/calibration"],
     "clients/calibrate/lens": ["daemon/recon"],
     "clients/calibrate/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/lens"],
     "clients/calibrate/guided": ["hal/base", "hal/image", "hal/toml", "proto", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
     # Depth of a recording, made by what makes it in the daemon.
-    "clients/calibrate/reprocess": ["hal", "hal/image", "hal/mcap", "hal/mjpeg", "proto", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/cpp", "clients/recording"],
+    "clients/calibrate/reprocess": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mcap", "hal/mjpeg", "proto", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/cpp", "clients/recording"],
     "clients/calibrate": ["clients/common", "clients/cpp", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
     # A daemon's administration: neither a fit nor OpenCV.
     "clients/ctl": ["hal/base", "hal/image", "hal/mcap", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],

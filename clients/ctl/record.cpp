@@ -1,0 +1,220 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <stdexcept>
+
+#include "clients/common/interruptible.hpp"
+#include "clients/common/json.hpp"
+#include "clients/common/reports.pb.h"
+#include "clients/ctl/online.hpp"
+#include "clients/recording/channels.hpp"
+#include "clients/recording/recorder.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+struct RecordOptions {
+  std::string output;
+  double seconds = 0;
+  double pictures_hz = 10;
+  bool no_jpeg = false;
+  bool force = false;
+  bool progress = false;
+};
+
+v1::Subscribe subscription_for(const client::Client& client, const RecordOptions& options) {
+  v1::Subscribe subscription;
+  subscription.set_depth(client.has_feature("predict_zstd") ? v1::DEPTH_PREDICT_ZSTD
+                                                            : v1::DEPTH_DELTA_ZSTD);
+  subscription.set_summary(true);
+  subscription.set_jpeg(!options.no_jpeg && client.has_feature("jpeg"));
+  return subscription;
+}
+
+/// One run of the command: from the daemon to the file.
+class Recording {
+ public:
+  Recording(const Context& context, const RecordOptions& options)
+      : options_(options),
+        client_(context.target),
+        sink_(options.output, options.force),
+        recorder_(sink_, {context.target.program, options.pictures_hz}) {}
+
+  /// Until interrupted, the time is over, the disk refuses or the daemon goes.
+  void run() {
+    const cli::Interruptible interruptible;
+    // Before frames come: while an answer is waited for only the newest few are kept.
+    const v1::Status status = client_.status();
+    fetch_files();
+    client_.subscribe(subscription_for(client_, options_));
+    const auto end = options_.seconds > 0
+                         ? began_ + milliseconds(static_cast<std::int64_t>(options_.seconds * 1e3))
+                         : Clock::time_point::max();
+    auto shown = began_;
+    try {
+      while (!cli::Interruptible::happened() && !recorder_.failed() && Clock::now() < end) {
+        if (auto item = client_.next(milliseconds(100))) take(*std::move(item), status);
+        if (Clock::now() - shown < std::chrono::seconds(1)) continue;
+        shown = Clock::now();
+        if (options_.progress) show();
+      }
+    } catch (...) {
+      // What came until then is a whole recording.
+      recorder_.finish();
+      throw;
+    }
+    recorder_.finish();
+  }
+
+  [[nodiscard]] cli::RecordReport report() const {
+    const auto counts = recorder_.counts();
+    cli::RecordReport report;
+    report.set_file(options_.output);
+    report.set_frames(counts.frames);
+    report.set_missed(seen_ == 0 ? 0 : last_ - first_ + 1 - counts.frames);
+    report.set_dropped(counts.dropped);
+    report.set_bytes(counts.bytes);
+    report.set_seconds(std::chrono::duration<double>(Clock::now() - began_).count());
+    return report;
+  }
+
+ private:
+  void take(client::Item item, const v1::Status& status) {
+    if (auto* event = std::get_if<v1::Event>(&item)) {
+      const bool another = event->has_calibration() || event->has_reference();
+      recorder_.add(std::move(*event));
+      if (!another) return;
+      fetch_files();
+      if (seen_ > 0) attach_files();
+      return;
+    }
+    auto& frame = std::get<v1::Frame>(item);  // it is never asked to connect again
+    last_ = frame.sequence();
+    if (seen_ == 0) first_ = last_;
+    recorder_.add(std::move(frame));
+    if (seen_++ > 0) return;
+    recorder_.add(status);
+    attach_files();
+  }
+
+  /// What depth is made by from here on.
+  void fetch_files() {
+    try {
+      const v1::CalibrationFiles files = client_.calibration();
+      put(recording::kCalibrationToml, "application/toml", files.calibration_toml());
+      put(recording::kReferencePng, "image/png", files.reference_png());
+    } catch (const client::Refused&) {
+      // Uncalibrated, or busy with another one, which an event will tell.
+    }
+    if (!client_.has_feature("reference")) return;
+    try {
+      put(recording::kUntouchedPng, "image/png", client_.reference().png());
+    } catch (const client::Refused&) {
+      // None is taken yet; its event will come.
+    }
+  }
+
+  void put(const char* name, const char* media_type, const std::string& data) {
+    files_[name] = mcap::Attachment{0, 0, name, media_type, data};
+  }
+
+  /// Those that are not in the recording yet.
+  void attach_files() {
+    for (auto& [name, file] : files_) recorder_.attach(std::move(file));
+    files_.clear();
+  }
+
+  void show() const {
+    const auto now = report();
+    std::cerr << fmt::format("\r{:.0f} s, {} frames, {} missed, {:.1f} MB, {:.2f} MB/s ",
+                             now.seconds(), now.frames(), now.missed(),
+                             static_cast<double>(now.bytes()) * 1e-6,
+                             static_cast<double>(now.bytes()) * 1e-6 / now.seconds())
+              << std::flush;
+  }
+
+  const RecordOptions& options_;
+  client::Client client_;
+  mcap::FileSink sink_;
+  recording::Recorder recorder_;
+  Clock::time_point began_ = Clock::now();
+  std::map<std::string, mcap::Attachment> files_;  // that wait for the first frame
+  std::uint64_t seen_ = 0;
+  std::uint64_t first_ = 0;  // sequences
+  std::uint64_t last_ = 0;
+};
+
+void print(const Context& context, const cli::RecordReport& report) {
+  if (context.json) {
+    context.out << cli::json_line(report);
+    return;
+  }
+  context.out << fmt::format("{}: {} frames in {:.1f} s, {:.1f} MB", report.file(), report.frames(),
+                             report.seconds(), static_cast<double>(report.bytes()) * 1e-6);
+  if (report.missed() > 0) {
+    context.out << fmt::format("; {} missed, {} of them because the disk is slow", report.missed(),
+                               report.dropped());
+  }
+  context.out << '\n';
+}
+
+void run_record(const Context& context, const RecordOptions& options) {
+  // A limit on the file's size is told by write(), as a full disk is.
+  (void)std::signal(SIGXFSZ, SIG_IGN);
+  if (!options.force && std::filesystem::exists(options.output)) {
+    throw std::runtime_error(options.output + " exists: name another file, or add --force");
+  }
+  Recording recording(context, options);
+  try {
+    recording.run();
+  } catch (const std::system_error& e) {
+    if (options.progress) std::cerr << '\n';
+    print(context, recording.report());
+    throw std::runtime_error(fmt::format(
+        "the recording ended early: {}. What was written until then can be read", e.what()));
+  } catch (...) {
+    if (options.progress) std::cerr << '\n';
+    print(context, recording.report());
+    throw;
+  }
+  if (options.progress) std::cerr << '\n';
+  const auto report = recording.report();
+  print(context, report);
+  if (report.frames() == 0) {
+    throw std::runtime_error("no frame came: dtactctl status says why");
+  }
+}
+
+}  // namespace
+
+void add_record(CLI::App& app, Context& context) {
+  auto* command = app.add_subcommand(
+      "record", "Record depth, the camera's JPEGs and events as an MCAP file until Ctrl-C");
+  const auto options = std::make_shared<RecordOptions>();
+  options->progress = ::isatty(STDERR_FILENO) == 1;
+  command->add_option("-o,--output", options->output, "The file, press.mcap")->required();
+  command->add_option("--seconds", options->seconds, "End after so long")
+      ->check(CLI::PositiveNumber);
+  command
+      ->add_option("--pictures-hz", options->pictures_hz,
+                   "Depth pictures for eyes a second, beside the lossless frames; 0: none")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
+  command->add_flag("--no-jpeg", options->no_jpeg,
+                    "Without the camera's JPEGs: depth cannot be made anew then");
+  command->add_flag("--force", options->force, "Replace the file if it exists");
+  command->add_flag("--progress", options->progress,
+                    "Show rate and size also where standard error is no terminal");
+  command->callback([&context, options] { run_record(context, *options); });
+}
+
+}  // namespace dtact::ctl

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "hal/mcap/reader.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::recording {
+
+/// What to do with each message of a recording; what is unset is passed over. They return false for
+/// enough. Times are the file's, nanoseconds since 1970.
+struct Takers {
+  /// As the daemon sent it, with its JPEG.
+  std::function<bool(const v1::Frame& frame, std::uint64_t log_time)> frame;
+  std::function<bool(const v1::Event& event, std::uint64_t log_time)> event;
+  std::function<bool(const v1::Status& status, std::uint64_t log_time)> status;
+};
+
+/// Goes through a recording in the order of the file. Throws mcap::Error when it is damaged or
+/// holds no dtact.v1.Frame.
+void read_recording(const mcap::Reader& file, const Takers& takers);
+
+/// The last attachment of that name that was taken up to `log_time`, or the first of all; none when
+/// there is none of that name.
+[[nodiscard]] std::optional<mcap::AttachmentPlace> find_attachment(
+    const mcap::Reader& file, const std::string& name, std::uint64_t log_time = UINT64_MAX);
+
+}  // namespace dtact::recording

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <variant>
+
+#include "clients/recording/recording_writer.hpp"
+#include "hal/mcap/writer.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::recording {
+
+/// Writes a recording on a thread of its own, so that a slow disk does not hold up who reads from
+/// the daemon. What waits is bounded: beyond it frames are dropped and counted; events and what is
+/// attached never are. The open chunk is written at least once a second.
+///
+/// When the sink refuses, the recording is over: the file is closed as well as it can be, what
+/// comes after is dropped, failed() tells, and finish() throws.
+class Recorder {
+ public:
+  struct Counts {
+    std::uint64_t frames = 0;   ///< Written or waiting to be.
+    std::uint64_t dropped = 0;  ///< Because too much waited.
+    std::uint64_t bytes = 0;    ///< Of the file.
+  };
+
+  static constexpr std::size_t kMostWaiting = std::size_t{64} << 20U;  ///< Bytes.
+
+  Recorder(mcap::Sink& sink, const RecordingOptions& options,
+           std::size_t most_waiting = kMostWaiting);
+  /// Without finish() the file is left without its index.
+  ~Recorder();
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  void add(v1::Frame frame);
+  void add(v1::Event event) { put(std::move(event), 0); }
+  void add(v1::Status status) { put(std::move(status), 0); }
+  void attach(mcap::Attachment attachment) { put(std::move(attachment), 0); }
+
+  [[nodiscard]] bool failed() const;
+  [[nodiscard]] Counts counts() const;
+  /// Writes what waits and closes the file. Throws what the sink threw.
+  void finish();
+
+ private:
+  using Item = std::variant<v1::Frame, v1::Event, v1::Status, mcap::Attachment>;
+  struct Waiting {
+    Item item;
+    std::size_t bytes = 0;
+  };
+
+  void put(Item item, std::size_t bytes);
+  void run();
+  void write(Item item);
+  void end();
+
+  RecordingWriter writer_;
+  const std::size_t most_waiting_;
+  mutable std::mutex mutex_;
+  std::condition_variable arrived_;
+  std::deque<Waiting> queue_;
+  std::size_t waiting_bytes_ = 0;
+  Counts counts_;
+  bool ending_ = false;
+  bool finishing_ = false;
+  std::exception_ptr failure_;
+  std::thread thread_;
+};
+
+}  // namespace dtact::recording

@@ -1,0 +1,159 @@
+#include "clients/recording/recording_writer.hpp"
+
+#include <google/protobuf/descriptor.pb.h>
+
+#include <algorithm>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "clients/cpp/maps.hpp"
+#include "clients/recording/channels.hpp"
+#include "clients/recording/foxglove.pb.h"
+
+namespace dtact::recording {
+namespace {
+
+/// A file and all that it imports, those first, as protoc --include_imports writes them.
+void add_files(const google::protobuf::FileDescriptor& file,
+               std::set<const google::protobuf::FileDescriptor*>& known,
+               google::protobuf::FileDescriptorSet& set) {
+  if (!known.insert(&file).second) return;
+  for (int i = 0; i < file.dependency_count(); ++i) add_files(*file.dependency(i), known, set);
+  file.CopyTo(set.add_file());
+}
+
+template <typename Image>
+void stamp(Image& image, std::uint64_t ns, const std::string& frame_id) {
+  constexpr std::uint64_t kSecond = 1'000'000'000;
+  image.mutable_timestamp()->set_seconds(static_cast<std::int64_t>(ns / kSecond));
+  image.mutable_timestamp()->set_nanos(static_cast<std::int32_t>(ns % kSecond));
+  image.set_frame_id(frame_id);
+}
+
+/// Micrometres, 0 where less or not to be believed.
+std::string picture_of(const v1::DepthMap& map) {
+  const std::vector<std::int16_t> values = client::values_of(map);
+  std::string data;
+  data.reserve(2 * values.size());
+  for (const std::int16_t value : values) {
+    const double um = value == map.untrusted_value() ? 0 : value * map.um_per_unit();
+    const auto pixel = static_cast<std::uint16_t>(std::clamp(um + 0.5, 0.0, 65535.0));
+    data += static_cast<char>(pixel % 256);
+    data += static_cast<char>(pixel / 256);
+  }
+  return data;
+}
+
+}  // namespace
+
+RecordingWriter::RecordingWriter(mcap::Sink& sink, const RecordingOptions& options)
+    : writer_(sink, {.library = options.program}),
+      picture_interval_ns_(
+          options.pictures_hz > 0 ? static_cast<std::int64_t>(1e9 / options.pictures_hz) : 0),
+      frame_(add_channel(kFrameTopic, *v1::Frame::descriptor())),
+      event_(add_channel(kEventTopic, *v1::Event::descriptor())),
+      light_(add_channel(kLightTopic, *v1::LightState::descriptor())),
+      status_(add_channel(kStatusTopic, *v1::Status::descriptor())) {}
+
+std::uint16_t RecordingWriter::add_channel(const char* topic,
+                                           const google::protobuf::Descriptor& type,
+                                           std::map<std::string, std::string> metadata) {
+  google::protobuf::FileDescriptorSet files;
+  std::set<const google::protobuf::FileDescriptor*> known;
+  add_files(*type.file(), known, files);
+  return writer_.add_channel(
+      writer_.add_schema(type.full_name(), "protobuf", files.SerializeAsString()), topic,
+      "protobuf", std::move(metadata));
+}
+
+RecordingWriter::Moment RecordingWriter::moment_of(std::uint64_t sequence,
+                                                   std::int64_t monotonic_ns,
+                                                   std::int64_t wall_ns) {
+  if (!epoch_ns_) {
+    epoch_ns_ = wall_ns - monotonic_ns;
+    next_picture_ns_ = monotonic_ns;
+  }
+  const auto positive = [](std::int64_t ns) {
+    return static_cast<std::uint64_t>(std::max<std::int64_t>(0, ns));
+  };
+  return {positive(*epoch_ns_ + monotonic_ns), positive(wall_ns), sequence};
+}
+
+void RecordingWriter::add_message(std::uint16_t channel, const google::protobuf::Message& message) {
+  buffer_.clear();
+  message.AppendToString(&buffer_);
+  writer_.add(mcap::Message{channel, static_cast<std::uint32_t>(now_.sequence), now_.log_time,
+                            now_.publish_time, buffer_});
+}
+
+void RecordingWriter::add(v1::Frame frame) {
+  now_ = moment_of(frame.sequence(), frame.monotonic_ns(), frame.wall_ns());
+  if (frame.has_jpeg()) {
+    add_jpeg(frame);
+    frame.clear_jpeg();
+  }
+  if (frame.has_depth() && picture_interval_ns_ > 0 && frame.monotonic_ns() >= next_picture_ns_) {
+    // From the time it was due on, so that the mean rate is the one asked for; from now after a
+    // gap.
+    next_picture_ns_ = std::max(next_picture_ns_, frame.monotonic_ns() - picture_interval_ns_ + 1);
+    next_picture_ns_ += picture_interval_ns_;
+    add_picture(frame);
+  }
+  if (frame.has_light()) add_light(frame.light());
+  add_message(frame_, frame);
+}
+
+void RecordingWriter::add_jpeg(const v1::Frame& frame) {
+  if (jpeg_ == 0) {
+    jpeg_ = add_channel(kCameraTopic, *foxglove::CompressedImage::descriptor());
+  }
+  foxglove::CompressedImage image;
+  stamp(image, now_.log_time, "dtact_camera");
+  image.set_format("jpeg");
+  image.set_data(frame.jpeg().data());
+  add_message(jpeg_, image);
+}
+
+void RecordingWriter::add_picture(const v1::Frame& frame) {
+  if (picture_ == 0) {
+    picture_ = add_channel(kDepthTopic, *foxglove::RawImage::descriptor(),
+                           {{"unit", "micrometre"}, {"untrusted", "0"}});
+  }
+  const v1::DepthMap& map = frame.depth();
+  foxglove::RawImage image;
+  stamp(image, now_.log_time, frame.frame_id());
+  image.set_width(map.width());
+  image.set_height(map.height());
+  image.set_encoding("16UC1");
+  image.set_step(2 * map.width());
+  image.set_data(picture_of(map));
+  add_message(picture_, image);
+}
+
+/// Each light once, from the frame that was exposed under it on.
+void RecordingWriter::add_light(const v1::LightState& light) {
+  std::string bytes = light.SerializeAsString();
+  if (bytes == last_light_) return;
+  last_light_ = std::move(bytes);
+  add_message(light_, light);
+}
+
+void RecordingWriter::add(const v1::Event& event) {
+  if (event.monotonic_ns() != 0) {
+    now_ = moment_of(event.sequence(), event.monotonic_ns(), event.wall_ns());
+  } else if (!epoch_ns_) {
+    // A daemon before 1.1 does not say when; later ones are as of the last frame.
+    return;
+  }
+  add_message(event_, event);
+}
+
+void RecordingWriter::add(const v1::Status& status) { add_message(status_, status); }
+
+void RecordingWriter::attach(const std::string& name, const std::string& media_type,
+                             const std::string& data) {
+  writer_.add(mcap::Attachment{now_.log_time, now_.log_time, name, media_type, data});
+}
+
+}  // namespace dtact::recording

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "hal/mcap/writer.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::recording {
+
+struct RecordingOptions {
+  std::string program;      ///< Who records: "dtactctl 0.1.0".
+  double pictures_hz = 10;  ///< Depth pictures for eyes a second; 0: none.
+};
+
+/// Writes what the daemon sends as an MCAP file (README.md beside this file). What the sink throws
+/// comes out; see mcap::Writer for what the file is worth then. One thread.
+///
+/// All times in the file run with CLOCK_MONOTONIC from the first frame's wall time on: a wall clock
+/// that is set during the recording does not reorder it.
+class RecordingWriter {
+ public:
+  RecordingWriter(mcap::Sink& sink, const RecordingOptions& options);
+
+  /// With its JPEG, if it has one, which is stored on a channel of its own.
+  void add(v1::Frame frame);
+  void add(const v1::Event& event);
+  /// As of the last frame or event, of which there has to be one; so for attach().
+  void add(const v1::Status& status);
+  void attach(const std::string& name, const std::string& media_type, const std::string& data);
+
+  void flush() { writer_.flush(); }
+  void finish() { writer_.finish(); }
+  [[nodiscard]] std::uint64_t bytes() const noexcept { return writer_.bytes(); }
+
+ private:
+  struct Moment {
+    std::uint64_t log_time = 0;
+    std::uint64_t publish_time = 0;  ///< The daemon's wall clock.
+    std::uint64_t sequence = 0;      ///< Of the frame, or of the last one before an event.
+  };
+  [[nodiscard]] Moment moment_of(std::uint64_t sequence, std::int64_t monotonic_ns,
+                                 std::int64_t wall_ns);
+  [[nodiscard]] std::uint16_t add_channel(const char* topic,
+                                          const google::protobuf::Descriptor& type,
+                                          std::map<std::string, std::string> metadata = {});
+  void add_message(std::uint16_t channel, const google::protobuf::Message& message);
+  void add_picture(const v1::Frame& frame);
+  void add_jpeg(const v1::Frame& frame);
+  void add_light(const v1::LightState& light);
+
+  mcap::Writer writer_;
+  std::int64_t picture_interval_ns_;
+  std::uint16_t frame_;
+  std::uint16_t event_;
+  std::uint16_t light_;
+  std::uint16_t status_;
+  std::uint16_t jpeg_ = 0;
+  std::uint16_t picture_ = 0;
+  /// Wall time of CLOCK_MONOTONIC's zero, at the first frame or event.
+  std::optional<std::int64_t> epoch_ns_;
+  Moment now_;
+  std::int64_t next_picture_ns_ = 0;
+  std::string last_light_;
+  std::string buffer_;
+};
+
+}  // namespace dtact::recording

@@ -1,0 +1,113 @@
+// dtactctl export, on a recording made here.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <sstream>
+
+#include "clients/ctl/ctl.hpp"
+#include "clients/recording/recording_writer.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "hal/image/png.hpp"
+#include "tests/unit/recording/sample.hpp"
+
+namespace dtact::recording {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class Export : public testing::Test {
+ protected:
+  Export() {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+    mcap::FileSink sink(file_, true);
+    RecordingWriter writer(sink, {.program = "test"});
+    for (std::uint64_t i = 0; i < 5; ++i) writer.add(sample_frame(10 + i));
+    v1::Event event;
+    event.set_sequence(14);
+    event.set_monotonic_ns(kBoot + 14 * 16'666'667);
+    event.set_wall_ns(kWall);
+    event.mutable_contact()->mutable_contact()->set_touching(true);
+    event.mutable_contact()->mutable_contact()->set_deepest_mm(0.5);
+    writer.add(event);
+    writer.finish();
+  }
+
+ public:
+  ~Export() override { fs::remove_all(folder_); }
+
+ protected:
+  int run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"export", file_.string(), "-o", out_.string()});
+    std::ostringstream out;
+    std::ostringstream error;
+    const int code = ctl::run(arguments, out, error);
+    said_ = out.str() + error.str();
+    return code;
+  }
+  [[nodiscard]] std::string read(const std::string& name) const {
+    return base::read_file(out_ / name);
+  }
+
+  fs::path folder_ = fs::path(testing::TempDir()) /
+                     (std::string("dtact_export_") +
+                      testing::UnitTest::GetInstance()->current_test_info()->name());
+  fs::path file_ = folder_ / "press.mcap";
+  fs::path out_ = folder_ / "out";
+  std::string said_;
+};
+
+TEST_F(Export, NumpyStack) {
+  ASSERT_EQ(run({"--to", "npy", "--frames", "1:3"}), 0) << said_;
+  const std::string npy = read("depth.npy");
+  EXPECT_EQ(npy.substr(0, 10), std::string("\x93NUMPY\x01\x00\x76\x00", 10));
+  EXPECT_THAT(npy.substr(10, 118),
+              HasSubstr("{'descr': '<f4', 'fortran_order': False, 'shape': (2, 2, 3), }"));
+  ASSERT_EQ(npy.size(), 128U + 2 * 6 * 4);
+  // 0, 1.25, −0.007, NaN, ...
+  EXPECT_EQ(npy.substr(128, 8), std::string("\0\0\0\0\0\0\xa0\x3f", 8));
+  EXPECT_EQ(npy.substr(140, 4), std::string("\0\0\xc0\x7f", 4));
+  EXPECT_THAT(said_, HasSubstr("2 frames, 2 depth maps"));
+}
+
+TEST_F(Export, Pictures) {
+  ASSERT_EQ(run({"--to", "png", "--frames", "4"}), 0) << said_;
+  const auto image = image::decode_png_grey16(read("depth-000004.png"), "test");
+  EXPECT_EQ(image.width, 3);
+  EXPECT_THAT(image.pixels, ElementsAre(0, 1250, 0, 0, 513, 2));
+}
+
+TEST_F(Export, Points) {
+  ASSERT_EQ(run({"--to", "ply", "--frames", ":1"}), 0) << said_;
+  EXPECT_THAT(read("depth-000000.ply"), HasSubstr("element vertex 5"));
+}
+
+TEST_F(Export, Tables) {
+  ASSERT_EQ(run({"--to", "csv", "--frames", "3:"}), 0) << said_;
+  EXPECT_EQ(read("frames.csv"),
+            "frame,sequence,time_ns,monotonic_ns,touching,area_mm2,x_mm,y_mm,deepest_mm,"
+            "deepest_x_mm,deepest_y_mm,volume_mm3,brightness,calibration,health,map\n"
+            "3,13,1700000000216666671,1216666671,0,0,0,0,1.25,0,0,0,128,,,\n"
+            "4,14,1700000000233333338,1233333338,0,0,0,0,1.25,0,0,0,128,,,\n");
+  EXPECT_EQ(read("events.csv"),
+            "time_ns,sequence,monotonic_ns,event,detail\n"
+            "1700000000233333338,14,1233333338,contact_made,deepest_mm=0.5\n");
+}
+
+TEST_F(Export, SaysWhatIsWrong) {
+  EXPECT_EQ(run({"--to", "npy", "--frames", "9:"}), 1);
+  EXPECT_THAT(said_, HasSubstr("of its 5 frames none is among --frames 9:"));
+  EXPECT_EQ(run({"--to", "npy"}), 1);
+  EXPECT_THAT(said_, HasSubstr("is not empty"));
+  EXPECT_EQ(run({"--to", "npy", "--force"}), 0);
+  EXPECT_EQ(run({"--to", "exr"}), 2);
+  EXPECT_EQ(run({"--to", "npy", "--frames", "3:x"}), 2);
+  base::write_file_atomically(file_, "no mcap");
+  EXPECT_EQ(run({"--to", "npy", "--force"}), 1);
+  EXPECT_THAT(said_, HasSubstr("is no MCAP file"));
+}
+
+}  // namespace
+}  // namespace dtact::recording

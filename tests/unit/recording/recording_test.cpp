@@ -1,0 +1,182 @@
+#include <gmock/gmock.h>
+#include <google/protobuf/descriptor.h>
+#include <google/protobuf/descriptor.pb.h>
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "clients/recording/channels.hpp"
+#include "clients/recording/foxglove.pb.h"
+#include "clients/recording/read_recording.hpp"
+#include "clients/recording/recording_writer.hpp"
+#include "tests/unit/recording/sample.hpp"
+
+namespace dtact::recording {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+using testing::ThrowsMessage;
+
+class RecordingFile : public testing::Test {
+ public:
+  ~RecordingFile() override { fs::remove(path_); }
+
+ protected:
+  fs::path path_ = fs::path(testing::TempDir()) /
+                   (std::string("dtact_recording_") +
+                    testing::UnitTest::GetInstance()->current_test_info()->name() + ".mcap");
+  mcap::FileSink sink_{path_, true};
+
+  /// (sequence, log time, publish time) of a topic.
+  using Row = std::tuple<std::uint32_t, std::uint64_t, std::uint64_t>;
+  [[nodiscard]] std::vector<Row> rows(const char* topic) const {
+    std::vector<Row> rows;
+    mcap::Reader(path_).read({topic}, [&](const mcap::Channel&, const mcap::Message& m) {
+      rows.emplace_back(m.sequence, m.log_time, m.publish_time);
+      return true;
+    });
+    return rows;
+  }
+  template <typename Type>
+  [[nodiscard]] Type first(const char* topic) const {
+    Type type;
+    mcap::Reader(path_).read({topic}, [&](const mcap::Channel&, const mcap::Message& m) {
+      EXPECT_TRUE(type.ParseFromArray(m.data.data(), static_cast<int>(m.data.size())));
+      return false;
+    });
+    return type;
+  }
+};
+
+TEST_F(RecordingFile, KeepsAFrameWholeAndItsJpegOnce) {
+  RecordingWriter writer(sink_, {.program = "test"});
+  writer.add(sample_frame(0));
+  writer.add(sample_frame(1));
+  writer.finish();
+  std::vector<std::string> frames;
+  Takers takers;
+  takers.frame = [&](const v1::Frame& frame, std::uint64_t time) {
+    EXPECT_EQ(time, static_cast<std::uint64_t>(frame.wall_ns()));
+    v1::Frame expected = sample_frame(frame.sequence());
+    // The JPEG says its size itself.
+    expected.mutable_jpeg()->clear_width();
+    expected.mutable_jpeg()->clear_height();
+    EXPECT_EQ(frame.SerializeAsString(), expected.SerializeAsString());
+    frames.push_back(frame.jpeg().data());
+    return true;
+  };
+  read_recording(mcap::Reader(path_), takers);
+  EXPECT_THAT(frames, ElementsAre("jpeg 0", "jpeg 1"));
+  EXPECT_FALSE(first<v1::Frame>(kFrameTopic).has_jpeg());
+  const auto image = first<foxglove::CompressedImage>(kCameraTopic);
+  EXPECT_EQ(image.format(), "jpeg");
+  EXPECT_EQ(image.data(), "jpeg 0");
+  EXPECT_EQ(image.timestamp().seconds(), 1'700'000'000);
+}
+
+TEST_F(RecordingFile, DrawsDepthForEyesInMicrometres) {
+  RecordingWriter writer(sink_, {.program = "test", .pictures_hz = 20});
+  for (std::uint64_t i = 0; i < 9; ++i) writer.add(sample_frame(i));
+  writer.finish();
+  const auto image = first<foxglove::RawImage>(kDepthTopic);
+  EXPECT_EQ(image.encoding(), "16UC1");
+  EXPECT_EQ(image.width(), 3U);
+  EXPECT_EQ(image.height(), 2U);
+  EXPECT_EQ(image.step(), 6U);
+  EXPECT_EQ(image.frame_id(), "dtact_surface");
+  // 0, 1250, −7, untrusted, 513, 2.
+  EXPECT_EQ(image.data(), std::string("\0\0\xe2\x04\0\0\0\0\x01\x02\x02\0", 12));
+  // 20 of 60 a second.
+  std::vector<std::uint32_t> sequences;
+  for (const auto& row : rows(kDepthTopic)) sequences.push_back(std::get<0>(row));
+  EXPECT_THAT(sequences, ElementsAre(0, 3, 6));
+}
+
+TEST_F(RecordingFile, TimesRunOnWhenTheWallClockIsSet) {
+  RecordingWriter writer(sink_, {.program = "test"});
+  writer.add(sample_frame(0));
+  v1::Frame set_back = sample_frame(1);
+  set_back.set_wall_ns(kWall - 3'600'000'000'000);
+  writer.add(set_back);
+  v1::Event event;
+  event.set_sequence(1);
+  event.set_monotonic_ns(kBoot + 20'000'000);
+  event.set_wall_ns(kWall - 3'599'000'000'000);
+  event.mutable_state()->set_state(v1::STATE_SERVING);
+  writer.add(event);
+  writer.finish();
+  constexpr std::uint64_t kBegin = kWall;
+  EXPECT_THAT(
+      rows(kFrameTopic),
+      ElementsAre(Row(0, kBegin, kBegin), Row(1, kBegin + 16'666'667, kBegin - 3'600'000'000'000)));
+  EXPECT_THAT(rows(kEventTopic),
+              ElementsAre(Row(1, kBegin + 20'000'000, kBegin - 3'599'000'000'000)));
+}
+
+TEST_F(RecordingFile, TellsEachLightOnce) {
+  RecordingWriter writer(sink_, {.program = "test"});
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    v1::Frame frame = sample_frame(i);
+    frame.mutable_light()->set_brightness(i < 2 ? 128 : 64);
+    writer.add(frame);
+  }
+  writer.finish();
+  EXPECT_THAT(rows(kLightTopic), SizeIs(2));
+}
+
+// Any reader of protobuf can be built from the file alone.
+TEST_F(RecordingFile, CarriesItsSchemas) {
+  RecordingWriter writer(sink_, {.program = "test"});
+  writer.add(sample_frame(0));
+  writer.finish();
+  const mcap::Reader reader(path_);
+  std::map<std::string, std::string> types;
+  for (const auto& [id, channel] : reader.channels()) {
+    const mcap::Schema& schema = reader.schemas().at(channel.schema);
+    types[channel.topic] = schema.name;
+    EXPECT_EQ(schema.encoding, "protobuf");
+    EXPECT_EQ(channel.message_encoding, "protobuf");
+    google::protobuf::FileDescriptorSet files;
+    ASSERT_TRUE(files.ParseFromString(schema.data));
+    google::protobuf::DescriptorPool pool;
+    for (const auto& file : files.file()) ASSERT_NE(pool.BuildFile(file), nullptr) << file.name();
+    EXPECT_NE(pool.FindMessageTypeByName(schema.name), nullptr) << schema.name;
+  }
+  EXPECT_EQ(types, (std::map<std::string, std::string>{{"/camera/jpeg", "foxglove.CompressedImage"},
+                                                       {"/dtact/depth", "foxglove.RawImage"},
+                                                       {"/dtact/event", "dtact.v1.Event"},
+                                                       {"/dtact/frame", "dtact.v1.Frame"},
+                                                       {"/dtact/light", "dtact.v1.LightState"},
+                                                       {"/dtact/status", "dtact.v1.Status"}}));
+}
+
+TEST_F(RecordingFile, FindsTheAttachmentOfATime) {
+  RecordingWriter writer(sink_, {.program = "test"});
+  writer.add(sample_frame(0));
+  writer.attach("a", "text/plain", "one");
+  writer.add(sample_frame(60));
+  writer.attach("a", "text/plain", "two");
+  writer.finish();
+  const mcap::Reader reader(path_);
+  const auto at = [&](std::int64_t time) {
+    return reader.attachment(find_attachment(reader, "a", static_cast<std::uint64_t>(time)).value())
+        .data;
+  };
+  EXPECT_EQ(at(0), "one");
+  EXPECT_EQ(at(kWall + 999'000'000), "one");
+  EXPECT_EQ(at(kWall + 1'001'000'000), "two");
+  EXPECT_FALSE(find_attachment(reader, "b"));
+}
+
+TEST_F(RecordingFile, RefusesAFileOfSomethingElse) {
+  mcap::Writer writer(sink_);
+  writer.finish();
+  EXPECT_THAT([&] { read_recording(mcap::Reader(path_), {}); },
+              ThrowsMessage<mcap::Error>(HasSubstr("name a file of dtactctl record")));
+}
+
+}  // namespace
+}  // namespace dtact::recording
