@@ -2,6 +2,7 @@
 
 #include "clients/calibrate/guided_command.hpp"
 #include "clients/calibrate/offline/offline.hpp"
+#include "clients/calibrate/reprocess/reprocess.hpp"
 #include "clients/common/program.hpp"
 
 namespace dtact::calibrate {
@@ -14,6 +15,7 @@ int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostre
   cli::add_global_options(app, context);
   ctl::add_guided(app, context);
   ctl::add_offline_commands(app, context.json);
+  reprocess::add_reprocess(app, context);
   return cli::run(app, arguments, out, error);
 }
 

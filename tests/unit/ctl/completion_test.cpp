@@ -61,12 +61,12 @@ std::set<std::string> options_of(Run run, std::vector<std::string> command) {
 }
 
 TEST(Completion, OffersCommands) {
-  EXPECT_THAT(complete("dtactctl re"), UnorderedElementsAre("rezero", "reconstruct"));
+  EXPECT_THAT(complete("dtactctl re"), UnorderedElementsAre("rezero", "record", "reprocess", "reconstruct"));
   EXPECT_THAT(complete("dtactctl --port 7 s"), UnorderedElementsAre("status", "snapshot"));
   EXPECT_THAT(complete("dtactctl calibration \"\""),
               UnorderedElementsAre("upload", "list", "show", "activate", "export", "--help"));
   EXPECT_THAT(complete("dtactctl calibrate d"), UnorderedElementsAre("depth"));
-  EXPECT_THAT(complete("dtact-calibrate re"), UnorderedElementsAre("reconstruct"));
+  EXPECT_THAT(complete("dtact-calibrate re"), UnorderedElementsAre("reconstruct", "reprocess"));
 }
 
 TEST(Completion, OffersValues) {
@@ -75,6 +75,7 @@ TEST(Completion, OffersValues) {
   EXPECT_THAT(complete("dtactctl calibrate depth --method p"), UnorderedElementsAre("published"));
   EXPECT_THAT(complete("dtact-calibrate depth --method p"), UnorderedElementsAre("published"));
   EXPECT_THAT(complete("dtactctl led --brightness \"\""), UnorderedElementsAre());
+  EXPECT_THAT(complete("dtactctl export press.mcap --to p"), UnorderedElementsAre("png", "ply"));
 }
 
 void expect_options(const std::string& program, Run run,
@@ -98,13 +99,15 @@ TEST(Completion, KnowsEveryOptionOfEveryCommand) {
                   {"led"},
                   {"rezero"},
                   {"snapshot"},
+                  {"record"},
+                  {"export"},
                   {"calibration", "upload"},
                   {"calibration", "list"},
                   {"calibration", "show"},
                   {"calibration", "activate"},
                   {"calibration", "export"}});
   expect_options("dtact-calibrate", calibrate::run,
-                 {{}, {"guided"}, {"depth"}, {"lens"}, {"reconstruct"}, {"evaluate"}});
+                 {{}, {"guided"}, {"depth"}, {"lens"}, {"reconstruct"}, {"reprocess"}, {"evaluate"}});
   // What dtactctl hands over.
   EXPECT_THAT(options_of(calibrate::run, {"depth"}),
               IsSubsetOf(complete("dtactctl calibrate depth --")));

@@ -18,7 +18,7 @@ RULES = {
     "dtactctl": ([], ["tomlplusplus", "hwy", "gpiod", "camera", "spdlog"],
                  FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
     "dtact-calibrate": (["core", "imgproc", "calib3d"],
-                        ["systemd", "gpiod", "camera", "spdlog", "jpeg"], []),
+                        ["systemd", "gpiod", "camera", "spdlog"], []),
 }
 
 

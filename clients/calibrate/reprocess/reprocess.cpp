@@ -1,0 +1,270 @@
+#include "clients/calibrate/reprocess/reprocess.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <numeric>
+#include <optional>
+#include <ostream>
+#include <stdexcept>
+#include <system_error>
+
+#include "clients/calibrate/reprocess/depth_remaker.hpp"
+#include "clients/common/json.hpp"
+#include "clients/common/reports.pb.h"
+#include "clients/recording/channels.hpp"
+#include "clients/recording/read_recording.hpp"
+#include "clients/recording/recording_writer.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "hal/image/png.hpp"
+#include "hal/luma/luma_buffer.hpp"
+#include "hal/mjpeg/grey_decoder.hpp"
+
+namespace dtact::reprocess {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string recording;
+  std::string calibration;
+  std::string output;
+  int untouched_frames = 0;
+  bool force = false;
+};
+
+std::span<const std::uint8_t> payload_of(const v1::Frame& frame) {
+  const std::string& data = frame.jpeg().data();
+  return {reinterpret_cast<const std::uint8_t*>(data.data()), data.size()};
+}
+
+bool has(const v1::Frame& frame, v1::Health condition) {
+  return std::ranges::find(frame.health(), condition) != frame.health().end();
+}
+
+/// The daemon would have measured depth in it, given a calibration. While the light is another than
+/// the reference's the daemon makes do with a scaled one, which no recording holds.
+bool measurable(const v1::Frame& frame) {
+  return !has(frame, v1::HEALTH_STARTING) && !has(frame, v1::HEALTH_LIGHT_UNSETTLED) &&
+         !has(frame, v1::HEALTH_REFERENCE_STALE);
+}
+
+class Reprocessor {
+ public:
+  Reprocessor(const Options& options, const cli::Context& context)
+      : options_(options),
+        calibration_(std::make_shared<const calibration::Calibration>(
+            calibration::load(options.calibration))),
+        file_(options.recording),
+        remaker_(calibration_),
+        decoder_(frame_width(), frame_height()),
+        luma_(frame_width(), frame_height()),
+        sink_(options.output, options.force),
+        writer_(sink_, {.program = context.target.program}) {}
+
+  void run() {
+    if (!recording::find_attachment(file_, recording::kUntouchedPng)) take_first_frames();
+    recording::Takers takers;
+    takers.status = [this](const v1::Status& status, std::uint64_t) {
+      followed_ = status.light_followed();
+      return true;
+    };
+    takers.frame = [this](const v1::Frame& frame, std::uint64_t time) {
+      take(frame, time);
+      return true;
+    };
+    takers.event = [this](const v1::Event& event, std::uint64_t) {
+      // Contact is judged anew.
+      if (!event.has_contact()) writer_.add(event);
+      return true;
+    };
+    recording::read_recording(file_, takers);
+    if (frames_ == 0) throw std::runtime_error(options_.recording + ": holds no frame");
+    if (maps_ == 0) {
+      throw std::runtime_error(options_.recording +
+                               ": no frame of it holds a JPEG that depth can be made of: record "
+                               "without --no-jpeg, from a camera that delivers JPEG");
+    }
+    writer_.finish();
+  }
+
+  [[nodiscard]] cli::RecordingReport report() const {
+    cli::RecordingReport report;
+    report.set_output(options_.output);
+    report.set_frames(frames_);
+    report.set_maps(maps_);
+    report.set_damage(file_.damage());
+    return report;
+  }
+
+ private:
+  [[nodiscard]] int frame_width() const { return calibration_->model->rectify.frame_width; }
+  [[nodiscard]] int frame_height() const { return calibration_->model->rectify.frame_height; }
+
+  bool decode(const v1::Frame& frame) {
+    const auto status = decoder_.decode(payload_of(frame), luma_.data(), luma_.stride());
+    if (status == hal::mjpeg::Status::wrong_size) {
+      throw std::runtime_error(fmt::format("{}: its images have another size than the {}x{} of {}",
+                                           options_.recording, frame_width(), frame_height(),
+                                           options_.calibration));
+    }
+    return status == hal::mjpeg::Status::ok;
+  }
+
+  /// The mean of the first frames, which the user says are untouched.
+  void take_first_frames() {
+    if (options_.untouched_frames == 0) {
+      throw std::runtime_error(
+          fmt::format("{} holds no {}: if nothing touched at its beginning, say so by "
+                      "--untouched-frames 32",
+                      options_.recording, recording::kUntouchedPng));
+    }
+    std::vector<std::uint32_t> sums(pixels());
+    std::uint32_t count = 0;
+    recording::Takers takers;
+    takers.frame = [&](const v1::Frame& frame, std::uint64_t) {
+      if (frame.has_jpeg() && measurable(frame) && decode(frame)) {
+        for (int y = 0; y < frame_height(); ++y) {
+          const std::uint8_t* row = luma_.row(y);
+          std::uint32_t* sum = sums.data() + std::ptrdiff_t{y} * frame_width();
+          for (int x = 0; x < frame_width(); ++x) sum[x] += row[x];
+        }
+        ++count;
+      }
+      return count < static_cast<std::uint32_t>(options_.untouched_frames);
+    };
+    recording::read_recording(file_, takers);
+    if (count == 0) throw std::runtime_error(options_.recording + ": none of its frames is whole");
+    std::vector<std::uint16_t> mean(sums.size());
+    std::ranges::transform(sums, mean.begin(), [count](std::uint32_t sum) {
+      return static_cast<std::uint16_t>((sum * 256 + count / 2) / count);
+    });
+    remaker_.set_reference(mean);
+    untouched_ = image::encode_png(image::Grey16{frame_width(), frame_height(), std::move(mean)});
+  }
+
+  [[nodiscard]] std::size_t pixels() const {
+    return static_cast<std::size_t>(frame_width()) * static_cast<std::size_t>(frame_height());
+  }
+
+  /// The reference of this time, where it is another than before.
+  void follow_reference(std::uint64_t time) {
+    const auto place = recording::find_attachment(file_, recording::kUntouchedPng, time);
+    if (!place || place->offset == reference_at_) return;
+    const bool first = std::exchange(reference_at_, place->offset) == 0;
+    untouched_ = file_.attachment(*place).data;
+    const image::Grey16 image = image::decode_png_grey16(untouched_, recording::kUntouchedPng);
+    if (image.width != frame_width() || image.height != frame_height()) {
+      throw std::runtime_error(fmt::format("{}: its {} has another size than the {}x{} of {}",
+                                           options_.recording, recording::kUntouchedPng,
+                                           frame_width(), frame_height(), options_.calibration));
+    }
+    remaker_.set_reference(image.pixels, first ? 1 + followed_ : 1);
+    attach_due_ = true;
+  }
+
+  void take(v1::Frame frame, std::uint64_t time) {
+    follow_reference(time);
+    const bool touched = remaker_.touching();
+    const bool made = frame.has_jpeg() && measurable(frame) && decode(frame);
+    if (made) {
+      remaker_.remake(luma_.view(), frame);
+      ++maps_;
+    } else {
+      frame.clear_depth();
+      frame.clear_contact();
+    }
+    writer_.add(frame);
+    if (frames_++ == 0) {
+      attach("calibration.toml", "application/toml", "calibration.toml");
+      attach("reference.png", "image/png", "reference.png");
+    }
+    if (attach_due_ || frames_ == 1) {
+      writer_.attach(recording::kUntouchedPng, "image/png", untouched_);
+      attach_due_ = false;
+    }
+    if (made && remaker_.touching() != touched) tell_contact(frame);
+  }
+
+  void attach(const char* name, const char* media_type, const char* file) {
+    writer_.attach(name, media_type, base::read_file(fs::path(options_.calibration) / file));
+  }
+
+  void tell_contact(const v1::Frame& frame) {
+    v1::Event event;
+    event.set_sequence(frame.sequence());
+    event.set_monotonic_ns(frame.monotonic_ns());
+    event.set_wall_ns(frame.wall_ns());
+    event.mutable_contact()->set_sequence(frame.sequence());
+    event.mutable_contact()->set_monotonic_ns(frame.monotonic_ns());
+    *event.mutable_contact()->mutable_contact() = frame.contact();
+    writer_.add(event);
+  }
+
+  const Options& options_;
+  std::shared_ptr<const calibration::Calibration> calibration_;
+  mcap::Reader file_;
+  DepthRemaker remaker_;
+  hal::mjpeg::GreyDecoder decoder_;
+  hal::luma::LumaBuffer luma_;
+  mcap::FileSink sink_;
+  recording::RecordingWriter writer_;
+  std::string untouched_;           // the PNG of the reference in use
+  std::uint64_t reference_at_ = 0;  // its place in the file
+  double followed_ = 0;
+  bool attach_due_ = false;
+  std::uint64_t frames_ = 0;
+  std::uint64_t maps_ = 0;
+};
+
+void run(const cli::Context& context, const Options& options) {
+  if (!options.force && fs::exists(options.output)) {
+    throw std::runtime_error(options.output + " exists: name another file, or add --force");
+  }
+  if (fs::exists(options.output) && fs::equivalent(options.recording, options.output)) {
+    throw std::runtime_error(options.output + " is the recording itself: name another file");
+  }
+  Reprocessor reprocessor(options, context);
+  try {
+    reprocessor.run();
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove(options.output, ignored);
+    throw;
+  }
+  const auto report = reprocessor.report();
+  if (context.json) {
+    context.out << cli::json_line(report);
+    return;
+  }
+  context.out << fmt::format("{}: {} frames, depth made anew in {}\n", report.output(),
+                             report.frames(), report.maps());
+  if (!report.damage().empty()) {
+    context.out << fmt::format("the recording is not whole ({}): all before that is in it\n",
+                               report.damage());
+  }
+}
+
+}  // namespace
+
+void add_reprocess(CLI::App& app, cli::Context& context) {
+  CLI::App* command = app.add_subcommand(
+      "reprocess", "Make the depth of a recording anew with another calibration");
+  const auto options = std::make_shared<Options>();
+  command->add_option("RECORDING", options->recording, "A file of dtactctl record")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command->add_option("--calibration", options->calibration, "Calibration folder")->required();
+  command->add_option("-o,--output", options->output, "The recording to write")->required();
+  command
+      ->add_option("--untouched-frames", options->untouched_frames,
+                   "Nothing touched in so many frames at the beginning: where the recording holds "
+                   "no untouched image")
+      ->check(CLI::Range(1, 1000));
+  command->add_flag("--force", options->force, "Replace the file if it exists");
+  command->callback([&context, options] { run(context, *options); });
+}
+
+}  // namespace dtact::reprocess
