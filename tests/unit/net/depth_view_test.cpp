@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <random>
 #include <stdexcept>
 
@@ -30,8 +31,8 @@ pipeline::DepthFrame frame_of(int width, int height, std::vector<std::int16_t> d
 }
 
 pipeline::DepthFrame counting(int width, int height) {
-  std::vector<std::int16_t> depth;
-  for (int i = 0; i < width * height; ++i) depth.push_back(static_cast<std::int16_t>(i));
+  std::vector<std::int16_t> depth(static_cast<std::size_t>(width * height));
+  std::iota(depth.begin(), depth.end(), std::int16_t{0});
   return frame_of(width, height, std::move(depth));
 }
 

@@ -64,9 +64,9 @@ TEST(PredictZstd, ChangesItsFormAt15And270) {
 
 TEST(PredictZstd, FindsEscapesEverywhere) {
   for (std::size_t width = 1; width < 40; ++width) {
-    std::vector<std::int16_t> map;
-    for (std::size_t i = 0; i < 3 * width; ++i) {
-      map.push_back(static_cast<std::int16_t>(i % 5 == 0 ? 300 * i : i % 7));
+    std::vector<std::int16_t> map(3 * width);
+    for (std::size_t i = 0; i < map.size(); ++i) {
+      map[i] = static_cast<std::int16_t>(i % 5 == 0 ? 300 * i : i % 7);
     }
     std::string bytes;
     PredictZstdEncoder().encode(map, width, bytes);
@@ -93,8 +93,9 @@ TEST(PredictZstd, ComesBackFromMapsOfManySizesWithOneEncoder) {
 }
 
 TEST(PredictZstd, AFlatMapIsSmall) {
+  const std::vector<std::int16_t> map(800 * 600, 0);
   std::string bytes;
-  PredictZstdEncoder().encode(std::vector<std::int16_t>(800 * 600, 0), 800, bytes);
+  PredictZstdEncoder().encode(map, 800, bytes);
   EXPECT_LT(bytes.size(), 100U);
 }
 
