@@ -1,0 +1,55 @@
+"""Depth from a dtactd tactile sensor, as numpy arrays in millimetres.
+
+    import dtact
+
+    with dtact.connect("gripper") as s:
+        for f in s.frames():
+            print(f.depth_mm.shape, f.contact)
+"""
+from . import aio
+from .camera import Camera
+from .client import Client
+from .errors import (
+    Busy,
+    ConnectionError,
+    Denied,
+    DeviceFailed,
+    Error,
+    Invalid,
+    NoFrame,
+    NotInFrame,
+    ProtocolError,
+    Refused,
+    StorageFailed,
+    TimeoutError,
+    Touched,
+    Uncalibrated,
+    Unsupported,
+)
+from .event import CalibrationEvent, ContactEvent, Event, LightEvent, ReferenceEvent, StateEvent
+from .frame import Frame
+from .recording import Recording
+from .subscription import Subscription
+from .values import (
+    CalibrationFiles,
+    CalibrationSummary,
+    Contact,
+    Light,
+    Pong,
+    ReferenceImage,
+    Server,
+    Status,
+    StoredCalibration,
+)
+
+#: `with connect("gripper") as client`; see Client.
+connect = Client
+
+__all__ = [
+    "Busy", "Camera", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Client",
+    "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "Error", "Event", "Frame",
+    "Invalid", "Light", "LightEvent", "NoFrame", "NotInFrame", "Pong", "ProtocolError", "Recording",
+    "ReferenceEvent", "ReferenceImage", "Refused", "Server", "StateEvent", "Status", "StorageFailed",
+    "StoredCalibration", "Subscription", "TimeoutError", "Touched", "Uncalibrated", "Unsupported",
+    "aio", "connect",
+]

@@ -1,0 +1,269 @@
+"""The same for asyncio:
+
+    async with dtact.aio.connect("gripper") as s:
+        async for frame in s.frames():
+            ...
+
+What came is kept while nobody takes it, as with the client that waits. Several tasks may use one
+client; of those that take frames each gets some.
+"""
+from __future__ import annotations
+
+import asyncio
+import builtins
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+from types import TracebackType
+from typing import TypeVar
+
+from . import requests
+from .errors import ConnectionError, Error, NoFrame, ProtocolError, TimeoutError
+from .event import Event
+from .frame import Frame
+from .protocol import Conversation
+from .requests import Request, T
+from .session import BACK_OFF_S, Session
+from .subscription import Subscription
+from .transport import is_local
+from .values import CalibrationFiles, Light, Pong, ReferenceImage, Status, StoredCalibration
+
+_Item = TypeVar("_Item")
+
+
+class _Link(asyncio.BufferedProtocol):
+    """Puts what comes into the conversation and wakes whoever waits for it."""
+
+    def __init__(self, conversation: Conversation) -> None:
+        self._conversation = conversation
+        self._waiters: set[asyncio.Future[None]] = set()
+        self._error: Error | None = None
+        self.transport: asyncio.Transport | None = None
+        self.open = False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        self.transport = transport
+        self.open = True
+
+    def get_buffer(self, sizehint: int) -> memoryview:
+        return self._conversation.get_buffer()
+
+    def buffer_updated(self, nbytes: int) -> None:
+        try:
+            self._conversation.buffer_updated(nbytes)
+        except ProtocolError as e:
+            self._error = e
+            self.close()
+        self._wake()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self.open = False
+        self._wake()
+
+    def reason(self) -> Error | None:
+        """What was wrong with what came, if that ended the connection."""
+        return self._error
+
+    def close(self) -> None:
+        self.open = False
+        if self.transport is not None:
+            self.transport.close()
+
+    def _wake(self) -> None:
+        for waiter in self._waiters:
+            if not waiter.done():
+                waiter.set_result(None)
+
+    async def changed(self) -> None:
+        """Until more came or the connection ended."""
+        waiter = asyncio.get_running_loop().create_future()
+        self._waiters.add(waiter)
+        try:
+            await waiter
+        finally:
+            self._waiters.discard(waiter)
+
+
+class Client(Session):
+    __doc__ = (Session.__doc__ or "").replace("A connection", "An asyncio connection", 1)
+
+    _link: _Link | None = None
+
+    async def __aenter__(self) -> Client:
+        await self._open()
+        return self
+
+    async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                        trace: TracebackType | None) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        """Ends the connection."""
+        self._lost(ConnectionError(f"the connection to {self._address} was closed"))
+        self._reconnect = False
+        await asyncio.sleep(0)  # The transport closes its socket in the loop's next turn.
+
+    # ------------------------------------------------------------ frames and events
+
+    async def subscribe(self, subscription: Subscription | None = Subscription()) -> None:
+        """Replaces what is sent from now on; None ends it. Frames that came before are dropped:
+        what frames() gives is as was asked last."""
+        await self._ask(self._subscribe_request(subscription))
+        self._subscription = subscription
+
+    async def frames(self, timeout: float | None = None) -> AsyncIterator[Frame]:
+        """One frame after another, without an end. Subscribes to depth if nothing is subscribed.
+        Who comes back late gets the newest `kept_frames`. NoFrame when none comes within `timeout`
+        seconds, which are the client's unless given; with `reconnect` there is no limit unless one
+        is given."""
+        if self._subscription is None:
+            await self.subscribe()
+        limit = timeout if timeout is not None or self._reconnect else self._timeout
+        while True:
+            frame = await self._wait(Conversation.take_frame, limit)
+            if frame is None:
+                raise NoFrame(self._no_frame(limit or 0, await self.status()))
+            yield frame
+
+    async def events(self, timeout: float | None = None) -> AsyncIterator[Event]:
+        """One event after another, those from before included; ends when none comes within
+        `timeout` seconds. Frames go on to be kept for frames()."""
+        while (event := await self._wait(Conversation.take_event, timeout)) is not None:
+            yield event
+
+    async def next(self, timeout: float | None = None) -> Frame | Event | None:
+        """The next frame or event as they came; None when none came within `timeout` seconds."""
+        return await self._wait(Conversation.take, timeout)
+
+    # ------------------------------------------------------------ requests: see dtact.Client
+
+    async def status(self) -> Status:
+        return await self._ask(requests.status())
+
+    async def set_light(self, brightness: int | None = None, scheme: str | None = None,
+                        leds: Sequence[tuple[int, int, int]] | None = None) -> Light:
+        return await self._ask(requests.set_light(brightness, scheme, leds))
+
+    async def rezero(self, force: bool = False) -> None:
+        await self._ask(requests.rezero(force))
+
+    async def calibration(self, number: int | None = None) -> CalibrationFiles:
+        return await self._ask(requests.calibration(number))
+
+    async def calibrations(self) -> list[StoredCalibration]:
+        return await self._ask(requests.calibrations())
+
+    async def upload_calibration(self, files: CalibrationFiles) -> int | None:
+        return await self._ask(requests.upload_calibration(files))
+
+    async def activate_calibration(self, number: int) -> None:
+        await self._ask(requests.activate_calibration(number))
+
+    async def reference(self) -> ReferenceImage:
+        return await self._ask(requests.reference())
+
+    async def ping(self) -> Pong:
+        return await self._ask(requests.ping(time.monotonic))
+
+    # ------------------------------------------------------------ the connection
+
+    async def _ask(self, request: Request[T]) -> T:
+        if self._link is None:
+            self._check_usable()
+            await self._open()
+        return await self._exchange(request)
+
+    async def _exchange(self, request: Request[T]) -> T:
+        number, data = self._prepare(request)
+        link = self._link
+        assert link is not None and link.transport is not None
+        link.transport.write(data)
+        try:
+            async with asyncio.timeout(self._patience(request)):
+                while not self._has_answer(number):
+                    if not link.open:
+                        self._lost(link.reason() or self._ended())
+                        raise self._broken
+                    await link.changed()
+        except builtins.TimeoutError as e:
+            if isinstance(e, Error):
+                raise
+            self._conversation.forget(number)
+            raise TimeoutError("the daemon gave no answer in time: look at journalctl -u dtactd") from e
+        return self._answer(number, request)
+
+    async def _wait(self, take: Callable[[Conversation], _Item | None],
+                    limit: float | None) -> _Item | None:
+        """What `take` finds once it finds something; None when that takes longer than `limit`."""
+        back_off = BACK_OFF_S[0]
+        try:
+            async with asyncio.timeout(limit):
+                while (item := take(self._conversation)) is None:
+                    if self._link is not None and self._link.open:
+                        await self._link.changed()
+                        continue
+                    if self._link is not None:
+                        self._lost(self._link.reason() or self._ended())
+                    self._check_usable()
+                    try:
+                        await self._open()
+                    except ProtocolError:
+                        raise
+                    except ConnectionError:
+                        await asyncio.sleep(back_off)
+                        back_off = min(2 * back_off, BACK_OFF_S[1])
+                return item
+        except builtins.TimeoutError as e:
+            if isinstance(e, Error):
+                raise
+            return None
+
+    def _lost(self, error: Error) -> None:
+        self._broken = error
+        if self._link is not None:
+            self._link.close()
+        self._link = None
+
+    async def _open(self) -> None:
+        """Connects and subscribes as before."""
+        self._conversation = self._conversation.successor()
+        try:
+            async with asyncio.timeout(self._timeout):
+                self._link = await self._connected()
+        except ConnectionError:
+            raise
+        except OSError as e:
+            raise self._cannot_connect(e) from e
+        try:
+            server = await self._exchange(self._hello())
+            self._server = server
+            if self._subscription is not None:
+                await self._exchange(self._subscribe_request(self._subscription))
+        except Error as e:
+            self._lost(e)
+            raise
+
+    async def _connected(self) -> _Link:
+        loop = asyncio.get_running_loop()
+        address = self._address
+
+        def make() -> _Link:
+            return _Link(self._conversation)
+
+        if address.path:
+            transport, link = await loop.create_unix_connection(make, address.path)
+        else:
+            tls = None if self._pin is None else self._tls_context()
+            transport, link = await loop.create_connection(make, address.host, address.port, ssl=tls)
+        if self._pin is not None:
+            try:
+                self._check_pin(transport.get_extra_info("ssl_object").getpeercert(True))
+            except Error:
+                transport.close()
+                raise
+        self._local = is_local(transport.get_extra_info("socket"))
+        return link
+
+
+#: `async with connect(...) as client`.
+connect = Client

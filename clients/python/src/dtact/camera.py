@@ -1,0 +1,276 @@
+"""The sensor as a camera of LeRobot's shape, without LeRobot: what its robots, recorder and tools
+call on a camera is here, with the names, arguments and exceptions of lerobot.cameras.Camera
+(release 0.6, huggingface/lerobot pull request 3644 for the depth). lerobot_camera_dtact makes a
+LeRobot camera of it."""
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .address import DEFAULT_HOST
+from .client import Client
+from .errors import ConnectionError, Error, NoFrame
+from .frame import Frame
+from .subscription import Subscription
+
+#: The depth that is shown as the brightest colour, as in recordings' pictures.
+SHOWN_MM = 2.0
+# Black, violet, red, orange, light yellow: lighter all the way, so that it also reads in grey.
+_COLOURS = np.array([(0, 0, 0), (80, 18, 123), (183, 55, 121), (251, 135, 97), (252, 253, 191)])
+
+
+def _colour_table() -> NDArray[np.uint8]:
+    at = np.linspace(0, 255, len(_COLOURS))
+    channels = [np.interp(np.arange(256), at, _COLOURS[:, c]) for c in range(3)]
+    return np.stack(channels, axis=1).round().astype(np.uint8)
+
+
+_TABLE = _colour_table()
+
+
+def colour(depth_mm: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Depth as a picture: uint8 (H, W, 3), RGB; black where nothing is pressed or not to be
+    believed, lighter the deeper, lightest from SHOWN_MM on. `depth_mm`: float32 (H, W)."""
+    shade = np.nan_to_num(depth_mm, nan=0.0) * (255 / SHOWN_MM)
+    return _TABLE[np.clip(shade, 0, 255).astype(np.uint8)]
+
+
+class Camera:
+    """One sensor, read by a thread of its own between connect() and disconnect(), so that the newest
+    frame is always at hand.
+
+    :param address: see dtact.Client, as for `token`, `token_file` and `fingerprint`.
+    :param fps: at most so many frames a second; None: all of the daemon's.
+    :param width: and `height`, of depth and picture in pixels: the daemon's, or a half or a quarter
+        of them; None: the daemon's.
+    :param use_rgb: and `use_depth`, as LeRobot's depth cameras have them.
+    """
+
+    def __init__(
+        self,
+        address: str = DEFAULT_HOST,
+        *,
+        fps: int | None = None,
+        width: int | None = None,
+        height: int | None = None,
+        use_rgb: bool = True,
+        use_depth: bool = True,
+        token: str | None = None,
+        token_file: str | Path | None = None,
+        fingerprint: str | None = None,
+    ) -> None:
+        self.fps = fps
+        self.width = width
+        self.height = height
+        self.use_rgb = use_rgb
+        self.use_depth = use_depth
+        self._address = address
+        self._identity: dict[str, Any] = {
+            "token": token, "token_file": token_file, "fingerprint": fingerprint}
+        self._thread: threading.Thread | None = None
+        self._stop = threading.Event()
+        self._changed = threading.Condition()
+        # Of the reading thread, under `_changed`:
+        self._newest: Frame | None = None
+        self._came_at = 0.0  # time.perf_counter()
+        self._count = 0
+        self._error: Exception | None = None
+        # What async_read() and async_read_depth() have given last.
+        self._seen = {"rgb": 0, "depth": 0}
+
+    def __enter__(self) -> Camera:
+        self.connect()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.disconnect()
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether frames are being read."""
+        return self._thread is not None and self._thread.is_alive()
+
+    @staticmethod
+    def find_cameras() -> list[dict[str, Any]]:
+        """The daemon of this machine, if one runs at the usual address: "name", "type", "id" (the
+        address to give) and "default_stream_profile" with width, height and fps."""
+        try:
+            with Client(timeout=1.0, program="dtact find_cameras") as client:
+                status, server = client.status(), client.server
+        except Error:
+            return []
+        size = status.calibration
+        return [{
+            "name": server.name or f"dtact {server.serial}".strip(),
+            "type": "dtact",
+            "id": DEFAULT_HOST,
+            "serial": server.serial,
+            "default_stream_profile": {
+                "width": size.width if size else None,
+                "height": size.height if size else None,
+                "fps": status.fps,
+            },
+        }]
+
+    def connect(self, warmup: bool = True) -> None:
+        """Connects and starts to read. `warmup`: returns once the first depth is there. Sets fps,
+        width and height where they were left out. ConnectionError; ValueError for a size or rate
+        that the daemon cannot give."""
+        if self._thread is not None:
+            raise ConnectionError(f"{self} is already connected")
+        client = Client(self._address, program="dtact camera", kept_frames=1, **self._identity)
+        try:
+            client.subscribe(self._subscription(client))
+        except BaseException:
+            client.close()
+            raise
+        self._stop.clear()
+        self._newest = self._error = None
+        self._count = 0
+        self._seen = {"rgb": 0, "depth": 0}
+        self._thread = threading.Thread(target=self._read_loop, args=(client,), daemon=True,
+                                        name=f"{self}")
+        self._thread.start()
+        if warmup:
+            try:
+                self._after(0, 10_000)
+            except BaseException:
+                self.disconnect()
+                raise
+
+    def disconnect(self) -> None:
+        """Ends the connection."""
+        if self._thread is None:
+            raise ConnectionError(f"{self} is not connected")
+        self._stop.set()
+        self._thread.join()
+        self._thread = None
+
+    # ------------------------------------------------------------ pictures
+
+    def read(self) -> NDArray[np.uint8]:
+        """The next frame's depth in colours: uint8 (H, W, 3), RGB. Waits for it."""
+        return self._picture(self._after(self._checked("rgb"), 10_000))
+
+    def async_read(self, timeout_ms: float = 200) -> NDArray[np.uint8]:
+        """The newest frame's that this has not given yet; waits up to `timeout_ms` for one.
+        TimeoutError."""
+        self._checked("rgb")
+        return self._picture(self._after(self._seen["rgb"], timeout_ms, "rgb"))
+
+    def read_latest(self, max_age_ms: int = 500) -> NDArray[np.uint8]:
+        """The newest frame's, without waiting. TimeoutError when it came longer than `max_age_ms`
+        ago, RuntimeError when none came yet."""
+        self._checked("rgb")
+        return self._picture(self._latest(max_age_ms))
+
+    # ------------------------------------------------------------ depth
+
+    def read_depth(self) -> NDArray[np.float32]:
+        """The next frame's indentation: float32 (H, W, 1) in metres, positive = pressed; 0 where
+        it is not to be believed, since LeRobot's encoder has no room for NaN."""
+        return self._metres(self._after(self._checked("depth"), 10_000))
+
+    def async_read_depth(self, timeout_ms: float = 200) -> NDArray[np.float32]:
+        """As async_read(), with read_depth()'s values."""
+        self._checked("depth")
+        return self._metres(self._after(self._seen["depth"], timeout_ms, "depth"))
+
+    def read_latest_depth(self, max_age_ms: int = 500) -> NDArray[np.float32]:
+        """As read_latest(), with read_depth()'s values."""
+        self._checked("depth")
+        return self._metres(self._latest(max_age_ms))
+
+    # ------------------------------------------------------------ inside
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__}({self._address})"
+
+    def _subscription(self, client: Client) -> Subscription:
+        """What is asked of the daemon; completes fps, width and height."""
+        status = client.status()
+        size = status.calibration
+        if size is None:
+            raise ConnectionError(f"{self}: the daemon has no calibration. {status.advice}")
+        if self.width is None and self.height is None:
+            self.width, self.height = size.width, size.height
+        sizes = {(size.width // d, size.height // d): d for d in (4, 2, 1)}
+        decimation = sizes.get((self.width or 0, self.height or 0))
+        if decimation is None:
+            possible = ", ".join(f"{w} × {h}" for w, h in reversed(sizes))
+            raise ValueError(f"{self}: {self.width} × {self.height} is no size of this daemon's "
+                             f"depth: it gives {possible}")
+        camera_fps = float(status.message.camera.fps) or status.fps
+        if self.fps is None:
+            self.fps = round(camera_fps)
+        if self.fps >= round(camera_fps):
+            return Subscription(decimation=decimation)
+        if "rates" in client.server.features:
+            return Subscription(decimation=decimation, depth_hz=self.fps)
+        every = camera_fps / self.fps
+        if abs(every - round(every)) > 0.01 * every:
+            raise ValueError(f"{self}: {self.fps} frames a second are no whole fraction of the "
+                             f"camera's {camera_fps:g}, and this daemon is too old for others")
+        return Subscription(decimation=decimation, every=round(every))
+
+    def _read_loop(self, client: Client) -> None:
+        error: Exception = ConnectionError(f"{self} was disconnected")
+        try:
+            with client:
+                while not self._stop.is_set():
+                    frame = client.next(0.1)
+                    if isinstance(frame, Frame) and frame.has_depth:
+                        with self._changed:
+                            self._newest = frame
+                            self._came_at = time.perf_counter()
+                            self._count += 1
+                            self._changed.notify_all()
+        except Exception as e:
+            error = e
+        with self._changed:
+            self._error = error
+            self._changed.notify_all()
+
+    def _checked(self, what: str) -> int:
+        """How many frames came so far. Raises when `what` cannot be read."""
+        if self._thread is None:
+            raise ConnectionError(f"{self} is not connected: call connect() first")
+        if not (self.use_rgb if what == "rgb" else self.use_depth):
+            raise RuntimeError(f"{self} was made with use_{what}=False")
+        with self._changed:
+            return self._count
+
+    def _after(self, count: int, timeout_ms: float, reader: str = "") -> Frame:
+        """The newest frame once more than `count` came."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._count > count or self._error, timeout_ms / 1e3)
+            if self._count > count and self._newest is not None:
+                if reader:
+                    self._seen[reader] = self._count
+                return self._newest
+            if self._error is not None:
+                raise self._error
+        raise NoFrame(f"{self}: no new depth within {timeout_ms:g} ms; dtactctl status says why")
+
+    def _latest(self, max_age_ms: float) -> Frame:
+        with self._changed:
+            frame, age_ms = self._newest, (time.perf_counter() - self._came_at) * 1e3
+        if frame is None:
+            raise RuntimeError(f"{self}: no depth has come yet")
+        if age_ms > max_age_ms:
+            raise NoFrame(f"{self}: the newest depth came {age_ms:.0f} ms ago, at most "
+                          f"{max_age_ms:g} were asked for")
+        return frame
+
+    def _picture(self, frame: Frame) -> NDArray[np.uint8]:
+        return colour(frame.depth_mm)
+
+    def _metres(self, frame: Frame) -> NDArray[np.float32]:
+        return np.nan_to_num(frame.depth_mm, nan=0.0)[:, :, np.newaxis] * np.float32(1e-3)

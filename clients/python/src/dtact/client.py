@@ -1,0 +1,223 @@
+"""The client that waits."""
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from types import TracebackType
+from typing import Any, TypeVar, cast
+
+from . import requests
+from .errors import ConnectionError, Error, NoFrame, ProtocolError, TimeoutError
+from .event import Event
+from .frame import Frame
+from .protocol import Conversation
+from .requests import Request, T
+from .session import BACK_OFF_S, Session
+from .spaces import depth_box
+from .subscription import Subscription
+from .transport import Link
+from .values import CalibrationFiles, Light, Pong, ReferenceImage, Status, StoredCalibration
+
+_Item = TypeVar("_Item")
+
+#: Messages read at one go while more lie ready: the newest frames count, and calls have to end.
+_MOST_AT_ONCE = 64
+
+
+class Client(Session):
+    __doc__ = (Session.__doc__ or "") + """
+    Calls wait; one thread at a time. With `with`, or close() at the end."""
+
+    _link: Link | None = None
+
+    def _begin(self) -> None:
+        self._open(time.monotonic() + self._timeout)
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Ends the connection."""
+        self._lost(ConnectionError(f"the connection to {self._address} was closed"))
+        self._reconnect = False
+
+    # ------------------------------------------------------------ frames and events
+
+    def subscribe(self, subscription: Subscription | None = Subscription()) -> None:
+        """Replaces what is sent from now on; None ends it. Frames that came before are dropped:
+        what frames() gives is as was asked last."""
+        self._ask(self._subscribe_request(subscription))
+        self._subscription = subscription
+
+    def frames(self, timeout: float | None = None) -> Iterator[Frame]:
+        """One frame after another, without an end. Subscribes to depth if nothing is subscribed.
+        Who comes back late gets the newest `kept_frames`. NoFrame when none comes within `timeout`
+        seconds, which are the client's unless given; with `reconnect` there is no limit unless one
+        is given."""
+        if self._subscription is None:
+            self.subscribe()
+        limit = timeout if timeout is not None or self._reconnect else self._timeout
+        while True:
+            frame = self._wait(Conversation.take_frame, limit)
+            if frame is None:
+                raise NoFrame(self._no_frame(limit or 0, self.status()))
+            yield frame
+
+    def events(self, timeout: float | None = None) -> Iterator[Event]:
+        """One event after another, those from before included; ends when none comes within
+        `timeout` seconds. Frames go on to be kept for frames()."""
+        while (event := self._wait(Conversation.take_event, timeout)) is not None:
+            yield event
+
+    def next(self, timeout: float | None = None) -> Frame | Event | None:
+        """The next frame or event as they came; None when none came within `timeout` seconds."""
+        return cast("Frame | Event | None", self._wait(Conversation.take, timeout))
+
+    # ------------------------------------------------------------ requests
+    # Each raises Refused with the daemon's sentence, or a ConnectionError.
+
+    def status(self) -> Status:
+        """How the daemon is."""
+        return self._ask(requests.status())
+
+    def set_light(self, brightness: int | None = None, scheme: str | None = None,
+                  leds: Sequence[tuple[int, int, int]] | None = None) -> Light:
+        """Changes the ring and returns once it shows it; what is left out stays. `brightness`:
+        0 … 255. `scheme`: "all", "scheme1" … "scheme4". `leds`: eight colours (r, g, b)."""
+        return self._ask(requests.set_light(brightness, scheme, leds))
+
+    def rezero(self, force: bool = False) -> None:
+        """Takes the present picture as untouched; `force`: although something touches."""
+        self._ask(requests.rezero(force))
+
+    def calibration(self, number: int | None = None) -> CalibrationFiles:
+        """The files of one calibration; without a number, of the current one."""
+        return self._ask(requests.calibration(number))
+
+    def calibrations(self) -> list[StoredCalibration]:
+        """All that the daemon has: the configured one, then the uploaded ones, oldest first. May
+        take a few seconds."""
+        return self._ask(requests.calibrations())
+
+    def upload_calibration(self, files: CalibrationFiles) -> int | None:
+        """Returns once the daemon uses and has stored it, with its number; None from a daemon too
+        old to say it. May take a few seconds."""
+        return self._ask(requests.upload_calibration(files))
+
+    def activate_calibration(self, number: int) -> None:
+        """Makes one of calibrations() current."""
+        self._ask(requests.activate_calibration(number))
+
+    def reference(self) -> ReferenceImage:
+        """The untouched picture that depth is measured against at present."""
+        return self._ask(requests.reference())
+
+    def ping(self) -> Pong:
+        """The daemon's clocks and the way's time."""
+        return self._ask(requests.ping(time.monotonic))
+
+    @property
+    def observation_space(self) -> Any:
+        """A gymnasium.spaces.Box of what `depth_mm` is under the present subscription: float32
+        (H, W) in millimetres. NaN lies in no Box: numpy.nan_to_num() takes it out. Waits for a
+        frame. ImportError without gymnasium."""
+        return depth_box(next(frame for frame in self.frames() if frame.has_depth))
+
+    # ------------------------------------------------------------ the connection
+
+    def _ask(self, request: Request[T]) -> T:
+        deadline = time.monotonic() + self._patience(request)
+        if self._link is None:
+            self._check_usable()
+            self._open(deadline)
+        return self._exchange(request, deadline)
+
+    def _exchange(self, request: Request[T], deadline: float) -> T:
+        number, data = self._prepare(request)
+        assert self._link is not None
+        try:
+            self._link.send(data, deadline)
+        except OSError as e:
+            self._lost(self._broke(e))
+        while not self._has_answer(number):
+            if self._link is None:
+                raise self._broken
+            if not self._read(deadline):
+                self._conversation.forget(number)
+                raise TimeoutError("the daemon gave no answer in time: look at journalctl -u dtactd")
+        return self._answer(number, request)
+
+    def _wait(self, take: Callable[[Conversation], _Item | None],
+              limit: float | None) -> _Item | None:
+        """What `take` finds once it finds something; None when that takes longer than `limit`."""
+        deadline = math.inf if limit is None else time.monotonic() + limit
+        back_off = BACK_OFF_S[0]
+        while True:
+            # The newest frames count: what lies ready comes first.
+            for _ in range(_MOST_AT_ONCE):
+                if self._link is None or not self._read(None):
+                    break
+            item = take(self._conversation)
+            if item is not None:
+                return item
+            if self._link is None:
+                self._check_usable()
+                try:
+                    self._open(min(deadline, time.monotonic() + self._timeout))
+                except ProtocolError:
+                    raise
+                except ConnectionError:
+                    if time.monotonic() + back_off >= deadline:
+                        return None
+                    time.sleep(back_off)
+                    back_off = min(2 * back_off, BACK_OFF_S[1])
+            elif not self._read(deadline):
+                return None
+
+    def _read(self, deadline: float | None) -> bool:
+        """Reads once. False when nothing came in time (without a deadline: lay ready)."""
+        assert self._link is not None
+        try:
+            count = self._link.receive(self._conversation.get_buffer(), deadline)
+            if count < 0:
+                return False
+            if count == 0:
+                self._lost(self._ended())
+            else:
+                self._conversation.buffer_updated(count)
+        except ProtocolError as e:
+            self._lost(e)
+        except OSError as e:
+            self._lost(self._broke(e))
+        return True
+
+    def _lost(self, error: Error) -> None:
+        self._broken = error
+        if self._link is not None:
+            self._link.close()
+        self._link = None
+
+    def _open(self, deadline: float) -> None:
+        """Connects and subscribes as before."""
+        self._conversation = self._conversation.successor()
+        tls = None if self._pin is None else self._tls_context()
+        try:
+            self._link = Link(self._address, deadline, tls, self._check_pin)
+        except ConnectionError:
+            raise
+        except OSError as e:
+            raise self._cannot_connect(e) from e
+        self._local = self._link.local
+        try:
+            server = self._exchange(self._hello(), deadline)
+            self._server = server
+            if self._subscription is not None:
+                self._exchange(self._subscribe_request(self._subscription), deadline)
+        except Error as e:
+            self._lost(e)
+            raise

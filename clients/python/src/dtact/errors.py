@@ -1,0 +1,94 @@
+"""What goes wrong. The text of each error is a sentence for the user and names the remedy."""
+from __future__ import annotations
+
+import builtins
+
+
+class Error(Exception):
+    """What all of the package's exceptions are."""
+
+
+class ConnectionError(Error, builtins.ConnectionError):
+    """No connection, or it broke. Without `reconnect` the client is of no further use."""
+
+
+class TimeoutError(ConnectionError, builtins.TimeoutError):
+    """The daemon did not answer in time."""
+
+
+class ProtocolError(ConnectionError):
+    """The other side does not speak this wire, or another version of it, or is not who it was
+    pinned to be."""
+
+
+class NoFrame(Error, builtins.TimeoutError):
+    """No frame came in time. The connection goes on."""
+
+
+class NotInFrame(Error, LookupError):
+    """A frame does not hold what was asked of it: it was not subscribed or not measured."""
+
+
+class Refused(Error):
+    """The daemon refused a request. The connection goes on. The daemon's sentence is the text."""
+
+    #: The number of the ErrorCode in dtact.proto.
+    code: int
+
+    def __init__(self, code: int, sentence: str) -> None:
+        super().__init__(sentence)
+        self.code = code
+
+
+class Invalid(Refused, ValueError):
+    """A field of the request is out of range; the sentence names it. Nothing has changed."""
+
+
+class Touched(Refused):
+    """Refused while something touches."""
+
+
+class DeviceFailed(Refused):
+    """The ring or the camera failed."""
+
+
+class Busy(Refused):
+    """Too many commands wait, or too many clients: ask again."""
+
+
+class Uncalibrated(Refused):
+    """Needs a calibration."""
+
+
+class StorageFailed(Refused):
+    """The daemon's state directory could not be read or written."""
+
+
+class Unsupported(Refused):
+    """This daemon does not know the request, or a value in it: it is older than this package."""
+
+
+class Denied(Refused):
+    """The token is missing or wrong, or its rights do not reach."""
+
+
+# ErrorCode of dtact.proto.
+_VERSION = 3
+_TYPES: dict[int, type[Refused]] = {
+    4: Invalid,
+    5: Touched,
+    6: DeviceFailed,
+    7: Busy,
+    8: Uncalibrated,
+    9: StorageFailed,
+    10: Unsupported,
+    11: Denied,
+}
+UNSUPPORTED = 10
+
+
+def refusal(code: int, sentence: str) -> Error:
+    """The exception for an Error message of the daemon."""
+    if code == _VERSION:
+        return ProtocolError(sentence)
+    return _TYPES.get(code, Refused)(code, sentence)

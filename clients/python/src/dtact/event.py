@@ -1,0 +1,79 @@
+"""What the daemon tells every client that wants events."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from .messages import Message, name_of
+from .values import Contact, Light, condition_names, wall_time
+
+
+@dataclass(frozen=True)
+class Event:
+    """What all events have."""
+
+    #: The last frame captured before it; 0: none yet, or a 1.0 daemon that does not say.
+    sequence: int
+    time: datetime | None  #: UTC, by the daemon's clock; None from a 1.0 daemon
+    monotonic_s: float | None  #: the daemon's CLOCK_MONOTONIC; None from a 1.0 daemon
+
+
+@dataclass(frozen=True)
+class ContactEvent(Event):
+    """Contact was made or lost."""
+
+    contact: Contact
+
+
+@dataclass(frozen=True)
+class LightEvent(Event):
+    """The light changed, by whomever."""
+
+    light: Light
+
+
+@dataclass(frozen=True)
+class ReferenceEvent(Event):
+    """A new untouched picture is in use."""
+
+    restored: bool  #: the last good one from the daemon's state directory
+
+
+@dataclass(frozen=True)
+class StateEvent(Event):
+    """The daemon's state or its conditions changed."""
+
+    state: str
+    health: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CalibrationEvent(Event):
+    """Another calibration is in use."""
+
+    name: str
+    number: int | None
+
+
+def event_of(message: Message) -> Event | None:
+    """From dtact.proto's Event; None for a kind that this package does not know."""
+    kind = message.WhichOneof("what")
+    if kind is None:
+        return None
+    m = getattr(message, kind)
+    # A 1.0 daemon has a contact's moment in the contact and the others' nowhere.
+    sequence = int(message.sequence or getattr(m, "sequence", 0))
+    time = wall_time(message.wall_ns) if message.wall_ns else None
+    monotonic_ns = message.monotonic_ns or getattr(m, "monotonic_ns", 0)
+    monotonic_s = monotonic_ns * 1e-9 if monotonic_ns else None
+    if kind == "contact":
+        return ContactEvent(sequence, time, monotonic_s, Contact.of(m.contact))
+    if kind == "light":
+        return LightEvent(sequence, time, monotonic_s, Light.of(m))
+    if kind == "reference":
+        return ReferenceEvent(sequence, time, monotonic_s, m.restored)
+    if kind == "state":
+        return StateEvent(sequence, time, monotonic_s, name_of("State", m.state),
+                          condition_names(m.health))
+    number = m.number if m.HasField("number") else None
+    return CalibrationEvent(sequence, time, monotonic_s, m.name, number)

@@ -1,0 +1,158 @@
+"""Each request: what is sent, and what the answer means. Both clients use them."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import AbstractSet, Callable, Generic, Sequence, TypeVar
+
+from .errors import Invalid
+from .messages import ClientMessage, Message
+from .subscription import Subscription
+from .values import (
+    CalibrationFiles,
+    Light,
+    Pong,
+    ReferenceImage,
+    Server,
+    Status,
+    StoredCalibration,
+    wall_time,
+)
+
+T = TypeVar("T")
+
+MAJOR, MINOR = 1, 1  # kMajor and kMinor of proto/defaults.hpp
+MOST_PROGRAM_BYTES = 64
+_ERROR_INVALID = 4
+
+
+@dataclass(frozen=True)
+class Request(Generic[T]):
+    """`answer` makes of the Reply what the caller gets."""
+
+    message: Message
+    answer: Callable[[Message], T]
+    #: Features that the daemon has to have, or it would not understand.
+    needs: frozenset[str] = frozenset()
+    #: Calibrations are parsed, and some written to a disk, before the request is answered.
+    slow: bool = False
+
+
+def _nothing(reply: Message) -> None:
+    return None
+
+
+def _cut(text: str, most: int) -> str:
+    return text.encode()[:most].decode(errors="ignore")
+
+
+def hello(program: str, token: str | None) -> Request[Server]:
+    message = ClientMessage()
+    message.hello.major, message.hello.minor = MAJOR, MINOR
+    message.hello.program = _cut(program, MOST_PROGRAM_BYTES)
+    if token is not None:
+        message.hello.token = token
+    return Request(message, lambda reply: Server.of(reply.hello))
+
+
+def subscribe(subscription: Subscription, features: AbstractSet[str]) -> Request[None]:
+    message = ClientMessage()
+    message.subscribe.CopyFrom(subscription.message(features))
+    return Request(message, _nothing, needs=subscription.needs())
+
+
+def unsubscribe() -> Request[None]:
+    message = ClientMessage()
+    message.subscribe.SetInParent()
+    return Request(message, _nothing)
+
+
+def set_light(brightness: int | None, scheme: str | None,
+              leds: Sequence[tuple[int, int, int]] | None) -> Request[Light]:
+    message = ClientMessage()
+    request = message.set_light
+    request.SetInParent()
+    if brightness is not None:
+        request.brightness = brightness
+    if scheme is not None:
+        request.scheme = scheme
+    for r, g, b in leds or ():
+        request.leds.add(r=r, g=g, b=b)
+    return Request(message, lambda reply: Light.of(reply.light))
+
+
+def rezero(force: bool) -> Request[None]:
+    message = ClientMessage()
+    message.rezero.force = force
+    return Request(message, _nothing)
+
+
+def status() -> Request[Status]:
+    message = ClientMessage()
+    message.get_status.SetInParent()
+    return Request(message, lambda reply: Status.of(reply.status))
+
+
+def calibration(number: int | None) -> Request[CalibrationFiles]:
+    message = ClientMessage()
+    message.get_calibration.SetInParent()
+    if number is not None:
+        message.get_calibration.number = number
+
+    def answer(reply: Message) -> CalibrationFiles:
+        m = reply.calibration
+        came = m.number if m.HasField("number") else None
+        if number is not None and came != number:
+            raise Invalid(_ERROR_INVALID, "this daemon is older and knows only its current "
+                          "calibration: update dtactd")
+        return CalibrationFiles(m.name, m.calibration_toml, m.reference_png, came)
+
+    return Request(message, answer)
+
+
+def calibrations() -> Request[list[StoredCalibration]]:
+    message = ClientMessage()
+    message.list_calibrations.SetInParent()
+    return Request(message,
+                   lambda reply: [StoredCalibration.of(m) for m in reply.calibrations.calibrations],
+                   slow=True)
+
+
+def upload_calibration(files: CalibrationFiles) -> Request[int | None]:
+    message = ClientMessage()
+    request = message.upload_calibration
+    request.name = files.name
+    request.calibration_toml = files.calibration_toml
+    request.reference_png = files.reference_png
+    return Request(message,
+                   lambda reply: reply.done.calibration if reply.done.HasField("calibration") else None,
+                   slow=True)
+
+
+def activate_calibration(number: int) -> Request[None]:
+    message = ClientMessage()
+    message.activate_calibration.number = number
+    return Request(message, _nothing, slow=True)
+
+
+def reference() -> Request[ReferenceImage]:
+    message = ClientMessage()
+    message.get_reference.SetInParent()
+
+    def answer(reply: Message) -> ReferenceImage:
+        m = reply.reference
+        number = m.calibration if m.HasField("calibration") else None
+        return ReferenceImage(m.png, Light.of(m.light), m.sequence, number)
+
+    return Request(message, answer, needs=frozenset({"reference"}))
+
+
+def ping(clock: Callable[[], float]) -> Request[Pong]:
+    message = ClientMessage()
+    message.ping.SetInParent()
+    sent = clock()
+
+    def answer(reply: Message) -> Pong:
+        m = reply.pong
+        return Pong(m.monotonic_ns * 1e-9, wall_time(m.wall_ns), clock() - sent)
+
+    return Request(message, answer, needs=frozenset({"ping"}))

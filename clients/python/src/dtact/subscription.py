@@ -1,0 +1,93 @@
+"""What a client wants of every frame."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import AbstractSet, Literal
+
+from .encodings import has_rvl
+from .messages import Message, message_class, value_of
+
+Encoding = Literal["auto", "int16", "delta_zstd", "rvl", "predict_zstd"]
+
+# The names by which proto/README.md calls what came after version 1.0.
+_ENCODING_FEATURES = {"rvl": "rvl", "predict_zstd": "predict_zstd"}
+
+
+@dataclass(frozen=True)
+class Subscription:
+    """What is to be sent from now on. What is left out is not sent; a limit of 0 Hz is none.
+
+    All but `depth`, `luma`, `every` and `summary` need a daemon of version 1.1; an older one is
+    not asked for them and Unsupported is raised.
+    """
+
+    #: How depth travels; every encoding gives the same depth. "auto": RVL where both sides can,
+    #: else int16. None: no depth.
+    depth: Encoding | None = "auto"
+    luma: bool = False  #: the camera's picture in grey
+    jpeg: bool = False  #: the camera's own JPEG, if that is what it delivers
+    summary: bool = False  #: frames also without maps: contact, health and times
+    every: int = 1  #: every n-th frame
+    depth_hz: float = 0.0  #: at most so many depth maps a second, 0.01 … 1000
+    luma_hz: float = 0.0
+    jpeg_hz: float = 0.0
+    summary_hz: float = 0.0
+    decimation: int = 1  #: 1, 2 or 4 pixels averaged to one along each side
+    um_per_unit: int = 1  #: depth in steps of 1, 2, 5 or 10 micrometres
+    #: Part of the depth map: (x, y, width, height) in pixels of the calibration's resolution, or
+    #: "contact": the box around what is pressed, and no map while nothing is.
+    region: tuple[int, int, int, int] | Literal["contact"] | None = None
+    events: bool = True
+
+    def needs(self) -> frozenset[str]:
+        """The features that a daemon has to have for it."""
+        asked = {
+            "jpeg": self.jpeg,
+            "rates": any((self.depth_hz, self.luma_hz, self.jpeg_hz, self.summary_hz)),
+            "decimation": self.decimation not in (0, 1),
+            "units": self.um_per_unit not in (0, 1),
+            "region": self.region is not None,
+            "events": not self.events,
+        }
+        names = {name for name, wanted in asked.items() if wanted}
+        if self.depth in _ENCODING_FEATURES:
+            names.add(_ENCODING_FEATURES[self.depth])
+        return frozenset(names)
+
+    def message(self, features: AbstractSet[str]) -> Message:
+        """The request for a daemon that has such features. ValueError for an encoding that is no
+        Encoding."""
+        request = message_class("Subscribe")()
+        if self.depth is not None:
+            request.depth = value_of(self._constant(features))
+        if self.luma:
+            request.luma = value_of("LUMA_GREY8")
+        request.every = self.every
+        request.summary = self.summary
+        request.jpeg = self.jpeg
+        request.depth_hz = self.depth_hz
+        request.luma_hz = self.luma_hz
+        request.jpeg_hz = self.jpeg_hz
+        request.summary_hz = self.summary_hz
+        request.decimation = self.decimation
+        request.um_per_unit = self.um_per_unit
+        if self.region == "contact":
+            request.contact_box = True
+        elif self.region is not None:
+            box = request.box
+            box.x, box.y, box.width, box.height = self.region
+        if not self.events:
+            request.events = False
+        return request
+
+    def _constant(self, features: AbstractSet[str]) -> str:
+        if self.depth == "auto":
+            can = has_rvl() and _ENCODING_FEATURES["rvl"] in features
+            return "DEPTH_RVL" if can else "DEPTH_INT16"
+        if self.depth not in ("int16", "delta_zstd", "rvl", "predict_zstd"):
+            raise ValueError(f'"{self.depth}" is no encoding of depth: "auto", "int16", '
+                             '"delta_zstd", "rvl" or "predict_zstd"')
+        if self.depth == "rvl" and not has_rvl():
+            raise ValueError("this installation of dtact was built without RVL: install a C compiler "
+                             "and python3-dev, then dtact again, or choose another encoding")
+        return f"DEPTH_{self.depth.upper()}"

@@ -1,0 +1,180 @@
+"""What frames, events and answers hold besides pixels. Millimetres are of the surface frame: origin
+at the centre of the depth map, x to the right, y down, as the camera sees it."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from typing import Iterable
+
+from .messages import Message, name_of
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=timezone.utc)
+
+
+def wall_time(nanoseconds: int) -> datetime:
+    """Nanoseconds since 1970 as a datetime in UTC, rounded down to microseconds."""
+    return _EPOCH + timedelta(microseconds=nanoseconds // 1000)
+
+
+def condition_names(health: Iterable[int]) -> tuple[str, ...]:
+    """The `health` of a message: HEALTH_LIGHT_UNSETTLED → "light_unsettled"."""
+    return tuple(name_of("Health", value) for value in health)
+
+
+@dataclass(frozen=True)
+class Contact:
+    """What touches, in a summary."""
+
+    touching: bool
+    area_mm2: float  #: pressed deeper than the contact threshold
+    x_mm: float  #: depth-weighted centroid
+    y_mm: float
+    deepest_mm: float
+    deepest_x_mm: float
+    deepest_y_mm: float
+    volume_mm3: float
+
+    @classmethod
+    def of(cls, m: Message) -> Contact:
+        return cls(m.touching, m.area_mm2, m.x_mm, m.y_mm, m.deepest_mm, m.deepest_x_mm,
+                   m.deepest_y_mm, m.volume_mm3)
+
+
+@dataclass(frozen=True)
+class Light:
+    """The ring."""
+
+    brightness: int  #: 0 … 255
+    leds: tuple[tuple[int, int, int], ...]  #: eight colours (r, g, b) of 0 … 255
+    #: The daemon's CLOCK_MONOTONIC in seconds from which on frames are exposed under it; None while
+    #: it is not known and from a 1.0 daemon.
+    since_s: float | None
+
+    @classmethod
+    def of(cls, m: Message) -> Light:
+        leds = tuple((led.r, led.g, led.b) for led in m.leds)
+        return cls(m.brightness, leds, m.since_ns * 1e-9 if m.HasField("since_ns") else None)
+
+
+@dataclass(frozen=True)
+class CalibrationSummary:
+    """What a calibration is made for."""
+
+    name: str
+    method: str  #: "list" or "published"
+    mm_per_px: float
+    width: int  #: of the depth map at full resolution, pixels
+    height: int
+    covered_from_mm: float
+    covered_to_mm: float
+    created: str  #: ISO 8601
+    frame_width: int  #: of the camera's picture, pixels
+    frame_height: int
+
+    @classmethod
+    def of(cls, m: Message) -> CalibrationSummary:
+        return cls(m.name, m.method, m.mm_per_px, m.width, m.height, m.covered_from_mm,
+                   m.covered_to_mm, m.created, m.frame_width, m.frame_height)
+
+
+@dataclass(frozen=True)
+class StoredCalibration:
+    """One of the calibrations that the daemon has."""
+
+    number: int  #: 0 is the one of the configuration file; uploaded ones count from 1
+    name: str
+    uploaded: str  #: ISO 8601, UTC; empty for number 0
+    current: bool  #: what the daemon starts with
+    in_use: bool
+    summary: CalibrationSummary | None
+    damage: str  #: why it cannot be read, or empty
+
+    @classmethod
+    def of(cls, m: Message) -> StoredCalibration:
+        summary = CalibrationSummary.of(m.summary) if m.HasField("summary") else None
+        # An older daemon does not say which is in use: the current one is taken to be.
+        in_use = m.in_use if m.HasField("in_use") else m.current
+        return cls(m.number, m.name, m.uploaded, m.current, in_use, summary, m.damage)
+
+
+@dataclass(frozen=True)
+class CalibrationFiles:
+    """The files of one calibration, as `dtact-calibrate` writes them into a folder."""
+
+    name: str
+    calibration_toml: bytes
+    reference_png: bytes
+    number: int | None = None
+
+    @classmethod
+    def read(cls, folder: str | Path) -> CalibrationFiles:
+        """From a folder, under its name."""
+        folder = Path(folder)
+        return cls(folder.resolve().name, (folder / "calibration.toml").read_bytes(),
+                   (folder / "reference.png").read_bytes())
+
+    def write(self, folder: str | Path) -> None:
+        """Into a folder, which is made."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "calibration.toml").write_bytes(self.calibration_toml)
+        (folder / "reference.png").write_bytes(self.reference_png)
+
+
+@dataclass(frozen=True)
+class ReferenceImage:
+    """The untouched picture that depth is measured against."""
+
+    png: bytes  #: 16-bit grey, 256 units a grey level, the camera's size
+    light: Light
+    sequence: int  #: the last frame in it
+    calibration: int | None
+
+
+@dataclass(frozen=True)
+class Pong:
+    """The daemon's clocks, and how long the way there and back took."""
+
+    monotonic_s: float
+    time: datetime
+    round_trip_s: float
+
+
+@dataclass(frozen=True)
+class Status:
+    """How the daemon is. `message` holds all of dtact.proto's Status."""
+
+    state: str  #: "settling", "referencing", "serving", "uncalibrated", "camera_lost"
+    health: tuple[str, ...]
+    advice: str  #: what to do about state and health; empty when all is well
+    fps: float  #: over the last second
+    light: Light
+    calibration: CalibrationSummary | None
+    version: str
+    message: Message
+
+    @classmethod
+    def of(cls, m: Message) -> Status:
+        calibration = CalibrationSummary.of(m.calibration) if m.HasField("calibration") else None
+        return cls(name_of("State", m.state), condition_names(m.health), m.advice, m.fps,
+                   Light.of(m.light), calibration, m.version, m)
+
+
+@dataclass(frozen=True)
+class Server:
+    """Who answered."""
+
+    program: str
+    major: int
+    minor: int
+    features: frozenset[str]  #: what it can do beyond version 1.0; proto/README.md lists the names
+    rights: str  #: "view", "control", or "unspecified" of a 1.0 daemon: everything
+    name: str
+    serial: str  #: the camera's, as far as it tells one
+    frame_id: str  #: of the surface frame
+
+    @classmethod
+    def of(cls, m: Message) -> Server:
+        return cls(m.program, m.major, m.minor, frozenset(m.features), name_of("Rights", m.rights),
+                   m.name, m.serial, m.surface_frame.frame_id)
