@@ -14,7 +14,9 @@ from .errors import (
     ConnectionError,
     Denied,
     DeviceFailed,
+    EndedByDaemon,
     Error,
+    IdentityError,
     Invalid,
     NoFrame,
     NotInFrame,
@@ -26,8 +28,17 @@ from .errors import (
     Uncalibrated,
     Unsupported,
 )
-from .event import CalibrationEvent, ContactEvent, Event, LightEvent, ReferenceEvent, StateEvent
+from .event import (
+    CalibrationEvent,
+    ContactEvent,
+    Event,
+    LightEvent,
+    Reconnected,
+    ReferenceEvent,
+    StateEvent,
+)
 from .frame import Frame
+from .mcap import read
 from .recording import Recording
 from .subscription import Subscription
 from .values import (
@@ -47,9 +58,9 @@ connect = Client
 
 __all__ = [
     "Busy", "Camera", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Client",
-    "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "Error", "Event", "Frame",
-    "Invalid", "Light", "LightEvent", "NoFrame", "NotInFrame", "Pong", "ProtocolError", "Recording",
-    "ReferenceEvent", "ReferenceImage", "Refused", "Server", "StateEvent", "Status", "StorageFailed",
+    "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "EndedByDaemon", "Error",
+    "Event", "Frame", "IdentityError", "Invalid", "Light", "LightEvent", "NoFrame", "NotInFrame", "Pong", "ProtocolError", "Recording",
+    "Reconnected", "ReferenceEvent", "ReferenceImage", "Refused", "Server", "StateEvent", "Status", "StorageFailed",
     "StoredCalibration", "Subscription", "TimeoutError", "Touched", "Uncalibrated", "Unsupported",
-    "aio", "connect",
+    "aio", "connect", "read",
 ]

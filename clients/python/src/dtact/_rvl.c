@@ -15,10 +15,11 @@ struct nibbles {
   int left; /* nibbles of `word` not taken yet */
 };
 
-/* The next number; -1 when the bytes end before it does or it has more than 32 bits. */
-static int64_t take(struct nibbles *in) {
-  uint64_t value = 0;
-  for (int shift = 0; shift < 33; shift += 3) {
+/* The next number; -1 when the words end before it does, or it is longer than any in a map or than
+ * it needs to be. */
+static int32_t take(struct nibbles *in) {
+  uint32_t value = 0;
+  for (int shift = 0; shift < 30; shift += 3) {
     if (in->left == 0) {
       if (in->end - in->next < 4) return -1;
       in->word = (uint32_t)in->next[0] | (uint32_t)in->next[1] << 8 |
@@ -29,34 +30,32 @@ static int64_t take(struct nibbles *in) {
     const uint32_t nibble = in->word >> 28;
     in->word <<= 4;
     --in->left;
-    value |= (uint64_t)(nibble & 7) << shift;
-    if ((nibble & 8) == 0) return value <= UINT32_MAX ? (int64_t)value : -1;
+    value |= (nibble & 7) << shift;
+    if (nibble < 8) return nibble != 0 || shift == 0 ? (int32_t)value : -1;
   }
   return -1;
 }
 
-/* What is wrong, or null. `out` is zero before. */
-static const char *decode(struct nibbles in, int16_t *out, int64_t count) {
-  int64_t previous = 0;
-  int64_t at = 0;
+/* What is wrong, or null. `out` is zero before. Exactly what the encoder makes is taken, as by the
+ * C++ library. */
+static const char *decode(struct nibbles in, int16_t *out, Py_ssize_t count) {
+  int32_t previous = 0;
+  Py_ssize_t at = 0;
   while (at < count) {
-    const int64_t zeros = take(&in);
-    if (zeros < 0) return "the bytes end within a run of zeros";
-    if (zeros > count - at) return "a run of zeros ends beyond the map";
+    const int32_t zeros = take(&in);
+    if (zeros < 0 || zeros > count - at || (zeros == 0 && at != 0)) return "bad run of zeros";
     at += zeros;
-    const int64_t others = take(&in);
-    if (others < 0) return "the bytes end within a run";
-    if (others > count - at) return "a run ends beyond the map";
-    if (zeros == 0 && others == 0) return "a pair of runs is empty";
-    for (int64_t i = 0; i < others; ++i) {
-      const int64_t zigzag = take(&in);
+    const int32_t others = take(&in);
+    if (others < 0 || others > count - at || (others == 0 && at != count)) return "bad run";
+    for (const Py_ssize_t end = at + others; at < end; ++at) {
+      const int32_t zigzag = take(&in);
       if (zigzag < 0) return "the bytes end within a run";
       previous += (zigzag >> 1) ^ -(zigzag & 1);
-      if (previous < INT16_MIN || previous > INT16_MAX) return "a pixel does not fit int16";
-      out[at++] = (int16_t)previous;
+      if (previous < INT16_MIN || previous > INT16_MAX || previous == 0) return "bad pixel";
+      out[at] = (int16_t)previous;
     }
   }
-  return in.next == in.end ? NULL : "bytes follow the last pixel";
+  return in.next == in.end && in.word == 0 ? NULL : "bytes follow the last pixel";
 }
 
 static PyObject *rvl_decode(PyObject *self, PyObject *arguments) {

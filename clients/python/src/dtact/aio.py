@@ -22,7 +22,7 @@ from .event import Event
 from .frame import Frame
 from .protocol import Conversation
 from .requests import Request, T
-from .session import BACK_OFF_S, Session
+from .session import BackOff, Session
 from .subscription import Subscription
 from .transport import is_local
 from .values import CalibrationFiles, Light, Pong, ReferenceImage, Status, StoredCalibration
@@ -195,7 +195,7 @@ class Client(Session):
     async def _wait(self, take: Callable[[Conversation], _Item | None],
                     limit: float | None) -> _Item | None:
         """What `take` finds once it finds something; None when that takes longer than `limit`."""
-        back_off = BACK_OFF_S[0]
+        back_off = BackOff()
         try:
             async with asyncio.timeout(limit):
                 while (item := take(self._conversation)) is None:
@@ -207,11 +207,9 @@ class Client(Session):
                     self._check_usable()
                     try:
                         await self._open()
-                    except ProtocolError:
-                        raise
-                    except ConnectionError:
-                        await asyncio.sleep(back_off)
-                        back_off = min(2 * back_off, BACK_OFF_S[1])
+                    except ConnectionError as e:
+                        self._lost(e)
+                        await asyncio.sleep(back_off.next())
                 return item
         except builtins.TimeoutError as e:
             if isinstance(e, Error):
@@ -219,7 +217,7 @@ class Client(Session):
             return None
 
     def _lost(self, error: Error) -> None:
-        self._broken = error
+        self._note_loss(error)
         if self._link is not None:
             self._link.close()
         self._link = None
@@ -242,6 +240,7 @@ class Client(Session):
         except Error as e:
             self._lost(e)
             raise
+        self._note_return()
 
     async def _connected(self) -> _Link:
         loop = asyncio.get_running_loop()
@@ -253,9 +252,9 @@ class Client(Session):
         if address.path:
             transport, link = await loop.create_unix_connection(make, address.path)
         else:
-            tls = None if self._pin is None else self._tls_context()
-            transport, link = await loop.create_connection(make, address.host, address.port, ssl=tls)
-        if self._pin is not None:
+            transport, link = await loop.create_connection(make, address.host, address.port,
+                                                           ssl=self._tls)
+        if self._tls is not None:
             try:
                 self._check_pin(transport.get_extra_info("ssl_object").getpeercert(True))
             except Error:

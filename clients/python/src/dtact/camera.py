@@ -45,7 +45,7 @@ class Camera:
     """One sensor, read by a thread of its own between connect() and disconnect(), so that the newest
     frame is always at hand.
 
-    :param address: see dtact.Client, as for `token`, `token_file` and `fingerprint`.
+    :param address: see dtact.Client, as for `token`, `token_file`, `fingerprint` and `ca_file`.
     :param fps: at most so many frames a second; None: all of the daemon's.
     :param width: and `height`, of depth and picture in pixels: the daemon's, or a half or a quarter
         of them; None: the daemon's.
@@ -64,6 +64,7 @@ class Camera:
         token: str | None = None,
         token_file: str | Path | None = None,
         fingerprint: str | None = None,
+        ca_file: str | Path | None = None,
     ) -> None:
         self.fps = fps
         self.width = width
@@ -72,7 +73,8 @@ class Camera:
         self.use_depth = use_depth
         self._address = address
         self._identity: dict[str, Any] = {
-            "token": token, "token_file": token_file, "fingerprint": fingerprint}
+            "token": token, "token_file": token_file, "fingerprint": fingerprint,
+            "ca_file": ca_file}
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._changed = threading.Condition()

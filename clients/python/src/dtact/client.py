@@ -13,7 +13,7 @@ from .event import Event
 from .frame import Frame
 from .protocol import Conversation
 from .requests import Request, T
-from .session import BACK_OFF_S, Session
+from .session import BackOff, Session
 from .spaces import depth_box
 from .subscription import Subscription
 from .transport import Link
@@ -156,7 +156,7 @@ class Client(Session):
               limit: float | None) -> _Item | None:
         """What `take` finds once it finds something; None when that takes longer than `limit`."""
         deadline = math.inf if limit is None else time.monotonic() + limit
-        back_off = BACK_OFF_S[0]
+        back_off = BackOff()
         while True:
             # The newest frames count: what lies ready comes first.
             for _ in range(_MOST_AT_ONCE):
@@ -169,13 +169,12 @@ class Client(Session):
                 self._check_usable()
                 try:
                     self._open(min(deadline, time.monotonic() + self._timeout))
-                except ProtocolError:
-                    raise
-                except ConnectionError:
-                    if time.monotonic() + back_off >= deadline:
+                except ConnectionError as e:
+                    self._lost(e)
+                    left = deadline - time.monotonic()
+                    if left <= 0:
                         return None
-                    time.sleep(back_off)
-                    back_off = min(2 * back_off, BACK_OFF_S[1])
+                    time.sleep(min(back_off.next(), left))
             elif not self._read(deadline):
                 return None
 
@@ -197,7 +196,7 @@ class Client(Session):
         return True
 
     def _lost(self, error: Error) -> None:
-        self._broken = error
+        self._note_loss(error)
         if self._link is not None:
             self._link.close()
         self._link = None
@@ -205,9 +204,8 @@ class Client(Session):
     def _open(self, deadline: float) -> None:
         """Connects and subscribes as before."""
         self._conversation = self._conversation.successor()
-        tls = None if self._pin is None else self._tls_context()
         try:
-            self._link = Link(self._address, deadline, tls, self._check_pin)
+            self._link = Link(self._address, deadline, self._tls, self._check_pin)
         except ConnectionError:
             raise
         except OSError as e:
@@ -221,3 +219,4 @@ class Client(Session):
         except Error as e:
             self._lost(e)
             raise
+        self._note_return()

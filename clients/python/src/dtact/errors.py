@@ -13,12 +13,29 @@ class ConnectionError(Error, builtins.ConnectionError):
 
 
 class TimeoutError(ConnectionError, builtins.TimeoutError):
-    """The daemon did not answer in time."""
+    """The daemon did not answer a request in time. The connection stays; the answer is passed over
+    when it comes."""
 
 
 class ProtocolError(ConnectionError):
-    """The other side does not speak this wire, or another version of it, or is not who it was
-    pinned to be."""
+    """The other side does not speak this wire, or another version of it."""
+
+
+class IdentityError(ConnectionError):
+    """Not the daemon that `fingerprint` or `ca_file` ask for, or nothing that says so while a token
+    is to be sent."""
+
+
+class EndedByDaemon(ConnectionError):
+    """The daemon ended the connection and said why: too many clients or requests, or one that it
+    could not read."""
+
+    #: The number of the ErrorCode in dtact.proto.
+    code: int
+
+    def __init__(self, code: int, sentence: str) -> None:
+        super().__init__(sentence)
+        self.code = code
 
 
 class NoFrame(Error, builtins.TimeoutError):

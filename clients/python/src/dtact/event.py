@@ -1,4 +1,4 @@
-"""What the daemon tells every client that wants events."""
+"""What the daemon tells every client that wants events, and what the client adds."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -53,6 +53,16 @@ class CalibrationEvent(Event):
 
     name: str
     number: int | None
+
+
+@dataclass(frozen=True)
+class Reconnected(Event):
+    """The connection was lost and is there again, subscribed as before. What happened meanwhile was
+    not seen. `sequence` is that of the last frame before; a smaller one after it is that of a
+    daemon or camera that began anew."""
+
+    reason: str  #: why it was lost: a sentence
+    away_s: float
 
 
 def event_of(message: Message) -> Event | None:

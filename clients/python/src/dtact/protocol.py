@@ -9,7 +9,7 @@ from typing import Generic, TypeVar
 
 from google.protobuf.message import DecodeError
 
-from .errors import ConnectionError, Error, ProtocolError, refusal
+from .errors import EndedByDaemon, Error, ProtocolError, refusal
 from .event import Event, event_of
 from .frame import Frame
 from .messages import Message, ServerMessage
@@ -60,13 +60,21 @@ class Conversation:
         self.answers: dict[int, Message] = {}
         #: Why the daemon ends the connection, once it has said so.
         self.farewell: Error | None = None
+        #: Of the last frame that came; 0: none.
+        self.last_sequence = 0
 
     def successor(self) -> Conversation:
         """That of the next connection: what came of events stays to be taken."""
         other = Conversation(self._kept_frames)
         other._arrivals = self._arrivals
         other._events = self._events
+        other.last_sequence = self.last_sequence
         return other
+
+    def tell(self, event: Event) -> None:
+        """An event that is not the daemon's."""
+        self._arrivals += 1
+        self._events.put(self._arrivals, event)
 
     # ------------------------------------------------------------ out
 
@@ -123,6 +131,7 @@ class Conversation:
         self._arrivals += 1
         kind = message.WhichOneof("body")
         if kind == "frame":
+            self.last_sequence = message.frame.sequence
             self._frames.put(self._arrivals, Frame(message.frame))
         elif kind == "event":
             event = event_of(message.event)
@@ -134,8 +143,8 @@ class Conversation:
     def _reply(self, reply: Message) -> None:
         if reply.id == 0 and reply.HasField("error"):
             error = refusal(reply.error.code, reply.error.message)
-            is_connection = isinstance(error, ConnectionError)
-            self.farewell = error if is_connection else ConnectionError(reply.error.message)
+            is_version = isinstance(error, ProtocolError)
+            self.farewell = error if is_version else EndedByDaemon(reply.error.code, str(error))
         elif reply.id in self._waiting:
             self._waiting.discard(reply.id)
             self.answers[reply.id] = reply

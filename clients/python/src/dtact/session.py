@@ -3,12 +3,25 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import random
 import ssl
+import stat
+import time
 from pathlib import Path
 
 from . import requests
 from .address import DEFAULT_HOST, Address, parse
-from .errors import UNSUPPORTED, ConnectionError, Denied, Error, ProtocolError, Unsupported, refusal
+from .errors import (
+    UNSUPPORTED,
+    ConnectionError,
+    Denied,
+    Error,
+    IdentityError,
+    ProtocolError,
+    Unsupported,
+    refusal,
+)
+from .event import Reconnected
 from .protocol import Conversation
 from .recording import Recording
 from .requests import Request, T
@@ -17,8 +30,22 @@ from .values import Server, Status
 
 #: Calibrations take the daemon seconds.
 _SLOW_S = 30.0
-#: Between two attempts to connect again: from, to.
-BACK_OFF_S = (0.1, 5.0)
+# What more attempts to connect do not mend.
+_FINAL = (ProtocolError, IdentityError, Denied)
+_MOST_TOKEN_BYTES = 256
+
+
+class BackOff:
+    """The waits between attempts to connect again, in seconds: 0.1, 0.2, … 5, less a random part of up
+    to a half, so that the clients of a daemon do not all come at once."""
+
+    def __init__(self) -> None:
+        self._next = 0.1
+
+    def next(self) -> float:
+        wait = self._next * random.uniform(0.5, 1.0)
+        self._next = min(2 * self._next, 5.0)
+        return wait
 
 
 class Session:
@@ -26,10 +53,14 @@ class Session:
 
     :param address: "host", "host:port", "unix:/path"; port 7377 unless given.
     :param token: what the daemon asks for on an address beyond its machine. It is sent only to
-        this machine and to a daemon whose certificate is pinned by `fingerprint`.
-    :param token_file: the same from the first line of a file.
+        this machine, to a daemon known by `fingerprint` or `ca_file`, or where `insecure` says so.
+    :param token_file: the same from the first line of a file that only its owner may read.
     :param fingerprint: SHA-256 of the daemon's certificate in hexadecimal, as `dtactctl cert`
-        prints it: TLS, and nobody else is spoken to.
+        prints it: TLS 1.3, and nobody else is spoken to.
+    :param ca_file: TLS 1.3 with a certificate that one of those in this PEM file has signed for the
+        host's name.
+    :param insecure: sends the token over plain TCP to other machines too: whoever hears it there may
+        use it.
     :param program: shown by `dtactctl status`.
     :param timeout: seconds for the connection, each request, and each frame.
     :param reconnect: connect and subscribe again when the connection breaks while frames or events
@@ -44,6 +75,8 @@ class Session:
         token: str | None = None,
         token_file: str | Path | None = None,
         fingerprint: str | None = None,
+        ca_file: str | Path | None = None,
+        insecure: bool = False,
         program: str = "dtact Python client",
         timeout: float = 5.0,
         reconnect: bool = False,
@@ -53,12 +86,15 @@ class Session:
             raise ValueError("give a token or a token_file, not both")
         if kept_frames < 1:
             raise ValueError("kept_frames has to be 1 or more")
-        if token_file is not None:
-            lines = Path(token_file).read_text().splitlines()
-            token = lines[0].strip() if lines else ""
         self._address: Address = parse(address)
-        self._token = token
+        self._token = token if token_file is None else read_token(Path(token_file))
         self._pin = None if fingerprint is None else _plain(fingerprint)
+        # A socket file needs no TLS and uses none.
+        tls = not self._address.path and (fingerprint is not None or ca_file is not None)
+        self._tls = _tls_context(ca_file) if tls else None
+        self._insecure = insecure
+        self._options = [*_given("--token-file", token_file), *_given("--fingerprint", fingerprint),
+                         *_given("--ca-file", ca_file), *(["--insecure"] if insecure else [])]
         self._program = program
         self._timeout = timeout
         self._reconnect = reconnect
@@ -69,6 +105,8 @@ class Session:
         self._local = False
         #: Why there is no connection, while there is none.
         self._broken: Error = ConnectionError(f"not connected to {self._address}")
+        self._lost_at: float | None = None
+        self._lost_because = ""
         self._begin()
 
     def _begin(self) -> None:
@@ -91,7 +129,10 @@ class Session:
     def record(self, path: str | Path) -> Recording:
         """Records all that the daemon gives into an MCAP file until the end of the `with` block,
         or stop(). `dtactctl record` does it, over a connection of its own."""
-        return Recording(path, self._address, self._token, self._pin)
+        if self._token is not None and "--token-file" not in self._options:
+            raise Error("give the token as a token_file: other users would see it in dtactctl's "
+                        "command line")
+        return Recording(path, self._address, self._options)
 
     def __repr__(self) -> str:
         state = self._server.program if self._server else "not connected"
@@ -101,9 +142,10 @@ class Session:
 
     def _hello(self) -> Request[Server]:
         """The first request on a new connection, whose `_local` is known."""
-        if self._token is not None and not (self._local or self._pin is not None):
-            raise Error(f"the token is not sent to {self._address}: nothing says who listens there. "
-                        "Give the fingerprint of the daemon's certificate (dtactctl cert)")
+        if self._token is not None and not (self._local or self._tls or self._insecure):
+            raise IdentityError(f"the token was not sent: {self._address} is another machine, and "
+                                "over plain TCP whoever listens there gets it. Give the fingerprint "
+                                "of the daemon's certificate (dtactctl cert prints it)")
         return requests.hello(self._program, self._token)
 
     def _prepare(self, request: Request[T]) -> tuple[int, bytes]:
@@ -127,8 +169,21 @@ class Session:
 
     def _check_usable(self) -> None:
         """Without a connection: raises why, unless another one may be made."""
-        if not self._reconnect or isinstance(self._broken, ProtocolError | Denied):
+        if not self._reconnect or isinstance(self._broken, _FINAL):
             raise self._broken
+
+    def _note_loss(self, error: Error) -> None:
+        self._broken = error
+        if self._server is not None and self._lost_at is None:
+            self._lost_at, self._lost_because = time.monotonic(), str(error)
+
+    def _note_return(self) -> None:
+        """Tells of it where there was a connection before."""
+        if self._lost_at is not None:
+            self._conversation.tell(Reconnected(
+                self._conversation.last_sequence, None, None, self._lost_because,
+                time.monotonic() - self._lost_at))
+        self._lost_at = None
 
     def _patience(self, request: Request[T]) -> float:
         return max(self._timeout, _SLOW_S) if request.slow else self._timeout
@@ -150,9 +205,11 @@ class Session:
         if isinstance(error, ConnectionRefusedError | FileNotFoundError):
             return ConnectionError(f"nothing listens on {name}: is dtactd running (systemctl status "
                                    "dtactd), and is this its address?")
+        if isinstance(error, ssl.SSLCertVerificationError):
+            return IdentityError(f"{name} has no certificate that the ca_file vouches for: {error}")
         if isinstance(error, ssl.SSLError):
-            return ConnectionError(f"{name} does not speak TLS ({error}): without a fingerprint no "
-                                   "TLS is used; dtactctl status shows the daemon's addresses")
+            return ConnectionError(f"{name} does not speak TLS ({error}): leave the fingerprint "
+                                   "and the ca_file out if this daemon has no certificate")
         if isinstance(error, TimeoutError):
             return ConnectionError(f"{name} does not answer: check the address, the network and the "
                                    "firewall")
@@ -171,21 +228,13 @@ class Session:
             "(journalctl -u dtactd says why), or it expects TLS there"
         )
 
-    def _tls_context(self) -> ssl.SSLContext:
-        context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-        # Daemons sign their certificates themselves: the pin says whose it is, not an authority.
-        context.check_hostname = False
-        context.verify_mode = ssl.CERT_NONE
-        context.minimum_version = ssl.TLSVersion.TLSv1_2
-        return context
-
     def _check_pin(self, certificate: bytes | None) -> None:
-        """ProtocolError for another certificate (DER) than the pinned one."""
+        """IdentityError for another certificate (DER) than the pinned one."""
         found = hashlib.sha256(certificate or b"").hexdigest()
         if self._pin is not None and not hmac.compare_digest(found, self._pin):
-            raise ProtocolError(f"{self._address} has another certificate than the pinned one: its "
-                                f"fingerprint is {found}. If the daemon got a new one (dtactctl "
-                                "cert), pin that; else somebody stands between")
+            raise IdentityError(f"{self._address} has another certificate than the pinned one: its "
+                                f"fingerprint is {found}. If the daemon got a new one, give "
+                                "that; else somebody else answers there")
 
 
 def _plain(fingerprint: str) -> str:
@@ -194,3 +243,37 @@ def _plain(fingerprint: str) -> str:
         raise ValueError("a fingerprint has 64 hexadecimal digits (SHA-256), as dtactctl cert "
                          "prints it")
     return plain
+
+
+def read_token(file: Path) -> str:
+    """The first line of a file. Error when it is no token or others may read it."""
+    try:
+        mode = file.stat().st_mode
+        lines = file.read_text().splitlines()
+    except (OSError, UnicodeDecodeError) as e:
+        raise Error(f"cannot read a token from {file}: {e}") from e
+    if mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise Error(f"{file} can be read by others: chmod 600 {file}")
+    token = lines[0].rstrip() if lines else ""
+    if not 1 <= len(token.encode()) <= _MOST_TOKEN_BYTES:
+        raise Error(f"the first line of {file} is no token: it has 1 to {_MOST_TOKEN_BYTES} bytes")
+    return token
+
+
+def _tls_context(ca_file: str | Path | None) -> ssl.SSLContext:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.minimum_version = ssl.TLSVersion.TLSv1_3
+    if ca_file is not None:
+        try:
+            context.load_verify_locations(cafile=ca_file)
+        except OSError as e:
+            raise Error(f"cannot read certificates from {ca_file}: {e}; it has to be a PEM file") from e
+    else:
+        # Daemons sign their certificates themselves: the fingerprint says whose it is.
+        context.check_hostname = False
+        context.verify_mode = ssl.CERT_NONE
+    return context
+
+
+def _given(option: str, value: str | Path | None) -> list[str]:
+    return [] if value is None else [option, str(value)]

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import ipaddress
+import math
 import socket
 import ssl
 import time
@@ -54,7 +55,7 @@ class Link:
             self.local = is_local(sock)
             if tls is not None:
                 sock.settimeout(_left(deadline))
-                sock = tls.wrap_socket(sock)
+                sock = tls.wrap_socket(sock, server_hostname=address.host)
                 check(sock.getpeercert(binary_form=True))
         except BaseException:
             sock.close()
@@ -71,9 +72,9 @@ class Link:
 
     def receive(self, buffer: memoryview, deadline: float | None) -> int:
         """How many bytes came; -1 when none came in time (without a deadline: lay ready), 0 at the
-        end of the connection."""
+        end of the connection. math.inf waits without an end."""
         wait = 0.0 if deadline is None else max(0.0, deadline - time.monotonic())
-        self._socket.settimeout(wait)
+        self._socket.settimeout(None if wait == math.inf else wait)
         try:
             return self._socket.recv_into(buffer)
         except (BlockingIOError, TimeoutError, ssl.SSLWantReadError):

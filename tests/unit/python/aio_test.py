@@ -1,0 +1,126 @@
+"""The asyncio client, against a daemon that does as a test says."""
+import asyncio
+import tempfile
+import time
+import unittest
+from unittest import mock
+
+import certificate
+import dtact
+from fake_daemon import FakeDaemon, event, frame
+
+
+class Aio(unittest.IsolatedAsyncioTestCase):
+    async def first(self, iterator):
+        async for item in iterator:
+            return item
+
+    async def test_frames_events_and_requests(self):
+        with FakeDaemon(features=["ping"]) as daemon:
+            daemon.pushed = [frame(1), event(3), frame(2)]
+            async with dtact.aio.connect(daemon.address, token="t") as s:
+                self.assertTrue(s.same_machine)
+                seen = []
+                async for f in s.frames():
+                    seen.append((f.sequence, f.depth_mm.shape))
+                    if len(seen) == 2:
+                        break
+                self.assertEqual(seen, [(1, (2, 2)), (2, (2, 2))])
+                self.assertEqual((await self.first(s.events())).light.brightness, 3)
+                self.assertEqual((await s.status()).state, "serving")
+                self.assertEqual((await s.set_light(brightness=4)).brightness, 4)
+                self.assertEqual((await s.ping()).monotonic_s, 7.0)
+                self.assertIsNone(await s.next(0.05))
+                await s.rezero()
+                await s.activate_calibration(1)
+            self.assertEqual(daemon.requests[0].hello.token, "t")
+
+    async def test_requests_of_several_tasks(self):
+        with FakeDaemon() as daemon:
+            async with dtact.aio.connect(daemon.address) as s:
+                lights = await asyncio.gather(*(s.set_light(brightness=b) for b in range(20)))
+                self.assertEqual([light.brightness for light in lights], list(range(20)))
+
+    async def test_refusal_and_no_frame(self):
+        def refuse(request, reply):
+            reply.error.code, reply.error.message = 5, "something touches"
+        with FakeDaemon() as daemon:
+            daemon.answers["rezero"] = refuse
+            async with dtact.aio.connect(daemon.address) as s:
+                with self.assertRaisesRegex(dtact.Touched, "something touches"):
+                    await s.rezero()
+                with self.assertRaisesRegex(dtact.NoFrame, "serving"):
+                    await self.first(s.frames(timeout=0.05))
+                with self.assertRaises(dtact.Unsupported):
+                    await s.subscribe(dtact.Subscription(decimation=2))
+
+    async def test_timeouts(self):
+        with FakeDaemon() as daemon:
+            daemon.answers["rezero"] = False
+            async with dtact.aio.connect(daemon.address, timeout=0.2) as s:
+                with self.assertRaises(dtact.TimeoutError):
+                    await s.rezero()
+                self.assertEqual((await s.status()).state, "serving")
+        with self.assertRaises(dtact.ConnectionError):
+            async with dtact.aio.connect(daemon.address):
+                pass
+
+    async def test_breaking_and_connecting_again(self):
+        with FakeDaemon() as daemon:
+            async with dtact.aio.connect(daemon.address) as s:
+                daemon.pushed = [frame(1)]
+                await s.subscribe()
+                daemon.drop()
+                self.assertEqual((await s.next(5)).sequence, 1)
+                with self.assertRaisesRegex(dtact.ConnectionError, "ended the connection"):
+                    await s.next(5)
+            async with dtact.aio.connect(daemon.address, reconnect=True) as s:
+                self.assertEqual((await self.first(s.frames())).sequence, 1)
+                daemon.drop()
+                self.assertEqual((await self.first(s.frames(timeout=10))).sequence, 1)
+                self.assertIsInstance(await self.first(s.events()), dtact.Reconnected)
+                self.assertEqual(daemon.connections, 3)
+                await s.close()
+                with self.assertRaisesRegex(dtact.ConnectionError, "was closed"):
+                    await s.status()
+
+    async def test_unix_socket(self):
+        with tempfile.TemporaryDirectory() as folder, FakeDaemon(path=f"{folder}/socket") as daemon:
+            async with dtact.aio.connect(daemon.address, token="t") as s:
+                self.assertTrue(s.same_machine)
+
+    async def test_tls(self):
+        with tempfile.TemporaryDirectory() as folder:
+            made = certificate.make(folder)
+        if made is None:
+            self.skipTest("there is no openssl to make a certificate with")
+        context, fingerprint = made
+        with FakeDaemon(tls=context) as daemon, \
+                mock.patch("dtact.aio.is_local", return_value=False):
+            daemon.pushed = [frame(1)]
+            async with dtact.aio.connect(daemon.address, fingerprint=fingerprint, token="t") as s:
+                self.assertEqual((await self.first(s.frames())).sequence, 1)
+            sent = len(daemon.requests)
+            with self.assertRaisesRegex(dtact.IdentityError, fingerprint):
+                async with dtact.aio.connect(daemon.address, fingerprint="0" * 64):
+                    pass
+            self.assertEqual(len(daemon.requests), sent)
+        with FakeDaemon() as daemon, mock.patch("dtact.aio.is_local", return_value=False):
+            with self.assertRaisesRegex(dtact.IdentityError, "fingerprint"):
+                async with dtact.aio.connect(daemon.address, token="t"):
+                    pass
+            self.assertEqual(daemon.requests, [])
+
+    async def test_frames_are_kept_while_nobody_takes_them(self):
+        with FakeDaemon() as daemon:
+            daemon.pushed = [frame(n) for n in range(1, 21)]
+            async with dtact.aio.connect(daemon.address, kept_frames=2) as s:
+                await s.subscribe()
+                until = time.monotonic() + 0.2
+                while time.monotonic() < until:
+                    await asyncio.sleep(0.02)
+                self.assertEqual((await s.next(1)).sequence, 19)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,396 @@
+"""The client that waits, against a daemon that does as a test says."""
+import itertools
+import os
+import pathlib
+import socket
+import sys
+import tempfile
+import time
+import types
+import unittest
+from unittest import mock
+
+import numpy as np
+
+import certificate
+import dtact
+from dtact.messages import ServerMessage
+from fake_daemon import FakeDaemon, event, frame
+
+
+def refuse(code, sentence):
+    def answer(request, reply):
+        reply.error.code = code
+        reply.error.message = sentence
+    return answer
+
+
+class Connecting(unittest.TestCase):
+    def test_says_hello_and_who_answered(self):
+        with FakeDaemon(features=["ping", "rates"]) as daemon:
+            with dtact.connect(daemon.address, program="test", token="secret") as s:
+                self.assertEqual(s.server.program, "fake")
+                self.assertEqual(s.server.features, {"ping", "rates"})
+                self.assertTrue(s.same_machine)
+            hello = daemon.requests[0].hello
+            self.assertEqual((hello.major, hello.minor, hello.program, hello.token),
+                             (1, 1, "test", "secret"))
+
+    def test_over_a_unix_socket(self):
+        with tempfile.TemporaryDirectory() as folder, FakeDaemon(path=f"{folder}/socket") as daemon:
+            with dtact.connect(daemon.address, token="secret") as s:
+                self.assertTrue(s.same_machine)
+                self.assertEqual(s.status().state, "serving")
+
+    def test_to_nobody(self):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            port = server.getsockname()[1]
+        with self.assertRaisesRegex(dtact.ConnectionError, f"nothing listens on 127.0.0.1 port {port}"):
+            dtact.connect(f"127.0.0.1:{port}")
+        with self.assertRaisesRegex(dtact.ConnectionError, "nothing listens on /nowhere"):
+            dtact.connect("unix:/nowhere")
+        with self.assertRaises(dtact.ConnectionError):
+            dtact.connect("no.such.host.invalid")
+
+    def test_to_one_who_says_nothing(self):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            began = time.monotonic()
+            with self.assertRaisesRegex(dtact.TimeoutError, "no answer in time"):
+                dtact.connect("127.0.0.1:%d" % server.getsockname()[1], timeout=0.2)
+            self.assertLess(time.monotonic() - began, 5)
+
+    def test_to_another_version_and_without_rights(self):
+        with FakeDaemon() as daemon:
+            daemon.answers["hello"] = refuse(3, "this daemon speaks version 2")
+            with self.assertRaisesRegex(dtact.ProtocolError, "version 2"):
+                dtact.connect(daemon.address)
+            daemon.answers["hello"] = refuse(11, "no such token")
+            with self.assertRaisesRegex(dtact.Denied, "no such token"):
+                dtact.connect(daemon.address)
+
+    def test_token_from_a_file(self):
+        with tempfile.NamedTemporaryFile("w") as file, FakeDaemon() as daemon:
+            file.write("of-the-file\nelse")
+            file.flush()
+            dtact.connect(daemon.address, token_file=file.name).close()
+            self.assertEqual(daemon.requests[0].hello.token, "of-the-file")
+            self.assertRaises(ValueError, dtact.connect, token="a", token_file="b")
+
+    def test_no_token_to_strangers(self):
+        with FakeDaemon() as daemon, mock.patch("dtact.transport.is_local", return_value=False):
+            with self.assertRaisesRegex(dtact.IdentityError, "fingerprint"):
+                dtact.connect(daemon.address, token="secret")
+            self.assertEqual(daemon.requests, [])
+            dtact.connect(daemon.address, token="secret", insecure=True).close()
+            self.assertEqual(daemon.requests[0].hello.token, "secret")
+
+    def test_token_files_that_will_not_do(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder, "token")
+            file.write_text("secret")
+            file.chmod(0o640)
+            with self.assertRaisesRegex(dtact.Error, "chmod 600"):
+                dtact.connect(token_file=file)
+            file.chmod(0o600)
+            for text in ("", "\nx", "x" * 257):
+                file.write_text(text)
+                with self.assertRaisesRegex(dtact.Error, "1 to 256 bytes"):
+                    dtact.connect(token_file=file)
+        with self.assertRaisesRegex(dtact.Error, "cannot read a token"):
+            dtact.connect(token_file=file)
+
+
+class Tls(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = cls.enterClassContext(tempfile.TemporaryDirectory())
+        made = certificate.make(cls.folder)
+        if made is None:
+            raise unittest.SkipTest("there is no openssl to make a certificate with")
+        cls.context, cls.fingerprint = made
+
+    def test_pinned(self):
+        with FakeDaemon(tls=self.context) as daemon, \
+                mock.patch("dtact.transport.is_local", return_value=False):
+            daemon.pushed = [frame(1)]
+            colons = ":".join(self.fingerprint[i : i + 2] for i in range(0, 64, 2)).upper()
+            for pin in (self.fingerprint, colons):
+                with dtact.connect(daemon.address, fingerprint=pin, token="secret") as s:
+                    self.assertEqual(next(s.frames()).sequence, 1)
+            self.assertEqual(daemon.requests[0].hello.token, "secret")
+
+    def test_another_certificate_gets_nothing(self):
+        with FakeDaemon(tls=self.context) as daemon:
+            with self.assertRaisesRegex(dtact.IdentityError, self.fingerprint):
+                dtact.connect(daemon.address, fingerprint="0" * 64, token="secret")
+        self.assertEqual(daemon.requests, [])
+
+    def test_an_authority(self):
+        with FakeDaemon(tls=self.context) as daemon, tempfile.TemporaryDirectory() as other:
+            dtact.connect(daemon.address, ca_file=f"{self.folder}/certificate.pem").close()
+            certificate.make(other)
+            with self.assertRaisesRegex(dtact.IdentityError, "vouches"):
+                dtact.connect(daemon.address, ca_file=f"{other}/certificate.pem")
+            with self.assertRaisesRegex(dtact.Error, "PEM"):
+                dtact.connect(daemon.address, ca_file=f"{other}/nothing.pem")
+
+    def test_one_side_only(self):
+        with FakeDaemon() as daemon:
+            with self.assertRaises(dtact.ConnectionError):
+                dtact.connect(daemon.address, fingerprint="0" * 64, timeout=1)
+        with FakeDaemon(tls=self.context) as daemon:
+            with self.assertRaises(dtact.ConnectionError):
+                dtact.connect(daemon.address, timeout=1)
+
+    def test_what_is_no_fingerprint(self):
+        for text in ("", "12", "g" * 64):
+            self.assertRaises(ValueError, dtact.connect, fingerprint=text)
+
+
+class Frames(unittest.TestCase):
+    def test_come_as_arrays(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            daemon.pushed = [frame(1), event(3), frame(2)]
+            f, g = itertools.islice(s.frames(), 2)
+            self.assertEqual((f.sequence, g.sequence), (1, 2))
+            np.testing.assert_array_equal(f.depth_mm,
+                                          np.array([[0, 1], [np.nan, 0.025]], np.float32))
+            self.assertEqual(daemon.requests[1].subscribe.depth, 1)
+            self.assertEqual(next(s.events()).light.brightness, 3)
+            self.assertEqual(list(s.events(timeout=0.05)), [])
+
+    def test_who_comes_late_gets_the_newest(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, kept_frames=2) as s:
+            daemon.pushed = [frame(n) for n in range(1, 21)]
+            frames = s.frames()
+            next(frames)
+            daemon.push(*(frame(n) for n in range(21, 41)))
+            time.sleep(0.2)
+            self.assertEqual([next(frames).sequence for _ in range(2)], [39, 40])
+
+    def test_none_in_time(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            with self.assertRaisesRegex(dtact.NoFrame, "no frame came within 0.05 s; the daemon's "
+                                        "state is serving. All is well."):
+                next(s.frames(timeout=0.05))
+            daemon.push(frame(9))
+            self.assertEqual(s.next(5).sequence, 9)
+            self.assertIsNone(s.next(0))
+
+    def test_a_request_between_frames_loses_none(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            def with_frames(request, reply):
+                daemon.push(frame(2), event(1), frame(3))
+                reply.light.brightness = 5
+            daemon.answers["set_light"] = with_frames
+            daemon.pushed = [frame(1)]
+            frames = s.frames()
+            self.assertEqual(next(frames).sequence, 1)
+            self.assertEqual(s.set_light(brightness=5).brightness, 5)
+            self.assertEqual([next(frames).sequence for _ in range(2)], [2, 3])
+
+    def test_a_damaged_map_is_a_protocol_error(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            broken = frame(1)
+            broken.frame.depth.data = b"x"
+            daemon.pushed = [broken]
+            with self.assertRaises(dtact.ProtocolError):
+                next(s.frames()).depth_mm
+
+
+class Requests(unittest.TestCase):
+    def test_refusals_have_types_and_the_daemons_sentence(self):
+        kinds = {4: dtact.Invalid, 5: dtact.Touched, 6: dtact.DeviceFailed, 7: dtact.Busy,
+                 8: dtact.Uncalibrated, 9: dtact.StorageFailed, 10: dtact.Unsupported,
+                 11: dtact.Denied, 99: dtact.Refused}
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            for code, kind in kinds.items():
+                daemon.answers["rezero"] = refuse(code, f"because of {code}")
+                with self.assertRaises(dtact.Refused) as caught:
+                    s.rezero()
+                self.assertIs(type(caught.exception), kind)
+                self.assertEqual((str(caught.exception), caught.exception.code),
+                                 (f"because of {code}", code))
+            self.assertEqual(s.status().state, "serving")
+
+    def test_set_light(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            s.set_light(brightness=0, scheme="all", leds=[(1, 2, 3)] * 8)
+            sent = daemon.requests[-1].set_light
+            self.assertTrue(sent.HasField("brightness"))
+            self.assertEqual((sent.scheme, len(sent.leds), sent.leds[7].b), ("all", 8, 3))
+            s.set_light(leds=[(1, 2, 3)] * 8)
+            self.assertFalse(daemon.requests[-1].set_light.HasField("brightness"))
+
+    def test_calibrations(self):
+        def files(request, reply):
+            reply.calibration.name = "c"
+            reply.calibration.calibration_toml = b"t"
+            reply.calibration.reference_png = b"p"
+
+        def listed(request, reply):
+            reply.calibrations.calibrations.add(number=0, name="a", damage="d")
+            one = reply.calibrations.calibrations.add(number=4, name="b", current=True)
+            one.summary.width = 580
+
+        def uploaded(request, reply):
+            reply.done.calibration = 5
+
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s, \
+                tempfile.TemporaryDirectory() as folder:
+            daemon.answers = {"get_calibration": files, "list_calibrations": listed,
+                              "upload_calibration": uploaded}
+            got = s.calibration()
+            self.assertEqual(got, dtact.CalibrationFiles("c", b"t", b"p", None))
+            with self.assertRaisesRegex(dtact.Invalid, "older"):
+                s.calibration(3)
+            first, second = s.calibrations()
+            self.assertEqual((first.damage, first.summary, first.in_use), ("d", None, False))
+            self.assertEqual((second.summary.width, second.in_use), (580, True))
+            got.write(f"{folder}/mine")
+            self.assertEqual(s.upload_calibration(dtact.CalibrationFiles.read(f"{folder}/mine")), 5)
+            self.assertEqual(daemon.requests[-1].upload_calibration.name, "mine")
+            s.activate_calibration(0)
+            self.assertTrue(daemon.requests[-1].activate_calibration.HasField("number"))
+
+    def test_what_an_older_daemon_does_not_know_is_not_sent(self):
+        with FakeDaemon(minor=0) as daemon, dtact.connect(daemon.address) as s:
+            for ask in (s.ping, s.reference,
+                        lambda: s.subscribe(dtact.Subscription(decimation=2)),
+                        lambda: s.subscribe(dtact.Subscription(depth="rvl"))):
+                self.assertRaises(dtact.Unsupported, ask)
+            self.assertEqual(len(daemon.requests), 1)
+            s.subscribe(dtact.Subscription(depth="delta_zstd", luma=True, every=3))
+            sent = daemon.requests[-1].subscribe
+            self.assertEqual((sent.depth, sent.luma, sent.every), (2, 1, 3))
+
+    def test_every_part_of_a_subscription_is_sent(self):
+        names = ["rvl", "predict_zstd", "jpeg", "rates", "decimation", "units", "region", "events"]
+        with FakeDaemon(features=names) as daemon, dtact.connect(daemon.address) as s:
+            s.subscribe(dtact.Subscription(
+                depth="predict_zstd", jpeg=True, summary=True, depth_hz=30, luma_hz=1, jpeg_hz=2,
+                summary_hz=60, decimation=4, um_per_unit=5, region=(1, 2, 3, 4), events=False))
+            m = daemon.requests[-1].subscribe
+            self.assertEqual((m.depth, m.jpeg, m.summary, m.depth_hz, m.luma_hz, m.jpeg_hz,
+                              m.summary_hz, m.decimation, m.um_per_unit, m.events),
+                             (4, True, True, 30, 1, 2, 60, 4, 5, False))
+            self.assertEqual((m.box.x, m.box.y, m.box.width, m.box.height), (1, 2, 3, 4))
+            self.assertTrue(m.HasField("events"))
+            s.subscribe(dtact.Subscription(region="contact"))
+            m = daemon.requests[-1].subscribe
+            self.assertTrue(m.contact_box)
+            self.assertEqual(m.depth, 3)
+            self.assertFalse(m.HasField("events"))
+            s.subscribe(None)
+            self.assertEqual(daemon.requests[-1].subscribe.ByteSize(), 0)
+
+    def test_ping(self):
+        with FakeDaemon(features=["ping"]) as daemon, dtact.connect(daemon.address) as s:
+            pong = s.ping()
+            self.assertEqual((pong.monotonic_s, pong.time.timestamp()), (7.0, 1.0))
+            self.assertGreater(pong.round_trip_s, 0)
+
+    def test_no_answer_in_time_leaves_the_connection(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, timeout=0.2) as s:
+            daemon.answers["rezero"] = False
+            self.assertRaises(dtact.TimeoutError, s.rezero)
+            self.assertEqual(s.status().state, "serving")
+
+
+class Breaking(unittest.TestCase):
+    def test_what_came_before_is_given_first(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            daemon.pushed = [frame(1), frame(2)]
+            frames = s.frames()
+            self.assertEqual(next(frames).sequence, 1)
+            daemon.drop()
+            self.assertEqual(next(frames).sequence, 2)
+            with self.assertRaisesRegex(dtact.ConnectionError, "ended the connection"):
+                next(frames)
+            with self.assertRaisesRegex(dtact.ConnectionError, "ended the connection"):
+                s.status()
+            self.assertEqual(daemon.connections, 1)
+
+    def test_the_daemons_reason_is_given(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            def end(request, reply):
+                message = ServerMessage()
+                message.reply.error.code = 12
+                message.reply.error.message = "more requests than are served"
+                daemon.push(message)
+                daemon.drop()
+                return False
+            daemon.answers["rezero"] = end
+            with self.assertRaisesRegex(dtact.EndedByDaemon, "more requests than are served") as e:
+                s.rezero()
+            self.assertEqual(e.exception.code, 12)
+
+    def test_reconnects_and_subscribes_again(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, reconnect=True) as s:
+            s.subscribe(dtact.Subscription(depth="int16", every=2))
+            daemon.push(frame(1), event(1))
+            self.assertEqual(next(s.frames()).sequence, 1)
+            daemon.pushed = [frame(2)]
+            daemon.drop()
+            self.assertEqual(next(s.frames(timeout=10)).sequence, 2)
+            events = s.events(timeout=10)
+            self.assertEqual(next(events).light.brightness, 1)
+            back = next(events)
+            self.assertIsInstance(back, dtact.Reconnected)
+            self.assertEqual(back.sequence, 1)
+            self.assertIn("ended the connection", back.reason)
+            self.assertEqual(daemon.connections, 2)
+            self.assertEqual(daemon.requests[-1].subscribe.every, 2)
+            daemon.drop()
+            time.sleep(0.1)
+            with self.assertRaises(dtact.ConnectionError):
+                s.set_light(brightness=1)  # It was under way: nobody knows whether it was done.
+            self.assertEqual(s.set_light(brightness=1).brightness, 1)
+
+    def test_waits_for_a_daemon_that_comes_back(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with FakeDaemon(path=f"{folder}/socket") as daemon:
+                s = dtact.connect(daemon.address, reconnect=True)
+                s.subscribe()
+            os.unlink(f"{folder}/socket")
+            self.assertIsNone(s.next(timeout=0.3))
+            with self.assertRaisesRegex(dtact.ConnectionError, "nothing listens"):
+                s.status()
+            with FakeDaemon(path=f"{folder}/socket") as daemon:
+                daemon.pushed = [frame(5)]
+                self.assertEqual(next(s.frames(timeout=10)).sequence, 5)
+                back = next(s.events())
+                self.assertIn("ended the connection", back.reason)
+                self.assertGreater(back.away_s, 0.3)
+                s.close()
+
+    def test_no_use_after_close(self):
+        with FakeDaemon() as daemon:
+            s = dtact.connect(daemon.address, reconnect=True)
+            s.close()
+            for call in (s.status, lambda: s.next(1), lambda: next(s.frames())):
+                with self.assertRaisesRegex(dtact.ConnectionError, "was closed"):
+                    call()
+            self.assertEqual(daemon.connections, 1)
+
+
+class Spaces(unittest.TestCase):
+    def test_box(self):
+        gymnasium = types.ModuleType("gymnasium")
+        gymnasium.spaces = types.ModuleType("gymnasium.spaces")
+        gymnasium.spaces.Box = lambda **settings: settings
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            with mock.patch.dict(sys.modules, {"gymnasium": gymnasium,
+                                               "gymnasium.spaces": gymnasium.spaces}):
+                daemon.pushed = [frame(1, values=(0,) * 6, width=3)]
+                self.assertEqual(s.observation_space, {
+                    "low": np.float32(-32.768), "high": np.float32(32.767), "shape": (2, 3),
+                    "dtype": np.float32})
+            with mock.patch.dict(sys.modules, {"gymnasium": None}):
+                daemon.push(frame(2))
+                with self.assertRaisesRegex(ImportError, "pip install gymnasium"):
+                    s.observation_space
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,141 @@
+"""A daemon on a thread that answers as a test tells it to."""
+import socket
+import threading
+
+from dtact.messages import ClientMessage, ServerMessage
+
+
+def frame(sequence, values=(0, 1000, -32768, 25), width=2, um_per_unit=1.0):
+    """A Frame message with an int16 map."""
+    message = ServerMessage()
+    m = message.frame
+    m.sequence = sequence
+    m.monotonic_ns = 5_000_000_000 + sequence
+    m.wall_ns = 1_700_000_000_123_456_789
+    depth = m.depth
+    depth.encoding = 1
+    depth.width, depth.height = width, len(values) // width
+    depth.mm_per_px = 0.5
+    depth.um_per_unit = um_per_unit
+    depth.untrusted_value = -32768
+    depth.uncertainty_um = 14.0
+    depth.data = b"".join(v.to_bytes(2, "little", signed=True) for v in values)
+    return message
+
+
+def event(brightness):
+    message = ServerMessage()
+    message.event.light.brightness = brightness
+    return message
+
+
+class FakeDaemon:
+    """Accepts connections on a port of its own. `requests` are those that came; the messages in
+    `pushed` are sent behind the answer to Subscribe."""
+
+    def __init__(self, features=(), minor=1, path=None, tls=None):
+        self.features, self.minor, self.tls = features, minor, tls
+        self.requests = []
+        self.pushed = []
+        self.answers = {}  # request kind → function (request, Reply message); False: no answer
+        self.connections = 0
+        self._connection = None
+        if path:
+            self._socket = socket.socket(socket.AF_UNIX)
+            self._socket.bind(path)
+            self.address = f"unix:{path}"
+        else:
+            self._socket = socket.create_server(("127.0.0.1", 0))
+            self.address = "127.0.0.1:%d" % self._socket.getsockname()[1]
+        self._socket.listen()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        # A shutdown wakes the thread, which a close alone does not.
+        self._socket.shutdown(socket.SHUT_RDWR)
+        self.drop()
+        self._thread.join(10)
+        self._socket.close()
+
+    def drop(self):
+        """Ends the present connection."""
+        connection = self._connection
+        if connection is not None:
+            try:
+                connection.shutdown(socket.SHUT_RDWR)
+            except OSError:
+                pass
+
+    def push(self, *messages):
+        self._connection.sendall(b"".join(packed(m) for m in messages))
+
+    def _serve(self):
+        while True:
+            try:
+                connection, _ = self._socket.accept()
+            except OSError:
+                return
+            threading.Thread(target=self._greet, args=(connection,), daemon=True).start()
+
+    def _greet(self, connection):
+        try:
+            if self.tls:
+                connection = self.tls.wrap_socket(connection, server_side=True)
+            with connection:
+                self._connection = connection
+                self.connections += 1
+                self._talk(connection)
+        except (OSError, EOFError):
+            connection.close()
+
+    def _talk(self, connection):
+        while True:
+            size = int.from_bytes(read(connection, 4), "big")
+            request = ClientMessage.FromString(read(connection, size))
+            self.requests.append(request)
+            kind = request.WhichOneof("request")
+            message = ServerMessage()
+            reply = message.reply
+            reply.id = request.id
+            if kind in self.answers:
+                if self.answers[kind] is False or self.answers[kind](request, reply) is False:
+                    continue
+            elif kind == "hello":
+                hello = reply.hello
+                hello.major, hello.minor, hello.program = 1, self.minor, "fake"
+                hello.features.extend(self.features)
+            elif kind == "set_light":
+                reply.light.brightness = request.set_light.brightness
+            elif kind == "get_status":
+                reply.status.state = 3
+                reply.status.advice = "All is well."
+                reply.status.camera.fps = 60
+                reply.status.calibration.width = 2
+                reply.status.calibration.height = 2
+            elif kind == "ping":
+                reply.pong.monotonic_ns = 7_000_000_000
+                reply.pong.wall_ns = 1_000_000_000
+            else:
+                reply.done.SetInParent()
+            connection.sendall(packed(message))
+            if kind == "subscribe":
+                connection.sendall(b"".join(packed(m) for m in self.pushed))
+
+
+def packed(message):
+    body = message.SerializeToString()
+    return len(body).to_bytes(4, "big") + body
+
+
+def read(connection, count):
+    data = b""
+    while len(data) < count:
+        part = connection.recv(count - len(data))
+        if not part:
+            raise EOFError
+        data += part
+    return data

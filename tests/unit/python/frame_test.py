@@ -1,0 +1,125 @@
+"""What a frame holds, and what it says of what it does not hold."""
+import datetime
+import unittest
+
+import numpy as np
+
+import dtact
+from dtact.messages import ServerMessage
+from fake_daemon import frame
+
+
+class Depth(unittest.TestCase):
+    def test_millimetres_and_nan(self):
+        f = dtact.Frame(frame(1).frame)
+        self.assertEqual(f.depth_mm.dtype, np.float32)
+        np.testing.assert_array_equal(f.depth_mm, np.array([[0, 1], [np.nan, 0.025]], np.float32))
+        np.testing.assert_array_equal(f.depth_values, [[0, 1000], [-32768, 25]])
+        self.assertEqual(f.uncertainty_mm, 0.014)
+        self.assertEqual((f.mm_per_px, f.decimation, f.origin_px, f.full_shape),
+                         (0.5, 1, (0, 0), (2, 2)))
+
+    def test_units_and_signs(self):
+        f = dtact.Frame(frame(1, values=(3, -3, 32767, -32767), um_per_unit=5.0).frame)
+        np.testing.assert_array_equal(
+            f.depth_mm, np.array([[0.015, -0.015], [163.835, -163.835]], np.float32))
+
+    def test_rows_and_columns(self):
+        f = dtact.Frame(frame(1, values=(1, 2, 3, 4, 5, 6), width=3).frame)
+        self.assertEqual(f.depth_values.tolist(), [[1, 2, 3], [4, 5, 6]])
+        self.assertEqual(f.depth_mm.shape, (2, 3))
+
+    def test_a_part(self):
+        message = frame(1).frame
+        message.depth.x, message.depth.y = 10, 20
+        message.depth.full_width, message.depth.full_height = 145, 144
+        message.depth.decimation = 4
+        f = dtact.Frame(message)
+        self.assertEqual((f.origin_px, f.full_shape, f.decimation), ((10, 20), (144, 145), 4))
+
+    def test_none(self):
+        message = ServerMessage().frame
+        message.sequence = 5
+        message.health.append(1)
+        f = dtact.Frame(message)
+        self.assertFalse(f.has_depth)
+        for name in ("depth_mm", "depth_values", "uncertainty_mm", "um_per_unit", "mm_per_px"):
+            with self.assertRaisesRegex(dtact.NotInFrame, r"frame 5 has no depth map \(uncalibrated\)"):
+                getattr(f, name)
+        self.assertRaises(dtact.NotInFrame, getattr, f, "luma")
+        self.assertRaises(dtact.NotInFrame, getattr, f, "jpeg")
+
+
+class Else(unittest.TestCase):
+    def test_times(self):
+        f = dtact.Frame(frame(7).frame)
+        self.assertEqual(f.time, datetime.datetime(2023, 11, 14, 22, 13, 20, 123456,
+                                                   tzinfo=datetime.timezone.utc))
+        self.assertAlmostEqual(f.monotonic_s, 5.000000007, places=12)
+
+    def test_contact_that_is_not_measured_is_none(self):
+        message = frame(1).frame
+        message.contact_absence = 2
+        f = dtact.Frame(message)
+        self.assertIsNone(f.contact)
+        self.assertEqual(f.contact_absence, "referencing")
+
+    def test_contact(self):
+        message = frame(1).frame
+        message.contact.touching = True
+        message.contact.area_mm2 = 2.5
+        message.contact.deepest_mm = 0.75
+        contact = dtact.Frame(message).contact
+        self.assertTrue(contact.touching)
+        self.assertEqual((contact.area_mm2, contact.deepest_mm, contact.x_mm), (2.5, 0.75, 0.0))
+
+    def test_health_light_calibration_and_pictures(self):
+        message = frame(1).frame
+        message.health.extend([3, 9, 200])
+        message.light.brightness = 80
+        message.light.leds.add(r=1, g=2, b=3)
+        message.calibration = 4
+        message.luma.encoding = 1
+        message.luma.width, message.luma.height, message.luma.data = 3, 2, b"abcdef"
+        message.jpeg.data = b"\xff\xd8"
+        f = dtact.Frame(message)
+        self.assertEqual(f.health, ("light_unsettled", "frames_lost", "200"))
+        self.assertEqual((f.light.brightness, f.light.leds, f.light.since_s), (80, ((1, 2, 3),), None))
+        self.assertEqual(f.calibration, 4)
+        self.assertEqual(f.luma.tolist(), [[97, 98, 99], [100, 101, 102]])
+        self.assertEqual(f.jpeg, b"\xff\xd8")
+        message.luma.data = b"abcde"
+        self.assertRaises(dtact.ProtocolError, getattr, dtact.Frame(message), "luma")
+
+
+class Events(unittest.TestCase):
+    def test_every_kind(self):
+        from dtact.event import event_of
+        event = ServerMessage().event
+        event.sequence, event.monotonic_ns, event.wall_ns = 8, 2_000_000_000, 1_000_000
+        event.calibration.name, event.calibration.number = "new", 3
+        made = event_of(event)
+        self.assertIsInstance(made, dtact.CalibrationEvent)
+        self.assertEqual((made.name, made.number, made.sequence, made.monotonic_s), ("new", 3, 8, 2.0))
+        self.assertEqual(made.time.isoformat(), "1970-01-01T00:00:00.001000+00:00")
+        event.state.state = 5
+        event.state.health.append(10)
+        self.assertEqual((event_of(event).state, event_of(event).health),
+                         ("camera_lost", ("camera_trouble",)))
+        event.reference.restored = True
+        self.assertTrue(event_of(event).restored)
+        event.contact.contact.touching = True
+        self.assertTrue(event_of(event).contact.touching)
+
+    def test_of_a_1_0_daemon(self):
+        from dtact.event import event_of
+        event = ServerMessage().event
+        event.contact.sequence, event.contact.monotonic_ns = 12, 3_000_000_000
+        self.assertEqual((event_of(event).sequence, event_of(event).monotonic_s), (12, 3.0))
+        event.light.brightness = 9
+        made = event_of(event)
+        self.assertEqual((made.sequence, made.time, made.monotonic_s), (0, None, None))
+
+
+if __name__ == "__main__":
+    unittest.main()

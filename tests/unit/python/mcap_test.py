@@ -1,0 +1,131 @@
+"""Recordings, written here by the letter of https://mcap.dev/spec."""
+import os
+import pathlib
+import struct
+import tempfile
+import time
+import unittest
+from unittest import mock
+
+import zstandard
+
+import dtact
+from fake_daemon import event, frame
+
+MAGIC = bytes.fromhex("89 4d 43 41 50 30 0d 0a")
+
+
+def record(opcode, body):
+    return struct.pack("<BQ", opcode, len(body)) + body
+
+
+def text(value):
+    return struct.pack("<I", len(value)) + value.encode()
+
+
+def channel(number, topic):
+    return record(4, struct.pack("<HH", number, 1) + text(topic) + text("protobuf") + text(""))
+
+
+def message(number, content):
+    return record(5, struct.pack("<HIQQ", number, 0, 1, 1) + content.SerializeToString())
+
+
+def chunk(records, compression="zstd", size=None):
+    packed = zstandard.ZstdCompressor().compress(records) if compression else records
+    return record(6, struct.pack("<QQQI", 0, 0, len(records) if size is None else size, 0)
+                  + text(compression) + struct.pack("<Q", len(packed)) + packed)
+
+
+CHANNELS = channel(3, "/dtact/frame") + channel(4, "/dtact/event") + channel(5, "/dtact/depth")
+
+
+class Read(unittest.TestCase):
+    def read(self, *parts):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder, "press.mcap")
+            file.write_bytes(b"".join(parts))
+            return [item.sequence if isinstance(item, dtact.Frame) else -item.light.brightness
+                    for item in dtact.read(file)]
+
+    def test_frames_and_events(self):
+        inside = (message(3, frame(1).frame) + message(5, frame(9).frame) + message(4, event(7).event)
+                  + message(3, frame(2).frame))
+        for packed in (chunk(CHANNELS + inside), chunk(CHANNELS + inside, ""),
+                       CHANNELS + chunk(inside), CHANNELS + inside):
+            self.assertEqual(self.read(MAGIC, record(1, b"any"), packed, record(2, b""), MAGIC),
+                             [1, -7, 2])
+
+    def test_one_that_was_cut_off(self):
+        first, second = chunk(message(3, frame(1).frame)), chunk(message(3, frame(2).frame))
+        for cut in (0, 1, 8, 9, len(second) - 1):
+            self.assertEqual(self.read(MAGIC, CHANNELS, first, second[:cut]), [1])
+
+    def test_damage(self):
+        good = message(3, frame(1).frame)
+        for part in (chunk(good, size=len(good) - 1), chunk(good, size=1 << 40),
+                     chunk(good, size=len(good) + 1), record(6, b"short"),
+                     chunk(good).replace(b"zstd", b"lz4_"), struct.pack("<BQ", 5, 1 << 60),
+                     chunk(good)[:-8] + bytes(8), record(5, b"\3"),
+                     record(5, struct.pack("<HIQQ", 3, 0, 1, 1) + b"\xff\xff")):
+            with self.assertRaisesRegex(dtact.Error, "damaged"):
+                self.read(MAGIC, CHANNELS, part, MAGIC)
+        with self.assertRaisesRegex(dtact.Error, "no MCAP"):
+            self.read(b"PK")
+
+
+class Record(unittest.TestCase):
+    """On a stand-in of dtactctl."""
+
+    def setUp(self):
+        folder = self.enterContext(tempfile.TemporaryDirectory())
+        self.program = pathlib.Path(folder, "dtactctl")
+        self.enterContext(mock.patch.dict(os.environ, {"PATH": f"{folder}:/usr/bin:/bin"}))
+        self.said = pathlib.Path(folder, "said")
+
+    def dtactctl(self, script):
+        self.program.write_text(f"#!/bin/sh\n{script}\n")
+        self.program.chmod(0o755)
+
+    def wait_until_it_said(self):
+        until = time.monotonic() + 30
+        while not (self.said.exists() and self.said.read_text()) and time.monotonic() < until:
+            time.sleep(0.01)
+
+    def session(self, address, **options):
+        # The sessions of both clients, without a connection.
+        return dtact.aio.Client(address, **options)
+
+    def test_is_started_and_told_to_finish(self):
+        self.dtactctl(f'trap "echo finished >> {self.said}; exit 0" TERM; echo "$@" > {self.said}\n'
+                      "while true; do sleep 0.01; done")
+        with self.session("gripper:7", fingerprint="AB" * 32).record("press.mcap"):
+            self.wait_until_it_said()
+        self.assertEqual(self.said.read_text(), "--host gripper --port 7 --fingerprint "
+                         + "AB" * 32 + " record -o press.mcap\nfinished\n")
+
+    def test_over_a_socket_file(self):
+        self.dtactctl(f'echo "$@" > {self.said}')
+        with self.session("unix:/run/s").record("p.mcap"):
+            self.wait_until_it_said()
+        self.assertEqual(self.said.read_text(), "--host unix:/run/s record -o p.mcap\n")
+
+    def test_what_went_wrong_is_said(self):
+        self.dtactctl("echo dtactctl: the disk is full >&2; exit 1")
+        recording = self.session("gripper").record("press.mcap")
+        with self.assertRaisesRegex(dtact.Error, "the disk is full"):
+            recording._process.wait(10)
+            recording.stop()
+
+    def test_without_dtactctl(self):
+        with self.assertRaisesRegex(dtact.Error, "not in PATH"):
+            self.session("gripper").record("press.mcap")
+
+    def test_a_token_is_not_shown_to_others(self):
+        self.dtactctl("exit 0")
+        with self.assertRaisesRegex(dtact.Error, "token_file"):
+            self.session("gripper", token="secret").record("press.mcap")
+
+
+if __name__ == "__main__":
+    unittest.main()
