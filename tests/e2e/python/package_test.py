@@ -1,0 +1,239 @@
+"""The Python package on dtactd and the simulated sensor."""
+import asyncio
+import contextlib
+import io
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import threading
+import time
+import unittest
+from unittest import mock
+
+import numpy as np
+
+import dtact
+from daemon import SOURCE, Daemon
+
+
+def setUpModule():
+    global daemon
+    daemon = Daemon()
+    daemon.start()
+
+
+def tearDownModule():
+    daemon.remove()
+
+
+def pressed(client):
+    """A frame of the scene's press, some tenths of a millimetre deep."""
+    until = time.monotonic() + 60
+    for f in client.frames():
+        if f.contact and f.contact.deepest_mm > 0.3 and f.has_depth:
+            return f
+        if time.monotonic() > until:
+            raise AssertionError("nothing was pressed within a minute")
+
+
+class Depth(unittest.TestCase):
+    def test_is_what_dtactctl_saves(self):
+        """The C++ library's decoder, on the very same frame, for every encoding."""
+        file = daemon.folder / "depth.npy"
+        with dtact.connect(daemon.address) as s:
+            encodings = ["int16", "delta_zstd"]
+            encodings += [name for name in ("rvl", "predict_zstd") if name in s.server.features]
+            for encoding in encodings:
+                for _ in range(20):
+                    s.subscribe(dtact.Subscription(depth=encoding))
+                    pressed(s)
+                    frames, stop = {}, threading.Event()
+
+                    def collect():
+                        for f in s.frames():
+                            frames[f.sequence] = f
+                            if stop.is_set():
+                                return
+
+                    thread = threading.Thread(target=collect)
+                    thread.start()
+                    report = json.loads(daemon.dtactctl("--json", "snapshot", "-o", str(file)))
+                    time.sleep(0.1)
+                    stop.set()
+                    thread.join()
+                    f = frames.get(int(report["frame"]["sequence"]))
+                    if f is not None and f.has_depth and np.nanmax(f.depth_mm) > 0.3:
+                        break
+                else:
+                    self.fail(f"{encoding}: no frame was seen by both")
+                saved = np.load(file)
+                np.testing.assert_array_equal(f.depth_mm, saved)
+                self.assertEqual((f.depth_mm.dtype, f.depth_mm.shape), (np.float32, (580, 580)))
+                self.assertEqual(f.message.depth.encoding,
+                                 1 + ["int16", "delta_zstd", "rvl", "predict_zstd"].index(encoding))
+
+    def test_what_comes_with_it(self):
+        with dtact.connect(daemon.address) as s:
+            f = pressed(s)
+            self.assertTrue(s.same_machine)
+            self.assertLess(abs(time.monotonic() - f.monotonic_s), 2)
+            self.assertLess(abs(time.time() - f.time.timestamp()), 2)
+            # The ball's deepest point, as the daemon found it and as the map has it.
+            self.assertAlmostEqual(float(np.nanmax(f.depth_mm)), f.contact.deepest_mm, delta=0.1)
+            self.assertGreater(f.contact.area_mm2, 0.5)
+            self.assertTrue(0 < f.uncertainty_mm < 0.2, f.uncertainty_mm)
+            self.assertAlmostEqual(f.mm_per_px, 0.0413793, places=6)
+            self.assertEqual(f.light.brightness, 255)
+            s.subscribe(dtact.Subscription(depth=None, luma=True))
+            f = next(s.frames())
+            self.assertEqual((f.luma.shape, f.luma.dtype, f.has_depth), ((600, 800), np.uint8, False))
+
+    def test_parts_and_steps(self):
+        with dtact.connect(daemon.address) as s:
+            if not {"decimation", "region", "units", "jpeg"} <= s.server.features:
+                self.skipTest("this daemon speaks version 1.0")
+            s.subscribe(dtact.Subscription(decimation=4, um_per_unit=5))
+            f = pressed(s)
+            self.assertEqual((f.depth_mm.shape, f.decimation, f.um_per_unit), ((145, 145), 4, 5.0))
+            self.assertAlmostEqual(float(np.nanmax(f.depth_mm)), f.contact.deepest_mm, delta=0.2)
+            s.subscribe(dtact.Subscription(region=(100, 200, 60, 40)))
+            f = next(s.frames())
+            self.assertEqual((f.depth_mm.shape, f.origin_px, f.full_shape),
+                             ((40, 60), (100, 200), (580, 580)))
+            s.subscribe(dtact.Subscription(region="contact"))
+            f = pressed(s)
+            self.assertLess(f.depth_mm.size, 580 * 580 / 2)
+            self.assertGreater(float(np.nanmax(f.depth_mm)), 0.3)
+            s.subscribe(dtact.Subscription(depth=None, jpeg=True))
+            f = next(s.frames())
+            self.assertEqual((f.jpeg[:2], f.jpeg[-2:]), (b"\xff\xd8", b"\xff\xd9"))
+
+
+class Commands(unittest.TestCase):
+    def test_light_is_told_and_set(self):
+        with dtact.connect(daemon.address) as s:
+            self.assertEqual(s.set_light(brightness=200).brightness, 200)
+            lights = [e.light.brightness for e in s.events(timeout=1) if isinstance(e, dtact.LightEvent)]
+            self.assertIn(200, lights)
+            self.assertEqual(s.set_light(scheme="all", brightness=255).leds, ((255, 255, 255),) * 8)
+            with self.assertRaisesRegex(dtact.Invalid, "set_light"):
+                s.set_light(brightness=256)
+
+    def test_rezero_is_refused_while_something_touches(self):
+        with dtact.connect(daemon.address) as s:
+            for _ in range(10):
+                pressed(s)
+                try:
+                    s.rezero()
+                except dtact.Touched as e:
+                    self.assertIn("touches", str(e))
+                    return
+            self.fail("it was never refused")
+
+    def test_calibrations(self):
+        with dtact.connect(daemon.address, timeout=20) as s:
+            files = s.calibration()
+            folder = daemon.folder / "again"
+            files.write(folder)
+            number = s.upload_calibration(dtact.CalibrationFiles.read(folder))
+            self.assertEqual(number, 1)
+            stored = {c.number: c for c in s.calibrations()}
+            self.assertEqual((stored[1].name, stored[1].in_use, stored[0].in_use),
+                             ("again", True, False))
+            self.assertEqual(s.calibration(1).calibration_toml, files.calibration_toml)
+            s.activate_calibration(0)
+            events = [e for e in s.events(timeout=1) if isinstance(e, dtact.CalibrationEvent)]
+            self.assertEqual([e.name for e in events], ["again", "calibration"])
+
+    def test_clocks_and_reference(self):
+        with dtact.connect(daemon.address) as s:
+            if not {"ping", "reference"} <= s.server.features:
+                self.skipTest("this daemon speaks version 1.0")
+            before = time.monotonic()
+            pong = s.ping()
+            self.assertTrue(before <= pong.monotonic_s <= time.monotonic())
+            self.assertTrue(s.reference().png.startswith(b"\x89PNG"))
+
+    def test_a_recording_is_read_back(self):
+        file = daemon.folder / "press.mcap"
+        if " record " not in daemon.dtactctl("--help"):
+            self.skipTest("this dtactctl does not record")
+        program = pathlib.Path(os.environ["DTACTCTL"])
+        with mock.patch.dict(os.environ, {"PATH": f"{program.parent}:{os.environ['PATH']}"}), \
+                dtact.connect(daemon.address) as s:
+            with s.record(file):
+                f = pressed(s)
+                seen = f.sequence, f.depth_mm
+                time.sleep(1)
+        frames = {f.sequence: f for f in dtact.read(file) if isinstance(f, dtact.Frame)}
+        np.testing.assert_array_equal(frames[seen[0]].depth_mm, seen[1])
+
+
+class Connections(unittest.TestCase):
+    def test_goes_on_after_the_daemon_was_started_again(self):
+        with dtact.connect(daemon.address, reconnect=True) as s:
+            next(s.frames())
+            daemon.stop()
+            daemon.start()
+            self.assertTrue(next(s.frames(timeout=60)))
+            self.assertEqual(s.status().state in ("settling", "referencing", "serving"), True)
+
+    def test_asyncio(self):
+        async def main():
+            async with dtact.aio.connect(daemon.address) as s:
+                async for f in s.frames():
+                    if f.contact and f.contact.touching:
+                        return f.depth_mm.shape, (await s.status()).state
+        self.assertEqual(asyncio.run(main()), ((580, 580), "serving"))
+
+    def test_camera(self):
+        with dtact.Camera(daemon.address, fps=30) as camera:
+            self.assertEqual((camera.width, camera.height), (580, 580))
+            until = time.monotonic() + 60
+            while (deepest := float(camera.read_depth().max())) < 0.0003:
+                self.assertLess(time.monotonic(), until)
+            self.assertLess(deepest, 0.002)
+            self.assertEqual(camera.read_latest(5000).shape, (580, 580, 3))
+            self.assertGreater(int(camera.async_read(5000).max()), 20)
+
+
+class Documents(unittest.TestCase):
+    """What they show runs as it stands."""
+
+    def run_code(self, blocks):
+        names, out = {}, io.StringIO()
+        with contextlib.redirect_stdout(out):
+            for block in blocks:
+                exec(compile(block.replace('"gripper"', repr(daemon.address)), "shown", "exec"), names)
+        return out.getvalue()
+
+    def test_readme(self):
+        text = (SOURCE / "clients/python/README.md").read_text()
+        blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+        self.assertGreaterEqual(len(blocks), 5)
+        for block in blocks:
+            out = self.run_code([block])
+            if "deepest_mm" in block:
+                self.assertRegex(out, r"^\(580, 580\), \d\.\d\d mm deep, ±0\.\d{3} mm\n$")
+
+    def test_notebook(self):
+        notebook = json.loads((SOURCE / "clients/python/docs/press.ipynb").read_text())
+        cells = ["".join(c["source"]) for c in notebook["cells"] if c["cell_type"] == "code"]
+        drawing = mock.MagicMock()  # matplotlib is not needed to see that the code runs.
+        with mock.patch.dict(sys.modules, {"matplotlib": drawing, "matplotlib.pyplot": drawing}):
+            self.assertRegex(self.run_code(cells), r"mm deep on [\d.]+ mm²")
+
+
+class Bench(unittest.TestCase):
+    def test_runs(self):
+        ran = subprocess.run([sys.executable, SOURCE / "clients/python/bench/decode.py", "--repeat", "1"],
+                             capture_output=True, text=True, check=True)
+        for name in ("int16", "delta_zstd", "rvl", "predict_zstd"):
+            self.assertIn(name, ran.stdout)
+
+
+if __name__ == "__main__":
+    unittest.main()
