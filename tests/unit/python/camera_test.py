@@ -1,8 +1,11 @@
 """LeRobot's camera shape: the names, arguments and exceptions that its robots and recorder use."""
 import importlib
 import inspect
+import os
 import pathlib
 import sys
+import tempfile
+import threading
 import time
 import types
 import unittest
@@ -116,7 +119,6 @@ class Reading(unittest.TestCase):
         camera = self.camera()
         self.daemon.push(frame(2, values=(5, 5, 5, 5)))
         self.wait_for(camera, 2)
-        import threading
         threading.Timer(0.1, lambda: self.daemon.push(frame(3, values=(7,) * 4))).start()
         self.assertEqual(camera.read_depth()[0, 0, 0], np.float32(7e-3) * np.float32(1e-3))
 
@@ -162,11 +164,25 @@ class Reading(unittest.TestCase):
         self.assertFalse(camera.is_connected)
 
     def test_find_cameras(self):
+        here = {"name": "dtact", "type": "dtact", "id": "127.0.0.1", "serial": "",
+                "default_stream_profile": {"width": 2, "height": 2, "fps": 0.0}}
+        folder = self.enterContext(tempfile.TemporaryDirectory())
+        self.enterContext(mock.patch.dict(os.environ, {"PATH": f"{folder}:/usr/bin:/bin"}))
         with mock.patch("dtact.camera.Client", lambda **_: dtact.Client(self.daemon.address)):
-            found = dtact.Camera.find_cameras()
-        self.assertEqual(found, [{
-            "name": "dtact", "type": "dtact", "id": "127.0.0.1", "serial": "",
-            "default_stream_profile": {"width": 2, "height": 2, "fps": 0.0}}])
+            self.assertEqual(dtact.Camera.find_cameras(), [here])
+        # As dtactctl find prints it.
+        program = pathlib.Path(folder, "dtactctl")
+        program.write_text("""#!/bin/sh
+[ "$*" = "--json find --seconds 1" ] || exit 2
+echo '{"name":"a","address":"192.0.2.7","port":7377,"serial":"S1","tls":true}'
+echo '{"name":"b","address":"fe80::1","port":7378}'
+""")
+        program.chmod(0o755)
+        with mock.patch("dtact.camera.Client", side_effect=dtact.ConnectionError("nobody")):
+            self.assertEqual(dtact.Camera.find_cameras(), [
+                {"name": "a", "type": "dtact", "id": "192.0.2.7:7377", "serial": "S1"},
+                {"name": "b", "type": "dtact", "id": "[fe80::1]:7378", "serial": ""}])
+        program.write_text("#!/bin/sh\necho dtactctl: nobody >&2; exit 4\n")
         with mock.patch("dtact.camera.Client", side_effect=dtact.ConnectionError("nobody")):
             self.assertEqual(dtact.Camera.find_cameras(), [])
 

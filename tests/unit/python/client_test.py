@@ -110,7 +110,7 @@ class Tls(unittest.TestCase):
         cls.context, cls.fingerprint = made
 
     def test_pinned(self):
-        with FakeDaemon(tls=self.context) as daemon, \
+        with FakeDaemon(tls=self.context, features=["rvl"]) as daemon, \
                 mock.patch("dtact.transport.is_local", return_value=False):
             daemon.pushed = [frame(1)]
             colons = ":".join(self.fingerprint[i : i + 2] for i in range(0, 64, 2)).upper()
@@ -118,6 +118,7 @@ class Tls(unittest.TestCase):
                 with dtact.connect(daemon.address, fingerprint=pin, token="secret") as s:
                     self.assertEqual(next(s.frames()).sequence, 1)
             self.assertEqual(daemon.requests[0].hello.token, "secret")
+            self.assertEqual(daemon.requests[-1].subscribe.depth, 3)
 
     def test_another_certificate_gets_nothing(self):
         with FakeDaemon(tls=self.context) as daemon:
@@ -279,7 +280,7 @@ class Requests(unittest.TestCase):
             s.subscribe(dtact.Subscription(region="contact"))
             m = daemon.requests[-1].subscribe
             self.assertTrue(m.contact_box)
-            self.assertEqual(m.depth, 3)
+            self.assertEqual(m.depth, 1)
             self.assertFalse(m.HasField("events"))
             s.subscribe(None)
             self.assertEqual(daemon.requests[-1].subscribe.ByteSize(), 0)

@@ -154,9 +154,9 @@ WITHOUT_RVL = """
 import dtact
 from dtact import encodings
 assert not encodings.has_rvl()
-assert dtact.Subscription().message({"rvl"}).depth == 1, "int16 is asked for"
+assert dtact.Subscription().message({"rvl"}, False).depth == 1, "int16 is asked for"
 try:
-    dtact.Subscription(depth="rvl").message({"rvl"})
+    dtact.Subscription(depth="rvl").message({"rvl"}, False)
 except ValueError as e:
     print(e)
 """
@@ -173,8 +173,9 @@ class WithoutTheExtension(unittest.TestCase):
 
     def test_otherwise_rvl_is(self):
         self.assertTrue(encodings.has_rvl())
-        self.assertEqual(dtact.Subscription().message({"rvl"}).depth, 3)
-        self.assertEqual(dtact.Subscription().message(set()).depth, 1)
+        self.assertEqual(dtact.Subscription().message({"rvl"}, False).depth, 3)
+        self.assertEqual(dtact.Subscription().message({"rvl"}, True).depth, 1)
+        self.assertEqual(dtact.Subscription().message(set(), False).depth, 1)
 
 
 if __name__ == "__main__":

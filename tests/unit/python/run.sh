@@ -12,7 +12,7 @@ python=/usr/bin/python3
 
 missing=()
 for needed in google.protobuf:python3-protobuf numpy:python3-numpy zstandard:python3-zstandard \
-  setuptools:python3-setuptools wheel:python3-wheel pip:python3-pip ensurepip:python3-venv; do
+  setuptools:python3-setuptools wheel:python3-wheel pip:python3-pip; do
   $python -c "import ${needed%:*}" 2> /dev/null || missing+=("${needed#*:}")
 done
 if ((${#missing[@]})); then
@@ -27,7 +27,7 @@ install() {
   shift
   rm -rf "$folder/source"
   cp -r "$source" "$folder/source"
-  "$into/bin/python" -m pip install -q --no-index --no-deps --no-build-isolation --force-reinstall \
+  $python -m pip --python "$into/bin/python" install -q --no-index --no-deps --no-build-isolation --force-reinstall \
     --disable-pip-version-check --root-user-action=ignore "$@" \
     "$folder/source" "$folder/source/lerobot"
 }
@@ -37,7 +37,7 @@ flock 9
 stamp=$(cd "$source" && find . -type f -not -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum | sha256sum)
 if [ "$(cat "$folder/stamp" 2> /dev/null)" != "$stamp" ]; then
   rm -rf "$folder/venv" "$folder/without_rvl"
-  $python -m venv --system-site-packages "$folder/venv"
+  $python -m venv --system-site-packages --without-pip "$folder/venv"
   install "$folder/venv"
   # As on a machine without a compiler.
   CC=/bin/false install "$folder/venv" --target "$folder/without_rvl"

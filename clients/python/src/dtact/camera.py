@@ -4,6 +4,9 @@ call on a camera is here, with the names, arguments and exceptions of lerobot.ca
 LeRobot camera of it."""
 from __future__ import annotations
 
+import json
+import shutil
+import subprocess
 import threading
 import time
 from pathlib import Path
@@ -39,6 +42,26 @@ def colour(depth_mm: NDArray[np.float32]) -> NDArray[np.uint8]:
     believed, lighter the deeper, lightest from SHOWN_MM on. `depth_mm`: float32 (H, W)."""
     shade = np.nan_to_num(depth_mm, nan=0.0) * (255 / SHOWN_MM)
     return _TABLE[np.clip(shade, 0, 255).astype(np.uint8)]
+
+
+def _of_this_machine() -> list[dict[str, Any]]:
+    try:
+        with Client(timeout=1.0, program="dtact find_cameras") as client:
+            status, server = client.status(), client.server
+    except Error:
+        return []
+    size = status.calibration
+    return [{
+        "name": server.name or f"dtact {server.serial}".strip(),
+        "type": "dtact",
+        "id": DEFAULT_HOST,
+        "serial": server.serial,
+        "default_stream_profile": {
+            "width": size.width if size else None,
+            "height": size.height if size else None,
+            "fps": status.fps,
+        },
+    }]
 
 
 class Camera:
@@ -101,25 +124,21 @@ class Camera:
 
     @staticmethod
     def find_cameras() -> list[dict[str, Any]]:
-        """The daemon of this machine, if one runs at the usual address: "name", "type", "id" (the
-        address to give) and "default_stream_profile" with width, height and fps."""
-        try:
-            with Client(timeout=1.0, program="dtact find_cameras") as client:
-                status, server = client.status(), client.server
-        except Error:
-            return []
-        size = status.calibration
-        return [{
-            "name": server.name or f"dtact {server.serial}".strip(),
-            "type": "dtact",
-            "id": DEFAULT_HOST,
-            "serial": server.serial,
-            "default_stream_profile": {
-                "width": size.width if size else None,
-                "height": size.height if size else None,
-                "fps": status.fps,
-            },
-        }]
+        """The daemon of this machine at the usual address, and those that announce themselves in
+        the network (`dtactctl find`, where it is installed). Of each "name", "type", "id" (the
+        address to give) and "serial"; of this machine's also "default_stream_profile" with width,
+        height and fps."""
+        found = _of_this_machine()
+        program = shutil.which("dtactctl")
+        if program is not None:
+            ran = subprocess.run([program, "--json", "find", "--seconds", "1"], capture_output=True,
+                                 text=True, check=False)
+            for line in ran.stdout.splitlines():
+                one = json.loads(line)
+                host = f"[{one['address']}]" if ":" in one["address"] else one["address"]
+                found.append({"name": one["name"], "type": "dtact", "id": f"{host}:{one['port']}",
+                              "serial": one.get("serial", "")})
+        return found
 
     def connect(self, warmup: bool = True) -> None:
         """Connects and starts to read. `warmup`: returns once the first depth is there. Sets fps,

@@ -54,9 +54,10 @@ def hello(program: str, token: str | None) -> Request[Server]:
     return Request(message, lambda reply: Server.of(reply.hello))
 
 
-def subscribe(subscription: Subscription, features: AbstractSet[str]) -> Request[None]:
+def subscribe(subscription: Subscription, features: AbstractSet[str],
+              same_machine: bool) -> Request[None]:
     message = ClientMessage()
-    message.subscribe.CopyFrom(subscription.message(features))
+    message.subscribe.CopyFrom(subscription.message(features, same_machine))
     return Request(message, _nothing, needs=subscription.needs())
 
 

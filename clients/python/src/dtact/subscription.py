@@ -21,8 +21,8 @@ class Subscription:
     not asked for them and Unsupported is raised.
     """
 
-    #: How depth travels; every encoding gives the same depth. "auto": RVL where both sides can,
-    #: else int16. None: no depth.
+    #: How depth travels; every encoding gives the same depth. "auto": int16 on the daemon's own
+    #: machine, where bytes cost least; elsewhere RVL where both sides can, else int16. None: no depth.
     depth: Encoding | None = "auto"
     luma: bool = False  #: the camera's picture in grey
     jpeg: bool = False  #: the camera's own JPEG, if that is what it delivers
@@ -54,12 +54,12 @@ class Subscription:
             names.add(_ENCODING_FEATURES[self.depth])
         return frozenset(names)
 
-    def message(self, features: AbstractSet[str]) -> Message:
+    def message(self, features: AbstractSet[str], same_machine: bool) -> Message:
         """The request for a daemon that has such features. ValueError for an encoding that is no
         Encoding."""
         request = message_class("Subscribe")()
         if self.depth is not None:
-            request.depth = value_of(self._constant(features))
+            request.depth = value_of(self._constant(features, same_machine))
         if self.luma:
             request.luma = value_of("LUMA_GREY8")
         request.every = self.every
@@ -80,9 +80,9 @@ class Subscription:
             request.events = False
         return request
 
-    def _constant(self, features: AbstractSet[str]) -> str:
+    def _constant(self, features: AbstractSet[str], same_machine: bool) -> str:
         if self.depth == "auto":
-            can = has_rvl() and _ENCODING_FEATURES["rvl"] in features
+            can = not same_machine and has_rvl() and _ENCODING_FEATURES["rvl"] in features
             return "DEPTH_RVL" if can else "DEPTH_INT16"
         if self.depth not in ("int16", "delta_zstd", "rvl", "predict_zstd"):
             raise ValueError(f'"{self.depth}" is no encoding of depth: "auto", "int16", '
