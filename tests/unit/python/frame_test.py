@@ -46,6 +46,7 @@ class Depth(unittest.TestCase):
         for name in ("depth_mm", "depth_values", "uncertainty_mm", "um_per_unit", "mm_per_px"):
             with self.assertRaisesRegex(dtact.NotInFrame, r"frame 5 has no depth map \(uncalibrated\)"):
                 getattr(f, name)
+        self.assertFalse(f.has_luma or f.has_jpeg)
         self.assertRaises(dtact.NotInFrame, getattr, f, "luma")
         self.assertRaises(dtact.NotInFrame, getattr, f, "jpeg")
 

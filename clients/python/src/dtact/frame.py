@@ -103,10 +103,21 @@ class Frame:
 
     # ------------------------------------------------------------ pictures
 
+    @property
+    def has_luma(self) -> bool:
+        """Whether it holds the camera's picture in grey. One captured before it was subscribed does
+        not, though it may come after."""
+        return bool(self.message.HasField("luma"))
+
+    @property
+    def has_jpeg(self) -> bool:
+        """Whether it holds the camera's own JPEG, as with `has_luma`."""
+        return bool(self.message.HasField("jpeg"))
+
     @cached_property
     def luma(self) -> NDArray[np.uint8]:
         """The camera's picture in grey: uint8 (H, W) of the camera's size. NotInFrame without."""
-        if not self.message.HasField("luma"):
+        if not self.has_luma:
             raise NotInFrame(f"frame {self.sequence} has no luma: Subscription(luma=True) asks for it")
         luma = self.message.luma
         if luma.encoding != 1 or len(luma.data) != luma.width * luma.height:
@@ -117,7 +128,7 @@ class Frame:
     @property
     def jpeg(self) -> bytes:
         """The camera's own JPEG, not decoded; it may be broken inside. NotInFrame without one."""
-        if not self.message.HasField("jpeg"):
+        if not self.has_jpeg:
             raise NotInFrame(f"frame {self.sequence} has no JPEG: either Subscription(jpeg=True) was "
                              "not asked for, or the camera delivers another format")
         return bytes(self.message.jpeg.data)
