@@ -2,6 +2,7 @@
 from setuptools import Extension, setup
 
 setup(
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
     ext_modules=[
         Extension(
             "dtact._rvl",

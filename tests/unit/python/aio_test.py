@@ -1,5 +1,6 @@
 """The asyncio client, against a daemon that does as a test says."""
 import asyncio
+import socket
 import tempfile
 import time
 import unittest
@@ -20,6 +21,8 @@ class Aio(unittest.IsolatedAsyncioTestCase):
             daemon.pushed = [frame(1), event(3), frame(2)]
             async with dtact.aio.connect(daemon.address, token="t") as s:
                 self.assertTrue(s.same_machine)
+                sock = s._link.transport.get_extra_info("socket")
+                self.assertTrue(sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE))
                 seen = []
                 async for f in s.frames():
                     seen.append((f.sequence, f.depth_mm.shape))

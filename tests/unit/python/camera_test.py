@@ -1,4 +1,5 @@
 """LeRobot's camera shape: the names, arguments and exceptions that its robots and recorder use."""
+import abc
 import importlib
 import inspect
 import os
@@ -212,9 +213,12 @@ class Plugin(unittest.TestCase):
                     return subclass
                 return register
 
-        class Camera:
+        class Camera(abc.ABC):
             def __init__(self, config):
                 self.fps, self.width, self.height = config.fps, config.width, config.height
+
+        Camera.__abstractmethods__ = frozenset(
+            ["is_connected", "find_cameras", "connect", "read", "async_read", "disconnect"])
 
         modules = {name: types.ModuleType(name) for name in
                    ["lerobot", "lerobot.cameras", "lerobot.cameras.camera", "lerobot.cameras.configs"]}

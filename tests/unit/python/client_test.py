@@ -42,6 +42,14 @@ class Connecting(unittest.TestCase):
                 self.assertTrue(s.same_machine)
                 self.assertEqual(s.status().state, "serving")
 
+    def test_a_daemon_whose_machine_is_gone_is_noticed(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            sock = s._link._socket
+            self.assertTrue(sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE))
+            wait, every, times = (sock.getsockopt(socket.IPPROTO_TCP, option) for option in
+                                  (socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT))
+            self.assertEqual(wait + every * times, 30)
+
     def test_to_nobody(self):
         with socket.create_server(("127.0.0.1", 0)) as server:
             port = server.getsockname()[1]

@@ -24,7 +24,7 @@ from .protocol import Conversation
 from .requests import Request, T
 from .session import BackOff, Session
 from .subscription import Subscription
-from .transport import is_local
+from .transport import is_local, tune
 from .values import CalibrationFiles, Light, Pong, ReferenceImage, Status, StoredCalibration
 
 _Item = TypeVar("_Item")
@@ -260,7 +260,10 @@ class Client(Session):
             except Error:
                 transport.close()
                 raise
-        self._local = is_local(transport.get_extra_info("socket"))
+        sock = transport.get_extra_info("socket")
+        self._local = is_local(sock)
+        if not address.path:
+            tune(sock)
         return link
 
 

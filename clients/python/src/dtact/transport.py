@@ -5,6 +5,7 @@ import ipaddress
 import math
 import socket
 import ssl
+import sys
 import time
 from typing import Callable
 
@@ -19,6 +20,16 @@ def is_local(sock: socket.socket) -> bool:
     address = ipaddress.ip_address(remote)
     mapped = getattr(address, "ipv4_mapped", None)
     return (mapped or address).is_loopback or remote == sock.getsockname()[0].partition("%")[0]
+
+
+def tune(sock: socket.socket) -> None:
+    """Requests go at once, and a daemon whose machine is gone is noticed within half a minute."""
+    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    if sys.platform == "linux":
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 10)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPINTVL, 5)
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT, 4)
 
 
 def _left(deadline: float) -> float:
@@ -40,7 +51,7 @@ def _connected(address: Address, deadline: float) -> socket.socket:
             raise
         return sock
     sock = socket.create_connection((address.host, address.port), _left(deadline))
-    sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    tune(sock)
     return sock
 
 
