@@ -27,14 +27,15 @@ install() {
   shift
   rm -rf "$folder/source"
   cp -r "$source" "$folder/source"
-  $python -m pip --python "$into/bin/python" install -q --no-index --no-deps --no-build-isolation --force-reinstall \
-    --disable-pip-version-check --root-user-action=ignore "$@" \
+  $python -m pip --python "$into/bin/python" install -q --no-index --no-deps --no-build-isolation \
+    --force-reinstall --disable-pip-version-check --root-user-action=ignore "$@" \
     "$folder/source" "$folder/source/lerobot"
 }
 
 exec 9> "$folder/lock"
 flock 9
-stamp=$(cd "$source" && find . -type f -not -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum | sha256sum)
+stamp=$(cd "$source" \
+  && find . -type f -not -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum | sha256sum)
 if [ "$(cat "$folder/stamp" 2> /dev/null)" != "$stamp" ]; then
   rm -rf "$folder/venv" "$folder/without_rvl"
   $python -m venv --system-site-packages --without-pip "$folder/venv"
@@ -48,4 +49,5 @@ flock -u 9
 export WITHOUT_RVL=$folder/without_rvl MYPY_CACHE=$folder/mypy
 cd "$tests"
 # protobuf 3.21 itself warns of Python 3.14.
-exec "$folder/venv/bin/python" -B -W error -W default::DeprecationWarning -m unittest discover -v -p '*_test.py' -t . -s .
+exec "$folder/venv/bin/python" -B -W error -W default::DeprecationWarning \
+  -m unittest discover -v -p '*_test.py' -t . -s .

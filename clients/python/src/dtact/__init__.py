@@ -57,10 +57,11 @@ from .values import (
 connect = Client
 
 __all__ = [
-    "Busy", "Camera", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Client",
-    "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "EndedByDaemon", "Error",
-    "Event", "Frame", "IdentityError", "Invalid", "Light", "LightEvent", "NoFrame", "NotInFrame", "Pong", "ProtocolError", "Recording",
-    "Reconnected", "ReferenceEvent", "ReferenceImage", "Refused", "Server", "StateEvent", "Status", "StorageFailed",
+    "Busy", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Camera", "Client",
+    "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "EndedByDaemon",
+    "Error", "Event", "Frame", "IdentityError", "Invalid", "Light", "LightEvent", "NoFrame",
+    "NotInFrame", "Pong", "ProtocolError", "Reconnected", "Recording", "ReferenceEvent",
+    "ReferenceImage", "Refused", "Server", "StateEvent", "Status", "StorageFailed",
     "StoredCalibration", "Subscription", "TimeoutError", "Touched", "Uncalibrated", "Unsupported",
     "aio", "connect", "read",
 ]
