@@ -37,12 +37,12 @@ struct Options {
   std::chrono::milliseconds timeout{5000};   ///< Of the connection and of each request.
   /// What the daemon asks for, if it does: at most 256 bytes, see read_token(). Sent once the other
   /// end is known: over TLS, on this machine, or where `insecure` says so.
-  std::string token;
-  std::optional<Tls> tls;  ///< Unset: plain TCP. Socket files need none and use none.
+  std::string token{};
+  std::optional<Tls> tls{};  ///< Unset: plain TCP. Socket files need none and use none.
   /// Sends the token over plain TCP to other machines too: whoever hears it there may use it.
   bool insecure = false;
   /// Unset: a lost connection is an error, and the client of no further use.
-  std::optional<Reconnect> reconnect;
+  std::optional<Reconnect> reconnect{};
 };
 
 /// The first line of a file. Throws Error when it cannot be read, is empty, holds blanks or more
