@@ -45,7 +45,7 @@ void OrderDesk::take(bool camera_away, const Stamp& now) noexcept {
 void OrderDesk::execute(const RezeroOrder& order, bool camera_away) noexcept {
   rezero_ = order.ticket;
   if (!active_) {
-    answer(Outcome::invalid, kUncalibratedSentence);
+    answer(Outcome::uncalibrated, kUncalibratedSentence);
   } else if (camera_away) {
     answer(Outcome::camera_away, kAwaySentence);
   } else if (const auto refused = untouched_.rezero(order.force)) {

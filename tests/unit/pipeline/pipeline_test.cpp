@@ -246,7 +246,7 @@ TEST_F(PipelineTest, WithoutCalibrationThereIsLuma) {
   ASSERT_TRUE(until_state(State::uncalibrated));
   EXPECT_EQ(pipeline->status().calibration, nullptr);
   const CommandDone refused = ask(Rezero{});
-  EXPECT_EQ(refused.outcome, Outcome::invalid);
+  EXPECT_EQ(refused.outcome, Outcome::uncalibrated);
   EXPECT_NE(refused.message.find("dtactctl calibrate"), std::string::npos);
 }
 
