@@ -45,7 +45,10 @@ v1::SetLight change_to(const v1::LightState& light) {
   return change;
 }
 
-bool same(const v1::LightState& a, const v1::LightState& b) {
+/// Whether the ring shows the same, since whenever.
+bool same(v1::LightState a, v1::LightState b) {
+  a.clear_since_ns();
+  b.clear_since_ns();
   return a.SerializeAsString() == b.SerializeAsString();
 }
 

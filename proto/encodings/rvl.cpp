@@ -26,7 +26,8 @@ constexpr std::array<Code, kCodes> make_codes() {
     Code& code = codes.at(value);
     for (std::uint32_t rest = value, more = 1; more != 0; rest >>= 3U) {
       more = rest > 7 ? 8 : 0;
-      code.nibbles = static_cast<std::uint16_t>((code.nibbles << 4U) | more | (rest & 7U));
+      code.nibbles =
+          static_cast<std::uint16_t>((std::uint32_t{code.nibbles} << 4U) | more | (rest & 7U));
       code.bits = static_cast<std::uint8_t>(code.bits + 4);
     }
   }
