@@ -26,8 +26,9 @@ constexpr std::uint32_t tag(int field, std::uint32_t wire_type) {
   return static_cast<std::uint32_t>(field) * 8 + wire_type;
 }
 
-// Two client buffers of each kind in flight are the usual; more only costs memory.
-constexpr std::size_t kKeptBuffers = 16;
+// Buffers that no client holds and that are kept: two of each kind in flight are the usual. More of
+// them were slow clients', and their memory goes when those have left.
+constexpr std::size_t kSpareBuffers = 3;
 // Room for an envelope, the times, and the tags and lengths of the maps.
 constexpr std::size_t kMaxBody = wire::kMaxMessage - 256;
 
@@ -95,12 +96,19 @@ struct FrameEncoder::Impl {
 
 /// A buffer that no client holds any more. One thread owns them all, so use_count() is exact.
 std::shared_ptr<EncodedFrame> FrameEncoder::Impl::free_buffer() {
-  for (const auto& buffer : buffers) {
-    if (buffer.use_count() == 1) return buffer;
+  std::shared_ptr<EncodedFrame> found;
+  std::size_t spare = 0;
+  std::erase_if(buffers, [&](const auto& buffer) {
+    if (buffer.use_count() > 1) return false;
+    if (found != nullptr) return ++spare > kSpareBuffers;
+    found = buffer;
+    return false;
+  });
+  if (found == nullptr) {
+    found = std::make_shared<EncodedFrame>();
+    buffers.push_back(found);
   }
-  auto buffer = std::make_shared<EncodedFrame>();
-  if (buffers.size() < kKeptBuffers) buffers.push_back(buffer);
-  return buffer;
+  return found;
 }
 
 /// All but the times. False when it is too large.
