@@ -2,12 +2,9 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <limits.h>
 #include <malloc.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
-#include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/signal_set.hpp>
@@ -87,8 +84,8 @@ net::NetConfig make_net_config(const Config& config) {
   if (net.unix_socket.empty() && !run.empty()) net.unix_socket = run / "dtactd.sock";
   net.program = "dtactd " DTACT_VERSION;
   net.version = DTACT_VERSION;
-  std::array<char, HOST_NAME_MAX + 1> host{};
-  if (net.name.empty() && ::gethostname(host.data(), host.size() - 1) == 0) net.name = host.data();
+  boost::system::error_code nameless;
+  if (net.name.empty()) net.name = asio::ip::host_name(nameless);
   net.log = [](net::LogLevel level, const std::string& message) {
     spdlog::log(level == net::LogLevel::info ? spdlog::level::info : spdlog::level::warn, "{}",
                 message);
@@ -123,15 +120,11 @@ std::optional<announce::Announcer> announce_service(asio::io_context& io, const 
   if (!config.announce || !announce::is_reachable(config.net.address)) return std::nullopt;
   const auto ask = [&address = config.net.address, &server] {
     const v1::Status status = server.overview().status;
-    announce::Facts facts{DTACT_VERSION, status.serial(), false, false};
-    for (const auto& endpoint : status.endpoints()) {
-      facts.tls = facts.tls || endpoint.tls();
-      facts.token = facts.token || endpoint.token();
-    }
+    const v1::Endpoint& tcp = *status.endpoints().rbegin();  // a socket file comes before it
     announce::Service service;
-    service.name = status.name().empty() ? asio::ip::host_name() : status.name();
+    service.name = status.name();
     service.port = server.port();
-    service.txt = announce::txt_of(facts);
+    service.txt = announce::txt_of({DTACT_VERSION, status.serial(), tcp.tls(), tcp.token()});
     announce::restrict_to(address, service);
     return service;
   };

@@ -113,7 +113,7 @@ void Hub::on_event(const pipeline::Event& event) {
   }
   if (const auto* reference = std::get_if<pipeline::ReferenceTaken>(&event)) {
     reference_taken_ns_.reset();
-    if (!reference->restored) reference_taken_ns_ = base::system_clock().monotonic_ns();
+    if (!reference->restored) reference_taken_ns_ = reference->at.monotonic_ns;
   }
   v1::ServerMessage message;
   if (fill(event, *message.mutable_event())) broadcast(message);
