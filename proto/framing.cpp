@@ -36,7 +36,13 @@ bool MessageDecoder::take_length(std::string_view& input) noexcept {
 void MessageDecoder::take_body(std::string_view& input) {
   const std::size_t taken = std::min(input.size(), length_ - message_.size());
   const std::size_t needed = message_.size() + taken;
-  if (needed > message_.capacity()) message_.reserve(std::min(length_, 2 * needed));
+  if (needed > message_.capacity()) {
+    // Into a new string: libstdc++'s reserve() takes twice what a string has, if that is more.
+    std::string grown;
+    grown.reserve(std::min(length_, 2 * needed));
+    grown.append(message_);
+    message_.swap(grown);
+  }
   message_.append(input.substr(0, taken));
   input.remove_prefix(taken);
 }

@@ -53,6 +53,7 @@ class RawClient {
     send_bytes(bytes);
   }
 
+  [[nodiscard]] int descriptor() const noexcept { return fd_.get(); }
   /// The next message, or nothing at the end of the connection. Throws after a minute of silence.
   std::optional<v1::ServerMessage> receive() {
     while (decoder_.feed(unread_) != wire::MessageDecoder::Result::message) {

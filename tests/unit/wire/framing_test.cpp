@@ -15,6 +15,7 @@ namespace {
 using Result = MessageDecoder::Result;
 using testing::ElementsAre;
 using namespace std::string_literals;
+using namespace std::string_view_literals;
 
 /// Every message that `stream` holds when it arrives in pieces of `piece` bytes.
 std::vector<std::string> decode(std::string_view stream, std::size_t piece) {
@@ -99,6 +100,18 @@ TEST(MessageDecoder, GivesTheMemoryOfALargeMessageBack) {
   EXPECT_LE(decoder.held(), 4096U);
   ASSERT_EQ(decoder.feed(input), Result::message);
   EXPECT_EQ(decoder.message(), "y");
+}
+
+TEST(MessageDecoder, TakesNoMoreMemoryThanTheMessageHasBytes) {
+  MessageDecoder decoder;
+  std::string_view head = "\1\0\0\0"sv;
+  ASSERT_EQ(decoder.feed(head), Result::need_more);
+  const std::string piece(700'001, 'x');
+  for (std::size_t fed = 0; fed + piece.size() < 1U << 24U; fed += piece.size()) {
+    std::string_view input = piece;
+    ASSERT_EQ(decoder.feed(input), Result::need_more);
+    ASSERT_LE(decoder.held(), 1U << 24U);
+  }
 }
 
 TEST(MessageDecoder, TakesAnotherCapForTheNextMessage) {
