@@ -69,9 +69,10 @@ void Session::open(const Limit& limit) {
 void Session::reopen(int wake) {
   const Limit limit{Clock::now() + options_.timeout, wake};
   const std::size_t before = inbox_.size();
-  inbox_.emplace_back(Reconnected{
-      loss_->reason, std::chrono::floor<std::chrono::milliseconds>(Clock::now() - loss_->since),
-      last_sequence_});
+  inbox_.emplace_back(
+      Reconnected{loss_.value().reason,
+                  std::chrono::floor<std::chrono::milliseconds>(Clock::now() - loss_.value().since),
+                  last_sequence_});
   try {
     open(limit);
     if (subscription_) {
@@ -98,14 +99,14 @@ void Session::lose(const std::string& reason) {
   if (!loss_) {
     loss_ = Loss{reason, now, now};
     // A daemon that takes the connection and ends it at once is not asked any oftener for that.
-    if (now - opened_ > options_.reconnect->max) backoff_.reset();
+    if (now - opened_ > options_.reconnect.value().max) backoff_.reset();
   }
   loss_->retry_at = now + backoff_.next();
 }
 
 bool Session::wait_for_turn(const Limit& limit) const {
-  (void)wait(-1, 0, {std::min(limit.end, loss_->retry_at), limit.wake});
-  return Clock::now() >= loss_->retry_at;
+  (void)wait(-1, 0, {std::min(limit.end, loss_.value().retry_at), limit.wake});
+  return Clock::now() >= loss_.value().retry_at;
 }
 
 std::optional<v1::ServerMessage> Session::receive(const Limit& limit) {
@@ -160,7 +161,7 @@ v1::Reply Session::exchange(v1::ClientMessage& message, const Limit& limit) {
 
 v1::Reply Session::request(v1::ClientMessage& message, std::chrono::milliseconds timeout) {
   if (!connection_) {
-    if (Clock::now() < loss_->retry_at) throw ConnectionError(loss_->reason);
+    if (Clock::now() < loss_.value().retry_at) throw ConnectionError(loss_.value().reason);
     reopen(-1);
   }
   try {

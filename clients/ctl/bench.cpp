@@ -63,7 +63,7 @@ class Bench {
  private:
   static std::int64_t now() { return base::system_clock().monotonic_ns(); }
 
-  std::string head(const cli::BenchReport& report) const {
+  [[nodiscard]] std::string head(const cli::BenchReport& report) const {
     std::string clock = "not known: the daemon is elsewhere and older than 1.1";
     if (client_.same_machine()) {
       clock = "the same";

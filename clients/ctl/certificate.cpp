@@ -23,7 +23,7 @@
 namespace dtact::ctl {
 namespace {
 
-constexpr long kDay_s = 24 * 3600;
+constexpr long kDay_s = 24L * 3600;
 constexpr long kLife_s = 3652 * kDay_s;
 
 /// Longest host name, bytes (RFC 1035).

@@ -171,7 +171,7 @@ class Exporter {
   explicit Exporter(const ExportOptions& options)
       : options_(options),
         folder_(options.output),
-        range_(options.frames.empty() ? Range{} : *parse_range(options.frames)),
+        range_(options.frames.empty() ? Range{} : parse_range(options.frames).value()),
         frames_(folder_ / "frames.csv"),
         events_(folder_ / "events.csv") {
     frames_.write(kFrameColumns);
