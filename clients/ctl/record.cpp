@@ -112,13 +112,13 @@ class Recording {
       const v1::CalibrationFiles files = client_.calibration();
       put(recording::kCalibrationToml, "application/toml", files.calibration_toml());
       put(recording::kReferencePng, "image/png", files.reference_png());
-    } catch (const client::Refused&) {
+    } catch (const client::Refused&) {  // NOLINT(bugprone-empty-catch)
       // Uncalibrated, or busy with another one, which an event will tell.
     }
     if (!client_.has_feature("reference")) return;
     try {
       put(recording::kUntouchedPng, "image/png", client_.reference().png());
-    } catch (const client::Refused&) {
+    } catch (const client::Refused&) {  // NOLINT(bugprone-empty-catch)
       // None is taken yet; its event will come.
     }
   }

@@ -115,9 +115,10 @@ class Watch {
   }
 
   void draw() {
-    const Canvas canvas = screen_->canvas();
+    Screen& screen = screen_.value();
+    const Canvas canvas = screen.canvas();
     if (canvas.columns < kLeastColumns || canvas.rows < kLeastRows) {
-      return screen_->show({fmt::format("at least {} x {}, please", kLeastColumns, kLeastRows)});
+      return screen.show({fmt::format("at least {} x {}, please", kLeastColumns, kLeastRows)});
     }
     // The line may need two of a narrow terminal.
     const Canvas above{canvas.columns, canvas.rows - 1, canvas.palette};
@@ -127,7 +128,7 @@ class Watch {
     end = std::min(end, below_.size());
     lines.push_back(below_.substr(0, std::min(end, width)));
     lines.push_back(below_.substr(end, width));
-    screen_->show(lines);
+    screen.show(lines);
   }
 
   void show_status() {

@@ -116,7 +116,7 @@ void Recorder::run() {
     try {
       // The index is small: often there is room for it where there is none for a chunk.
       writer_.finish();
-    } catch (const std::exception&) {
+    } catch (const std::exception&) {  // NOLINT(bugprone-empty-catch)
       // The file ends after its last whole chunk, which is how a reader takes it.
     }
     const std::scoped_lock lock(mutex_);

@@ -58,13 +58,13 @@ RecordingWriter::RecordingWriter(mcap::Sink& sink, const RecordingOptions& optio
 
 std::uint16_t RecordingWriter::add_channel(const char* topic,
                                            const google::protobuf::Descriptor& type,
-                                           std::map<std::string, std::string> metadata) {
+                                           const std::map<std::string, std::string>& metadata) {
   google::protobuf::FileDescriptorSet files;
   std::set<const google::protobuf::FileDescriptor*> known;
   add_files(*type.file(), known, files);
   return writer_.add_channel(
       writer_.add_schema(type.full_name(), "protobuf", files.SerializeAsString()), topic,
-      "protobuf", std::move(metadata));
+      "protobuf", metadata);
 }
 
 RecordingWriter::Moment RecordingWriter::moment_of(std::uint64_t sequence,

@@ -44,7 +44,7 @@ class RecordingWriter {
                                  std::int64_t wall_ns);
   [[nodiscard]] std::uint16_t add_channel(const char* topic,
                                           const google::protobuf::Descriptor& type,
-                                          std::map<std::string, std::string> metadata = {});
+                                          const std::map<std::string, std::string>& metadata = {});
   void add_message(std::uint16_t channel, const google::protobuf::Message& message);
   void add_picture(const v1::Frame& frame);
   void add_jpeg(const v1::Frame& frame);

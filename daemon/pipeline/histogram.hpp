@@ -29,8 +29,8 @@ class Histogram {
   /// How many values are at most each of the ascending `bounds_ns`, into `counts` of the same
   /// length. A bucket that a bound cuts counts above it, so a count is that of a bound at most 3.2
   /// % lower. Returns the count of all.
-  std::uint64_t cumulate(std::span<const std::int64_t> bounds_ns,
-                         std::span<std::uint64_t> counts) const noexcept;
+  [[nodiscard]] std::uint64_t cumulate(std::span<const std::int64_t> bounds_ns,
+                                       std::span<std::uint64_t> counts) const noexcept;
 
  private:
   static constexpr int kSubBits = 5;
