@@ -93,13 +93,14 @@ net::NetConfig make_net_config(const Config& config) {
   return net;
 }
 
-/// Memory of large messages goes back when they are done with. Without this glibc keeps up to twice
-/// the largest that ever came (mallopt(3), dynamic mmap threshold), locked into memory with the
-/// rest. Buffers of frames stay below and are used again without a page fault.
+/// Memory of large messages and of frames goes back when they are done with, be it in the middle of
+/// the heap. Without this glibc keeps up to twice the largest block that ever came (mallopt(3),
+/// dynamic mmap threshold), locked into memory with the rest. Frames' buffers are used again, so
+/// that a frame costs no page faults.
 void give_large_blocks_back() {
-  constexpr int kLarge = 4 << 20;
+  constexpr int kLarge = 256 << 10;
   (void)::mallopt(M_MMAP_THRESHOLD, kLarge);
-  (void)::mallopt(M_TRIM_THRESHOLD, kLarge);
+  (void)::mallopt(M_TRIM_THRESHOLD, 4 << 20);
 }
 
 /// Nothing when none is configured.

@@ -12,6 +12,13 @@ void DepthMaps::begin(const pipeline::DepthFrame& frame) noexcept {
   encoded_made_ = 0;
 }
 
+void DepthMaps::forget() noexcept {
+  views_.clear();
+  views_made_ = 0;
+  encoded_.clear();
+  encoded_made_ = 0;
+}
+
 const DepthMaps::View& DepthMaps::view(const DepthSpec& spec, bool contact_box) {
   for (std::size_t i = 0; i < views_made_; ++i) {
     if (views_[i].spec == spec && views_[i].contact_box == contact_box) return views_[i];

@@ -18,6 +18,8 @@ class DepthMaps {
  public:
   /// Begins another frame, which must stay as it is until the next call.
   void begin(const pipeline::DepthFrame& frame) noexcept;
+  /// Gives the buffers back. Between two frames only: what get() gave is gone.
+  void forget() noexcept;
 
   struct Map {
     std::string head;  ///< dtact.v1.DepthMap without `data`.

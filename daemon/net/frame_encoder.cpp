@@ -178,6 +178,8 @@ void FrameEncoder::begin(const pipeline::DepthFrame& frame,
   impl_->done.clear();
 }
 
+void FrameEncoder::forget() noexcept { impl_->maps.forget(); }
+
 std::shared_ptr<const EncodedFrame> FrameEncoder::encode(const FrameKind& kind) {
   for (const auto& [asked, encoded] : impl_->done) {
     if (asked == kind) return encoded;

@@ -58,6 +58,10 @@ class FrameEncoder {
   /// out. Null when it would exceed the wire's cap.
   [[nodiscard]] std::shared_ptr<const EncodedFrame> encode(const FrameKind& kind);
 
+  /// What clients want has changed: gives back the memory of maps that nobody may want any more.
+  /// Between two frames only.
+  void forget() noexcept;
+
   /// What each encoding took; its count is that of encodings, not of clients.
   [[nodiscard]] const pipeline::Histogram& times() const noexcept { return times_; }
 

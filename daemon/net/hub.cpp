@@ -175,6 +175,7 @@ void Hub::update_want() {
     wanted.jpeg |= (parts & Subscription::kJpeg) != 0;
   }
   port_.want(wanted);
+  encoder_.forget();
 }
 
 Traffic Hub::traffic() const {

@@ -50,7 +50,8 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   void number_calibration(std::uint64_t key, std::uint64_t number) { numbers_[key] = number; }
   [[nodiscard]] std::optional<std::uint64_t> calibration_number(
       std::optional<std::uint64_t> key) const;
-  /// After a client's subscription changed: tells the pipeline what all of them together want.
+  /// After a client's subscription changed: tells the pipeline what all of them together want, and
+  /// lets go of what nobody wants any more.
   void update_want();
   [[nodiscard]] const std::vector<std::shared_ptr<Session>>& sessions() const noexcept {
     return sessions_;

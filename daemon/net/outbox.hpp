@@ -70,14 +70,13 @@ class Outbox {
   void write_control();
   void write_frame();
   void on_written(const boost::system::error_code& error, std::size_t size);
-
-  Transport& transport_;
-  Owner& owner_;
-  /// Answers and events with their lengths that are not sent.
+  /// Answers and events that are not sent.
   [[nodiscard]] std::size_t control_count() const noexcept {
     return control_.size() + (sending_control_.empty() ? 0 : 1);
   }
 
+  Transport& transport_;
+  Owner& owner_;
   std::deque<std::string> control_;  ///< Answers and events with their lengths.
   std::string sending_control_;      ///< The one that is being sent.
   std::size_t control_bytes_ = 0;

@@ -229,6 +229,28 @@ TEST_F(Hostile, SlowReaders) {
   daemon->end("12 slow readers");
 }
 
+TEST_F(Hostile, AMapOfItsOwnForEverybody) {
+  std::list<RawClient> picky;
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    picky.emplace_back(daemon->port());
+    picky.back().hello();
+    v1::ClientMessage message;
+    auto& subscribe = *message.mutable_subscribe();
+    subscribe.set_depth(v1::DEPTH_INT16);
+    subscribe.set_um_per_unit(2);
+    subscribe.mutable_box()->set_x(i);
+    subscribe.mutable_box()->set_width(10'000);
+    subscribe.mutable_box()->set_height(10'000);
+    ASSERT_TRUE(picky.back().request(message).has_done());
+  }
+  for (auto& client : picky) {
+    while (!client.frame().has_depth()) {
+    }
+  }
+  picky.clear();
+  daemon->end("12 clients with a map of their own");
+}
+
 TEST_F(Hostile, StoppedReaders) {
   std::vector<pid_t> stopped;
   const std::string port = std::to_string(daemon->port());
