@@ -33,7 +33,10 @@ bool Outbox::push(const v1::ServerMessage& message, bool first) {
 }
 
 void Outbox::push(std::shared_ptr<const EncodedFrame> frame) {
-  if (frame_ != nullptr) ++dropped_;
+  if (frame_ != nullptr) {
+    ++dropped_;
+    ++in_vain_;
+  }
   frame_ = std::move(frame);
   if (!writing_) write_next();
 }
@@ -84,6 +87,7 @@ void Outbox::write_frame() {
 
 void Outbox::on_written(const error_code& error, std::size_t size) {
   writing_ = false;
+  in_vain_ = 0;
   if (error) return owner_.on_write_failed(error.message());
   sent_bytes_ += size;
   write_next();

@@ -19,11 +19,14 @@ namespace dtact::net {
 ///
 /// Overflow. Frames: one being sent and one waiting; a newer one takes the waiting one's place and
 /// the drop is counted. Answers and events: never dropped, sent before the waiting frame; when more
-/// than kMaxMessages or kMaxBytes of them lie unread, no more are taken.
+/// than kMaxMessages or kMaxBytes of them lie unread, no more are taken. A reader that has stopped
+/// is to be spared frames: stalled().
 class Outbox {
  public:
   static constexpr std::size_t kMaxMessages = 1024;
   static constexpr std::size_t kMaxBytes = std::size_t{4} << 20U;
+  /// Frames that came in vain while one message was being sent; 1 s of a whole stream.
+  static constexpr int kStalledAfter = 60;
 
   /// Whose outbox it is.
   class Owner {
@@ -48,6 +51,9 @@ class Outbox {
   [[nodiscard]] bool frame_waits() const noexcept { return frame_ != nullptr; }
   /// The waiting frame is not wanted any more.
   void drop_frame() noexcept { frame_.reset(); }
+  /// The reader has stopped: a frame made for it would be made for nobody. Ends when what is being
+  /// sent has gone.
+  [[nodiscard]] bool stalled() const noexcept { return in_vain_ >= kStalledAfter; }
   /// Sends what is queued, then ends the sending side. Nothing may be pushed after it.
   void finish();
   /// The transport is closed: nothing more is sent, and on_write_failed() is not called any more.
@@ -86,6 +92,7 @@ class Outbox {
   bool writing_ = false;
   bool finishing_ = false;
   bool closed_ = false;
+  int in_vain_ = 0;  ///< Frames replaced since this write began.
   std::uint64_t sent_ = 0;
   std::uint64_t dropped_ = 0;
   std::uint64_t sent_bytes_ = 0;

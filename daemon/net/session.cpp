@@ -273,7 +273,14 @@ std::optional<FrameKind> Session::due(std::int64_t timestamp_ns, std::uint64_t m
   const Subscription::Due due = subscription_.next(timestamp_ns, missed);
   outbox_.count_dropped(due.missed);
   if (due.parts == 0) return std::nullopt;
-  waiting_ = due.parts | (outbox_.frame_waits() ? waiting_ : Subscription::Parts{0});
+  waiting_ = due.parts | (outbox_.frame_waits() || spared_ ? waiting_ : Subscription::Parts{0});
+  spared_ = outbox_.stalled();
+  if (spared_) {
+    // The one that waits is old: the next after the reader goes on takes its place.
+    outbox_.count_dropped(outbox_.frame_waits() ? 2 : 1);
+    outbox_.drop_frame();
+    return std::nullopt;
+  }
   return subscription_.kind(waiting_);
 }
 

@@ -116,7 +116,8 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   std::uint32_t minor_ = 0;
   State state_ = State::fresh;
   Subscription subscription_;
-  Subscription::Parts waiting_ = 0;  ///< What the frame holds that waits to be sent.
+  Subscription::Parts waiting_ = 0;  ///< What the frame holds, or owes, that waits to be sent.
+  bool spared_ = false;              ///< The last frame was not made, since the reader has stopped.
 
   std::optional<Rights> rights_;  ///< Once it is let in.
   TokenBucket requests_;

@@ -70,17 +70,19 @@ TEST_F(Judged, IsGoneWhenItAnswersNoMoreAfterItStoppedReading) {
   EXPECT_FALSE(alive(seconds(322), {true, 5, seconds(23)}));
 }
 
-/// Frames that the client has missed, once it reads again.
-std::uint64_t missed(RawClient& client) {
-  return client.frame().dropped() + client.frame().dropped();
-}
-
 void publish_for(Rig& rig, milliseconds time, std::uint64_t& sequence) {
   const auto end = Clock::now() + time;
   while (Clock::now() < end) {
     rig.port.publish(make_frame(++sequence, 800, 600));
     std::this_thread::sleep_for(milliseconds(20));
   }
+}
+
+/// Frames made since the start; once answered, what was being sent to `asking` has gone.
+std::uint64_t encoded(RawClient& asking) {
+  v1::ClientMessage message;
+  message.mutable_get_status();
+  return asking.request(message).status().encoded();
 }
 
 // NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send for constants
@@ -97,10 +99,37 @@ TEST(StoppedReader, IsKeptAndToldWhatItMissed) {
   publish_for(rig, 3 * kDeadAfter, sequence);
   rig.port.emit(pipeline::ReferenceTaken{1, false});
   EXPECT_THAT(rig.log(), Not(HasSubstr("disconnected")));
-  EXPECT_GT(missed(stopped), 10U);
-  v1::ClientMessage get;
-  get.mutable_get_status();
-  EXPECT_TRUE(stopped.request(get).has_status());
+  EXPECT_EQ(stopped.frame().sequence(), 1U);
+  EXPECT_GT(encoded(stopped), 60U);
+  // What waited while it was stopped is old, and is not sent.
+  rig.port.publish(make_frame(++sequence, 800, 600));
+  const auto frame = stopped.frame();
+  EXPECT_EQ(frame.sequence(), sequence);
+  EXPECT_EQ(frame.dropped(), sequence - 2);
+}
+
+// The second frame waits, the next 60 take each other's place, and then none is made any more.
+TEST(StoppedReader, IsNotMadeFramesForUntilItReadsOn) {
+  Rig rig;
+  RawClient asking(rig.tcp_port());
+  asking.hello();
+  RawClient stopped(rig.tcp_port(), kSmallBuffer);
+  stopped.hello();
+  stopped.subscribe(v1::DEPTH_INT16);
+  std::uint64_t sequence = 0;
+  for (; sequence < 100; ++sequence) {
+    rig.port.publish(make_frame(sequence + 1, 800, 600));
+    ASSERT_TRUE(rig.port.wait_fetched());
+  }
+  EXPECT_EQ(encoded(asking), 62U);
+
+  EXPECT_EQ(stopped.frame().sequence(), 1U);
+  EXPECT_EQ(encoded(stopped), 62U);
+  rig.port.publish(make_frame(++sequence, 800, 600));
+  const auto frame = stopped.frame();
+  EXPECT_EQ(frame.sequence(), 101U);
+  EXPECT_EQ(frame.dropped(), 99U);
+  EXPECT_EQ(encoded(asking), 63U);
 }
 
 /// The thread gets a network of its own, in which only loopback is up, and goes back at the end.
