@@ -34,10 +34,10 @@ struct NetConfig {
   std::size_t max_clients_per_address = 16;  ///< The same for each Peer.host.
   /// Of one client, and as many at once after a rest. A request counts once for each 64 kB of it.
   int max_requests_per_s = 500;
-  std::string frame_id = "dtact_surface";         ///< Name of the surface frame in every message.
-  std::string name;                               ///< The daemon's own, in the handshake and status.
-  std::string program = "dtactd";                 ///< "dtactd 0.1.0": in the handshake.
-  std::string version;                            ///< "0.1.0": in status.
+  std::string frame_id = "dtact_surface";  ///< Name of the surface frame in every message.
+  std::string name;                        ///< The daemon's own, in the handshake and status.
+  std::string program = "dtactd";          ///< "dtactd 0.1.0": in the handshake.
+  std::string version;                     ///< "0.1.0": in status.
   std::chrono::milliseconds hello_timeout{5000};  ///< A client silent for so long is let go.
   /// A peer whose machine has not answered for so long is dead: a pulled cable. One that answers
   /// and only does not read is not.

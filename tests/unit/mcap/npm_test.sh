@@ -7,7 +7,9 @@ skip() {
   echo "skipped: $1"
   exit 77
 }
-command -v node >/dev/null && command -v npm >/dev/null || skip "node and npm are not installed"
+for tool in node npm; do
+  command -v "$tool" >/dev/null || skip "$tool is not installed"
+done
 mkdir -p "$folder"
 cp "$here/package.json" "$here/npm.mjs" "$folder/"
 cd "$folder"
@@ -28,8 +30,8 @@ attachment a.txt text/plain 5 4 attached
 metadata m key=value
 EOF
 "$sample" write ours.mcap
-node npm.mjs read ours.mcap >read
-cat expected - <<'EOF' | diff - read
+node npm.mjs read ours.mcap >told
+cat expected - <<'EOF' | diff - told
 statistics 6 1 2 1 1 2 100 105 1:3,2:3
 streamed 6 true
 EOF
