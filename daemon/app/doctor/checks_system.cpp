@@ -68,7 +68,7 @@ Findings check_memory(const Machine& machine) {
   }
   if (available_kb < 0) return {};
   const std::string what = fmt::format("{} MiB are available", available_kb / 1024);
-  // Twice what it holds with eight clients (README.md).
+  // Twice what it holds with eight clients (tests/MEASURED.md).
   constexpr long kEnoughKb = 128L * 1024;
   if (available_kb >= kEnoughKb) return {{Verdict::good, what, ""}};
   return {{Verdict::note, what + ": too few for a daemon that locks its memory",
