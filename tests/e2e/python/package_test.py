@@ -211,13 +211,16 @@ class Documents(unittest.TestCase):
         names, out = {}, io.StringIO()
         with contextlib.redirect_stdout(out):
             for block in blocks:
-                exec(compile(block.replace('"gripper"', repr(daemon.address)), "shown", "exec"), names)
+                here = re.sub('"(gripper|localhost)"', repr(daemon.address), block)
+                exec(compile(here, "shown", "exec"), names)
         return out.getvalue()
 
-    def test_readme(self):
-        text = (SOURCE / "clients/python/README.md").read_text()
-        blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-        self.assertGreaterEqual(len(blocks), 5)
+    def test_readmes(self):
+        blocks = []
+        for page, least in (("README.md", 1), ("clients/python/README.md", 5)):
+            shown = re.findall(r"```python\n(.*?)```", (SOURCE / page).read_text(), re.DOTALL)
+            self.assertGreaterEqual(len(shown), least, page)
+            blocks += shown
         for block in blocks:
             out = self.run_code([block])
             if "deepest_mm" in block:
