@@ -61,7 +61,8 @@ std::set<std::string> options_of(Run run, std::vector<std::string> command) {
 }
 
 TEST(Completion, OffersCommands) {
-  EXPECT_THAT(complete("dtactctl re"), UnorderedElementsAre("rezero", "record", "reprocess", "reconstruct"));
+  EXPECT_THAT(complete("dtactctl re"),
+              UnorderedElementsAre("rezero", "record", "reprocess", "reconstruct"));
   EXPECT_THAT(complete("dtactctl --port 7 s"), UnorderedElementsAre("status", "snapshot"));
   EXPECT_THAT(complete("dtactctl calibration \"\""),
               UnorderedElementsAre("upload", "list", "show", "activate", "export", "--help"));
@@ -106,8 +107,9 @@ TEST(Completion, KnowsEveryOptionOfEveryCommand) {
                   {"calibration", "show"},
                   {"calibration", "activate"},
                   {"calibration", "export"}});
-  expect_options("dtact-calibrate", calibrate::run,
-                 {{}, {"guided"}, {"depth"}, {"lens"}, {"reconstruct"}, {"reprocess"}, {"evaluate"}});
+  expect_options(
+      "dtact-calibrate", calibrate::run,
+      {{}, {"guided"}, {"depth"}, {"lens"}, {"reconstruct"}, {"reprocess"}, {"evaluate"}});
   // What dtactctl hands over.
   EXPECT_THAT(options_of(calibrate::run, {"depth"}),
               IsSubsetOf(complete("dtactctl calibrate depth --")));
