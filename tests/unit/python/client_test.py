@@ -1,6 +1,5 @@
 """The client that waits, against a daemon that does as a test says."""
 import itertools
-import os
 import pathlib
 import socket
 import sys
@@ -12,9 +11,7 @@ from unittest import mock
 
 import numpy as np
 
-import certificate
 import dtact
-from dtact.messages import ServerMessage
 from fake_daemon import FakeDaemon, event, frame
 
 
@@ -106,54 +103,6 @@ class Connecting(unittest.TestCase):
                     dtact.connect(token_file=file)
         with self.assertRaisesRegex(dtact.Error, "cannot read a token"):
             dtact.connect(token_file=file)
-
-
-class Tls(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.folder = cls.enterClassContext(tempfile.TemporaryDirectory())
-        made = certificate.make(cls.folder)
-        if made is None:
-            raise unittest.SkipTest("there is no openssl to make a certificate with")
-        cls.context, cls.fingerprint = made
-
-    def test_pinned(self):
-        with FakeDaemon(tls=self.context, features=["rvl"]) as daemon, \
-                mock.patch("dtact.transport.is_local", return_value=False):
-            daemon.pushed = [frame(1)]
-            colons = ":".join(self.fingerprint[i : i + 2] for i in range(0, 64, 2)).upper()
-            for pin in (self.fingerprint, colons):
-                with dtact.connect(daemon.address, fingerprint=pin, token="secret") as s:
-                    self.assertEqual(next(s.frames()).sequence, 1)
-            self.assertEqual(daemon.requests[0].hello.token, "secret")
-            self.assertEqual(daemon.requests[-1].subscribe.depth, 3)
-
-    def test_another_certificate_gets_nothing(self):
-        with FakeDaemon(tls=self.context) as daemon:
-            with self.assertRaisesRegex(dtact.IdentityError, self.fingerprint):
-                dtact.connect(daemon.address, fingerprint="0" * 64, token="secret")
-        self.assertEqual(daemon.requests, [])
-
-    def test_an_authority(self):
-        with FakeDaemon(tls=self.context) as daemon, tempfile.TemporaryDirectory() as other:
-            dtact.connect(daemon.address, ca_file=f"{self.folder}/certificate.pem").close()
-            certificate.make(other)
-            with self.assertRaisesRegex(dtact.IdentityError, "vouches"):
-                dtact.connect(daemon.address, ca_file=f"{other}/certificate.pem")
-            with self.assertRaisesRegex(dtact.Error, "PEM"):
-                dtact.connect(daemon.address, ca_file=f"{other}/nothing.pem")
-
-    def test_one_side_only(self):
-        with FakeDaemon() as daemon:
-            with self.assertRaises(dtact.ConnectionError):
-                dtact.connect(daemon.address, fingerprint="0" * 64, timeout=1)
-        with FakeDaemon(tls=self.context) as daemon:
-            with self.assertRaises(dtact.ConnectionError):
-                dtact.connect(daemon.address, timeout=1)
-
-    def test_what_is_no_fingerprint(self):
-        for text in ("", "12", "g" * 64):
-            self.assertRaises(ValueError, dtact.connect, fingerprint=text)
 
 
 class Frames(unittest.TestCase):
@@ -304,83 +253,6 @@ class Requests(unittest.TestCase):
             daemon.answers["rezero"] = False
             self.assertRaises(dtact.TimeoutError, s.rezero)
             self.assertEqual(s.status().state, "serving")
-
-
-class Breaking(unittest.TestCase):
-    def test_what_came_before_is_given_first(self):
-        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
-            daemon.pushed = [frame(1), frame(2)]
-            frames = s.frames()
-            self.assertEqual(next(frames).sequence, 1)
-            daemon.drop()
-            self.assertEqual(next(frames).sequence, 2)
-            with self.assertRaisesRegex(dtact.ConnectionError, "ended the connection"):
-                next(frames)
-            with self.assertRaisesRegex(dtact.ConnectionError, "ended the connection"):
-                s.status()
-            self.assertEqual(daemon.connections, 1)
-
-    def test_the_daemons_reason_is_given(self):
-        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
-            def end(request, reply):
-                message = ServerMessage()
-                message.reply.error.code = 12
-                message.reply.error.message = "more requests than are served"
-                daemon.push(message)
-                daemon.drop()
-                return False
-            daemon.answers["rezero"] = end
-            with self.assertRaisesRegex(dtact.EndedByDaemon, "more requests than are served") as e:
-                s.rezero()
-            self.assertEqual(e.exception.code, 12)
-
-    def test_reconnects_and_subscribes_again(self):
-        with FakeDaemon() as daemon, dtact.connect(daemon.address, reconnect=True) as s:
-            s.subscribe(dtact.Subscription(depth="int16", every=2))
-            daemon.push(frame(1), event(1))
-            self.assertEqual(next(s.frames()).sequence, 1)
-            daemon.pushed = [frame(2)]
-            daemon.drop()
-            self.assertEqual(next(s.frames(timeout=10)).sequence, 2)
-            events = s.events(timeout=10)
-            self.assertEqual(next(events).light.brightness, 1)
-            back = next(events)
-            self.assertIsInstance(back, dtact.Reconnected)
-            self.assertEqual(back.sequence, 1)
-            self.assertIn("ended the connection", back.reason)
-            self.assertEqual(daemon.connections, 2)
-            self.assertEqual(daemon.requests[-1].subscribe.every, 2)
-            daemon.drop()
-            time.sleep(0.1)
-            with self.assertRaises(dtact.ConnectionError):
-                s.set_light(brightness=1)  # It was under way: nobody knows whether it was done.
-            self.assertEqual(s.set_light(brightness=1).brightness, 1)
-
-    def test_waits_for_a_daemon_that_comes_back(self):
-        with tempfile.TemporaryDirectory() as folder:
-            with FakeDaemon(path=f"{folder}/socket") as daemon:
-                s = dtact.connect(daemon.address, reconnect=True)
-                s.subscribe()
-            os.unlink(f"{folder}/socket")
-            self.assertIsNone(s.next(timeout=0.3))
-            with self.assertRaisesRegex(dtact.ConnectionError, "nothing listens"):
-                s.status()
-            with FakeDaemon(path=f"{folder}/socket") as daemon:
-                daemon.pushed = [frame(5)]
-                self.assertEqual(next(s.frames(timeout=10)).sequence, 5)
-                back = next(s.events())
-                self.assertIn("ended the connection", back.reason)
-                self.assertGreater(back.away_s, 0.3)
-                s.close()
-
-    def test_no_use_after_close(self):
-        with FakeDaemon() as daemon:
-            s = dtact.connect(daemon.address, reconnect=True)
-            s.close()
-            for call in (s.status, lambda: s.next(1), lambda: next(s.frames())):
-                with self.assertRaisesRegex(dtact.ConnectionError, "was closed"):
-                    call()
-            self.assertEqual(daemon.connections, 1)
 
 
 class Spaces(unittest.TestCase):

@@ -1,0 +1,90 @@
+"""The client that waits, when the connection ends."""
+import os
+import tempfile
+import time
+import unittest
+
+import dtact
+from dtact.messages import ServerMessage
+from fake_daemon import FakeDaemon, event, frame
+
+
+class Breaking(unittest.TestCase):
+    def test_what_came_before_is_given_first(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            daemon.pushed = [frame(1), frame(2)]
+            frames = s.frames()
+            self.assertEqual(next(frames).sequence, 1)
+            daemon.drop()
+            self.assertEqual(next(frames).sequence, 2)
+            with self.assertRaisesRegex(dtact.ConnectionError, "ended the connection"):
+                next(frames)
+            with self.assertRaisesRegex(dtact.ConnectionError, "ended the connection"):
+                s.status()
+            self.assertEqual(daemon.connections, 1)
+
+    def test_the_daemons_reason_is_given(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            def end(request, reply):
+                message = ServerMessage()
+                message.reply.error.code = 12
+                message.reply.error.message = "more requests than are served"
+                daemon.push(message)
+                daemon.drop()
+                return False
+            daemon.answers["rezero"] = end
+            with self.assertRaisesRegex(dtact.EndedByDaemon, "more requests than are served") as e:
+                s.rezero()
+            self.assertEqual(e.exception.code, 12)
+
+    def test_reconnects_and_subscribes_again(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, reconnect=True) as s:
+            s.subscribe(dtact.Subscription(depth="int16", every=2))
+            daemon.push(frame(1), event(1))
+            self.assertEqual(next(s.frames()).sequence, 1)
+            daemon.pushed = [frame(2)]
+            daemon.drop()
+            self.assertEqual(next(s.frames(timeout=10)).sequence, 2)
+            events = s.events(timeout=10)
+            self.assertEqual(next(events).light.brightness, 1)
+            back = next(events)
+            self.assertIsInstance(back, dtact.Reconnected)
+            self.assertEqual(back.sequence, 1)
+            self.assertIn("ended the connection", back.reason)
+            self.assertEqual(daemon.connections, 2)
+            self.assertEqual(daemon.requests[-1].subscribe.every, 2)
+            daemon.drop()
+            time.sleep(0.1)
+            with self.assertRaises(dtact.ConnectionError):
+                s.set_light(brightness=1)  # It was under way: nobody knows whether it was done.
+            self.assertEqual(s.set_light(brightness=1).brightness, 1)
+
+    def test_waits_for_a_daemon_that_comes_back(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with FakeDaemon(path=f"{folder}/socket") as daemon:
+                s = dtact.connect(daemon.address, reconnect=True)
+                s.subscribe()
+            os.unlink(f"{folder}/socket")
+            self.assertIsNone(s.next(timeout=0.3))
+            with self.assertRaisesRegex(dtact.ConnectionError, "nothing listens"):
+                s.status()
+            with FakeDaemon(path=f"{folder}/socket") as daemon:
+                daemon.pushed = [frame(5)]
+                self.assertEqual(next(s.frames(timeout=10)).sequence, 5)
+                back = next(s.events())
+                self.assertIn("ended the connection", back.reason)
+                self.assertGreater(back.away_s, 0.3)
+                s.close()
+
+    def test_no_use_after_close(self):
+        with FakeDaemon() as daemon:
+            s = dtact.connect(daemon.address, reconnect=True)
+            s.close()
+            for call in (s.status, lambda: s.next(1), lambda: next(s.frames())):
+                with self.assertRaisesRegex(dtact.ConnectionError, "was closed"):
+                    call()
+            self.assertEqual(daemon.connections, 1)
+
+
+if __name__ == "__main__":
+    unittest.main()
