@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """page_client_test.py: starts the daemon on the simulated sensor, where a ball is pressed in again
-and again, and runs page_client.py against it. The programs are named by the environment: DTACTD,
+and again, and runs page_client against it. The programs are named by the environment: DTACTD,
 SIM_RENDER, CALIBRATE.
 
 The depth map's sides are no multiples of four and not equal: what is left over and what is mistaken
@@ -71,8 +71,8 @@ def main():
             with subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT) as daemon:
                 try:
                     port = listening(daemon, log)
-                    result = subprocess.run([sys.executable, HERE / "page_client.py", "127.0.0.1",
-                                             port], check=False).returncode
+                    result = subprocess.run([sys.executable, "-B", HERE / "page_client",
+                                             "127.0.0.1", port], check=False).returncode
                 finally:
                     daemon.terminate()
         if result == 1:
