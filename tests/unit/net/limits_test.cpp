@@ -13,6 +13,7 @@
 #include "daemon/net/limited_log.hpp"
 #include "daemon/net/token_bucket.hpp"
 #include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/requests.hpp"
 #include "tests/unit/net/rig.hpp"
 
 namespace dtact::net::test {
@@ -21,12 +22,6 @@ namespace {
 using testing::HasSubstr;
 using namespace std::string_literals;
 using std::chrono::milliseconds;
-
-v1::ClientMessage get_status() {
-  v1::ClientMessage message;
-  message.mutable_get_status();
-  return message;
-}
 
 /// A connection from another address of this machine than 127.0.0.1, all of which reach it.
 base::UniqueFd connected_from(const char* from, std::uint16_t port) {
