@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/requests.hpp"
 #include "tests/unit/net/rig.hpp"
 
 namespace dtact::net::test {
@@ -46,13 +47,6 @@ v1::ClientMessage activate(std::uint64_t number) {
   v1::ClientMessage message;
   message.mutable_activate_calibration()->set_number(number);
   return message;
-}
-
-/// Expects the request to be refused as invalid with a sentence that has `part` in it.
-void expect_invalid(RawClient& client, const v1::ClientMessage& message, const std::string& part) {
-  const auto reply = client.request(message);
-  EXPECT_EQ(reply.error().code(), v1::ERROR_INVALID);
-  EXPECT_THAT(reply.error().message(), HasSubstr(part));
 }
 
 /// The pipeline says that it uses a calibration.

@@ -1,3 +1,4 @@
+// What clients may ask, and how they are answered; SetLight has a file of its own.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +8,7 @@
 #include "hal/base/clock.hpp"
 #include "hal/image/png.hpp"
 #include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/requests.hpp"
 #include "tests/unit/net/rig.hpp"
 
 namespace dtact::net::test {
@@ -16,29 +18,10 @@ using pipeline::CommandDone;
 using pipeline::Outcome;
 using testing::HasSubstr;
 
-v1::ClientMessage brightness(std::uint32_t value) {
-  v1::ClientMessage message;
-  message.mutable_set_light()->set_brightness(value);
-  return message;
-}
-
-v1::ClientMessage scheme(const std::string& name) {
-  v1::ClientMessage message;
-  message.mutable_set_light()->set_scheme(name);
-  return message;
-}
-
 v1::ClientMessage rezero(bool force) {
   v1::ClientMessage message;
   message.mutable_rezero()->set_force(force);
   return message;
-}
-
-/// Expects the request to be refused as invalid with a sentence that has `part` in it.
-void expect_invalid(RawClient& client, const v1::ClientMessage& message, const std::string& part) {
-  const auto reply = client.request(message);
-  EXPECT_EQ(reply.error().code(), v1::ERROR_INVALID);
-  EXPECT_THAT(reply.error().message(), HasSubstr(part));
 }
 
 TEST(Subscribe, RefusesUnknownEncodings) {
@@ -121,25 +104,6 @@ TEST(GetReference, SaysWhyThereIsNone) {
   EXPECT_EQ(client.request(get_reference()).error().code(), v1::ERROR_BUSY);
 }
 
-TEST(SetLight, TellsSinceWhenFramesAreExposedUnderIt) {
-  Rig rig({}, [](FakePort& port) {
-    port.answer([](const pipeline::Command& command) {
-      CommandDone done{command.ticket, Outcome::done, ""};
-      done.light_since_ns = 123;
-      return done;
-    });
-  });
-  RawClient client(rig.tcp_port());
-  client.hello();
-  EXPECT_EQ(client.request(brightness(100)).light().since_ns(), 123);
-  rig.port.emit(pipeline::LightChanged{{}, {4, 5, 6}, 7});
-  const auto event = client.event();
-  EXPECT_EQ(event.light().since_ns(), 7);
-  EXPECT_EQ(event.sequence(), 4U);
-  EXPECT_EQ(event.monotonic_ns(), 5);
-  EXPECT_EQ(event.wall_ns(), 6);
-}
-
 TEST(Status, TellsNameSerialAndWhatEachClientTook) {
   NetConfig config;
   config.name = "gripper";
@@ -172,175 +136,6 @@ TEST(Status, TellsNameSerialAndWhatEachClientTook) {
   *answer.mutable_reply() = hello;
   EXPECT_EQ(told.clients(0).sent_bytes(), answer.ByteSizeLong() + 4) << "with its length";
   EXPECT_EQ(told.clients(0).waiting_bytes(), 0U);
-}
-
-TEST(SetLight, ChangesOnlyWhatIsSet) {
-  Rig rig({}, answer_done);
-  RawClient client(rig.tcp_port());
-  client.hello();
-  auto reply = client.request(brightness(100));
-  EXPECT_EQ(reply.light().brightness(), 100U);
-  EXPECT_EQ(reply.light().leds(3).g(), 255U);  // as the ring was
-  reply = client.request(scheme("scheme4"));
-  EXPECT_EQ(reply.light().brightness(), 100U);
-  EXPECT_EQ(reply.light().leds(0).r(), 255U);
-  EXPECT_EQ(reply.light().leds(2).r(), 0U);
-  const auto command = rig.port.wait_command(1);
-  ASSERT_TRUE(command.has_value());
-  const auto& light = std::get<pipeline::SetLight>(command->what).light;
-  EXPECT_EQ(light.brightness, 100);
-  EXPECT_EQ(light.leds[2], (hal::Rgb{0, 0, 0}));
-}
-
-TEST(SetLight, TakesEightColours) {
-  Rig rig({}, answer_done);
-  RawClient client(rig.tcp_port());
-  client.hello();
-  auto message = scheme("all");
-  for (std::uint32_t i = 0; i < 8; ++i) {
-    auto& led = *message.mutable_set_light()->add_leds();
-    led.set_r(i);
-    led.set_b(255);
-  }
-  const auto reply = client.request(message);
-  ASSERT_EQ(reply.light().leds_size(), 8);
-  EXPECT_EQ(reply.light().leds(7).r(), 7U);
-  EXPECT_EQ(reply.light().leds(7).g(), 0U);
-  EXPECT_EQ(reply.light().leds(7).b(), 255U);
-}
-
-TEST(SetLight, NamesTheFieldThatIsWrong) {
-  Rig rig({}, answer_done);
-  RawClient client(rig.tcp_port());
-  client.hello();
-  expect_invalid(client, brightness(256), "set_light.brightness: 256; allowed are 0 to 255");
-  expect_invalid(client, scheme("disco"),
-                 "\"disco\" is unknown; known are all, scheme1, scheme2, scheme3, scheme4");
-  v1::ClientMessage message;
-  message.mutable_set_light()->add_leds();
-  expect_invalid(client, message, "1 colours, the ring has 8");
-  for (int i = 0; i < 7; ++i) message.mutable_set_light()->add_leds();
-  message.mutable_set_light()->mutable_leds(5)->set_g(1000);
-  expect_invalid(client, message, "set_light.leds[5]: 0, 1000, 0");
-  message.mutable_set_light()->mutable_leds(5)->set_g(255);
-  message.mutable_set_light()->mutable_leds(7)->set_b(256);
-  expect_invalid(client, message, "set_light.leds[7]: 0, 0, 256; allowed are 0 to 255");
-  message.mutable_set_light()->mutable_leds(7)->set_b(255);
-  message.mutable_set_light()->mutable_leds(0)->set_r(256);
-  expect_invalid(client, message, "set_light.leds[0]: 256, 0, 0");
-}
-
-TEST(SetLight, AnswersOnlyWhenTheRingHasBeenWritten) {
-  Rig rig;
-  RawClient client(rig.tcp_port());
-  client.hello();
-  auto message = brightness(10);
-  message.set_id(50);
-  client.send(message);
-  const auto command = rig.port.wait_command(0);
-  ASSERT_TRUE(command.has_value());
-  // Anything that is answered now comes before the light's answer.
-  v1::ClientMessage status;
-  status.mutable_get_status();
-  EXPECT_TRUE(client.request(status).has_status());
-  rig.port.emit(CommandDone{command->ticket, Outcome::done, ""});
-  const auto reply = client.reply();
-  EXPECT_EQ(reply.id(), 50U);
-  EXPECT_EQ(reply.light().brightness(), 10U);
-}
-
-TEST(SetLight, TheLastWriterWinsAndEveryoneIsTold) {
-  Rig rig({}, [](FakePort& port) {
-    port.answer([&port](const pipeline::Command& command) {
-      port.emit(pipeline::LightChanged{std::get<pipeline::SetLight>(command.what).light});
-      return CommandDone{command.ticket, Outcome::done, ""};
-    });
-  });
-  RawClient a(rig.tcp_port());
-  RawClient b(rig.tcp_port());
-  RawClient watcher(rig.tcp_port());
-  a.hello();
-  b.hello();
-  watcher.hello();
-  EXPECT_EQ(a.request(brightness(10)).light().brightness(), 10U);
-  EXPECT_EQ(b.request(brightness(20)).light().brightness(), 20U);
-  EXPECT_EQ(watcher.event().light().brightness(), 10U);
-  EXPECT_EQ(watcher.event().light().brightness(), 20U);
-  // The next partial change builds on the last writer's light.
-  EXPECT_EQ(a.request(scheme("scheme1")).light().brightness(), 20U);
-}
-
-TEST(SetLight, AChangeBuildsOnTheOneThatIsStillUnderWay) {
-  Rig rig;
-  RawClient client(rig.tcp_port());
-  client.hello();
-  auto message = brightness(10);
-  message.set_id(50);
-  client.send(message);
-  message = scheme("scheme2");
-  message.set_id(51);
-  client.send(message);
-  const auto second = rig.port.wait_command(1);
-  ASSERT_TRUE(second.has_value());
-  EXPECT_EQ(std::get<pipeline::SetLight>(second->what).light.brightness, 10);
-}
-
-// The light of the first is told while the second is still to be written.
-TEST(SetLight, AChangeBuildsOnTheLastOneAskedFor) {
-  Rig rig;
-  RawClient client(rig.tcp_port());
-  client.hello();
-  std::uint64_t id = 50;
-  const auto send = [&](v1::ClientMessage message) {
-    message.set_id(id++);
-    client.send(message);
-  };
-  send(brightness(10));
-  send(scheme("scheme2"));
-  const auto first = rig.port.wait_command(0);
-  ASSERT_TRUE(first.has_value() && rig.port.wait_command(1).has_value());
-  rig.port.emit(CommandDone{first->ticket, Outcome::done, ""});
-  rig.port.emit(pipeline::LightChanged{std::get<pipeline::SetLight>(first->what).light});
-  EXPECT_EQ(client.event().light().brightness(), 10U);
-  send(brightness(30));
-  const auto third = rig.port.wait_command(2);
-  ASSERT_TRUE(third.has_value());
-  const auto& light = std::get<pipeline::SetLight>(third->what).light;
-  EXPECT_EQ(light.brightness, 30);
-  EXPECT_EQ(light.leds[0], (hal::Rgb{0, 0, 0})) << "scheme2 lights 2, 3, 6 and 7";
-  EXPECT_EQ(light.leds[2], (hal::Rgb{255, 255, 255}));
-}
-
-TEST(SetLight, AFailedWriteIsNotBuiltOn) {
-  Rig rig({}, [](FakePort& port) {
-    port.answer([](const pipeline::Command& command) {
-      return CommandDone{command.ticket, Outcome::device_error, "/dev/spidev0.0: check the wiring"};
-    });
-  });
-  RawClient client(rig.tcp_port());
-  client.hello();
-  const auto reply = client.request(brightness(10));
-  EXPECT_EQ(reply.error().code(), v1::ERROR_DEVICE);
-  EXPECT_EQ(reply.error().message(), "/dev/spidev0.0: check the wiring");
-  (void)client.request(scheme("scheme2"));
-  const auto second = rig.port.wait_command(1);
-  ASSERT_TRUE(second.has_value());
-  EXPECT_EQ(std::get<pipeline::SetLight>(second->what).light.brightness, 255);
-}
-
-TEST(SetLight, ALightKeptForTheRingIsBuiltOn) {
-  Rig rig({}, [](FakePort& port) {
-    port.answer([](const pipeline::Command& command) {
-      return CommandDone{command.ticket, Outcome::ring_away, "/dev/spidev0.0: not there"};
-    });
-  });
-  RawClient client(rig.tcp_port());
-  client.hello();
-  EXPECT_EQ(client.request(brightness(10)).error().code(), v1::ERROR_DEVICE);
-  (void)client.request(scheme("scheme2"));
-  const auto second = rig.port.wait_command(1);
-  ASSERT_TRUE(second.has_value());
-  EXPECT_EQ(std::get<pipeline::SetLight>(second->what).light.brightness, 10);
 }
 
 TEST(Rezero, IsRefusedUnderContactUnlessForced) {
