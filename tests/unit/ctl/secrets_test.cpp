@@ -11,33 +11,21 @@
 #include <string>
 
 #include "clients/ctl/certificate.hpp"
-#include "clients/ctl/ctl.hpp"
 #include "daemon/net/tls.hpp"
 #include "daemon/net/tokens.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/calibration/sample.hpp"
+#include "tests/unit/ctl/run_ctl.hpp"
 
 namespace dtact::ctl {
 namespace {
 
 namespace fs = std::filesystem;
 using calibration::TempFolder;
+using test::ctl;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::MatchesRegex;
-
-struct Result {
-  int code = 0;
-  std::string out;
-  std::string error;
-};
-
-Result ctl(const std::vector<std::string>& arguments) {
-  std::ostringstream out;
-  std::ostringstream error;
-  const int code = run(arguments, out, error);
-  return {code, out.str(), error.str()};
-}
 
 /// What the openssl command says of a certificate.
 std::string described(const fs::path& certificate) {

@@ -1,0 +1,170 @@
+// dtactctl calibration against the server with a store and a pipeline that the tests play.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "clients/cpp/client.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "tests/unit/ctl/run_ctl.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+namespace fs = std::filesystem;
+using net::test::answer_done;
+using net::test::Rig;
+using test::ctl;
+using testing::AllOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+/// The pipeline says that it uses a calibration.
+void be_calibrated(Rig& rig, const std::string& name) {
+  auto calibration = std::make_shared<calibration::Calibration>();
+  calibration->name = name;
+  pipeline::Status status;
+  status.calibration = std::move(calibration);
+  rig.port.set_status(status);
+}
+
+TEST(Calibration, GoesUpAndComesBack) {
+  Rig rig({}, answer_done);
+  be_calibrated(rig, "first");
+  std::string name = (fs::temp_directory_path() / "dtact-ctl-XXXXXX").string();
+  const fs::path temporary = ::mkdtemp(name.data());
+  const fs::path folder = temporary / "ball";
+  fs::create_directory(folder);
+  base::write_file_atomically(folder / "calibration.toml", "version = 1\n");
+  base::write_file_atomically(folder / "reference.png", "png");
+
+  auto result = ctl(rig, {"calibration", "upload", folder.string() + "/"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_EQ(result.out, "the daemon uses calibration ball (4) from now on\n");
+  EXPECT_EQ(ctl(rig, {"calibration", "show"}).out, "# calibration ball (4)\nversion = 1\n");
+  const std::string copy = (temporary / "copy").string();
+  result = ctl(rig, {"calibration", "export", "-o", copy});
+  EXPECT_EQ(result.out, copy + ": calibration ball (4)\n");
+  EXPECT_EQ(base::read_file(copy + "/reference.png"), "png");
+  EXPECT_EQ(base::read_file(copy + "/calibration.toml"), "version = 1\n");
+  result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "other", "--json"});
+  EXPECT_EQ(result.out, R"({"name":"other","folder":"","number":"5"})"
+                        "\n");
+  result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "no good"});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_EQ(ctl(rig, {"calibration", "upload", temporary.string()}).code, 1);
+  fs::remove_all(temporary);
+}
+
+TEST(Calibration, IsExportedOnceUnlessForced) {
+  const Rig rig({}, answer_done);
+  std::string name = (fs::temp_directory_path() / "dtact-ctl-XXXXXX").string();
+  const fs::path temporary = ::mkdtemp(name.data());
+  const std::string folder = (temporary / "factory").string();
+  auto result = ctl(rig, {"calibration", "export", "configured", "-o", folder, "--json"});
+  EXPECT_EQ(result.code, 0) << result.error;
+  EXPECT_EQ(result.out, R"({"name":"factory","folder":")" + folder + "\",\"number\":\"0\"}\n");
+  result = ctl(rig, {"calibration", "export", "2", "-o", folder});
+  EXPECT_EQ(result.code, 1);
+  EXPECT_THAT(result.error, AllOf(HasSubstr(folder + " exists"), HasSubstr("--force")));
+  EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "toml of factory");
+  EXPECT_EQ(ctl(rig, {"calibration", "export", "2", "-o", folder, "--force"}).code, 0);
+  EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "bad");
+  // What is no part of a calibration is not lost, forced or not.
+  base::write_file_atomically(folder + "/notes.txt", "mine");
+  EXPECT_EQ(ctl(rig, {"calibration", "export", "1", "-o", folder, "--force"}).code, 1);
+  EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "bad");
+  EXPECT_EQ(ctl(rig, {"calibration", "export", "9", "-o", (temporary / "x").string()}).code, 1);
+  EXPECT_FALSE(fs::exists(temporary / "x"));
+  fs::remove_all(temporary);
+}
+
+TEST(Calibration, IsListed) {
+  Rig rig;
+  be_calibrated(rig, "first");
+  EXPECT_EQ(
+      ctl(rig, {"calibration", "list"}).out,
+      "          id  uploaded              name         image        map    mm/px  method     "
+      "range\n"
+      "  configured  -                     factory    800x600    580x580   0.0414  list       "
+      "-0.02 "
+      "to 1.40 mm\n"
+      "*          1  2026-01-31T12:00:00Z  first      800x600    580x580   0.0414  list       "
+      "-0.02 "
+      "to 1.40 mm\n"
+      "           2  2026-01-31T12:00:00Z  broken   cannot be read: calibration.toml:3: scale "
+      "missing\n"
+      "           3  2026-01-31T12:00:00Z  stuck      800x600    580x580   0.0414  list       "
+      "-0.02 "
+      "to 1.40 mm\n");
+  const std::string json = ctl(rig, {"calibration", "list", "--json"}).out;
+  EXPECT_THAT(
+      json,
+      StartsWith(R"({"number":"0","name":"factory","uploaded":"","current":false,"summary":{)"
+                 R"("name":"factory","method":"list","mm_per_px":0.0414,"width":580,"height":580,)"
+                 R"("covered_from_mm":-0.02,"covered_to_mm":1.4,"created":"","frame_width":800,)"
+                 R"("frame_height":600},"in_use":false})"
+                 "\n"));
+  EXPECT_THAT(json, HasSubstr(R"("name":"broken","uploaded":"2026-01-31T12:00:00Z",)"
+                              R"("current":false,"damage":"calibration.toml:3: scale missing",)"));
+  EXPECT_EQ(std::count(json.begin(), json.end(), '\n'), 4);
+}
+
+TEST(Calibration, InUseAndToStartWithAreToldApart) {
+  Rig rig({}, answer_done);
+  EXPECT_THAT(ctl(rig, {"calibration", "list"}).out,
+              AllOf(HasSubstr("\n>          1"), EndsWith("none is in use\n"
+                                                          "the daemon starts with 1 (>)\n")));
+  be_calibrated(rig, "stuck");
+  EXPECT_EQ(ctl(rig, {"calibration", "activate", "3"}).code, 1);  // disk full
+  EXPECT_THAT(ctl(rig, {"calibration", "list"}).out,
+              AllOf(HasSubstr("\n>          1"), HasSubstr("\n*          3"),
+                    EndsWith("mm\nthe daemon starts with 1 (>)\n")));
+  be_calibrated(rig, "ball");
+  client::Options target;
+  target.port = rig.tcp_port();
+  v1::UploadCalibration files;
+  files.set_name("ball");
+  files.set_calibration_toml("unwritable");
+  files.set_reference_png("png");
+  EXPECT_THROW(client::Client(target).upload_calibration(files), client::Refused);
+  EXPECT_THAT(ctl(rig, {"calibration", "list"}).out,
+              AllOf(HasSubstr("\n>          1"), Not(HasSubstr("\n*")),
+                    EndsWith("in use is ball, under no number that the daemon knows\n"
+                             "the daemon starts with 1 (>)\n")));
+}
+
+TEST(Calibration, IsShownAndActivatedByItsId) {
+  const Rig rig({}, answer_done);
+  EXPECT_EQ(ctl(rig, {"calibration", "show", "configured"}).out,
+            "# calibration factory (configured)\ntoml of factory");
+  EXPECT_EQ(ctl(rig, {"calibration", "show", "1", "--json"}).out,
+            // The files in base64.
+            R"({"name":"first","calibration_toml":"dG9tbCBvZiBmaXJzdA==",)"
+            R"("reference_png":"cG5nIG9mIGZpcnN0","number":"1"})"
+            "\n");
+  EXPECT_EQ(ctl(rig, {"calibration", "activate", "configured"}).out,
+            "the daemon uses calibration configured from now on\n");
+  EXPECT_EQ(ctl(rig, {"calibration", "activate", "1", "--json"}).out,
+            R"({"name":"","folder":"","number":"1"})"
+            "\n");
+  const auto refused = ctl(rig, {"calibration", "activate", "2"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.error, HasSubstr("scale missing"));
+  const auto wrong = ctl(rig, {"calibration", "show", "newest"});
+  EXPECT_EQ(wrong.code, 2);
+  EXPECT_THAT(wrong.error, HasSubstr("a number that dtactctl calibration list shows"));
+  EXPECT_EQ(ctl(rig, {"calibration", "show", "0"}).code, 2);
+  EXPECT_EQ(ctl(rig, {"calibration", "activate"}).code, 2);
+  EXPECT_EQ(ctl(rig, {"calibration", "export"}).code, 2);
+}
+
+}  // namespace
+}  // namespace dtact::ctl
