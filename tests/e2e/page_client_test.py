@@ -19,7 +19,7 @@ SCENES = HERE.parents[1] / "config/scenes"
 SCENE = """
 [loop]
 from_s = 2.0
-to_s = 7.0
+to_s = 8.0
 
 [[press]]
 object = "ball"
