@@ -1,10 +1,17 @@
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <iosfwd>
 #include <string>
 #include <vector>
 
+#include "clients/common/program.hpp"
+
 namespace dtact::calibrate {
+
+/// Gives `app` dtact-calibrate's name, options and commands; what parses later fills `context`,
+/// which must outlive that.
+void set_up(CLI::App& app, cli::Context& context);
 
 /// The program dtact-calibrate, for main() and tests: runs the command that `arguments` (without
 /// the program's own name) asks for. Returns an ExitCode.

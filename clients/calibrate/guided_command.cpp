@@ -68,6 +68,7 @@ void add_guided(CLI::App& app, cli::Context& context) {
       ->add_option("--folder", plan->folder,
                    "Work folder: everything taken is saved there at once, and a session with the "
                    "same folder goes on; its name becomes the calibration's")
+      ->type_name("FOLDER")
       ->capture_default_str();
   guided
       ->add_option("--patience", plan->patience_s, "Seconds to wait for a surface that holds still")

@@ -35,6 +35,7 @@ void add_global_options(CLI::App& app, Context& context) {
   client::Options& target = context.target;
   app.add_option("--host", target.host,
                  "Name or address of the daemon's machine, also with :PORT, or unix:/PATH")
+      ->type_name("HOST")
       ->capture_default_str();
   app.add_option("--port", target.port, "TCP port of the daemon")
       ->capture_default_str()

@@ -176,7 +176,9 @@ void add_calibration(CLI::App& app, Context& context) {
 
   auto* fetch = command->add_subcommand("export", "Save one as a calibration folder");
   add_id(fetch, which);
-  fetch->add_option("-o,--output", options->folder, "The folder to write")->required();
+  fetch->add_option("-o,--output", options->folder, "The folder to write")
+      ->type_name("FOLDER")
+      ->required();
   fetch->add_flag("--force", options->force, "Replace the calibration that is in the folder");
   fetch->callback(
       [&context, options] { save(context, options->number(), options->folder, options->force); });

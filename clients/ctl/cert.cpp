@@ -63,14 +63,17 @@ void add_cert(CLI::App& app, Context& context) {
   CLI::App* command =
       app.add_subcommand("cert", "Make the daemon's TLS certificate and key (needs no daemon)");
   const auto arguments = std::make_shared<Arguments>();
-  auto* output = command->add_option("-o,--output", arguments->folder,
-                                     "Folder to write dtactd.crt and dtactd.key to");
+  auto* output = command
+                     ->add_option("-o,--output", arguments->folder,
+                                  "Folder to write dtactd.crt and dtactd.key to")
+                     ->type_name("FOLDER");
   command->add_option("--name", arguments->names,
                       "Further host names and addresses that clients use, beside this machine's");
   command->add_flag("--force", arguments->force, "Replace a pair that is there");
   auto* shown =
       command
           ->add_option("--show", arguments->show, "Only print the fingerprint of this certificate")
+          ->type_name("FILE")
           ->excludes(output);
   command->callback([arguments, shown, output, &context] {
     if (shown->count() > 0) return show(arguments->show, context.out);

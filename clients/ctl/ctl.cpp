@@ -8,9 +8,8 @@
 
 namespace dtact::ctl {
 
-int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& error) {
-  CLI::App app("Talks to dtactd, the daemon for DTact tactile sensors.", "dtactctl");
-  cli::Context context{{}, false, out};
+void set_up(CLI::App& app, cli::Context& context, const std::vector<std::string>& arguments) {
+  app.name("dtactctl")->description("Talks to dtactd, the daemon for DTact tactile sensors.");
   cli::add_global_options(app, context);
   add_status(app, context);
   add_watch(app, context);
@@ -26,6 +25,12 @@ int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostre
   add_cert(app, context);
   add_token(app, context);
   add_handed_over(app, arguments);
+}
+
+int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& error) {
+  CLI::App app;
+  cli::Context context{{}, false, out};
+  set_up(app, context, arguments);
   return cli::run(app, arguments, out, error);
 }
 

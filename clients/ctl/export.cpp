@@ -281,7 +281,9 @@ void add_export(CLI::App& app, cli::Context& context) {
                    "csv: none. All write frames.csv (contact, times) and events.csv")
       ->required()
       ->check(CLI::IsMember({"npy", "png", "ply", "csv"}));
-  command->add_option("-o,--output", options->output, "The folder to write")->required();
+  command->add_option("-o,--output", options->output, "The folder to write")
+      ->type_name("FOLDER")
+      ->required();
   command->add_option("--frames", options->frames, "FIRST:END, counted from 0; END is left out")
       ->check([](const std::string& text) {
         return parse_range(text) ? "" : "\"" + text + "\" is not FIRST:END, as 0:100 is";

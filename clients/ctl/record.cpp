@@ -201,7 +201,9 @@ void add_record(CLI::App& app, Context& context) {
       "record", "Record depth, the camera's JPEGs and events as an MCAP file until Ctrl-C");
   const auto options = std::make_shared<RecordOptions>();
   options->progress = ::isatty(STDERR_FILENO) == 1;
-  command->add_option("-o,--output", options->output, "The file, press.mcap")->required();
+  command->add_option("-o,--output", options->output, "The file, press.mcap")
+      ->type_name("FILE")
+      ->required();
   command->add_option("--seconds", options->seconds, "End after so long")
       ->check(CLI::PositiveNumber);
   command

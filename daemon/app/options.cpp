@@ -1,18 +1,13 @@
 #include "daemon/app/options.hpp"
 
-#include <CLI/CLI.hpp>
-
 #include "version.hpp"
 
 namespace dtact::app {
 
-Parsed parse_options(int argc, const char* const* argv) {
-  Parsed parsed;
-  Options& options = parsed.options;
-  CLI::App cli(
+void set_up(CLI::App& cli, Options& options) {
+  cli.name("dtactd")->description(
       "Reads a DTact sensor, reconstructs depth and streams it over TCP.\n"
-      "Every key of the configuration is documented in dtactd.toml.",
-      "dtactd");
+      "Every key of the configuration is documented in dtactd.toml.");
   cli.set_version_flag("--version", "dtactd " DTACT_VERSION);
   cli.add_option("-c,--config", options.config, "Configuration file (TOML)")
       ->check(CLI::ExistingFile);
@@ -42,6 +37,12 @@ Parsed parse_options(int argc, const char* const* argv) {
   cli.footer(
       "Environment: DTACTD_LOG sets the log level; it wins over the file, an option over it.\n"
       "Exit status: 0 after SIGTERM or SIGINT, 1 on an error, 2 on a wrong command line.");
+}
+
+Parsed parse_options(int argc, const char* const* argv) {
+  Parsed parsed;
+  CLI::App cli;
+  set_up(cli, parsed.options);
   try {
     cli.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

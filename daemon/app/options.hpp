@@ -1,5 +1,6 @@
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -23,6 +24,9 @@ struct Parsed {
   Options options;
   std::optional<int> exit_status;
 };
+
+/// Gives `cli` dtactd's name and options, which fill `options` when they are parsed.
+void set_up(CLI::App& cli, Options& options);
 
 [[nodiscard]] Parsed parse_options(int argc, const char* const* argv);
 

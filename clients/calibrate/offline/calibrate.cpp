@@ -109,13 +109,17 @@ void add_calibrate(CLI::App& app) {
       ->add_option("--reference", options->reference,
                    "Untouched surface: PNG files, or a folder of them (averaged); camera and light "
                    "are recorded from the folder's sensor.toml where there is one")
+      ->type_name("FILE")
       ->required();
-  depth->add_option("--ball", options->ball,
-                    "One press of the ball: PNG files, or a folder of them (averaged)");
+  depth
+      ->add_option("--ball", options->ball,
+                   "One press of the ball: PNG files, or a folder of them (averaged)")
+      ->type_name("FILE");
   depth
       ->add_option("--press", options->presses,
                    "One of several presses, at any place and depth, some of them light: a PNG file "
                    "or a folder; repeat. FOLDER@MM where the depth was measured")
+      ->type_name("FILE")
       ->take_all();
   depth->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")->required();
   add_map_options(*depth, options->map);
@@ -132,6 +136,7 @@ void add_calibrate(CLI::App& app) {
   depth
       ->add_option("-o,--output", options->output,
                    "Folder to write; an old calibration is replaced")
+      ->type_name("FOLDER")
       ->required();
   depth->add_flag("--force", options->force,
                   "Write the calibration although list and ball disagree: a wrong scale or radius, "

@@ -108,9 +108,11 @@ void add_calibrate_lens(CLI::App& app) {
   const auto options = std::make_shared<Options>();
   CLI::Option* reference =
       lens->add_option("--board-reference", options->reference,
-                       "Untouched surface: PNG files, or a folder of them (averaged)");
+                       "Untouched surface: PNG files, or a folder of them (averaged)")
+          ->type_name("FILE");
   CLI::Option* board = lens->add_option("--board", options->board,
-                                        "The board of pins pressed in: PNG files, or a folder");
+                                        "The board of pins pressed in: PNG files, or a folder")
+                           ->type_name("FILE");
   board->needs(reference);
   lens->add_option("--pins", options->pins, "Rows and columns of pins")
       ->capture_default_str()
@@ -118,15 +120,19 @@ void add_calibrate_lens(CLI::App& app) {
   lens->add_option("--pitch-mm", options->pitch_mm, "Distance of neighbouring pins, mm")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 100.0));
-  CLI::Option* chessboard = lens->add_option(
-      "--chessboard", options->chessboard,
-      "Images of a chessboard: the first lies on the surface, the others are tilted");
+  CLI::Option* chessboard =
+      lens->add_option(
+              "--chessboard", options->chessboard,
+              "Images of a chessboard: the first lies on the surface, the others are tilted")
+          ->type_name("FILE");
   chessboard->excludes(board)
       ->needs(lens->add_option("--squares", options->squares, "Squares across and down")
                   ->type_name("CxR"))
       ->needs(lens->add_option("--square-mm", options->square_mm, "Side of a square, mm")
                   ->check(CLI::Range(0.1, 100.0)));
-  lens->add_option("-o,--output", options->output, "Lens file to write (TOML)")->required();
+  lens->add_option("-o,--output", options->output, "Lens file to write (TOML)")
+      ->type_name("FILE")
+      ->required();
   lens->callback([options] { run(*options); });
 }
 

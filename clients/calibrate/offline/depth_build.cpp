@@ -59,9 +59,11 @@ std::pair<std::string, std::optional<double>> split_press(const std::string& tex
 void add_map_options(CLI::App& command, MapOptions& options) {
   command.add_option("--mm-per-px", options.mm_per_px,
                      "Scale of the depth map, mm per pixel (default: the lens's in the middle)");
-  command.add_option("--lens", options.lens,
-                     "Lens file of calibrate lens, or a calibration folder: rectifies the map; a "
-                     "list of one press takes its gain as well, several presses tell their own");
+  command
+      .add_option("--lens", options.lens,
+                  "Lens file of calibrate lens, or a calibration folder: rectifies the map; a "
+                  "list of one press takes its gain as well, several presses tell their own")
+      ->type_name("FILE");
   command
       .add_option("--centre", options.centre,
                   "Middle of the crop in the frame (default: the frame's)")

@@ -135,11 +135,16 @@ void add_evaluate(CLI::App& app, const bool& json) {
   CLI::App* evaluate =
       app.add_subcommand("evaluate", "Compare a calibration with the press of a ball");
   const auto options = std::make_shared<Options>();
-  evaluate->add_option("--calibration", options->calibration, "Calibration folder");
-  evaluate->add_option("--reference", options->reference,
-                       "Untouched surface: PNG files, or a folder of them (averaged)");
-  evaluate->add_option("--ball", options->ball,
-                       "The ball pressed in: PNG files, or a folder of them (averaged)");
+  evaluate->add_option("--calibration", options->calibration, "Calibration folder")
+      ->type_name("FOLDER");
+  evaluate
+      ->add_option("--reference", options->reference,
+                   "Untouched surface: PNG files, or a folder of them (averaged)")
+      ->type_name("FILE");
+  evaluate
+      ->add_option("--ball", options->ball,
+                   "The ball pressed in: PNG files, or a folder of them (averaged)")
+      ->type_name("FILE");
   evaluate
       ->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm (with --folder: 4)")
       ->check(CLI::Range(0.1, 100.0));
@@ -148,6 +153,7 @@ void add_evaluate(CLI::App& app, const bool& json) {
           ->add_option("--folder", options->folder,
                        "Folder with board_reference.png, board.png, ball_reference.png, ball.png: "
                        "measures the lens and makes and judges a calibration through it")
+          ->type_name("FOLDER")
           ->excludes("--calibration")
           ->excludes("--reference")
           ->excludes("--ball");
@@ -164,6 +170,7 @@ void add_evaluate(CLI::App& app, const bool& json) {
       ->check(CLI::Range(0.1, 100.0))
       ->needs(folder);
   evaluate->add_option("-o,--output", options->page, "Folder for a page of pictures")
+      ->type_name("FOLDER")
       ->needs(folder);
   evaluate->callback([options, &json] { run(*options, json); });
 }

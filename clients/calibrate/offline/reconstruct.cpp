@@ -58,15 +58,21 @@ void add_reconstruct(CLI::App& app) {
   CLI::App* reconstruct =
       app.add_subcommand("reconstruct", "Reconstruct the depth of an image, as the daemon does");
   const auto options = std::make_shared<Options>();
-  reconstruct->add_option("--calibration", options->calibration, "Calibration folder")->required();
+  reconstruct->add_option("--calibration", options->calibration, "Calibration folder")
+      ->type_name("FOLDER")
+      ->required();
   reconstruct
       ->add_option("--reference", options->reference,
                    "Untouched surface: PNG files, or a folder of them (averaged)")
+      ->type_name("FILE")
       ->required();
-  reconstruct->add_option("--frame", options->frame, "The image: a PNG file")->required();
+  reconstruct->add_option("--frame", options->frame, "The image: a PNG file")
+      ->type_name("FILE")
+      ->required();
   reconstruct
       ->add_option("-o,--output", options->output,
                    "depth.npy (float32 mm), depth.png (colours) or depth.ply (points)")
+      ->type_name("FILE")
       ->required();
   reconstruct->callback([options] { run(*options); });
 }

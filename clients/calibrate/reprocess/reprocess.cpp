@@ -256,8 +256,12 @@ void add_reprocess(CLI::App& app, cli::Context& context) {
   command->add_option("RECORDING", options->recording, "A file of dtactctl record")
       ->required()
       ->check(CLI::ExistingFile);
-  command->add_option("--calibration", options->calibration, "Calibration folder")->required();
-  command->add_option("-o,--output", options->output, "The recording to write")->required();
+  command->add_option("--calibration", options->calibration, "Calibration folder")
+      ->type_name("FOLDER")
+      ->required();
+  command->add_option("-o,--output", options->output, "The recording to write")
+      ->type_name("FILE")
+      ->required();
   command
       ->add_option("--untouched-frames", options->untouched_frames,
                    "Nothing touched in so many frames at the beginning: where the recording holds "
