@@ -1,0 +1,84 @@
+#include <iostream>
+
+#include "clients/calibrate/calibrate.hpp"
+#include "clients/ctl/ctl.hpp"
+#include "daemon/app/options.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "tests/unit/manual/pages.hpp"
+
+namespace dtact::manual {
+namespace {
+
+constexpr const char* kUserCommands = "User Commands";
+
+const PageName kDtactd{"dtactd", 8};
+const PageName kConfig{"dtactd.toml", 5};
+const PageName kCtl{"dtactctl", 1};
+const PageName kCalibrate{"dtact-calibrate", 1};
+
+}  // namespace
+
+Command dtactd() {
+  app::Options options;
+  CLI::App app;
+  app::set_up(app, options);
+  return describe(app);
+}
+
+Command dtactctl() {
+  cli::Context context{{}, false, std::cout};
+  CLI::App app;
+  const std::vector<std::string> none;
+  ctl::set_up(app, context, none);
+  return describe(app);
+}
+
+Command dtact_calibrate() {
+  cli::Context context{{}, false, std::cout};
+  CLI::App app;
+  calibrate::set_up(app, context);
+  return describe(app);
+}
+
+std::vector<File> all_files(const std::filesystem::path& root) {
+  const Command daemon = dtactd();
+  const Command ctl = dtactctl();
+  const Command calibrate = dtact_calibrate();
+  const PageNotes of_daemon{
+      8,
+      "System Administration",
+      {{"/etc/dtactd/dtactd.toml", "The configuration that the unit dtactd.service names."},
+       {"/var/lib/dtactd",
+        "Uploaded calibrations and the last good reference, unless `state_dir` or the unit names "
+        "another folder."},
+       {"/run/dtactd/dtactd.sock",
+        "For programs on this machine, unless `net.unix_socket` names another path."}},
+      {kConfig, kCtl, kCalibrate, {"systemctl", 1}, {"journalctl", 1}}};
+  const PageNotes of_ctl{1, kUserCommands, {}, {kCalibrate, kDtactd, kConfig}};
+  const PageNotes of_calibrate{1, kUserCommands, {}, {kCtl, kDtactd, kConfig}};
+
+  // As clients/ctl/hand_over.cpp has it.
+  const std::string as_is = "words=(dtact-calibrate $words); (( CURRENT++ )); _dtact-calibrate";
+  const std::string guided = R"(
+          if (( CURRENT > 2 )) && [[ $words[2] == (depth|lens) ]]; then
+            words[1]=dtact-calibrate
+          else
+            (( CURRENT == 2 )) && compadd depth lens
+            words=(dtact-calibrate guided $words[2,-1]); (( CURRENT++ ))
+          fi
+          _dtact-calibrate)";
+  return {
+      {"daemon/dtactd.8", program_page(daemon, of_daemon)},
+      {"clients/ctl/dtactctl.1", program_page(ctl, of_ctl)},
+      {"clients/calibrate/dtact-calibrate.1", program_page(calibrate, of_calibrate)},
+      {"config/dtactd.toml.5", config_page(base::read_file(root / "config/dtactd.toml"))},
+      {"daemon/dtactd.zsh-completion", zsh_completion(daemon, {})},
+      {"clients/ctl/dtactctl.zsh-completion", zsh_completion(ctl, {{"calibrate", guided},
+                                                                   {"reprocess", as_is},
+                                                                   {"reconstruct", as_is},
+                                                                   {"evaluate", as_is}})},
+      {"clients/calibrate/dtact-calibrate.zsh-completion", zsh_completion(calibrate, {})},
+  };
+}
+
+}  // namespace dtact::manual

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/unit/manual/command.hpp"
+
+// The manual pages and zsh's completions, made of the texts that `--help` prints, of the keys of
+// the configuration and of the commented config/dtactd.toml.
+namespace dtact::manual {
+
+/// A page by its name: {"dtactd.toml", 5}.
+using PageName = std::pair<std::string, int>;
+
+/// What a program's page says and its help does not.
+struct PageNotes {
+  int section = 1;
+  std::string volume;
+  std::vector<std::pair<std::string, std::string>> files;  ///< Path, what is in it.
+  std::vector<PageName> see_also;
+};
+
+[[nodiscard]] std::string program_page(const Command& program, const PageNotes& notes);
+
+/// The page dtactd.toml(5) from the text of config/dtactd.toml. Throws std::runtime_error for a key
+/// that the daemon has and the file has not, or the other way round.
+[[nodiscard]] std::string config_page(const std::string& toml);
+
+/// A file for zsh's fpath that completes `program`. `hand_over`: for each command that another
+/// program runs, what stands in its place: {"calibrate", "dtact-calibrate guided"}.
+[[nodiscard]] std::string zsh_completion(
+    const Command& program, const std::vector<std::pair<std::string, std::string>>& hand_over);
+
+/// The programs as they are built.
+[[nodiscard]] Command dtactd();
+[[nodiscard]] Command dtactctl();
+[[nodiscard]] Command dtact_calibrate();
+
+/// A file that is made, by its path in the tree.
+struct File {
+  std::filesystem::path path;
+  std::string text;
+};
+
+/// All of them, from the programs as they are built and the files of the tree `root`.
+[[nodiscard]] std::vector<File> all_files(const std::filesystem::path& root);
+
+}  // namespace dtact::manual
