@@ -1,0 +1,213 @@
+"""What a soak takes for a fault, on figures made by hand: every check finds its fault, and none finds
+one in a healthy run."""
+import pathlib
+import sys
+import unittest
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parents[1] / "clients/python/src")]
+import checks  # noqa: E402
+import plan  # noqa: E402
+from daemon import Held, log_lines  # noqa: E402
+
+HOUR = 3600
+
+
+def held(**changes):
+    return Held(**{"descriptors": 20, "threads": 6, "resident_kib": 50_000, "cpu_s": 1.0,
+                   "state_files": 4, "state_kib": 900, "log_kib": 3.0, **changes})
+
+
+def healthy(kinds=("quiet", "unplug"), rests=20):
+    """A run of two hours in which all is well; the rests stand for its whole length."""
+    episodes = [plan.Episode(i, kind) for i, kind in enumerate(kinds)]
+    record = checks.Record(episodes)
+    record.seconds = 2 * HOUR
+    names = ["socket:"] * 3 + ["/state"]
+    record.rests = [checks.Rest(i * 2 * HOUR / rests, i, held(), names, 0.5) for i in range(rests)]
+    for seen in record.seen:
+        first = seen.episode.first
+        record.take("frames", [frame(first + n) for n in range(0, plan.EPISODE, 10)])
+        for place in ("A", "B", "untouched"):
+            seen.depths.append((place, 0.02 if place != "untouched" else 0.0, 0.002, 0.0))
+    return record
+
+
+def frame(sequence, health=(), late_ns=0):
+    taken = sequence * 16_666_667
+    return (sequence, taken, taken, taken + 1_000_000, taken + 3_000_000 + late_ns, health)
+
+
+def faults(record):
+    return [fault for verdict in checks.verdicts(record) for fault in verdict.faults]
+
+
+class Checks(unittest.TestCase):
+    def finds(self, record, *texts):
+        found = faults(record)
+        self.assertEqual(len(found), len(texts), found)
+        for text, fault in zip(texts, found):
+            self.assertIn(text, fault)
+
+    def test_a_healthy_run_passes(self):
+        self.finds(healthy())
+
+    def test_descriptors_and_threads(self):
+        record = healthy()
+        record.rests[7].held = held(descriptors=21)
+        record.rests[7].descriptors = record.rests[0].descriptors + ["anon_inode:[eventfd]"]
+        self.finds(record, "went from 20 to 21 by episode 7: anon_inode:[eventfd] +1")
+        record = healthy()
+        record.rests[9].held = held(threads=5)
+        self.finds(record, "threads at rest went from 6 to 5")
+
+    def test_before_the_first_rests_nothing_counts(self):
+        record = healthy()
+        record.rests[0].held = held(descriptors=15, threads=3, resident_kib=20_000)
+        self.finds(record)
+
+    def test_a_slow_leak(self):
+        record = healthy()  # 1 MB an hour, and single rests that are far off
+        for i, rest in enumerate(record.rests):
+            wild = 4000 if i % 6 == 5 else 0
+            rest.held = held(resident_kib=50_000 + i * 102 + wild)
+        self.finds(record, "grows by 1020 kB an hour")
+
+    def test_a_leap(self):
+        record = healthy()
+        for rest in record.rests[10:]:
+            rest.held = held(resident_kib=56_000)
+        self.finds(record, "grew from 50000 to 56000 kB", "an hour")
+        record.seconds = 300  # too short for the slope, and the leap stays
+        self.finds(record, "grew from 50000 to 56000 kB")
+
+    def test_wandering_memory_is_no_leak(self):
+        record = healthy()
+        for i, rest in enumerate(record.rests):
+            rest.held = held(resident_kib=50_000 + (0, 700, -300, 500)[i % 4])
+        self.finds(record)
+
+    def test_state_folder(self):
+        record = healthy()
+        record.rests[-1].held = held(state_files=61)
+        self.finds(record, "61 files")
+
+    def test_latency(self):
+        record = healthy(["quiet"] * 10)
+        for seen in record.seen[8:]:
+            seen.client_ms = [9.0] * 100
+        self.finds(record, "the median went from 3.00 to 9.00 ms")
+        record.seconds = 60
+        self.finds(record)
+
+    def test_order_and_stamps(self):
+        record = healthy()
+        record.take("frames", [frame(5)])
+        self.finds(record, "frame 5 taken")
+        record = healthy()
+        record.take("frames", [(2000, 40e9, 39e9, 41e9, 42e9, ())])
+        self.finds(record, "was taken at")
+
+    def test_no_frames(self):
+        record = healthy()
+        record.seen[1].frames = 0
+        record.seen[1].cleared_frames = 0
+        self.finds(record, "no frame in episode 1", "no frame came at its end")
+
+    def test_conditions(self):
+        record = healthy()
+        record.seen[1].episode.must = frozenset({"image_repeated"})
+        record.seen[1].episode.events = frozenset({"light"})
+        self.finds(record, "image_repeated was never told", "no light event came")
+        record.seen[1].late = True
+        self.finds(record)
+        record.seen[0].conditions.add("light_drifted")
+        self.finds(record, "light_drifted was told without a reason")
+        record = healthy()
+        record.seen[0].episode.may = frozenset({"reference_stale"})
+        record.take("frames", [frame(plan.EPISODE * 2 - 1)])
+        record.seen[0].left.add("reference_stale")
+        self.finds(record, "reference_stale was left at its end")
+
+    def test_what_a_busy_machine_does_is_no_fault(self):
+        record = healthy()
+        record.seen[0].conditions |= {"frames_lost", "not_realtime", "camera_slow"}
+        self.finds(record)
+
+    def test_depth(self):
+        record = healthy()
+        record.take("depth", 240, (), "A", 0.051, 0.002, 0.0, 0.02)
+        self.finds(record, "A: 0.0510 mm wrong inside")
+        record = healthy()
+        record.take("depth", 240, ("reference_stale",), "A", 0.5, 0.002, 0.0, 0.02)
+        self.finds(record)
+        self.assertEqual(record.seen[0].told, 1)
+        record = healthy(["quiet"] * 10)
+        for seen in record.seen[8:]:
+            seen.depths = [("A", 0.026, 0.002, 0.0)] + seen.depths[1:]
+        self.finds(record, "depth of A wandered: 0.0200 mm wrong, then 0.0260")
+        record = healthy()
+        for seen in record.seen:
+            seen.depths = seen.depths[:2]
+        self.finds(record, "no depth of untouched was judged")
+
+    def test_clients_log_and_end(self):
+        record = healthy()
+        record.take("fault", "visitor 3: TimeoutError")
+        record.log = "[2026-01-01 00:00:00.000] [error] the disk is full\n"
+        record.ended = 139
+        self.finds(record, "visitor 3", "the disk is full", "status 139")
+
+    def test_broken_off(self):
+        record = healthy(rests=1)
+        self.finds(record, "never came to rest")
+
+
+class Slope(unittest.TestCase):
+    def test_is_the_median_of_all_pairs(self):
+        # Slopes 1, 1, 1, and to the wild point 8, 4.5 and 10 / 3.
+        self.assertAlmostEqual(checks.slope([(0, 0.0), (1, 1.0), (2, 2.0), (3, 10.0)]), 13 / 6)
+        self.assertEqual(checks.slope([(float(i), 2.0 * i) for i in range(9)] + [(9.0, 900.0)]), 2.0)
+        self.assertEqual(checks.slope([(1.0, 5.0)]), 0.0)
+
+
+class Plan(unittest.TestCase):
+    def test_one_seed_makes_one_run(self):
+        for seed in (1, 2):
+            a, b = plan.episodes(seed, 50), plan.episodes(seed, 50)
+            self.assertEqual(a, b)
+            self.assertEqual(plan.scene(seed, a), plan.scene(seed, b))
+        self.assertNotEqual(plan.episodes(1, 50), plan.episodes(2, 50))
+
+    def test_every_kind_comes_in_every_round(self):
+        kinds = [episode.kind for episode in plan.episodes(3, 1 + 2 * len(plan.KINDS))]
+        self.assertEqual(kinds[0], "quiet")
+        for a in (1, 1 + len(plan.KINDS)):
+            self.assertEqual(sorted(kinds[a:a + len(plan.KINDS)]), sorted(plan.KINDS))
+
+    def test_places(self):
+        episode = plan.Episode(2, "quiet")  # from frame 1920 on
+        self.assertEqual([episode.place(1920 + round(60 * s)) for s in
+                          (0.0, 2.0, 3.1, 4.0, 4.9, 9.0, 15.0)],
+                         [None, "untouched", None, "A", None, "B", "untouched"])
+        episode.blind = (1920 + 230, 1920 + 250)
+        self.assertIsNone(episode.place(1920 + 240))
+
+    def test_the_scene(self):
+        made = plan.Episode(1, "unplug", faults=[("unplug", 990, 30)])
+        text, words = plan.scene(1, [made])
+        self.assertIn('[[fault]]\nkind = "unplug"\nframe = 990\nframes = 30\n', text)
+        self.assertRegex(words["A"], r"^ball \d\.\d\d mm deep$")
+
+
+class Log(unittest.TestCase):
+    def test_levels(self):
+        text = ("[2026-11-22 15:00:00.000] [info] listening\n"
+                "[2026-11-22 15:00:01.000] [error] broke [error]\n"
+                "[2026-11-22 15:00:02.000] [warning] [error] is in the text only\n")
+        self.assertEqual(log_lines(text, "error"), ["broke [error]"])
+        self.assertEqual(log_lines(text, "warning"), ["[error] is in the text only"])
+
+
+if __name__ == "__main__":
+    unittest.main()

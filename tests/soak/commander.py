@@ -1,0 +1,87 @@
+"""Does what the plan says when its frame has come, and hears every event."""
+from __future__ import annotations
+
+import time
+
+import dtact
+from clients import PATIENCE_S
+
+
+class Commander:
+    """`note(text)`: what must not happen. `answers`: how many requests were answered."""
+
+    def __init__(self, address, calibration, note):
+        self._client = dtact.connect(address, program="soak commander", timeout=PATIENCE_S)
+        self._client.subscribe(dtact.Subscription(depth=None, summary=True, summary_hz=30))
+        self._files = dtact.CalibrationFiles.read(calibration)
+        self._note = note
+        self.sequence = 0
+        self.answers = 0
+        self.events: list[tuple[int, str, object]] = []  #: sequence, kind, event
+
+    def listen(self, seconds):
+        """Takes what comes for so long."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            item = self._client.next(timeout=left)
+            if isinstance(item, dtact.Frame):
+                self.sequence = max(self.sequence, item.sequence)
+            elif item is not None:
+                self._heard(item)
+
+    def _heard(self, event):
+        kind = type(event).__name__.removesuffix("Event").lower()
+        self.events.append((event.sequence, kind, event))
+        # While the camera is away no frame comes, but the events tell.
+        self.sequence = max(self.sequence, event.sequence)
+
+    def do(self, step) -> bool:
+        """False: too late to be judged."""
+        getattr(self, step.verb)(step)
+        self.answers += 1
+        self.listen(0.05)
+        return step.latest is None or self.sequence < step.latest
+
+    def light(self, step):
+        shown = self._client.set_light(brightness=step.value)
+        if shown.brightness != step.value:
+            self._note(f"light {step.value} was asked for and {shown.brightness} answered")
+
+    def rezero(self, step):
+        self._client.rezero(force=step.value)
+
+    def rezero_refused(self, step):
+        try:
+            self._client.rezero()
+        except dtact.Touched:
+            return
+        self.listen(0.1)
+        if self.sequence < step.latest:
+            self._note(f"a re-zero at frame {step.sequence} was not refused although something touches")
+
+    def upload(self, _step):
+        if self._client.upload_calibration(self._files) is None:
+            self._note("an uploaded calibration got no number")
+
+    def activate(self, step):
+        self._client.activate_calibration(step.value)
+
+    def upload_broken(self, _step):
+        before = self._client.status().calibration
+        half = self._files.reference_png[: len(self._files.reference_png) // 2]
+        try:
+            self._client.upload_calibration(
+                dtact.CalibrationFiles("broken", self._files.calibration_toml, half))
+        except dtact.Invalid:
+            pass
+        else:
+            self._note("a calibration with half of its reference was not refused")
+        if self._client.status().calibration != before:
+            self._note("a refused calibration is in use")
+
+    def status(self):
+        self.answers += 1
+        return self._client.status()
+
+    def close(self):
+        self._client.close()

@@ -1,0 +1,122 @@
+"""dtactd as a soak starts it, and what the kernel says about it."""
+from __future__ import annotations
+
+import os
+import pathlib
+import re
+import subprocess
+import time
+from dataclasses import dataclass
+
+SCENES = pathlib.Path(__file__).resolve().parents[2] / "config/scenes"
+_LINE = re.compile(r"^\[?(?:[^\[\]]*\] *\[)?(?P<level>trace|debug|info|warning|error|critical)\]? ")
+
+
+class Programs:
+    """The programs of one build folder with tests."""
+
+    def __init__(self, build: pathlib.Path):
+        self.dtactd = build / "daemon/dtactd"
+        self.calibrate = build / "clients/dtact-calibrate"
+        self.render = build / "hal/sim/dtact-sim-render"
+        self.truth = build / "tests/soak/soak_truth"
+
+
+def run(*command) -> str:
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise SystemExit(f"soak: {command[0]} failed:\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def calibrate(programs: Programs, folder: pathlib.Path, name: str, seed: int) -> pathlib.Path:
+    """As a user does it, from pictures with the noise of `seed`: untouched, and a ball held."""
+    scene = ["--scene", SCENES / "calibrate_ball.toml", "--seed", seed]
+    pictures = folder / "pictures" / name
+    run(programs.render, *scene, "--frames", "0:32", "-o", pictures / "reference")
+    run(programs.render, *scene, "--frames", "200:232", "-o", pictures / "ball")
+    run(programs.calibrate, "depth", "--reference", pictures / "reference", "--ball",
+        pictures / "ball", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400",
+        "--crop", "580,580", "-o", folder / name)
+    return folder / name
+
+
+@dataclass(frozen=True)
+class Held:
+    """What the process holds."""
+
+    descriptors: int
+    threads: int
+    resident_kib: int
+    cpu_s: float  #: used since its start
+    state_files: int
+    state_kib: int
+    log_kib: float
+
+
+class Daemon:
+    """Runs from here until end()."""
+
+    def __init__(self, programs: Programs, folder: pathlib.Path, calibration: pathlib.Path,
+                 scene: pathlib.Path):
+        self.log_file = folder / "dtactd.log"
+        self.state = folder / "state"
+        settings = ["net.port=0", f"calibration={calibration}", f"state_dir={self.state}",
+                    f"camera.sim.scene={scene}"]
+        with open(self.log_file, "w", encoding="utf-8") as out:
+            self._process = subprocess.Popen(
+                [str(programs.dtactd), *(word for s in settings for word in ("--set", s))],
+                stdout=out, stderr=subprocess.STDOUT)
+        self.pid = self._process.pid
+        until = time.monotonic() + 120
+        while not (found := re.search(r"listening on 127\.0\.0\.1:(\d+)", self.log())):
+            if not self.alive() or time.monotonic() > until:
+                self._process.kill()
+                raise SystemExit(f"soak: dtactd did not start:\n{self.log()}")
+            time.sleep(0.05)
+        self.address = f"127.0.0.1:{found[1]}"
+
+    def alive(self) -> bool:
+        return self._process.poll() is None
+
+    def log(self) -> str:
+        return self.log_file.read_text(encoding="utf-8", errors="replace")
+
+    def descriptors(self) -> list[str]:
+        """What each is, sorted; numbers of sockets and pipes left out."""
+        names = []
+        folder = pathlib.Path(f"/proc/{self.pid}/fd")
+        for number in os.listdir(folder):
+            try:
+                names.append(re.sub(r"\[\d+\]", "", os.readlink(folder / number)))
+            except OSError:  # closed since
+                pass
+        return sorted(names)
+
+    def held(self) -> Held:
+        status = pathlib.Path(f"/proc/{self.pid}/status").read_text()
+        fields = dict(line.split(":", 1) for line in status.splitlines())
+        times = pathlib.Path(f"/proc/{self.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        files = [f for f in self.state.rglob("*") if f.is_file()]
+        return Held(len(self.descriptors()), int(fields["Threads"]),
+                    int(fields["VmRSS"].split()[0]),
+                    (int(times[11]) + int(times[12])) / os.sysconf("SC_CLK_TCK"), len(files),
+                    sum(f.stat().st_size for f in files) // 1024,
+                    self.log_file.stat().st_size / 1024)
+
+    def end(self) -> int:
+        """SIGTERM. Its exit status; 128 + 9 when it did not end within a minute."""
+        self._process.terminate()
+        try:
+            status = self._process.wait(60)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            return 128 + 9
+        return status if status >= 0 else 128 - status
+
+
+def log_lines(text: str, level: str) -> list[str]:
+    """The texts of the log's lines of one level, without their time."""
+    return [line[found.end():] for line in text.splitlines()
+            if (found := _LINE.match(line)) and found["level"] == level]

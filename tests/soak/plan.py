@@ -1,0 +1,211 @@
+"""What a soak does and when, from one seed: the scene, its scripted faults, and the commands.
+
+The run is cut into episodes of the scene's loop. Times are the camera's sequence numbers, which go on
+while it is unplugged and when the machine is too busy to make every frame, so that nothing here
+depends on how fast the machine is.
+
+    0 s        3 s    5 s     5.5 s    8.5 s  10.5 s   11 s     13 s       14.5 s     16 s
+    untouched  A is held      untouched B is held      untouched visitors  no condition
+    (undo at 6 s)                                                leave; rest is left
+"""
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass, field
+
+FPS = 60
+EPISODE_S = 16
+EPISODE = EPISODE_S * FPS
+
+# Seconds of the episode. Held a little longer than they are judged.
+HOLD_A, HOLD_B = (3.0, 5.0), (8.5, 10.5)
+EDGE_S = 0.2
+#: While nothing has touched for long enough that the layer is flat and the contact told as lost.
+UNTOUCHED = (1.5, 2.4)
+VISITORS_LEAVE, REST = 13.0, 13.5
+#: By now whatever happened in the episode has been cleared.
+CLEARED = (14.5, 16.0)
+
+#: What a busy machine raises by itself: frames that the simulated camera could not make in time, and
+#: threads that did not get their turn or no real-time scheduling. Counted, and no fault.
+MACHINE = frozenset({"frames_lost", "camera_slow", "camera_trouble", "not_realtime"})
+# A camera that comes back, and light that changes, are followed by a new untouched image.
+BEGUN_ANEW = frozenset({"starting", "light_unsettled", "reference_stale", "reference_restored"})
+
+
+@dataclass(frozen=True)
+class Step:
+    """A command, due at a frame."""
+
+    sequence: int
+    verb: str  #: a method of commander.Commander
+    value: int | bool | None = None
+    #: Not judged when its answer comes later than this frame.
+    latest: int | None = None
+
+
+@dataclass
+class Episode:
+    index: int
+    kind: str
+    faults: list[tuple[str, int, int]] = field(default_factory=list)  #: kind, frame, frames
+    steps: list[Step] = field(default_factory=list)
+    must: frozenset[str] = frozenset()  #: conditions that have to be told,
+    may: frozenset[str] = frozenset()  #: and that may
+    events: frozenset[str] = frozenset()  #: kinds of events that have to come
+    blind: tuple[int, int] | None = None  #: frames in which the depth is asked to be wrong
+
+    @property
+    def first(self) -> int:
+        return self.index * EPISODE
+
+    def at(self, seconds: float) -> int:
+        return self.first + round(seconds * FPS)
+
+    def within(self, sequence: int, span: tuple[float, float], edge: float = 0.0) -> bool:
+        return self.at(span[0] + edge) <= sequence < self.at(span[1] - edge)
+
+    def place(self, sequence: int) -> str | None:
+        """Where the truth is known and still: "A", "B", "untouched" or None."""
+        if self.blind and self.blind[0] <= sequence < self.blind[1]:
+            return None
+        if self.within(sequence, HOLD_A, EDGE_S):
+            return "A"
+        if self.within(sequence, HOLD_B, EDGE_S):
+            return "B"
+        if self.within(sequence, UNTOUCHED) or self.within(sequence, CLEARED):
+            return "untouched"
+        return None
+
+
+# ------------------------------------------------------------ the kinds of episodes
+
+_EARLY = 0.5  # untouched
+_TOUCHED = 3.3  # A is held
+_UNDO = 6.0  # untouched again
+
+
+def _camera(kind, condition, *, touched=False, frames=(20, 100), may=BEGUN_ANEW):
+    def make(episode, rng):
+        at = episode.at((_TOUCHED if touched else _EARLY) + rng.uniform(0, 0.4))
+        episode.faults.append((kind, at, rng.randint(*frames)))
+        episode.must = frozenset({condition})
+        episode.may = may
+    return make
+
+
+def _light(*, touched=False, dark=False):
+    def make(episode, rng):
+        at = episode.at(_TOUCHED if touched else _EARLY)
+        level = 0 if dark else rng.randint(110, 235)
+        episode.steps = [Step(at, "light", level, episode.at(HOLD_A[1]) if touched else None),
+                         Step(episode.at(1.5 if dark else _UNDO), "light", 255)]
+        episode.must = frozenset({"light_unsettled", "light_mismatch"}
+                                 | ({"reference_stale"} if touched else set()))
+        episode.may = BEGUN_ANEW | {"image_dark"}
+        episode.events = frozenset({"light", "reference"})
+    return make
+
+
+def _rezero(episode, _rng):
+    episode.steps = [Step(episode.at(_EARLY), "rezero", False, episode.at(2.0))]
+    episode.events = frozenset({"reference"})
+
+
+def _rezero_touched(episode, _rng):
+    episode.steps = [Step(episode.at(_TOUCHED), "rezero_refused", None, episode.at(HOLD_A[1]))]
+
+
+def _rezero_forced(episode, _rng):
+    """The pressed picture is taken for untouched, as was asked, until the next one is."""
+    episode.steps = [Step(episode.at(_TOUCHED), "rezero", True),
+                     Step(episode.at(_UNDO), "rezero", True, episode.at(7.5))]
+    episode.events = frozenset({"reference"})
+    episode.blind = (episode.at(_TOUCHED - 0.1), episode.at(HOLD_B[0]))
+    episode.may = BEGUN_ANEW | {"light_drifted", "beyond_calibration", "camera_moved",
+                                "exposure_follows"}
+
+
+def _calibration(*, touched=False):
+    def make(episode, _rng):
+        at = (_TOUCHED, HOLD_B[0] + 0.3) if touched else (_EARLY, _UNDO)
+        episode.steps = [Step(episode.at(at[0]), "upload"), Step(episode.at(at[1]), "activate", 0)]
+        episode.events = frozenset({"calibration"})
+    return make
+
+
+def _calibration_broken(episode, _rng):
+    episode.steps = [Step(episode.at(_EARLY), "upload_broken")]
+
+
+def _quiet(_episode, _rng):
+    pass
+
+
+KINDS = {
+    "quiet": _quiet,
+    "unplug": _camera("unplug", "camera_trouble"),
+    "unplug_touched": _camera("unplug", "camera_trouble", touched=True, frames=(20, 60)),
+    "unplug_long": _camera("unplug", "camera_trouble", frames=(300, 330)),
+    "stall": _camera("stall", "camera_trouble"),
+    "stall_touched": _camera("stall", "camera_trouble", touched=True, frames=(20, 60)),
+    "hang": _camera("hang", "frames_lost", frames=(20, 60)),
+    "drop": _camera("drop", "frames_lost", touched=True, frames=(1, 5)),
+    "truncate": _camera("truncate", "frames_lost", touched=True, frames=(1, 5)),
+    "repeat": _camera("repeat", "image_repeated", touched=True, frames=(10, 40)),
+    "torn": _camera("torn", "image_repeated", frames=(10, 40)),
+    "light": _light(),
+    "light_touched": _light(touched=True),
+    "dark": _light(dark=True),
+    "rezero": _rezero,
+    "rezero_touched": _rezero_touched,
+    "rezero_forced": _rezero_forced,
+    "calibration": _calibration(),
+    "calibration_touched": _calibration(touched=True),
+    "calibration_broken": _calibration_broken,
+}
+#: For a run that has time for two.
+SHORT = ["unplug_touched", "light"]
+
+
+def episodes(seed: int, count: int, kinds: list[str] | None = None) -> list[Episode]:
+    """The first starts up in peace; then every kind once, in an order of its own, again and again."""
+    rng = random.Random(f"episodes {seed}")
+    order: list[str] = ["quiet"]
+    while len(order) < count:
+        order += kinds or rng.sample(sorted(KINDS), len(KINDS))
+    made = []
+    for index, kind in enumerate(order[:count]):
+        episode = Episode(index, kind)
+        KINDS[kind](episode, rng)
+        if index == 0:
+            episode.may = BEGUN_ANEW
+        made.append(episode)
+    return made
+
+
+# ------------------------------------------------------------ the scene
+
+def scene(seed: int, plan: list[Episode]) -> tuple[str, dict[str, str]]:
+    """The scene file's text, and what A and B are, in words."""
+    rng = random.Random(f"scene {seed}")
+
+    def press(name, text, down, hold, deepest):
+        x, y = rng.uniform(-3.5, 3.5), rng.uniform(-3.5, 3.5)
+        depth, angle = rng.uniform(0.6, deepest), rng.uniform(0, 90)
+        words[name] = f"{text.splitlines()[0].strip(chr(34))} {depth:.2f} mm deep"
+        return (f"[[press]]\nobject = {text}\nkeys = [\n"
+                f"  {{ t = {hold[0] - down}, x = {x:.3f}, y = {y:.3f}, depth = 0.0, "
+                f"rotation = {angle:.1f} }},\n"
+                f"  {{ t = {hold[0]}, depth = {depth:.3f} }},\n  {{ t = {hold[1]} }},\n"
+                f"  {{ t = {hold[1] + down}, depth = 0.0 }},\n]\n")
+
+    words: dict[str, str] = {}
+    ball = f'"ball"\nradius_mm = {rng.uniform(4, 6):.2f}'
+    other = rng.choice(['"m4_nut"', '"cylinder"\nradius_mm = 3.0\nlength_mm = 9.0'])
+    text = f"[loop]\nfrom_s = 0.0\nto_s = {EPISODE_S}.0\n\n"
+    text += press("A", ball, 0.5, HOLD_A, 1.1) + press("B", other, 0.5, HOLD_B, 0.9)
+    for episode in plan:
+        for kind, frame, frames in episode.faults:
+            text += f'[[fault]]\nkind = "{kind}"\nframe = {frame}\nframes = {frames}\n'
+    return text, words

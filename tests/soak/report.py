@@ -1,0 +1,114 @@
+"""report.md with its plots, and figures.csv."""
+from __future__ import annotations
+
+import csv
+import pathlib
+import statistics
+
+import plan
+from checks import MOST_ERROR_MM, Record, Verdict
+
+
+def _quantile(values, share):
+    values = sorted(values)
+    return values[min(len(values) - 1, int(share * len(values)))] if values else float("nan")
+
+
+def write(folder: pathlib.Path, record: Record, verdicts: list[Verdict], words: dict[str, str],
+          about: list[str]):
+    _csv(folder / "figures.csv", record)
+    plots = _plots(folder, record)
+    faults = [fault for verdict in verdicts for fault in verdict.faults]
+    lines = ["# Soak", "", *about, f"A: {words['A']}; B: {words['B']}.", "",
+             f"**{'passed' if not faults else f'{len(faults)} faults'}**", ""]
+    lines += [f"- {fault.strip()}" for fault in faults]
+    lines += ["", "| check | measured | limit | |", "| --- | --- | --- | --- |"]
+    lines += [f"| {v.check} | {v.measured} | {v.limit} | {v.word} |" for v in verdicts]
+    if plots:
+        lines += ["", f"![Memory, descriptors, threads, latency, frames, depth]({plots})",
+                  "", "Dashed: a scripted fault or command."]
+    lines += ["", "| episode | times | frames a second | conditions told |", "| --- | --- | --- | --- |"]
+    for kind in plan.KINDS:
+        of = [s for s in record.seen if s.episode.kind == kind]
+        if of:
+            told = sorted(set().union(*(s.conditions for s in of)))
+            rate = statistics.mean(s.frames for s in of) / plan.EPISODE_S
+            lines.append(f"| {kind} | {len(of)} | {rate:.1f} | {', '.join(told)} |")
+    (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _csv(file, record):
+    rests = {rest.episode: rest for rest in record.rests}
+    with open(file, "w", newline="", encoding="utf-8") as out:
+        table = csv.writer(out)
+        table.writerow(["episode", "kind", "frames", "client_p50_ms", "client_p99_ms", "daemon_p50_ms",
+                        "daemon_p99_ms", "error_A_mm", "error_B_mm", "error_untouched_mm",
+                        "descriptors", "threads", "resident_kib", "cpu_s", "state_kib", "log_kib",
+                        "load", "conditions"])
+        for s in record.seen:
+            rest = rests.get(s.episode.index)
+            held = rest.held if rest else None
+            worst = [max((d[2 if place == "untouched" else 1] for d in s.depths if d[0] == place),
+                         default="") for place in MOST_ERROR_MM]
+            table.writerow([s.episode.index, s.episode.kind, s.frames,
+                            *(f"{_quantile(values, share):.3f}"
+                              for values in (s.client_ms, s.daemon_ms) for share in (0.5, 0.99)),
+                            *worst, *([held.descriptors, held.threads, held.resident_kib, held.cpu_s,
+                                       held.state_kib, held.log_kib, rest.load] if held else [""] * 7),
+                            " ".join(sorted(s.conditions))])
+
+
+def _plots(folder, record):
+    """The file's name, or nothing where matplotlib is missing."""
+    try:
+        import matplotlib
+    except ImportError:
+        return ""
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    fig, axes = plt.subplots(5, 1, figsize=(11, 14), sharex=True, constrained_layout=True)
+    memory, counts, latency, frames, depth = axes
+    at = [rest.at_s / 60 for rest in record.rests]
+    memory.plot(at, [rest.held.resident_kib / 1024 for rest in record.rests], "o-", ms=3)
+    memory.set_ylabel("resident, MiB")
+    for name, mark in (("descriptors", "o-"), ("threads", "s-")):
+        counts.plot(at, [getattr(rest.held, name) for rest in record.rests], mark, ms=3, label=name)
+    counts.plot(at, [rest.load for rest in record.rests], ":", label="machine's load")
+    counts.set_ylabel("at rest")
+    counts.set_ylim(bottom=0)
+
+    seen = [s for s in record.seen if s.frames]
+    minutes = [(s.episode.index + 0.5) * plan.EPISODE_S / 60 for s in seen]
+    for key, label in (("client_ms", "ready to received"), ("daemon_ms", "ready to published")):
+        values = [getattr(s, key) for s in seen]
+        line, = latency.plot(minutes, [_quantile(v, 0.5) for v in values], "o-", ms=3,
+                             label=f"{label}, median")
+        latency.plot(minutes, [_quantile(v, 0.99) for v in values], "--", color=line.get_color(),
+                     label="99th percentile")
+    latency.set_ylabel("latency, ms")
+    latency.set_yscale("log")
+    frames.plot(minutes, [s.frames / plan.EPISODE_S for s in seen], "o-", ms=3)
+    frames.set_ylabel("frames a second")
+    frames.set_ylim(bottom=0)
+    for place, most in MOST_ERROR_MM.items():
+        which = 2 if place == "untouched" else 1
+        points = [(m, d[which]) for m, s in zip(minutes, seen) for d in s.depths if d[0] == place]
+        line, = depth.plot([p[0] for p in points], [p[1] for p in points], ".", ms=4, label=place)
+        depth.axhline(most, color=line.get_color(), lw=0.7, ls=":")
+    depth.set_ylabel("mean absolute error, mm\n(dotted: limits)")
+    depth.set_yscale("log")
+    depth.set_xlabel("minutes")
+    for axis in axes:
+        for s in record.seen if len(record.seen) <= 60 else []:
+            for sequence in [f[1] for f in s.episode.faults] + [t.sequence for t in s.episode.steps]:
+                axis.axvline(sequence / plan.FPS / 60, color="0.8", lw=0.7, ls="--", zorder=0)
+        axis.grid(alpha=0.3)
+    for axis in (counts, latency, depth):
+        axis.legend(fontsize=8, ncols=2)
+    if len(record.seen) <= 60:
+        for s in record.seen:
+            memory.text((s.episode.index + 0.5) * plan.EPISODE_S / 60, 1.02, s.episode.kind,
+                        transform=memory.get_xaxis_transform(), rotation=60, fontsize=7)
+    fig.savefig(folder / "soak.png", dpi=80)
+    return "soak.png"

@@ -1,0 +1,182 @@
+#!/usr/bin/env python3
+"""Runs dtactd on the simulated sensor for a long time, with scripted faults, commands and clients
+that come and go, all from one seed, and checks it the whole time. See README.md.
+
+Exit status: 0 nothing was found; 1 something was; 77 Debian's packages are missing.
+"""
+import argparse
+import math
+import multiprocessing
+import os
+import pathlib
+import queue
+import shutil
+import sys
+import time
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parents[1] / "clients/python/src")]
+try:
+    import checks
+    import clients
+    import plan
+    import report
+    from commander import Commander
+    from daemon import Daemon, Programs, calibrate, run
+except ImportError as problem:
+    print(f"soak: {problem}: apt-get install python3-numpy python3-protobuf python3-zstandard")
+    sys.exit(77)
+
+#: The honest client, the judge and the commander are there all the time.
+RESIDENTS = 3
+
+
+class Soak:
+    def __init__(self, programs, folder, seed, episodes, per_second):
+        self.folder = folder
+        self.episodes = episodes
+        self.record = checks.Record(episodes)
+        calibration = calibrate(programs, folder, "calibration", 1)
+        uploads = any(step.verb == "upload" for episode in episodes for step in episode.steps)
+        other = calibrate(programs, folder, "other", 2) if uploads else calibration
+        text, self.words = plan.scene(seed, episodes)
+        scene = folder / "scene.toml"
+        scene.write_text(text)
+        still = {"A": plan.HOLD_A, "B": plan.HOLD_B, "untouched": plan.UNTOUCHED}
+        size = run(programs.truth, scene, *(f"{folder / name}.truth:{round(sum(span) / 2 * plan.FPS)}"
+                                            for name, span in still.items()))
+        truths = clients.truth_maps(folder, *map(int, size.split()))
+        self.daemon = Daemon(programs, folder, calibration, scene)
+        self.began = time.monotonic()
+
+        self._queue = multiprocessing.Queue()
+        self._stop = multiprocessing.Event()
+        self._open = multiprocessing.Event()
+        self._inside = multiprocessing.Value("i", 0)
+        address = self.daemon.address
+        common = (address, self._queue, self._stop)
+        self._processes = [
+            multiprocessing.Process(target=clients.honest, args=common),
+            multiprocessing.Process(target=clients.judge, args=(*common, episodes, truths, per_second)),
+            multiprocessing.Process(target=clients.visitors,
+                                    args=(*common, self._open, self._inside, seed))]
+        for process in self._processes:
+            process.start()
+        self.commander = Commander(address, other, self.record.faults.append)
+
+    def drain(self):
+        while True:
+            try:
+                self.record.take(*self._queue.get_nowait())
+            except queue.Empty:
+                return
+
+    def wait(self, done):
+        """Until `done()`; listens meanwhile. RuntimeError when nothing moves any more."""
+        moved, at = time.monotonic(), self.commander.sequence
+        while not done():
+            self.commander.listen(0.05)
+            self.drain()
+            if self.commander.sequence != at:
+                moved, at = time.monotonic(), self.commander.sequence
+            if not self.daemon.alive():
+                raise RuntimeError("the daemon has ended")
+            if time.monotonic() - moved > clients.PATIENCE_S:
+                raise RuntimeError(f"no frame and no event came for {clients.PATIENCE_S:.0f} s after "
+                                   f"frame {at}")
+
+    def reached(self, sequence):
+        return lambda: self.commander.sequence >= sequence
+
+    def play(self, episode):
+        self._open.set()
+        for step in episode.steps:
+            self.wait(self.reached(step.sequence))
+            if not self.commander.do(step):
+                self.record.seen[episode.index].late = True
+        self.wait(self.reached(episode.at(plan.VISITORS_LEAVE)))
+        self._open.clear()
+        self.wait(self.reached(episode.at(plan.REST)))
+        until = time.monotonic() + clients.PATIENCE_S
+        self.wait(lambda: self._inside.value == 0 or time.monotonic() > until)
+        # Whoever was reset is noticed by the daemon a moment later.
+        self.wait(lambda: len(self.commander.status().message.clients) == RESIDENTS
+                  or time.monotonic() > until)
+        if time.monotonic() > until:
+            self.record.faults.append(f"episode {episode.index}: clients that have left are still "
+                                      "connected, or did not leave")
+        self.record.rests.append(checks.Rest(
+            time.monotonic() - self.began, episode.index, self.daemon.held(),
+            self.daemon.descriptors(), os.getloadavg()[0]))
+
+    def run(self):
+        try:
+            for episode in self.episodes:
+                self.play(episode)
+                print(f"soak: {time.monotonic() - self.began:6.0f} s  episode {episode.index + 1} of "
+                      f"{len(self.episodes)}, {episode.kind}; {self.record.visits} visits", flush=True)
+            self.wait(self.reached(plan.EPISODE * len(self.episodes)))
+        except Exception as problem:  # the report says what was seen until then
+            self.record.faults.append(f"the run broke off: {type(problem).__name__}: {problem}")
+        self.finish()
+
+    def finish(self):
+        self._open.clear()
+        self._stop.set()
+        until = time.monotonic() + clients.PATIENCE_S
+        while any(process.is_alive() for process in self._processes) and time.monotonic() < until:
+            self.drain()
+            time.sleep(0.05)
+        for process in self._processes:
+            if process.is_alive():
+                self.record.faults.append("a client did not end")
+                process.kill()
+            process.join()
+        self.drain()
+        self.commander.close()
+        self.record.seconds = time.monotonic() - self.began
+        for event in self.commander.events:
+            self.record.event(*event)
+        self.record.answered += self.commander.answers
+        self.record.ended = self.daemon.end()
+        self.record.log = self.daemon.log()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--build", required=True, type=pathlib.Path, help="folder of a build with tests")
+    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder, made anew")
+    how_long = parser.add_mutually_exclusive_group(required=True)
+    how_long.add_argument("--hours", type=float)
+    how_long.add_argument("--minutes", type=float)
+    how_long.add_argument("--smoke", action="store_true", help="three short episodes")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+
+    if options.smoke:
+        episodes = plan.episodes(options.seed, 1 + len(plan.SHORT), plan.SHORT)
+    else:
+        seconds = options.hours * 3600 if options.hours is not None else options.minutes * 60
+        if not 2 * plan.EPISODE_S <= seconds <= 365 * 86400:
+            parser.error(f"a soak takes from {2 * plan.EPISODE_S} seconds to a year")
+        episodes = plan.episodes(options.seed, math.ceil(seconds / plan.EPISODE_S))
+    shutil.rmtree(options.out, ignore_errors=True)
+    options.out.mkdir(parents=True)
+    soak = Soak(Programs(options.build.resolve()), options.out.resolve(), options.seed, episodes,
+                5.0 if len(episodes) < 200 else 2.0)
+    soak.run()
+
+    verdicts = checks.verdicts(soak.record)
+    about = [f"dtactd on the simulated sensor, {soak.record.seconds / 60:.1f} minutes, seed {options.seed}, "
+             f"{os.cpu_count()} CPUs, Linux {os.uname().release.split('-')[0]}."]
+    report.write(options.out, soak.record, verdicts, soak.words, about)
+    for verdict in verdicts:
+        print(f"{verdict.word:10}  {verdict.check}: {verdict.measured} (limit: {verdict.limit})")
+        for fault in verdict.faults:
+            print(f"            {fault.strip()}")
+    print(f"soak: report in {options.out / 'report.md'}")
+    return 1 if any(verdict.faults for verdict in verdicts) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
