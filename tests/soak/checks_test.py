@@ -80,6 +80,8 @@ class Checks(unittest.TestCase):
         self.finds(record, "grew from 50000 to 56000 kB", "an hour")
         record.seconds = 300  # too short for the slope, and the leap stays
         self.finds(record, "grew from 50000 to 56000 kB")
+        record.rests = record.rests[:3] + record.rests[-4:]
+        self.finds(record)
 
     def test_wandering_memory_is_no_leak(self):
         record = healthy()
@@ -154,7 +156,7 @@ class Checks(unittest.TestCase):
     def test_clients_log_and_end(self):
         record = healthy()
         record.take("fault", "visitor 3: TimeoutError")
-        record.log = "[2026-01-01 00:00:00.000] [error] the disk is full\n"
+        record.log = "[2026-01-01 00:00:00.000] [dtactd] [error] the disk is full\n"
         record.ended = 139
         self.finds(record, "visitor 3", "the disk is full", "status 139")
 
@@ -202,9 +204,9 @@ class Plan(unittest.TestCase):
 
 class Log(unittest.TestCase):
     def test_levels(self):
-        text = ("[2026-11-22 15:00:00.000] [info] listening\n"
-                "[2026-11-22 15:00:01.000] [error] broke [error]\n"
-                "[2026-11-22 15:00:02.000] [warning] [error] is in the text only\n")
+        text = ("[2026-11-22 15:00:00.000] [dtactd] [info] listening\n"
+                "[2026-11-22 15:00:01.000] [dtactd] [error] broke [error]\n"
+                "[2026-11-22 15:00:02.000] [dtactd] [warning] [error] is in the text only\n")
         self.assertEqual(log_lines(text, "error"), ["broke [error]"])
         self.assertEqual(log_lines(text, "warning"), ["[error] is in the text only"])
 

@@ -9,7 +9,8 @@ import time
 from dataclasses import dataclass
 
 SCENES = pathlib.Path(__file__).resolve().parents[2] / "config/scenes"
-_LINE = re.compile(r"^\[?(?:[^\[\]]*\] *\[)?(?P<level>trace|debug|info|warning|error|critical)\]? ")
+# [time] [dtactd] [level] text
+_LINE = re.compile(r"^(?:\[[^\]]*\] )*?\[(?P<level>trace|debug|info|warning|error|critical)\] ")
 
 
 class Programs:

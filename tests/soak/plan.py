@@ -100,8 +100,7 @@ def _light(*, touched=False, dark=False):
         level = 0 if dark else rng.randint(110, 235)
         episode.steps = [Step(at, "light", level, episode.at(HOLD_A[1]) if touched else None),
                          Step(episode.at(1.5 if dark else _UNDO), "light", 255)]
-        episode.must = frozenset({"light_unsettled", "light_mismatch"}
-                                 | ({"reference_stale"} if touched else set()))
+        episode.must = frozenset({"light_unsettled"} | ({"reference_stale"} if touched else set()))
         episode.may = BEGUN_ANEW | {"image_dark"}
         episode.events = frozenset({"light", "reference"})
     return make

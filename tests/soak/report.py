@@ -25,8 +25,7 @@ def write(folder: pathlib.Path, record: Record, verdicts: list[Verdict], words: 
     lines += ["", "| check | measured | limit | |", "| --- | --- | --- | --- |"]
     lines += [f"| {v.check} | {v.measured} | {v.limit} | {v.word} |" for v in verdicts]
     if plots:
-        lines += ["", f"![Memory, descriptors, threads, latency, frames, depth]({plots})",
-                  "", "Dashed: a scripted fault or command."]
+        lines += ["", f"![Memory, descriptors, threads, latency, frames, depth]({plots})"]
     lines += ["", "| episode | times | frames a second | conditions told |", "| --- | --- | --- | --- |"]
     for kind in plan.KINDS:
         of = [s for s in record.seen if s.episode.kind == kind]
@@ -69,17 +68,16 @@ def _plots(folder, record):
 
     fig, axes = plt.subplots(5, 1, figsize=(11, 14), sharex=True, constrained_layout=True)
     memory, counts, latency, frames, depth = axes
-    at = [rest.at_s / 60 for rest in record.rests]
+    at = [_minutes(rest.episode, plan.REST) for rest in record.rests]
     memory.plot(at, [rest.held.resident_kib / 1024 for rest in record.rests], "o-", ms=3)
     memory.set_ylabel("resident, MiB")
     for name, mark in (("descriptors", "o-"), ("threads", "s-")):
         counts.plot(at, [getattr(rest.held, name) for rest in record.rests], mark, ms=3, label=name)
     counts.plot(at, [rest.load for rest in record.rests], ":", label="machine's load")
     counts.set_ylabel("at rest")
-    counts.set_ylim(bottom=0)
 
     seen = [s for s in record.seen if s.frames]
-    minutes = [(s.episode.index + 0.5) * plan.EPISODE_S / 60 for s in seen]
+    minutes = [_minutes(s.episode.index, plan.EPISODE_S / 2) for s in seen]
     for key, label in (("client_ms", "ready to received"), ("daemon_ms", "ready to published")):
         values = [getattr(s, key) for s in seen]
         line, = latency.plot(minutes, [_quantile(v, 0.5) for v in values], "o-", ms=3,
@@ -87,28 +85,39 @@ def _plots(folder, record):
         latency.plot(minutes, [_quantile(v, 0.99) for v in values], "--", color=line.get_color(),
                      label="99th percentile")
     latency.set_ylabel("latency, ms")
-    latency.set_yscale("log")
     frames.plot(minutes, [s.frames / plan.EPISODE_S for s in seen], "o-", ms=3)
     frames.set_ylabel("frames a second")
-    frames.set_ylim(bottom=0)
     for place, most in MOST_ERROR_MM.items():
         which = 2 if place == "untouched" else 1
         points = [(m, d[which]) for m, s in zip(minutes, seen) for d in s.depths if d[0] == place]
         line, = depth.plot([p[0] for p in points], [p[1] for p in points], ".", ms=4, label=place)
         depth.axhline(most, color=line.get_color(), lw=0.7, ls=":")
     depth.set_ylabel("mean absolute error, mm\n(dotted: limits)")
-    depth.set_yscale("log")
-    depth.set_xlabel("minutes")
+    depth.set_xlabel("minutes of the camera")
+    for axis in axes[1:]:
+        axis.set_ylim(bottom=0)
     for axis in axes:
-        for s in record.seen if len(record.seen) <= 60 else []:
-            for sequence in [f[1] for f in s.episode.faults] + [t.sequence for t in s.episode.steps]:
-                axis.axvline(sequence / plan.FPS / 60, color="0.8", lw=0.7, ls="--", zorder=0)
+        _mark(axis, record.seen, axis is memory)
         axis.grid(alpha=0.3)
-    for axis in (counts, latency, depth):
-        axis.legend(fontsize=8, ncols=2)
-    if len(record.seen) <= 60:
-        for s in record.seen:
-            memory.text((s.episode.index + 0.5) * plan.EPISODE_S / 60, 1.02, s.episode.kind,
-                        transform=memory.get_xaxis_transform(), rotation=60, fontsize=7)
+        axis.margins(x=0.01)
+    for axis in (memory, counts, latency, depth):
+        axis.legend(fontsize=8, ncols=4)
     fig.savefig(folder / "soak.png", dpi=80)
     return "soak.png"
+
+
+def _minutes(episode, seconds):
+    return (episode * plan.EPISODE_S + seconds) / 60
+
+
+def _mark(axis, seen, named):
+    """Ticks along the top, where something was done to the daemon."""
+    groups = {"camera's fault": ("C3", [f[1] for s in seen for f in s.episode.faults]),
+              "command": ("C4", [t.sequence for s in seen for t in s.episode.steps])}
+    for label, (color, at) in groups.items():
+        axis.vlines([n / plan.FPS / 60 for n in at], 0.94, 1.0, color=color, lw=1,
+                    transform=axis.get_xaxis_transform(), label=label if named else None)
+    if named and len(seen) <= 60:
+        for s in seen:
+            axis.text(_minutes(s.episode.index, plan.EPISODE_S / 2), 1.02, s.episode.kind, ha="left",
+                      transform=axis.get_xaxis_transform(), rotation=60, fontsize=7)
