@@ -13,13 +13,15 @@ from daemon import Held, log_lines
 MOST_DESCRIPTORS_MORE = 0
 MOST_THREADS_MORE = 0
 #: Rests before the figures count: by then every kind of client has come once, and the allocator has
-#: an arena for each thread.
+#: an arena for each thread. In a run that has time for it, every kind of episode as well.
 WARM_UP_RESTS = 3
+LONG_WARM_UP_RESTS = 1 + len(plan.KINDS)
 #: Fewer say nothing of memory, which sanitizers hold back for a while as well.
 LEAST_RESTS_FOR_MEMORY = 8
-#: From the median of the first rests after that to the median of the last: fragmentation moves the
-#: resident memory by some hundred kB either way.
-MOST_RESIDENT_KIB_MORE = 3 * 1024
+#: From the median of the first rests after that to the median of the last. glibc gives back what is
+#: free at a heap's end only above 4 MB (M_TRIM_THRESHOLD in daemon/app/daemon.cpp), and each peak of
+#: what clients have waiting raises what it keeps; half as much again is more than that.
+MOST_RESIDENT_KIB_MORE = 6 * 1024
 #: A daemon that runs for a year and grows by this has grown by 4.4 GB: what is asked is none at all, and
 #: this is what two hours can tell from the wandering of single rests by Theil and Sen's slope.
 MOST_RESIDENT_KIB_PER_HOUR = 512
@@ -179,7 +181,8 @@ def verdicts(record: Record) -> list[Verdict]:
 def _held(rests: list[Rest], long: bool) -> list[Verdict]:
     if len(rests) < 2:
         return [Verdict("rests", str(len(rests)), "two at least", ("the run never came to rest",))]
-    warm = rests[min(WARM_UP_RESTS, len(rests) - 2):]
+    warm_up = LONG_WARM_UP_RESTS if len(rests) > 2 * LONG_WARM_UP_RESTS else WARM_UP_RESTS
+    warm = rests[min(warm_up, len(rests) - 2):]
     base = warm[0]
     made = []
     for name, most in (("descriptors", MOST_DESCRIPTORS_MORE), ("threads", MOST_THREADS_MORE)):

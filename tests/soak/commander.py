@@ -37,10 +37,17 @@ class Commander:
 
     def do(self, step) -> bool:
         """False: too late to be judged."""
-        getattr(self, step.verb)(step)
+        refused = None
+        try:
+            getattr(self, step.verb)(step)
+        except dtact.Refused as problem:
+            refused = problem
         self.answers += 1
         self.listen(0.05)
-        return step.latest is None or self.sequence < step.latest
+        in_time = step.latest is None or self.sequence < step.latest
+        if refused and in_time:
+            self._note(f"{step.verb} at frame {step.sequence} was refused: {refused}")
+        return in_time
 
     def light(self, step):
         shown = self._client.set_light(brightness=step.value)

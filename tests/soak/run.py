@@ -167,8 +167,8 @@ def main():
     soak.run()
 
     verdicts = checks.verdicts(soak.record)
-    about = [f"dtactd on the simulated sensor, {soak.record.seconds / 60:.1f} minutes, seed {options.seed}, "
-             f"{os.cpu_count()} CPUs, Linux {os.uname().release.split('-')[0]}."]
+    about = [f"dtactd on the simulated sensor, {soak.record.seconds / 60:.1f} minutes, seed "
+             f"{options.seed}, {os.cpu_count()} CPUs, Linux {os.uname().release.split('-')[0]}."]
     report.write(options.out, soak.record, verdicts, soak.words, about)
     for verdict in verdicts:
         print(f"{verdict.word:10}  {verdict.check}: {verdict.measured} (limit: {verdict.limit})")
