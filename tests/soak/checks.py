@@ -1,11 +1,12 @@
-"""What a soak has seen, and what of it is a fault. Every limit stands here, with its reason."""
+"""What of all that a soak has seen is a fault. Every limit stands here, with its reason."""
 from __future__ import annotations
 
 import statistics
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import plan
-from daemon import Held, log_lines
+from daemon import log_lines
+from record import Record, Rest, Seen
 
 # ------------------------------------------------------------ limits
 
@@ -44,102 +45,6 @@ MOST_OUTSIDE_MM = {"A": 0.03, "B": 0.03, "untouched": 0.01}
 MOST_UNTRUSTED = 0.05
 #: The median over the last fifth against the first: the depth must not wander.
 MOST_ERROR_MM_MORE = 0.005
-
-
-# ------------------------------------------------------------ what was seen
-
-@dataclass
-class Seen:
-    """Of one episode."""
-
-    episode: plan.Episode
-    frames: int = 0
-    conditions: set[str] = field(default_factory=set)
-    events: set[str] = field(default_factory=set)
-    cleared_frames: int = 0  #: in the episode's last seconds,
-    left: set[str] = field(default_factory=set)  #: and the conditions in them
-    late: bool = False  #: a command came too late for what it was to meet
-    client_ms: list[float] = field(default_factory=list)
-    daemon_ms: list[float] = field(default_factory=list)
-    #: Of frames against which nothing speaks: place, inside, outside, untrusted.
-    depths: list[tuple[str, float, float, float]] = field(default_factory=list)
-    told: int = 0  #: judged frames that said themselves what speaks against them
-
-
-@dataclass
-class Rest:
-    at_s: float
-    episode: int
-    held: Held
-    descriptors: list[str]
-    load: float  #: the machine's, 1 minute
-
-
-class Record:
-    """Collects what the clients tell."""
-
-    def __init__(self, episodes: list[plan.Episode]):
-        self.seen = [Seen(episode) for episode in episodes]
-        self.rests: list[Rest] = []
-        self.faults: list[str] = []
-        self.answered = 0
-        self.visits = 0
-        self.log = ""
-        self.ended = 0  #: the daemon's exit status
-        self.seconds = 0.0
-        self._last = (-1, -1)  # sequence and stamp
-
-    def at(self, sequence: int) -> Seen | None:
-        index = sequence // plan.EPISODE
-        return self.seen[index] if index < len(self.seen) else None
-
-    def take(self, word, *what):
-        """One tuple of clients.py."""
-        getattr(self, f"_{word}")(*what)
-
-    def _fault(self, text):
-        self.faults.append(text)
-
-    def _visit(self, answered):
-        self.visits += 1
-        self.answered += answered
-
-    def _frames(self, frames):
-        for sequence, taken, ready, published, received, health in frames:
-            if (sequence, taken) <= self._last or sequence <= self._last[0] or taken <= self._last[1]:
-                self._fault(f"frame {sequence} taken at {taken} ns came after frame "
-                            f"{self._last[0]} of {self._last[1]} ns")
-            if not taken <= ready <= published <= received:
-                self._fault(f"frame {sequence} was taken at {taken}, ready at {ready}, published at "
-                            f"{published} and received at {received} ns")
-            self._last = (sequence, taken)
-            seen = self.at(sequence)
-            if seen is None:
-                continue
-            seen.frames += 1
-            seen.conditions.update(health)
-            seen.client_ms.append((received - ready) / 1e6)
-            seen.daemon_ms.append((published - ready) / 1e6)
-            if seen.episode.within(sequence, plan.CLEARED):
-                seen.cleared_frames += 1
-                seen.left.update(health)
-
-    def _depth(self, sequence, health, place, inside, outside, untrusted, _stated):
-        seen = self.at(sequence)
-        if seen is None:
-            return
-        if set(health) - plan.MACHINE:
-            seen.told += 1
-        else:
-            seen.depths.append((place, inside, outside, untrusted))
-
-    def event(self, sequence, kind, event):
-        seen = self.at(sequence)
-        if seen is None:
-            return
-        seen.events.add(kind)
-        if kind == "state":
-            seen.conditions.update(event.health)
 
 
 # ------------------------------------------------------------ what of it is a fault

@@ -9,6 +9,7 @@ sys.path[:0] = [str(HERE), str(HERE.parents[1] / "clients/python/src")]
 import checks  # noqa: E402
 import plan  # noqa: E402
 from daemon import Held, log_lines  # noqa: E402
+from record import Record, Rest  # noqa: E402
 
 HOUR = 3600
 
@@ -21,10 +22,10 @@ def held(**changes):
 def healthy(kinds=("quiet", "unplug"), rests=20):
     """A run of two hours in which all is well; the rests stand for its whole length."""
     episodes = [plan.Episode(i, kind) for i, kind in enumerate(kinds)]
-    record = checks.Record(episodes)
+    record = Record(episodes)
     record.seconds = 2 * HOUR
     names = ["socket:"] * 3 + ["/state"]
-    record.rests = [checks.Rest(i * 2 * HOUR / rests, i, held(), names, 0.5) for i in range(rests)]
+    record.rests = [Rest(i * 2 * HOUR / rests, i, held(), names, 0.5) for i in range(rests)]
     for seen in record.seen:
         first = seen.episode.first
         record.take("frames", [frame(first + n) for n in range(0, plan.EPISODE, 10)])

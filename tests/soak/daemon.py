@@ -1,9 +1,11 @@
 """dtactd as a soak starts it, and what the kernel says about it."""
 from __future__ import annotations
 
+import atexit
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import time
 from dataclasses import dataclass
@@ -39,6 +41,7 @@ def calibrate(programs: Programs, folder: pathlib.Path, name: str, seed: int) ->
     run(programs.calibrate, "depth", "--reference", pictures / "reference", "--ball",
         pictures / "ball", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400",
         "--crop", "580,580", "-o", folder / name)
+    shutil.rmtree(pictures)
     return folder / name
 
 
@@ -67,7 +70,8 @@ class Daemon:
         with open(self.log_file, "w", encoding="utf-8") as out:
             self._process = subprocess.Popen(
                 [str(programs.dtactd), *(word for s in settings for word in ("--set", s))],
-                stdout=out, stderr=subprocess.STDOUT)
+                stdout=out, stderr=subprocess.STDOUT, start_new_session=True)
+        atexit.register(self._process.kill)  # whatever happens here
         self.pid = self._process.pid
         until = time.monotonic() + 120
         while not (found := re.search(r"listening on 127\.0\.0\.1:(\d+)", self.log())):

@@ -6,7 +6,8 @@ import pathlib
 import statistics
 
 import plan
-from checks import MOST_ERROR_MM, Record, Verdict
+from checks import MOST_ERROR_MM, Verdict
+from record import Record
 
 
 def _quantile(values, share):

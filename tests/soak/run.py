@@ -11,6 +11,7 @@ import os
 import pathlib
 import queue
 import shutil
+import signal
 import sys
 import time
 
@@ -20,6 +21,7 @@ try:
     import checks
     import clients
     import plan
+    import record
     import report
     from commander import Commander
     from daemon import Daemon, Programs, calibrate, run
@@ -31,11 +33,18 @@ except ImportError as problem:
 RESIDENTS = 3
 
 
+def alone(target, *arguments):
+    """A client's process: Ctrl-C is for the one that started it, which ends them all in order."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    target(*arguments)
+
+
 class Soak:
     def __init__(self, programs, folder, seed, episodes, per_second):
         self.folder = folder
         self.episodes = episodes
-        self.record = checks.Record(episodes)
+        self.record = record.Record(episodes)
         calibration = calibrate(programs, folder, "calibration", 1)
         uploads = any(step.verb == "upload" for episode in episodes for step in episode.steps)
         other = calibrate(programs, folder, "other", 2) if uploads else calibration
@@ -56,10 +65,10 @@ class Soak:
         address = self.daemon.address
         common = (address, self._queue, self._stop)
         self._processes = [
-            multiprocessing.Process(target=clients.honest, args=common),
-            multiprocessing.Process(target=clients.judge, args=(*common, episodes, truths, per_second)),
-            multiprocessing.Process(target=clients.visitors,
-                                    args=(*common, self._open, self._inside, seed))]
+            multiprocessing.Process(target=alone, args=arguments, daemon=True) for arguments in (
+                (clients.honest, *common),
+                (clients.judge, *common, episodes, truths, per_second),
+                (clients.visitors, *common, self._open, self._inside, seed))]
         for process in self._processes:
             process.start()
         self.commander = Commander(address, other, self.record.faults.append)
@@ -105,7 +114,7 @@ class Soak:
         if time.monotonic() > until:
             self.record.faults.append(f"episode {episode.index}: clients that have left are still "
                                       "connected, or did not leave")
-        self.record.rests.append(checks.Rest(
+        self.record.rests.append(record.Rest(
             time.monotonic() - self.began, episode.index, self.daemon.held(),
             self.daemon.descriptors(), os.getloadavg()[0]))
 
@@ -116,7 +125,7 @@ class Soak:
                 print(f"soak: {time.monotonic() - self.began:6.0f} s  episode {episode.index + 1} of "
                       f"{len(self.episodes)}, {episode.kind}; {self.record.visits} visits", flush=True)
             self.wait(self.reached(plan.EPISODE * len(self.episodes)))
-        except Exception as problem:  # the report says what was seen until then
+        except (Exception, KeyboardInterrupt) as problem:  # the report has what was seen until then
             self.record.faults.append(f"the run broke off: {type(problem).__name__}: {problem}")
         self.finish()
 
@@ -162,6 +171,7 @@ def main():
         episodes = plan.episodes(options.seed, math.ceil(seconds / plan.EPISODE_S))
     shutil.rmtree(options.out, ignore_errors=True)
     options.out.mkdir(parents=True)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     soak = Soak(Programs(options.build.resolve()), options.out.resolve(), options.seed, episodes,
                 5.0 if len(episodes) < 200 else 2.0)
     soak.run()
