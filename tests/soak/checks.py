@@ -165,11 +165,13 @@ def _conditions(seen: list[Seen]) -> Verdict:
             faults.append(f"{where}: {name} was told without a reason")
         for name in sorted(s.left - plan.MACHINE):
             faults.append(f"{where}: {name} was left at its end")
-        if s.cleared_frames == 0:
-            faults.append(f"{where}: no frame came at its end")
     judged = sum(1 for s in seen if s.episode.must and not s.late)
-    return Verdict("conditions", f"{judged} scripted faults", "each told, and cleared",
-                   tuple(faults))
+    # A machine so busy that the camera skips more than a second: the next episodes tell.
+    unseen = sum(1 for s in seen if s.cleared_frames == 0)
+    if unseen > max(1, len(seen) // 10):
+        faults.append(f"no frame came at the end of {unseen} episodes")
+    return Verdict("conditions", f"{judged} scripted faults, {unseen} ends unseen",
+                   "each told, and cleared", tuple(faults))
 
 
 def _depth(seen: list[Seen], long: bool) -> list[Verdict]:

@@ -121,7 +121,9 @@ class Checks(unittest.TestCase):
         record = healthy()
         record.seen[1].frames = 0
         record.seen[1].cleared_frames = 0
-        self.finds(record, "no frame in episode 1", "no frame came at its end")
+        self.finds(record, "no frame in episode 1")
+        record.seen[0].cleared_frames = 0
+        self.finds(record, "no frame in episode 1", "no frame came at the end of 2 episodes")
 
     def test_conditions(self):
         record = healthy()

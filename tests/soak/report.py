@@ -21,7 +21,7 @@ def write(folder: pathlib.Path, record: Record, verdicts: list[Verdict], words: 
     plots = _plots(folder, record)
     faults = [fault for verdict in verdicts for fault in verdict.faults]
     lines = ["# Soak", "", *about, f"A: {words['A']}; B: {words['B']}.", "",
-             f"**{'passed' if not faults else f'{len(faults)} faults'}**", ""]
+             f"**{f'Found: {len(faults)}' if faults else 'Nothing was found.'}**", ""]
     lines += [f"- {fault.strip()}" for fault in faults]
     lines += ["", "| check | measured | limit | |", "| --- | --- | --- | --- |"]
     lines += [f"| {v.check} | {v.measured} | {v.limit} | {v.word} |" for v in verdicts]
@@ -48,8 +48,9 @@ def _csv(file, record):
         for s in record.seen:
             rest = rests.get(s.episode.index)
             held = rest.held if rest else None
-            worst = [max((d[2 if place == "untouched" else 1] for d in s.depths if d[0] == place),
-                         default="") for place in MOST_ERROR_MM]
+            errors = [[d[2 if place == "untouched" else 1] for d in s.depths if d[0] == place]
+                      for place in MOST_ERROR_MM]
+            worst = [f"{max(of):.4f}" if of else "" for of in errors]
             table.writerow([s.episode.index, s.episode.kind, s.frames,
                             *(f"{_quantile(values, share):.3f}"
                               for values in (s.client_ms, s.daemon_ms) for share in (0.5, 0.99)),
