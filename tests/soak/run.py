@@ -127,6 +127,7 @@ class Soak:
             self.wait(self.reached(plan.EPISODE * len(self.episodes)))
         except (Exception, KeyboardInterrupt) as problem:  # the report has what was seen until then
             self.record.faults.append(f"the run broke off: {type(problem).__name__}: {problem}")
+            del self.record.seen[len(self.record.rests):]  # those that were not played to their end
         self.finish()
 
     def finish(self):
