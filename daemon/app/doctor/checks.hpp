@@ -35,7 +35,7 @@ using Findings = std::vector<Finding>;
 [[nodiscard]] Findings check_core_clock(const Machine& machine, const hal::RingConfig& ring);
 /// What a Raspberry Pi's firmware says of under-voltage and heat.
 [[nodiscard]] Findings check_throttling(const Machine& machine);
-/// The groups that systemd/dtactd.service starts the daemon in.
+/// The groups that udev's rules give the devices to, and that the unit's user is in.
 [[nodiscard]] Findings check_groups(const Machine& machine);
 /// The device of a Raspberry Pi 5's ws2812-pio driver: there, permitted.
 [[nodiscard]] Findings check_pio(const Machine& machine, const hal::RingConfig& ring);

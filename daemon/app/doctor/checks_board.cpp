@@ -95,8 +95,8 @@ Findings check_groups(const Machine& machine) {
     missing += (missing.empty() ? "" : ", ") + std::string(group);
   }
   if (missing.empty()) return {{Verdict::good, "video, spi and gpio are there", ""}};
-  return {{Verdict::note, fmt::format("missing: {}; the unit would not start (216/GROUP)", missing),
-           "sudo cp config/udev/dtactd-groups.conf /etc/sysusers.d/ && sudo systemd-sysusers"}};
+  return {{Verdict::note, fmt::format("missing: {}; their devices stay root's", missing),
+           "sudo cp systemd/dtactd.sysusers /etc/sysusers.d/dtactd.conf && sudo systemd-sysusers"}};
 }
 
 }  // namespace dtact::app

@@ -5,7 +5,7 @@ set -eu
 source=$1
 [ -x /lib/systemd/systemd-udevd ] || { echo "skipped: udev is not installed here" >&2; exit 77; }
 mkdir -p /etc/sysusers.d /etc/udev/rules.d
-cp "$source/config/udev/dtactd-groups.conf" /etc/sysusers.d/
+cp "$source/systemd/dtactd.sysusers" /etc/sysusers.d/dtactd.conf
 cp "$source/config/udev/60-dtactd.rules" /etc/udev/rules.d/
 systemd-sysusers
 /lib/systemd/systemd-udevd --daemon

@@ -65,7 +65,7 @@ TEST(DoctorGroups, AMissingOneIsNamed) {
   FakeMachine machine;
   machine.file("/etc/group", "root:x:0:\nvideo:x:44:anna\nspi:x:999:\nnotgpio:x:986:\n");
   const Finding finding = only_trouble(check_groups(machine));
-  EXPECT_EQ(finding.what, "missing: gpio; the unit would not start (216/GROUP)");
+  EXPECT_EQ(finding.what, "missing: gpio; their devices stay root's");
   EXPECT_THAT(finding.mend, HasSubstr("systemd-sysusers"));
   machine.file("/etc/group", "gpio:x:986:\nvideo:x:44:anna\nspi:x:999:\n");
   EXPECT_TRUE(all_good(check_groups(machine)));

@@ -1,31 +1,53 @@
 #!/usr/bin/env bash
-# systemd-analyze verify, with the program where it was built: the installed path need not exist. Then
-# what keeps a daemon from being given up.
+# The units of systemd/: well formed, hardened, alike, and never given up.
+# check_unit_file.sh SYSTEMD_FOLDER DTACTD
 set -euo pipefail
-unit=$1 program=$2
-command -v systemd-analyze >/dev/null || { echo "systemd-analyze is not installed"; exit 1; }
+source=$1 program=$2
+command -v systemd-analyze >/dev/null || { echo "skipped: systemd-analyze is not installed"; exit 77; }
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
+fail() { echo "FAILED: $1"; exit 1; }
 
-# verify: the first complaint about our unit, or nothing.
+# verify FILE: the complaints about our units, or nothing. The program is the one that was built: the
+# installed path need not exist.
 verify() {
   local output
-  output=$(systemd-analyze verify --man=no "$folder/dtactd.service" 2>&1) || { echo "$output"; return; }
+  output=$(systemd-analyze verify --man=no "$folder/$1" 2>&1) || { echo "$output"; return; }
   grep -F dtactd <<<"$output" || true
 }
 
-sed "s|/usr/bin/dtactd|$program|" "$unit" >"$folder/dtactd.service"
-complaint=$(verify)
-[[ -z $complaint ]] || { echo "$complaint"; exit 1; }
+for unit in dtactd.service dtactd@.service; do
+  sed "s|/usr/bin/dtactd|$program|" "$source/$unit" >"$folder/$unit"
+done
+for unit in dtactd.service dtactd@.service; do
+  complaint=$(verify "$unit")
+  [[ -z $complaint ]] || fail "$complaint"
+  # In tenths: 1.5. What is left is what the sensor needs: its devices, FIFO, the network.
+  systemd-analyze security --offline=true --no-pager --threshold=15 "$folder/$unit" >"$folder/score" ||
+    fail "$unit is too exposed: $(grep -v '^✓' "$folder/score")"
+  tail -n 1 "$folder/score"
+  grep -qx 'StartLimitIntervalSec=0' "$source/$unit" || fail "$unit gives up after five failures"
+  ! grep -qE '^[^#]*network-online' "$source/$unit" || fail "$unit waits for the network"
+  # These would let the units score better, and the capture thread run worse.
+  ! grep -qE '^(RestrictRealtime=yes|SystemCallFilter=~.*@resources)' "$source/$unit" || fail "$unit forbids FIFO"
+done
 
-grep -qx 'StartLimitIntervalSec=0' "$unit" || { echo "the unit gives up after five failures"; exit 1; }
-! grep -qE '^[^#]*network-online' "$unit" || { echo "the unit waits for the network"; exit 1; }
+# The instances are the one service under other names. It alone keeps its folder in /run, which is
+# theirs, too.
+settings() { grep -vE '^(#|$)' "$source/$1"; }
+difference=$(diff <(settings dtactd.service | sed -E '/^RuntimeDirectoryPreserve=yes$/d
+    s|/etc/dtactd/dtactd\.toml|/etc/dtactd/%i.toml|; s|^(Description=.*)|\1, %i|
+    s|^(State\|Runtime)Directory=dtactd$|&/%i|; s|^(LoadCredential=.*:dtactd)|\1@%i|') \
+  <(settings dtactd@.service)) || fail "the template differs: $difference"
 
 # The back-off is for systemd 254 and later; an older one knows neither key, and both are all it says.
-cp -r "$unit.d" "$folder/dtactd.service.d"
-complaint=$(verify)
-if (($(systemctl --version | sed -n '1s/systemd \([0-9]*\).*/\1/p') < 254)); then
-  complaint=$(grep -vE "Unknown key '(RestartSteps|RestartMaxDelaySec)'" <<<"$complaint" || true)
-fi
-[[ -z $complaint ]] || { echo "$complaint"; exit 1; }
+for unit in dtactd.service dtactd@.service; do
+  mkdir "$folder/$unit.d"
+  cp "$source/back-off.conf" "$source/network.conf" "$folder/$unit.d"
+  complaint=$(verify "$unit")
+  if (($(systemctl --version | sed -n '1s/systemd \([0-9]*\).*/\1/p') < 254)); then
+    complaint=$(grep -vE "Unknown key '(RestartSteps|RestartMaxDelaySec)'" <<<"$complaint" || true)
+  fi
+  [[ -z $complaint ]] || fail "$complaint"
+done
 echo "clean"
