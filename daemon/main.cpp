@@ -1,18 +1,21 @@
-#include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <exception>
 #include <iostream>
+#include <string>
 
 #include "daemon/app/config.hpp"
 #include "daemon/app/daemon.hpp"
 #include "daemon/app/doctor/doctor.hpp"
+#include "daemon/app/journal.hpp"
 #include "daemon/app/options.hpp"
+#include "daemon/app/service.hpp"
 
 int main(int argc, char** argv) {
   using namespace dtact::app;
+  std::string mend;  // what to try beside what an error says
   try {
-    spdlog::set_default_logger(spdlog::stderr_color_mt("dtactd"));
+    spdlog::set_default_logger(make_logger());
     const Parsed command_line = parse_options(argc, argv);
     if (command_line.exit_status) return *command_line.exit_status;
     const Options& options = command_line.options;
@@ -27,10 +30,13 @@ int main(int argc, char** argv) {
     if (options.doctor) return doctor(loaded.config.hal, std::cout);
 
     spdlog::set_level(spdlog::level::from_str(loaded.config.log_level));
-    run_daemon(loaded.config);
+    mend = "; what else this machine lacks: " + doctor_command(options);
+    run_daemon(loaded.config,
+               [&options] { return load_config(options.config, options.settings).config; });
     return 0;
   } catch (const std::exception& e) {
-    spdlog::critical("{}", e.what());
+    spdlog::critical("{}{}", e.what(), mend);
+    notify_status(e.what() + mend);
     return 1;
   }
 }

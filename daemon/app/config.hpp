@@ -4,6 +4,7 @@
 #include <iosfwd>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/metrics/endpoint.hpp"
@@ -12,6 +13,9 @@
 #include "hal/config.hpp"
 
 namespace dtact::app {
+
+/// Begins the path of a file that the service manager hands in: "credential:tokens".
+inline constexpr std::string_view kCredential = "credential:";
 
 /// Everything that can be configured. config/dtactd.toml documents every key.
 struct Config {

@@ -10,6 +10,7 @@
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -18,7 +19,10 @@
 
 #include "daemon/announce/announcer.hpp"
 #include "daemon/app/give_way.hpp"
+#include "daemon/app/journal.hpp"
+#include "daemon/app/reload.hpp"
 #include "daemon/app/service.hpp"
+#include "daemon/app/status_teller.hpp"
 #include "daemon/app/watchdog.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/metrics/endpoint.hpp"
@@ -26,6 +30,7 @@
 #include "daemon/metrics/text.hpp"
 #include "daemon/net/calibration_store.hpp"
 #include "daemon/net/light_schemes.hpp"
+#include "daemon/net/security.hpp"
 #include "daemon/net/server.hpp"
 #include "daemon/pipeline/pipeline.hpp"
 #include "hal/base/clock.hpp"
@@ -86,9 +91,12 @@ net::NetConfig make_net_config(const Config& config) {
   net.version = DTACT_VERSION;
   boost::system::error_code nameless;
   if (net.name.empty()) net.name = asio::ip::host_name(nameless);
-  net.log = [](net::LogLevel level, const std::string& message) {
-    spdlog::log(level == net::LogLevel::info ? spdlog::level::info : spdlog::level::warn, "{}",
-                message);
+  net.tls_certificate = resolve_credential("net.tls_certificate", net.tls_certificate);
+  net.tls_key = resolve_credential("net.tls_key", net.tls_key);
+  net.token_file = resolve_credential("net.token_file", net.token_file);
+  net.log = [](const net::LogLine& line) {
+    log_line(line.level == net::LogLevel::info ? spdlog::level::info : spdlog::level::warn,
+             line.text, {{"DTACT_CLIENT", line.client}});
   };
   return net;
 }
@@ -133,14 +141,38 @@ std::optional<announce::Announcer> announce_service(asio::io_context& io, const 
       std::in_place, io, ask, [](const std::string& line) { spdlog::info("{}", line); });
 }
 
+/// Takes what can change from a configuration that was read again; from a broken one nothing.
+/// Returns what `systemctl status` is to say of it.
+std::string reload(Config& running, const std::function<Config()>& load, net::Server& server) {
+  try {
+    Reload fresh = merge(running, load());
+    server.reload(make_net_config(fresh.config));
+    running = std::move(fresh.config);
+    spdlog::set_level(spdlog::level::from_str(running.log_level));
+    spdlog::info(
+        "configuration read again, and with it the certificate and tokens; changed: {}",
+        fresh.changed.empty() ? "nothing" : fmt::format("{}", fmt::join(fresh.changed, ", ")));
+    if (fresh.restart.empty()) return {};
+    const std::string later = fmt::format("needs a restart: {}", fmt::join(fresh.restart, ", "));
+    spdlog::warn("{}", later);
+    return later;
+  } catch (const std::exception& e) {
+    spdlog::error("the configuration stays as it was: {}", e.what());
+    return fmt::format("the configuration stays as it was: {}", e.what());
+  }
+}
+
 }  // namespace
 
-void run_daemon(const Config& config) {
+void run_daemon(const Config& config, const std::function<Config()>& load) {
   give_large_blocks_back();
   asio::io_context io(1);
   // Before any thread starts, so that every thread leaves the signals to this one.
   asio::signal_set signals(io, SIGTERM, SIGINT);
+  asio::signal_set hangups(io, SIGHUP);
 
+  net::NetConfig net = make_net_config(config);
+  name_sensor(net.name);
   const fs::path state = make_state_folder(config);
   net::FolderCalibrationStore store(state, config.calibration);
   const auto calibration = load_calibration(store.current(), config.calibration);
@@ -154,7 +186,6 @@ void run_daemon(const Config& config) {
   if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;
   pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), calibration,
                               settings);
-  net::NetConfig net = make_net_config(config);
   if (net.fifo_priority > 0) {
     net.realtime_refused = base::make_fifo("network", net.fifo_priority).value_or("");
     if (!net.realtime_refused.empty()) spdlog::warn("{}", net.realtime_refused);
@@ -165,12 +196,32 @@ void run_daemon(const Config& config) {
   pipeline.start();
   for (const std::string& refused : pipeline.status().realtime) spdlog::warn("{}", refused);
 
+  pipeline::HealthSet told;
+  told.set(pipeline::Health::uncalibrated, calibration == nullptr);
+  told.set(pipeline::Health::ring_trouble, ring.away);
+  told.set(pipeline::Health::not_realtime, !pipeline.status().realtime.empty());
+  StatusTeller teller(
+      io, [&pipeline] { return pipeline.status(); },
+      fmt::format("listening on {}", fmt::join(server.addresses(), " and ")), told);
+  Config running = config;
+  std::function<void()> wait_for_hangup = [&] {
+    hangups.async_wait([&](const boost::system::error_code& error, int) {
+      if (error) return;
+      notify_reloading();
+      teller.set_note(reload(running, load, server));
+      notify_ready(teller.text());
+      wait_for_hangup();
+    });
+  };
+  wait_for_hangup();
   Watchdog watchdog(io, [&pipeline] { return pipeline.heartbeat(); });
   GiveWay give_way(io);
   signals.async_wait([&](const boost::system::error_code& error, int signal) {
     if (error) return;
     spdlog::info("{}: stopping", signal == SIGTERM ? "SIGTERM" : "SIGINT");
     notify_stopping();
+    hangups.cancel();
+    teller.stop();
     watchdog.stop();
     give_way.stop();
     if (announced) announced->stop();
@@ -182,9 +233,12 @@ void run_daemon(const Config& config) {
   for (const std::string& address : server.addresses()) {
     spdlog::info("dtactd {}, listening on {}", DTACT_VERSION, address);
   }
-  const std::string listening =
-      fmt::format("listening on {}", fmt::join(server.addresses(), " and "));
-  notify_ready(listening);
+  if (under_systemd() && net::reaches_beyond(config.net)) {
+    spdlog::info(
+        "other machines get through where IPAddressAllow= of the unit names them: sudo systemctl "
+        "edit dtactd, see network.conf in /usr/share/doc/dtactd/examples");
+  }
+  notify_ready(teller.text());
   io.run();
   pipeline.stop();
 }

@@ -102,6 +102,19 @@ Key path(std::string key, fs::path& field, const std::string& allowed) {
           [&field] { return tomlfile::quoted(field.string()); }};
 }
 
+Key secret(std::string key, fs::path& field, const std::string& allowed) {
+  Key other = path(std::move(key), field, allowed + ", or \"credential:NAME\"");
+  other.assign = [&field, assign = other.assign](const toml::node& node, const fs::path& folder) {
+    const auto value = node.value_exact<std::string>();
+    if (!value || !value->starts_with(kCredential)) return assign(node, folder);
+    const std::string name = value->substr(kCredential.size());
+    if (name.empty() || name.find('/') != std::string::npos) return false;
+    field = *value;
+    return true;
+  };
+  return other;
+}
+
 Key optional_integer(std::string path, std::optional<int>& field, int least, int most,
                      const std::string& unit) {
   return {std::move(path), fmt::format("a whole number, {} … {} {}, or false", least, most, unit),

@@ -41,6 +41,8 @@ template <typename Integer>
 [[nodiscard]] Key named(std::string path, int& field,
                         const std::vector<std::pair<std::string, int>>& names);
 [[nodiscard]] Key path(std::string key, std::filesystem::path& field, const std::string& allowed);
+/// A path, or the name of a credential (kCredential), which stays as it is.
+[[nodiscard]] Key secret(std::string key, std::filesystem::path& field, const std::string& allowed);
 /// A number, or false for "none".
 [[nodiscard]] Key optional_integer(std::string path, std::optional<int>& field, int least, int most,
                                    const std::string& unit);

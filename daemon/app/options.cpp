@@ -36,6 +36,9 @@ void set_up(CLI::App& cli, Options& options) {
       ->needs(doctor);
   cli.footer(
       "Environment: DTACTD_LOG sets the log level; it wins over the file, an option over it.\n"
+      "SIGHUP reads the configuration again and takes what can change while it runs: the log "
+      "level,\n"
+      "certificate, key, tokens and limits of clients. One with a mistake changes nothing.\n"
       "Exit status: 0 after SIGTERM or SIGINT, 1 on an error, 2 on a wrong command line.");
 }
 
@@ -49,6 +52,11 @@ Parsed parse_options(int argc, const char* const* argv) {
     parsed.exit_status = cli.exit(e) == 0 ? 0 : 2;
   }
   return parsed;
+}
+
+std::string doctor_command(const Options& options) {
+  return options.config ? "dtactd --config " + options.config->string() + " --doctor"
+                        : "dtactd --doctor";
 }
 
 }  // namespace dtact::app

@@ -18,6 +18,9 @@ struct Options {
   bool report = false;  ///< --report: the same for somebody else to read.
 };
 
+/// What checks the machine for the same configuration: "dtactd --config FILE --doctor".
+[[nodiscard]] std::string doctor_command(const Options& options);
+
 /// Either options to run with, or the exit status after --help, --version or a mistake, whose text
 /// has been printed.
 struct Parsed {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 namespace dtact::app {
@@ -8,14 +9,24 @@ namespace dtact::app {
 void notify_ready(const std::string& status);
 void notify_status(const std::string& status);
 void notify_stopping();
+/// The configuration is being read again; notify_ready() ends it. Type=notify-reload (systemd 253)
+/// waits for both, Type=notify shows them.
+void notify_reloading();
 
 /// Half of the unit's WatchdogSec= in microseconds, the interval at which to call notify_alive();
 /// 0 when no watchdog is set.
 [[nodiscard]] unsigned long long watchdog_interval_us();
 void notify_alive();
 
+/// Whether a unit of systemd's started this program ($INVOCATION_ID).
+[[nodiscard]] bool under_systemd();
 /// The unit's state folder ($STATE_DIRECTORY), or empty.
 [[nodiscard]] std::string state_directory();
+/// The file that "credential:NAME" stands for, one that systemd handed in (LoadCredential= of the
+/// unit); any other path stays as it is. Throws std::runtime_error, with `key` and the remedy, when
+/// there is none of that name.
+[[nodiscard]] std::filesystem::path resolve_credential(const std::string& key,
+                                                       const std::filesystem::path& path);
 /// The unit's folder below /run ($RUNTIME_DIRECTORY), or empty.
 [[nodiscard]] std::string runtime_directory();
 

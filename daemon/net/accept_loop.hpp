@@ -54,8 +54,8 @@ class AcceptLoop : public std::enable_shared_from_this<AcceptLoop<Protocol>> {
   /// Without descriptors every accept fails at once: wait instead of spinning, and say it once.
   void retry_later(const std::string& reason) {
     if (!std::exchange(told_, true)) {
-      log_(LogLevel::warning,
-           fmt::format("cannot accept clients: {}; trying again every second", reason));
+      log_({LogLevel::warning,
+            fmt::format("cannot accept clients: {}; trying again every second", reason)});
     }
     timer_.expires_after(std::chrono::seconds(1));
     timer_.async_wait([weak = this->weak_from_this()](const Error& error) {

@@ -6,14 +6,11 @@
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
-namespace {
 
 std::optional<Tokens> read_tokens(const NetConfig& config) {
   if (config.token_file.empty()) return std::nullopt;
   return Tokens(read_private_file(config.token_file, "the token file"), config.token_file.string());
 }
-
-}  // namespace
 
 Admission::Admission(const NetConfig& config) : config_(config), tokens_(read_tokens(config)) {}
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "daemon/net/net_config.hpp"
 #include "daemon/net/rights.hpp"
@@ -12,6 +13,10 @@
 
 namespace dtact::net {
 
+/// Those of config.token_file; nothing when none is configured. Throws as Tokens and
+/// read_private_file().
+[[nodiscard]] std::optional<Tokens> read_tokens(const NetConfig& config);
+
 /// Who is let in, with which rights, and what all clients together may take. On the network thread.
 class Admission {
  public:
@@ -19,8 +24,11 @@ class Admission {
   /// longest.
   static constexpr std::size_t kMaxIncoming = std::size_t{32} << 20U;
 
-  /// Reads config.token_file. Throws as Tokens and read_private_file().
+  /// Throws as read_tokens().
   explicit Admission(const NetConfig& config);
+
+  /// Counts for clients that come from now on.
+  void set_tokens(std::optional<Tokens> tokens) noexcept { tokens_ = std::move(tokens); }
 
   struct Verdict {
     std::optional<Rights> rights;  ///< Empty: refused, …

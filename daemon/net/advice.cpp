@@ -2,8 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <string_view>
+
+#include "proto/dtact.pb.h"
 
 namespace dtact::net {
 namespace {
@@ -95,7 +99,24 @@ std::string detail(const pipeline::Status& status, Health health) {
   return {};
 }
 
+/// "HEALTH_CAMERA_TROUBLE" without the enum's name, in small letters.
+std::string short_name(std::string name) {
+  name.erase(0, name.find('_') + 1);
+  std::ranges::transform(name, name.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name;
+}
+
 }  // namespace
+
+// The wire's values are the pipeline's plus one (messages.cpp).
+std::string health_name(Health health) {
+  return short_name(v1::Health_Name(static_cast<v1::Health>(static_cast<int>(health) + 1)));
+}
+
+std::string state_name(State state) {
+  return short_name(v1::State_Name(static_cast<v1::State>(static_cast<int>(state) + 1)));
+}
 
 std::string advice(const pipeline::Status& status) {
   std::string text;

@@ -10,4 +10,8 @@ namespace dtact::net {
 /// its remedy, the most urgent first. Empty when all is well.
 [[nodiscard]] std::string advice(const pipeline::Status& status);
 
+/// As on the wire, and as clients show it: "camera_trouble", "serving".
+[[nodiscard]] std::string health_name(pipeline::Health health);
+[[nodiscard]] std::string state_name(pipeline::State state);
+
 }  // namespace dtact::net

@@ -178,7 +178,7 @@ void Commands::change_calibration(const Who& who, CalibrationChange change) {
 }
 
 void Commands::keep_calibration(const Pending& pending, const CalibrationChange& change) {
-  config_.log(LogLevel::info, fmt::format("calibration {} is in use", change.name));
+  config_.log({LogLevel::info, fmt::format("calibration {} is in use", change.name)});
   in_use_.reset();
   if (change.upload == nullptr) {
     in_use_ = change.number;

@@ -134,9 +134,9 @@ void Hub::on_frame(const pipeline::DepthFrame& frame) {
     if (encoded != nullptr) {
       session->send_frame(std::move(encoded));
     } else if (!std::exchange(told_too_large_, true)) {
-      config_.log(LogLevel::warning,
-                  "a frame is above the wire's cap and is not sent: subscribe to depth or luma "
-                  "alone, or choose a smaller camera mode");
+      config_.log({LogLevel::warning,
+                   "a frame is above the wire's cap and is not sent: subscribe to depth or luma "
+                   "alone, or choose a smaller camera mode"});
     }
   }
 }

@@ -18,15 +18,14 @@ namespace dtact::net {
     TokenBucket lines{10, 100};
     unsigned long left_out = 0;
   };
-  return [state = std::make_shared<State>(State{std::move(log)})](LogLevel level,
-                                                                  const std::string& text) {
+  return [state = std::make_shared<State>(State{std::move(log)})](LogLine line) {
     if (!state->lines.take(1)) {
       ++state->left_out;
       return;
     }
     const auto left_out = std::exchange(state->left_out, 0);
-    state->log(level,
-               left_out == 0 ? text : fmt::format("{} ({} lines left out before)", text, left_out));
+    if (left_out > 0) line.text += fmt::format(" ({} lines left out before)", left_out);
+    state->log(line);
   };
 }
 

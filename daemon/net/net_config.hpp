@@ -13,8 +13,14 @@ namespace dtact::net {
 
 enum class LogLevel : std::uint8_t { info, warning };
 
-/// What the network part wants said. Called on the network thread only; must not throw.
-using Log = std::function<void(LogLevel, const std::string&)>;
+/// What the network part wants said.
+struct LogLine {
+  LogLevel level = LogLevel::info;
+  std::string text;
+  std::string client = {};  ///< Whom it is about, as Peer.address; empty: nobody.
+};
+/// Called on the network thread only; must not throw.
+using Log = std::function<void(const LogLine&)>;
 
 /// Settings of the network part.
 struct NetConfig {
@@ -46,7 +52,7 @@ struct NetConfig {
   /// normal scheduling. Whoever owns the thread sets it, …
   int fifo_priority = 20;
   std::string realtime_refused;  ///< … and says here why it was refused; in status.
-  Log log = [](LogLevel, const std::string&) {};
+  Log log = [](const LogLine&) {};
 };
 
 }  // namespace dtact::net

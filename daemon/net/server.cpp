@@ -28,11 +28,11 @@ NetConfig checked(NetConfig config) {
   check_security(config);
   if (is_insecure(config)) {
     config.log(
-        LogLevel::warning,
-        fmt::format("net.insecure: whoever can reach {} may {} the sensor, since there is no "
-                    "{}",
-                    config.address, config.token_file.empty() ? "watch and command" : "watch",
-                    config.token_file.empty() ? "token" : "TLS to keep a token secret"));
+        {LogLevel::warning,
+         fmt::format("net.insecure: whoever can reach {} may {} the sensor, since there is no "
+                     "{}",
+                     config.address, config.token_file.empty() ? "watch and command" : "watch",
+                     config.token_file.empty() ? "token" : "TLS to keep a token secret")});
   }
   config.log = limited(std::move(config.log));
   return config;
@@ -70,6 +70,23 @@ struct Server::Impl {
     hub->set_endpoints(std::move(endpoints));
   }
 
+  void reload(const NetConfig& fresh) {
+    std::unique_ptr<Tls> new_tls = make_tls(fresh);
+    std::optional<Tokens> new_tokens = read_tokens(fresh);
+    // From here on nothing fails.
+    if (tls && new_tls) {
+      *tls = std::move(*new_tls);  // where it is, since the listener knows its place
+      std::vector<EndpointInfo> endpoints = hub->endpoints();
+      endpoints.back().fingerprint = tls->fingerprint;  // TCP is the last
+      hub->set_endpoints(std::move(endpoints));
+    }
+    admission.set_tokens(std::move(new_tokens));
+    config.max_clients = fresh.max_clients;
+    config.max_clients_per_address = fresh.max_clients_per_address;
+    config.max_requests_per_s = fresh.max_requests_per_s;
+    config.hello_timeout = fresh.hello_timeout;
+  }
+
   NetConfig config;
   std::unique_ptr<Tls> tls;
   Admission admission;
@@ -101,6 +118,8 @@ std::vector<std::string> Server::addresses() const {
   for (const auto& listener : impl_->listeners) all.push_back(listener->address());
   return all;
 }
+
+void Server::reload(const NetConfig& fresh) { impl_->reload(fresh); }
 
 std::uint16_t Server::port() const { return impl_->listeners.back()->port(); }
 

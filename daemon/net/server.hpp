@@ -40,6 +40,11 @@ class Server {
   [[nodiscard]] std::vector<std::string> addresses() const;
   /// The TCP port it listens on; 0 without TCP.
   [[nodiscard]] std::uint16_t port() const;
+  /// Reads certificate, key and tokens again, whether their names have changed or not, and takes
+  /// the limits of `fresh`, all for clients that come from now on. Whether there are TLS and
+  /// tokens, and everything else, stays. Throws as the constructor, and changes nothing then. On
+  /// the thread that runs `io`.
+  void reload(const NetConfig& fresh);
   /// Takes no more clients and ends every connection; then `io` has no work of ours left and run()
   /// returns. On the thread that runs `io`, or while none does.
   void stop();

@@ -195,9 +195,10 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   decoder_.set_cap(wire::kMaxMessage);
   program_ = printable(hello.program());
   minor_ = hello.minor();
-  config_.log(LogLevel::info,
-              fmt::format("client {} ({}) connected{}{}", peer().address, program_,
-                          verdict.token_name.empty() ? "" : " as ", verdict.token_name));
+  config_.log({LogLevel::info,
+               fmt::format("client {} ({}) connected{}{}", peer().address, program_,
+                           verdict.token_name.empty() ? "" : " as ", verdict.token_name),
+               peer().address});
   v1::ServerMessage message;
   message.mutable_reply()->set_id(id);
   auto& reply = *message.mutable_reply()->mutable_hello();
@@ -236,7 +237,8 @@ void Session::reply_error(std::uint64_t id, int error_code_, const std::string& 
 }
 
 void Session::end_with(std::uint64_t id, int error_code_, const std::string& sentence) {
-  config_.log(LogLevel::warning, fmt::format("client {}: {}", peer().address, sentence));
+  config_.log(
+      {LogLevel::warning, fmt::format("client {}: {}", peer().address, sentence), peer().address});
   reply_error(id, error_code_, sentence);
   if (state_ == State::closed) return;
   // Closing at once, with bytes unread, would reset the connection and take the answer with it: so
@@ -298,9 +300,10 @@ void Session::close(const std::string& reason, LogLevel level) {
   timer_.cancel();
   outbox_.close();
   if (known || level != LogLevel::info) {
-    config_.log(level,
-                fmt::format("client {} ({}) disconnected: {}; {} frames sent, {} dropped",
-                            peer().address, program_, reason, outbox_.sent(), outbox_.dropped()));
+    config_.log({level,
+                 fmt::format("client {} ({}) disconnected: {}; {} frames sent, {} dropped",
+                             peer().address, program_, reason, outbox_.sent(), outbox_.dropped()),
+                 peer().address});
   }
   if (const auto host = host_.lock()) host->on_closed(*this);
 }

@@ -72,10 +72,11 @@ tcp::acceptor listen(asio::io_context& io, const tcp::endpoint& endpoint, const 
     error.clear();
     bind_to_absent(acceptor, endpoint, error);
     step([&] {
-      log(LogLevel::warning,
-          fmt::format("no interface has the address {} yet: clients can connect as soon as one has "
-                      "(ip address shows what there is)",
-                      endpoint.address().to_string()));
+      log({LogLevel::warning,
+           fmt::format(
+               "no interface has the address {} yet: clients can connect as soon as one has "
+               "(ip address shows what there is)",
+               endpoint.address().to_string())});
     });
   }
   step([&] { acceptor.listen(asio::socket_base::max_listen_connections, error); });

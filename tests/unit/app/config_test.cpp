@@ -84,6 +84,17 @@ TEST_F(ConfigFile, ReadsTheCamerasControls) {
   EXPECT_THAT(error("[camera.v4l2.controls]\nzoom = 1\n"), HasSubstr("zoom"));
 }
 
+TEST_F(ConfigFile, ASecretMayBeACredential) {
+  const Config config = load(
+      "[net]\ntoken_file = 'credential:tokens'\ntls_key = 'keys/a.key'\n"
+      "tls_certificate = 'keys/a.crt'\n");
+  EXPECT_EQ(config.net.token_file, "credential:tokens");
+  EXPECT_EQ(config.net.tls_key, folder_ / "keys/a.key");
+  EXPECT_THAT(error("[net]\ntoken_file = 'credential:../tokens'\n"),
+              HasSubstr("or \"credential:NAME\""));
+  EXPECT_THAT(error("[net]\ntoken_file = 'credential:'\n"), HasSubstr("net.token_file"));
+}
+
 TEST_F(ConfigFile, UnknownKeyNamesFileLineAndWhatIsAllowed) {
   EXPECT_THAT(
       error("[camera]\nwidht = 640\n"),

@@ -1,11 +1,14 @@
 #include "daemon/app/service.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <stdexcept>
 #include <string>
 
 #include "tests/fakes/notify_socket.hpp"
@@ -33,6 +36,41 @@ TEST(Service, WatchdogIsFedTwiceAnInterval) {
   ::setenv("WATCHDOG_USEC", "10000000", 1);
   EXPECT_EQ(watchdog_interval_us(), 5'000'000U);
   ::unsetenv("WATCHDOG_USEC");
+}
+
+TEST(Service, TellsThatItReadsItsConfigurationAgain) {
+  const fakes::NotifySocket manager(std::filesystem::path(::testing::TempDir()) /
+                                    ("dtact_notify_" + std::to_string(::getpid())));
+  ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
+  notify_reloading();
+  ::unsetenv("NOTIFY_SOCKET");
+  EXPECT_THAT(manager.next(std::chrono::seconds(10)).value_or(""),
+              testing::MatchesRegex("RELOADING=1\nMONOTONIC_USEC=[0-9]+"));
+}
+
+TEST(Service, ACredentialIsTheFileThatSystemdHandedIn) {
+  const auto folder = std::filesystem::path(::testing::TempDir()) /
+                      ("dtact_credentials_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "tokens") << "x";
+  ::setenv("CREDENTIALS_DIRECTORY", folder.c_str(), 1);
+  EXPECT_EQ(resolve_credential("net.token_file", "credential:tokens"), folder / "tokens");
+  EXPECT_EQ(resolve_credential("net.token_file", "/etc/tokens"), "/etc/tokens");
+  EXPECT_EQ(resolve_credential("net.token_file", ""), "");
+  const auto missing = [](const char* name) {
+    try {
+      return resolve_credential("net.tls_key", name).string();
+    } catch (const std::runtime_error& e) {
+      return std::string(e.what());
+    }
+  };
+  EXPECT_THAT(missing("credential:tls-key"),
+              testing::StartsWith("net.tls_key = \"credential:tls-key\": systemd handed in no "
+                                  "credential of that name: put it into "
+                                  "/etc/credstore/dtactd.tls-key "));
+  ::unsetenv("CREDENTIALS_DIRECTORY");
+  EXPECT_THAT(missing("credential:tokens"), testing::HasSubstr("/etc/credstore/dtactd.tokens"));
+  std::filesystem::remove_all(folder);
 }
 
 }  // namespace

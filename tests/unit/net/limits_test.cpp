@@ -51,8 +51,8 @@ TEST(TokenBucket, FillsUpToItsBurst) {
 
 TEST(LimitedLog, SaysHowManyLinesItLeftOut) {
   std::vector<std::string> lines;
-  const Log log = limited([&lines](LogLevel, const std::string& text) { lines.push_back(text); });
-  for (int i = 0; i < 5000; ++i) log(LogLevel::info, "x");
+  const Log log = limited([&lines](const LogLine& line) { lines.push_back(line.text); });
+  for (int i = 0; i < 5000; ++i) log({LogLevel::info, "x"});
   // 100, and those whose time came meanwhile; the last ones that were left out are not told yet.
   EXPECT_GE(lines.size(), 100U);
   EXPECT_LT(lines.size(), 5000U);

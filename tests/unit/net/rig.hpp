@@ -83,9 +83,9 @@ class Rig {
     config.port = 0;
     config.program = "dtactd 9.8.7";
     config.version = "9.8.7";
-    config.log = [this](LogLevel, const std::string& text) {
+    config.log = [this](const LogLine& line) {
       const std::lock_guard lock(mutex_);
-      log_ += text + "\n";
+      log_ += line.text + "\n";
     };
     server_ = std::make_unique<Server>(io_, config, port, store);
     thread_ = std::thread([this] { io_.run(); });

@@ -1,0 +1,56 @@
+#include "daemon/app/reload.hpp"
+
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include "daemon/app/config_keys.hpp"
+
+namespace dtact::app {
+namespace {
+
+constexpr std::array<std::string_view, 8> kLive = {"log_level",
+                                                   "net.tls_certificate",
+                                                   "net.tls_key",
+                                                   "net.token_file",
+                                                   "net.max_clients",
+                                                   "net.max_clients_per_address",
+                                                   "net.max_requests_per_s",
+                                                   "net.hello_timeout_ms"};
+
+/// Whether clients would meet another kind of door: with TLS or without, with a token or without.
+bool switches(const std::string& before, const std::string& after) {
+  constexpr const char* kNone = "\"\"";
+  return before == kNone || after == kNone;
+}
+
+}  // namespace
+
+bool is_live(const std::string& key) {
+  return std::find(kLive.begin(), kLive.end(), key) != kLive.end();
+}
+
+Reload merge(const Config& running, const Config& fresh) {
+  Reload reload;
+  reload.config = running;
+  Config wanted = fresh;
+  const std::vector<Key> keys = bind_keys(reload.config);
+  const std::vector<Key> news = bind_keys(wanted);
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const std::string before = keys[i].show();
+    const std::string after = news[i].show();
+    if (before == after) continue;
+    if (!is_live(keys[i].path) || switches(before, after)) {
+      reload.restart.push_back(keys[i].path);
+      continue;
+    }
+    const toml::table line = toml::parse("value = " + after);
+    (void)keys[i].assign(*line.get("value"), "/");  // it has passed this check already
+    reload.changed.push_back(keys[i].path);
+  }
+  return reload;
+}
+
+}  // namespace dtact::app

@@ -1,0 +1,145 @@
+// SIGHUP: what a running daemon takes from a configuration that is read again.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+#include "clients/cpp/client.hpp"
+#include "tests/e2e/daemon_process.hpp"
+
+namespace dtact::e2e {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::AllOf;
+using testing::EndsWith;
+using testing::HasSubstr;
+using testing::Not;
+
+constexpr const char* kOldToken = "0123456789abcdef-old";
+constexpr const char* kNewToken = "0123456789abcdef-new";
+
+/// A daemon with a certificate and a token that systemd hands in, whose configuration is a file.
+class Reload : public testing::Test {
+ protected:
+  Reload() {
+    old_ = make_pair_in("old");
+    write("tokens", std::string("control ") + kOldToken + "\n");
+    write("dtactd.toml", configuration("old", ""));
+    daemon_ = std::make_unique<DaemonProcess>(
+        std::vector<std::string>{"--config", file("dtactd.toml")},
+        Environment{{"CREDENTIALS_DIRECTORY", folder_.path().string()}});
+  }
+
+  [[nodiscard]] std::string file(const std::string& name) const {
+    return (folder_.path() / name).string();
+  }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(file(name)) << text;
+    fs::permissions(file(name), fs::perms::owner_read | fs::perms::owner_write);
+  }
+  /// Returns the certificate's fingerprint.
+  [[nodiscard]] std::string make_pair_in(const std::string& name) const {
+    std::string output;
+    EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "cert", "-o", file(name), "--name", "127.0.0.1"}), 0);
+    EXPECT_EQ(
+        run_program({DTACTCTL_PROGRAM, "cert", "--show", file(name + "/dtactd.crt")}, &output), 0);
+    return output.substr(0, 64);
+  }
+  /// `more` begins at line 9 of the file, in [net].
+  [[nodiscard]] static std::string configuration(const std::string& pair, const std::string& more) {
+    return "state_dir = 'state'\ncamera.backend = 'null'\nring.backend = 'null'\n[net]\nport = 0\n"
+           "token_file = 'credential:tokens'\ntls_certificate = '" +
+           pair + "/dtactd.crt'\ntls_key = '" + pair + "/dtactd.key'\n" + more;
+  }
+  /// Sends SIGHUP. Returns the status that the service manager is told when it is done.
+  [[nodiscard]] std::string reload() const {
+    EXPECT_EQ(::kill(daemon_->pid(), SIGHUP), 0);
+    bool reloading = false;
+    while (const auto message = daemon_->next_notification(std::chrono::seconds(60))) {
+      reloading = reloading || message->starts_with("RELOADING=1\nMONOTONIC_USEC=");
+      if (message->starts_with("READY=1\nSTATUS=")) {
+        EXPECT_TRUE(reloading);
+        return message->substr(15);
+      }
+    }
+    ADD_FAILURE() << "no READY=1 after SIGHUP";
+    return {};
+  }
+  [[nodiscard]] std::unique_ptr<client::Client> connect(const std::string& fingerprint,
+                                                        const std::string& token) const {
+    client::Options o;
+    o.port = daemon_->port();
+    o.timeout = std::chrono::seconds(20);
+    o.token = token;
+    o.tls = client::Tls{fingerprint, ""};
+    return std::make_unique<client::Client>(o);
+  }
+
+  TempFolder folder_;
+  std::string old_;
+  std::unique_ptr<DaemonProcess> daemon_;
+};
+
+TEST_F(Reload, TakesCertificateTokensAndLimits) {
+  const auto before = connect(old_, kOldToken);
+  const std::string renewed = make_pair_in("new");
+  write("tokens", std::string("view ") + kNewToken + "\n");
+  write("dtactd.toml", configuration("new", "max_clients = 2\n"));
+  EXPECT_THAT(reload(),
+              AllOf(HasSubstr("fps"), Not(HasSubstr("restart")),
+                    EndsWith("listening on 127.0.0.1:" + std::to_string(daemon_->port()))));
+  EXPECT_THAT(daemon_->log(),
+              HasSubstr("changed: net.tls_certificate, net.tls_key, net.max_clients"));
+  EXPECT_THROW(connect(renewed, kOldToken), client::Refused);
+  EXPECT_THROW(connect(old_, kNewToken), client::ConnectionError);
+  const auto after = connect(renewed, kNewToken);
+  EXPECT_EQ(after->server().rights(), v1::RIGHTS_VIEW);
+  // Who was there before stays, as what he was.
+  EXPECT_EQ(before->status().endpoints(0).fingerprint(), renewed);
+  EXPECT_THROW(connect(renewed, kNewToken), client::EndedByDaemon);  // the third
+}
+
+TEST_F(Reload, AMistakeLeavesEverythingAsItWas) {
+  write("dtactd.toml", configuration("old", "max_clients = 1\nmax_requests_per_s = 0\n"));
+  const std::string mistake = "dtactd.toml:10: net.max_requests_per_s: must be a whole number";
+  EXPECT_THAT(reload(),
+              AllOf(HasSubstr("the configuration stays as it was: "), HasSubstr(mistake)));
+  EXPECT_THAT(daemon_->log(), HasSubstr(mistake));
+  // As well one that shows only in the files it names.
+  write("dtactd.toml", configuration("old", "max_clients = 1\n"));
+  write("tokens", "control short\n");
+  EXPECT_THAT(reload(), HasSubstr("tokens:1: the token has 5 bytes"));
+  const auto one = connect(old_, kOldToken);
+  const auto two = connect(old_, kOldToken);
+  EXPECT_EQ(two->server().rights(), v1::RIGHTS_CONTROL);
+  // Mended, all is well again.
+  write("tokens", std::string("control ") + kOldToken + "\n");
+  EXPECT_THAT(reload(), Not(HasSubstr("stays")));
+  EXPECT_THROW(connect(old_, kOldToken), client::EndedByDaemon);  // max_clients = 1
+}
+
+TEST_F(Reload, NamesWhatNeedsARestart) {
+  write("dtactd.toml", configuration("old", "name = 'left'\n[contact]\ndebounce_frames = 3\n"));
+  EXPECT_THAT(reload(),
+              HasSubstr("; needs a restart: contact.debounce_frames, net.name; listening on "));
+  EXPECT_THAT(daemon_->log(), HasSubstr("needs a restart: contact.debounce_frames, net.name"));
+  EXPECT_EQ(daemon_->stop(SIGTERM), 0);
+}
+
+TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {
+  std::string output;
+  EXPECT_EQ(run_program({DTACTD_PROGRAM, "--set", "net.token_file=credential:tokens", "--set",
+                         "camera.backend=null", "--set", "ring.backend=null"},
+                        &output),
+            1);
+  EXPECT_THAT(output, AllOf(HasSubstr("/etc/credstore/dtactd.tokens"),
+                            HasSubstr("what else this machine lacks: dtactd --doctor")));
+}
+
+}  // namespace
+}  // namespace dtact::e2e

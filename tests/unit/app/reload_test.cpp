@@ -1,0 +1,55 @@
+#include "daemon/app/reload.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/app/config_keys.hpp"
+
+namespace dtact::app {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+TEST(Reload, TakesWhatCanChangeAndNamesTheRest) {
+  Config running;
+  Config fresh = running;
+  fresh.log_level = "debug";
+  fresh.net.max_clients = 3;
+  fresh.hal.camera.backend = "v4l2";
+  fresh.pipeline.light.brightness = 100;
+  const Reload reload = merge(running, fresh);
+  EXPECT_THAT(reload.changed, ElementsAre("log_level", "net.max_clients"));
+  EXPECT_THAT(reload.restart, ElementsAre("camera.backend", "ring.brightness"));
+  EXPECT_EQ(reload.config.log_level, "debug");
+  EXPECT_EQ(reload.config.net.max_clients, 3U);
+  EXPECT_EQ(reload.config.hal.camera.backend, "sim");
+  // Still to be done at the next reload, and not when the file is as it was.
+  EXPECT_THAT(merge(reload.config, fresh).restart,
+              ElementsAre("camera.backend", "ring.brightness"));
+  EXPECT_THAT(merge(reload.config, fresh).changed, IsEmpty());
+  EXPECT_THAT(merge(reload.config, running).restart, IsEmpty());
+}
+
+TEST(Reload, TokensAndTlsChangeFromFileToFileOnly) {
+  Config running;
+  Config fresh = running;
+  fresh.net.token_file = "/etc/dtactd/tokens";
+  EXPECT_THAT(merge(running, fresh).restart, ElementsAre("net.token_file"));
+  EXPECT_TRUE(merge(running, fresh).config.net.token_file.empty());
+  EXPECT_THAT(merge(fresh, running).restart, ElementsAre("net.token_file"));
+  Config other = fresh;
+  other.net.token_file = "credential:tokens";
+  EXPECT_THAT(merge(fresh, other).changed, ElementsAre("net.token_file"));
+  EXPECT_EQ(merge(fresh, other).config.net.token_file, "credential:tokens");
+}
+
+TEST(Reload, EveryLiveKeyIsAKey) {
+  Config config;
+  int live = 0;
+  for (const Key& key : bind_keys(config)) live += is_live(key.path) ? 1 : 0;
+  EXPECT_EQ(live, 8);
+}
+
+}  // namespace
+}  // namespace dtact::app
