@@ -4,12 +4,14 @@
 #include <signal.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 
 #include "clients/cpp/client.hpp"
 #include "tests/e2e/daemon_process.hpp"
+#include "tests/fakes/notify_socket.hpp"
 
 namespace dtact::e2e {
 namespace {
@@ -19,6 +21,7 @@ using testing::AllOf;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::Not;
+using testing::StartsWith;
 
 constexpr const char* kOldToken = "0123456789abcdef-old";
 constexpr const char* kNewToken = "0123456789abcdef-new";
@@ -132,6 +135,9 @@ TEST_F(Reload, NamesWhatNeedsARestart) {
 }
 
 TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {
+  const TempFolder folder;
+  const fakes::NotifySocket manager(folder.path() / "notify");
+  ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
   std::string output;
   EXPECT_EQ(run_program({DTACTD_PROGRAM, "--set", "net.token_file=credential:tokens", "--set",
                          "camera.backend=null", "--set", "ring.backend=null"},
@@ -139,6 +145,10 @@ TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {
             1);
   EXPECT_THAT(output, AllOf(HasSubstr("/etc/credstore/dtactd.tokens"),
                             HasSubstr("what else this machine lacks: dtactd --doctor")));
+  ::unsetenv("NOTIFY_SOCKET");
+  // What systemctl status shows of a daemon that cannot start.
+  EXPECT_THAT(manager.next(std::chrono::seconds(10)).value_or(""),
+              AllOf(StartsWith("STATUS=net.token_file = "), EndsWith("dtactd --doctor")));
 }
 
 }  // namespace
