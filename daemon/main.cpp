@@ -13,13 +13,15 @@
 
 int main(int argc, char** argv) {
   using namespace dtact::app;
-  std::string mend;  // what to try beside what an error says
+  std::string mend;        // what to try beside what an error says
+  bool is_service = true;  // systemd hears of its main process alone, not of its reload's check
   try {
     spdlog::set_default_logger(make_logger());
     const Parsed command_line = parse_options(argc, argv);
     if (command_line.exit_status) return *command_line.exit_status;
     const Options& options = command_line.options;
 
+    is_service = !options.check_config;
     const LoadedConfig loaded = load_config(options.config, options.settings);
     if (options.print_config) print_config(loaded, std::cout);
     if (options.print_config || options.check_config) return 0;
@@ -36,7 +38,7 @@ int main(int argc, char** argv) {
     return 0;
   } catch (const std::exception& e) {
     spdlog::critical("{}{}", e.what(), mend);
-    notify_status(e.what() + mend);
+    if (is_service) notify_status(e.what() + mend);
     return 1;
   }
 }

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
 
 #include "clients/cpp/client.hpp"
 #include "tests/e2e/daemon_process.hpp"
@@ -134,20 +135,34 @@ TEST_F(Reload, NamesWhatNeedsARestart) {
   EXPECT_EQ(daemon_->stop(SIGTERM), 0);
 }
 
-TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {
+/// Runs dtactd to its end, which is a failure. Returns what it says to the service manager first.
+std::optional<std::string> told_by_failing(std::vector<std::string> arguments,
+                                           std::string& output) {
   const TempFolder folder;
   const fakes::NotifySocket manager(folder.path() / "notify");
   ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
+  arguments.insert(arguments.begin(), DTACTD_PROGRAM);
+  EXPECT_EQ(run_program(arguments, &output), 1);
+  ::unsetenv("NOTIFY_SOCKET");
+  return manager.next(std::chrono::milliseconds(0));  // it has ended
+}
+
+// systemd takes messages of the main process alone, and complains of others.
+TEST(Check, TellsTheServiceManagerNothing) {
   std::string output;
-  EXPECT_EQ(run_program({DTACTD_PROGRAM, "--set", "net.token_file=credential:tokens", "--set",
-                         "camera.backend=null", "--set", "ring.backend=null"},
-                        &output),
-            1);
+  EXPECT_EQ(told_by_failing({"--check-config", "--set", "camera.width=1"}, output), std::nullopt);
+  EXPECT_THAT(output, HasSubstr("camera.width"));
+}
+
+TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {
+  std::string output;
+  const auto status = told_by_failing({"--set", "net.token_file=credential:tokens", "--set",
+                                       "camera.backend=null", "--set", "ring.backend=null"},
+                                      output);
   EXPECT_THAT(output, AllOf(HasSubstr("/etc/credstore/dtactd.tokens"),
                             HasSubstr("what else this machine lacks: dtactd --doctor")));
-  ::unsetenv("NOTIFY_SOCKET");
   // What systemctl status shows of a daemon that cannot start.
-  EXPECT_THAT(manager.next(std::chrono::seconds(10)).value_or(""),
+  EXPECT_THAT(status.value_or(""),
               AllOf(StartsWith("STATUS=net.token_file = "), EndsWith("dtactd --doctor")));
 }
 
