@@ -90,7 +90,7 @@ TEST_F(Library, IsFoundByPkgConfig) {
             (libraries() / "pkgconfig").string() +
             "'; '" DTACT_COMPILER "' " DTACT_FLAGS " -std=c++20 -o '" + program +
             "' example.cpp $(pkg-config --cflags --libs dtact)");
-  EXPECT_THAT(output_of("readelf -d '" + program + "'"), HasSubstr("[libdtact.so.0.1]"));
+  EXPECT_THAT(output_of("readelf -d '" + program + "'"), HasSubstr("[libdtact.so.1]"));
   expect_depth(program);
 }
 
@@ -104,7 +104,7 @@ TEST_F(Library, ExportsItsOwnNamesOnly) {
                            Not(HasSubstr("dtact::client::Session"))));
   std::istringstream lines(names);
   const std::regex own(
-      R"([0-9a-f]+ . ((typeinfo( name)? for |vtable for )?dtact::(client|v1)::.*|DTACT_0\.1))");
+      R"([0-9a-f]+ . ((typeinfo( name)? for |vtable for )?dtact::(client|v1)::.*|DTACT_1))");
   for (std::string line; std::getline(lines, line);) {
     EXPECT_TRUE(std::regex_match(line, own)) << line;
   }
