@@ -16,7 +16,7 @@ foreign=()
 for package in "$@"; do
   case $package in
     libcli11-dev) foreign+=("$package") ;;  # has no architecture
-    lib* | umockdev) foreign+=("$package:arm64") ;;
+    lib* | prometheus-cpp-dev | umockdev) foreign+=("$package:arm64") ;;
     *) foreign+=("$package") ;;
   esac
 done
