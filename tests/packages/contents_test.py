@@ -1,0 +1,176 @@
+#!/usr/bin/env python3
+"""What the Debian packages in the folder given hold: contents_test.py FOLDER.
+
+Exit code: 0 passed; 77 there are no packages; else failed.
+"""
+import pathlib
+import re
+import subprocess
+import sys
+import unittest
+
+TREE = pathlib.Path(__file__).resolve().parents[2]
+FOLDER = pathlib.Path(sys.argv.pop(1))
+
+# Of a list that is the same on Debian 12 and 13, amd64 and arm64: LIB is the architecture's folder,
+# UNITS where this Debian has its units, and an asterisk any name.
+FILES = {
+    "dtactd": """
+        /etc/dtactd/dtactd.toml
+        /usr/bin/dtactd
+        UNITS/dtactd.service
+        UNITS/dtactd@.service
+        /usr/lib/sysusers.d/dtactd.conf
+        /usr/lib/tmpfiles.d/dtactd.conf
+        /usr/lib/udev/rules.d/60-dtactd.rules
+        /usr/share/doc/dtactd/examples/boards/raspberry-pi-5-usb-pio.toml
+        /usr/share/doc/dtactd/examples/boards/try-board.sh
+        /usr/share/doc/dtactd/examples/grafana/dtactd.json
+        /usr/share/doc/dtactd/examples/network.conf
+        /usr/share/dtactd/scenes/calibration_presses.toml
+        /usr/share/dtactd/scenes/default.toml""",
+    "dtact-tools": """
+        /usr/bin/dtact-calibrate
+        /usr/bin/dtactctl
+        /usr/share/bash-completion/completions/dtact-calibrate
+        /usr/share/bash-completion/completions/dtactctl
+        /usr/share/dtact/foxglove-layout.json""",
+    "libdtact1": """
+        LIB/libdtact.so.1""",
+    "libdtact-dev": """
+        /usr/include/dtact/client.hpp
+        /usr/include/dtact/dtact.pb.h
+        LIB/cmake/dtact/dtactConfig.cmake
+        LIB/cmake/dtact/dtactConfigVersion.cmake
+        LIB/cmake/dtact/dtactTargets.cmake
+        LIB/libdtact.so
+        LIB/pkgconfig/dtact.pc
+        /usr/share/dtact/proto/README.md
+        /usr/share/dtact/proto/dtact.proto""",
+    "python3-dtact": """
+        /usr/lib/python3/dist-packages/dtact/__init__.py
+        /usr/lib/python3/dist-packages/dtact/_rvl.abi3.so
+        /usr/lib/python3/dist-packages/dtact/dtact.binpb
+        /usr/lib/python3/dist-packages/dtact/py.typed""",
+}
+# The folders and names that a package may have files in.
+PLACES = {
+    "dtactd": r"/etc/dtactd/|/usr/bin/dtactd$|(/usr)?/lib/systemd/system/dtactd|/usr/lib/\w+\.d/dtactd|"
+    r"/usr/lib/udev/rules\.d/60-dtactd|/usr/share/dtactd/scenes/|/usr/share/man/man[58]/dtactd|"
+    r"/usr/share/(bash|zsh)",
+    "dtact-tools": r"/usr/bin/dtact(ctl|-calibrate)$|/usr/share/(bash|zsh)|/usr/share/dtact/foxglove|"
+    r"/usr/share/man/man1/dtact",
+    "libdtact1": r"LIB/libdtact\.so\.1$",
+    "libdtact-dev": r"/usr/include/dtact/|LIB/(cmake/dtact/|libdtact\.so$|pkgconfig/dtact\.pc$)|"
+    r"/usr/share/dtact/proto/",
+    "python3-dtact": r"/usr/lib/python3/dist-packages/dtact(/|-[\d.]+\.egg-info/)",
+}
+
+
+def output(*command: str | pathlib.Path) -> str:
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
+
+
+def package(name: str) -> pathlib.Path:
+    (found,) = FOLDER.glob(f"{name}_*.deb")
+    return found
+
+
+def field(name: str, key: str) -> str:
+    return output("dpkg-deb", "--field", package(name), key).strip()
+
+
+def files(name: str) -> dict[str, str]:
+    """Path → rights and owner, of everything but folders."""
+    listing = [line.split() for line in output("dpkg-deb", "--contents", package(name)).splitlines()]
+    return {words[5].removeprefix("."): f"{words[0]} {words[1]}" for words in listing if words[0][0] != "d"}
+
+
+def control(name: str, member: str) -> str:
+    """A file of the package's control archive, '' where there is none."""
+    return subprocess.run(["dpkg-deb", "--info", package(name), member], capture_output=True, text=True).stdout
+
+
+def triplet(name: str) -> str:
+    return {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu"}[field(name, "Architecture")]
+
+
+class Contents(unittest.TestCase):
+    def test_the_packages_are_these(self) -> None:
+        names = sorted(path.name.split("_")[0] for path in FOLDER.glob("*.deb") if "-dbgsym_" not in path.name)
+        self.assertEqual(names, ["dtact-tools", "dtactd", "libdtact-dev", "libdtact1", "python3-dtact"])
+
+    def test_each_holds_its_files_and_no_others(self) -> None:
+        for name, expected in FILES.items():
+            present = files(name)
+            units = "/lib/systemd/system" if any(path.startswith("/lib/") for path in present) else "/usr/lib/systemd/system"
+            for path in expected.split():
+                path = path.replace("LIB", f"/usr/lib/{triplet(name)}").replace("UNITS", units)
+                self.assertIn(path, present)
+            places = PLACES[name].replace("LIB", f"/usr/lib/{triplet(name)}") + f"|/usr/share/doc/{name}/"
+            for path, rights in present.items():
+                self.assertRegex(path, f"^({places})", name)
+                self.assertRegex(rights, "^(-rw-r--r--|-rwxr-xr-x|lrwxrwxrwx) root/root$", path)
+
+    def test_the_configuration_is_the_only_conffile(self) -> None:
+        self.assertEqual(control("dtactd", "conffiles"), "/etc/dtactd/dtactd.toml\n")
+        for name in FILES.keys() - {"dtactd"}:
+            self.assertEqual(control(name, "conffiles"), "", name)
+
+    def test_debhelper_wrote_what_installs_the_service(self) -> None:
+        postinst = control("dtactd", "postinst")
+        for snippet in (
+            "systemd-sysusers ${DPKG_ROOT:+--root=\"$DPKG_ROOT\"} dtactd.conf",
+            "--create dtactd.conf",
+            "deb-systemd-helper enable 'dtactd.service'",
+            "deb-systemd-invoke $_dh_action 'dtactd.service'",
+        ):
+            self.assertIn(snippet, postinst)
+        # The user is there before the folders that belong to it, and both before the start.
+        order = [postinst.index(word) for word in ("systemd-sysusers", "--create", "deb-systemd-invoke")]
+        self.assertEqual(order, sorted(order))
+        self.assertIn("deb-systemd-invoke stop 'dtactd.service'", control("dtactd", "prerm"))
+        self.assertIn("deb-systemd-helper purge 'dtactd.service'", control("dtactd", "postrm"))
+        for script in ("postinst", "prerm", "postrm"):
+            self.assertNotIn("#DEBHELPER#", control("dtactd", script))
+            # No instance of the template starts or is enabled by itself.
+            self.assertNotRegex(control("dtactd", script), r"(invoke start|enable) 'dtactd@")
+
+    def test_each_depends_on_what_it_needs_and_no_more(self) -> None:
+        version = field("libdtact1", "Version")
+        self.assertIn(f"libdtact1 (= {version}), libprotobuf-dev", field("libdtact-dev", "Depends"))
+        python = field("python3-dtact", "Depends")
+        for needed in ("python3-numpy", "python3-protobuf", "python3-zstandard"):
+            self.assertIn(needed, python)
+        # Python's limited interface: one build for every Python from 3.11 on.
+        self.assertNotRegex(python, r"python3 \(<<")
+        self.assertIn("opencv-calib3d", field("dtact-tools", "Depends"))
+        self.assertNotRegex(field("dtactd", "Depends"), "opencv-(calib3d|imgproc)")
+        self.assertNotRegex(field("dtact-tools", "Depends"), "libcamera|libgpiod|libdtact1")
+        self.assertEqual(control("libdtact1", "shlibs"), "libdtact 1 libdtact1 (>= 0.1.0)\n")
+        for name in ("libdtact1", "libdtact-dev"):
+            self.assertEqual(field(name, "Multi-Arch"), "same")
+
+    def test_the_tree_says_the_same_elsewhere(self) -> None:
+        project = re.search(r"project\(dtactd VERSION ([\d.]+)", (TREE / "CMakeLists.txt").read_text())
+        assert project
+        for name in FILES:
+            self.assertRegex(field(name, "Version"), f"^{re.escape(project[1])}-", "debian/changelog")
+        # What ./dev installs and what the packages are built with.
+        listed = re.search(r"build_packages=\((.*?)\)", (TREE / "dev").read_text(), re.DOTALL)
+        assert listed
+        needed = re.search(r"Build-Depends: (.*?)\n\n", (TREE / "debian/control").read_text(), re.DOTALL)
+        assert needed
+        build_depends = {word.split()[0].split(":")[0] for word in needed[1].split(",")}
+        self.assertEqual(set(listed[1].split()) - build_depends, {"g++", "ccache"})
+        self.assertEqual(
+            {word for word in build_depends - set(listed[1].split()) if "python" not in word},
+            {"debhelper-compat", "dh-sequence-installsysusers"},
+        )
+
+
+if __name__ == "__main__":
+    if not list(FOLDER.glob("*.deb")):
+        print(f"skipped: no packages in {FOLDER}", file=sys.stderr)
+        sys.exit(77)
+    unittest.main(verbosity=2)
