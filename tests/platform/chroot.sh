@@ -1,5 +1,5 @@
 # shellcheck shell=bash disable=SC2154
-# Sourced by debian13.sh and arm64.sh: a Debian of its own in a folder, kept from run to run.
+# Sourced by the scripts of this folder: a Debian of its own in a folder, kept from run to run.
 #
 # Each script sets before sourcing:
 #   suite   Debian's release
@@ -24,9 +24,10 @@ inside() {
       CCACHE_DIR=/ccache bash -euc "$2"' inside "$root" "$1"
 }
 
-# prepare SETUP PACKAGE...: makes the chroot, runs SETUP once in it, installs the packages.
+# prepare SETUP PACKAGE...: makes the chroot, runs SETUP once in it, installs the packages. Scripts that
+# share a chroot each remember what they have installed.
 prepare() {
-  local setup=$1 stamp
+  local setup=$1 stamp installed=$root/installed.${0##*/}
   shift
   [ "$(id -u)" = 0 ] || skip "a chroot needs root: sudo $0"
   command -v debootstrap > /dev/null || skip "run: apt-get install debootstrap"
@@ -42,13 +43,13 @@ prepare() {
   fi
   cp /etc/resolv.conf "$root/etc/resolv.conf"
   stamp=$(printf '%s\n' "$setup" "$@" | sha256sum | cut -c1-16)
-  if [ "$(cat "$root/installed" 2> /dev/null)" != "$stamp" ]; then
+  if [ "$(cat "$installed" 2> /dev/null)" != "$stamp" ]; then
     echo "$(basename "$0"): installing packages"
     inside "$setup
       apt-get update -qq
       apt-get install -y -qq --no-install-recommends $*" >> "$root.log" 2>&1 \
       || { tail -n 20 "$root.log" >&2; exit 1; }
-    echo "$stamp" > "$root/installed"
+    echo "$stamp" > "$installed"
   fi
 }
 
@@ -58,4 +59,19 @@ copy_source() {
   mkdir -p "$root/source"
   (cd "$source_folder" && git ls-files -z --cached --others --exclude-standard \
     | tar --null --files-from=- --ignore-failed-read -c) | tar -x -C "$root/source"
+}
+
+# package OUT ARCHITECTURE [BUILT]: Debian packages of the source, into the folder OUT, which is emptied.
+# With a folder BUILT of what `cmake --preset dev` built in the chroot, nothing is compiled.
+package() {
+  local out=$1 architecture=$2 built=${3-} options=
+  [ -z "$built" ] || options=--no-check-builddeps
+  rm -rf "$root/packages" "$out"
+  mkdir -p "$root/packages" "$out"
+  cp -a "$root/source" "$root/packages/dtactd"
+  inside "${built:+export DTACT_BUILT=$built}
+    cd /packages/dtactd
+    dpkg-buildpackage --build=binary --no-sign $options --host-arch=$architecture > ../build.log 2>&1" \
+    || { tail -n 40 "$root/packages/build.log" >&2; exit 1; }
+  cp "$root"/packages/*.{deb,changes,buildinfo,log} "$out"
 }
