@@ -2,7 +2,8 @@
 # arm64.sh PACKAGE...: cross-builds the programs and the unit tests for arm64 on Debian 12, in a chroot
 # so that the other architecture's packages stay out of this machine, and runs the tests under
 # qemu-user. Of the Debian packages named, libraries are taken for arm64 and tools for this machine;
-# umockdev is both, and the tests load its library.
+# umockdev is both, and the tests load its library. Makes Debian packages of what it built, in
+# build/dev/packages-debian12-arm64.
 #
 # Exit code: 0 passed; 77 such a chroot cannot be had here (the reason is printed); else failed.
 set -euo pipefail
@@ -28,3 +29,4 @@ inside 'cd /source
   cmake --preset dev -B /build --toolchain /arm64.cmake > /build.log
   cmake --build /build --target daemon/all clients/all tests/{unit,fuzz}/all bench_memory > /build.log 2>&1 || { grep -v "^\[" /build.log; exit 1; }
   ctest --test-dir /build --output-on-failure -L unit'
+package "$source_folder/build/dev/packages-debian12-arm64" arm64 /build

@@ -62,7 +62,8 @@ copy_source() {
 }
 
 # package OUT ARCHITECTURE [BUILT]: Debian packages of the source, into the folder OUT, which is emptied.
-# With a folder BUILT of what `cmake --preset dev` built in the chroot, nothing is compiled.
+# With a folder BUILT of what `cmake --preset dev` built in the chroot, nothing is compiled. Then looks at
+# what they hold.
 package() {
   local out=$1 architecture=$2 built=${3-} options=
   [ -z "$built" ] || options=--no-check-builddeps
@@ -74,4 +75,5 @@ package() {
     dpkg-buildpackage --build=binary --no-sign $options --host-arch=$architecture > ../build.log 2>&1" \
     || { tail -n 40 "$root/packages/build.log" >&2; exit 1; }
   cp "$root"/packages/*.{deb,changes,buildinfo,log} "$out"
+  /usr/bin/python3 -B "$source_folder/tests/packages/contents_test.py" "$out"
 }

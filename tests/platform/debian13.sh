@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # debian13.sh PACKAGE...: builds the whole tree on Debian 13 (gcc 14, libgpiod 2) in a chroot, with
-# the Debian packages named, and runs the unit tests there.
+# the Debian packages named, and runs the unit tests there. Makes Debian packages of what it built, in
+# build/dev/packages-debian13-amd64 for example.
 #
 # Exit code: 0 passed; 77 such a chroot cannot be had here (the reason is printed); else failed.
 set -euo pipefail
@@ -16,3 +17,5 @@ inside 'cd /source
   cmake --preset dev -B /build > /build.log
   cmake --build /build > /build.log 2>&1 || { grep -v "^\[" /build.log; exit 1; }
   ctest --test-dir /build --output-on-failure -L unit'
+architecture=$(dpkg --print-architecture)
+package "$source_folder/build/dev/packages-debian13-$architecture" "$architecture" /build
