@@ -156,6 +156,9 @@ class Contents(unittest.TestCase):
         assert project
         for name in FILES:
             self.assertRegex(field(name, "Version"), f"^{re.escape(project[1])}-", "debian/changelog")
+        self.assertIn(
+            f"/usr/lib/python3/dist-packages/dtact-{project[1]}.egg-info/PKG-INFO", files("python3-dtact"), "pyproject.toml"
+        )
         # What ./dev installs and what the packages are built with.
         listed = re.search(r"build_packages=\((.*?)\)", (TREE / "dev").read_text(), re.DOTALL)
         assert listed
