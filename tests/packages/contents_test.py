@@ -28,12 +28,20 @@ FILES = {
         /usr/share/doc/dtactd/examples/grafana/dtactd.json
         /usr/share/doc/dtactd/examples/network.conf
         /usr/share/dtactd/scenes/calibration_presses.toml
-        /usr/share/dtactd/scenes/default.toml""",
+        /usr/share/dtactd/scenes/default.toml
+        /usr/share/man/man5/dtactd.toml.5.gz
+        /usr/share/man/man8/dtactd.8.gz
+        /usr/share/bash-completion/completions/dtactd
+        /usr/share/zsh/vendor-completions/_dtactd""",
     "dtact-tools": """
         /usr/bin/dtact-calibrate
         /usr/bin/dtactctl
         /usr/share/bash-completion/completions/dtact-calibrate
         /usr/share/bash-completion/completions/dtactctl
+        /usr/share/man/man1/dtact-calibrate.1.gz
+        /usr/share/man/man1/dtactctl.1.gz
+        /usr/share/zsh/vendor-completions/_dtact-calibrate
+        /usr/share/zsh/vendor-completions/_dtactctl
         /usr/share/dtact/foxglove-layout.json""",
     "libdtact1": """
         LIB/libdtact.so.1""",
