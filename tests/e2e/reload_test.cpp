@@ -99,13 +99,13 @@ TEST_F(Reload, TakesCertificateTokensAndLimits) {
                     EndsWith("listening on 127.0.0.1:" + std::to_string(daemon_->port()))));
   EXPECT_THAT(daemon_->log(),
               HasSubstr("changed: net.tls_certificate, net.tls_key, net.max_clients"));
-  EXPECT_THROW(connect(renewed, kOldToken), client::Refused);
-  EXPECT_THROW(connect(old_, kNewToken), client::ConnectionError);
+  EXPECT_THROW((void)connect(renewed, kOldToken), client::Refused);
+  EXPECT_THROW((void)connect(old_, kNewToken), client::ConnectionError);
   const auto after = connect(renewed, kNewToken);
   EXPECT_EQ(after->server().rights(), v1::RIGHTS_VIEW);
   // Who was there before stays, as what he was.
   EXPECT_EQ(before->status().endpoints(0).fingerprint(), renewed);
-  EXPECT_THROW(connect(renewed, kNewToken), client::EndedByDaemon);  // the third
+  EXPECT_THROW((void)connect(renewed, kNewToken), client::EndedByDaemon);  // the third
 }
 
 TEST_F(Reload, AMistakeLeavesEverythingAsItWas) {
@@ -124,7 +124,7 @@ TEST_F(Reload, AMistakeLeavesEverythingAsItWas) {
   // Mended, all is well again.
   write("tokens", std::string("control ") + kOldToken + "\n");
   EXPECT_THAT(reload(), Not(HasSubstr("stays")));
-  EXPECT_THROW(connect(old_, kOldToken), client::EndedByDaemon);  // max_clients = 1
+  EXPECT_THROW((void)connect(old_, kOldToken), client::EndedByDaemon);  // max_clients = 1
 }
 
 TEST_F(Reload, NamesWhatNeedsARestart) {
