@@ -1,0 +1,17 @@
+# shellcheck shell=bash disable=SC2154
+# The packages as they are, by apt: the service runs and is enabled, and a client gets frames.
+files > /tmp/before
+apt_get install /job/packages/*.deb
+grep -E '^(Creating|Created|W:|E:|warning)' /tmp/apt || true
+[ "$(systemctl is-enabled dtactd)" = enabled ] || fail "not enabled"
+within 300 serving
+dtactctl status | head -n 3
+frames 60 10
+systemctl status --no-pager dtactd | sed -n 's/^ *Status: /status: /p'
+systemd-analyze security --no-pager dtactd | tail -n 1
+[ "$(property NRestarts)" = 0 ] || fail "restarted: $(journalctl -b -u dtactd)"
+# Nothing of it runs as root.
+[ "$(ps -o user= -p "$(pid)")" = dtactd ] || fail "runs as $(ps -o user= -p "$(pid)")"
+# For the other cases a scene without gel mechanics, which starts in a tenth of the time.
+still_scene
+cp "$config" /tmp/still.toml

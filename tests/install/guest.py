@@ -1,0 +1,83 @@
+"""A Debian guest on User Mode Linux: a disc, a folder that both sides see, and a power switch."""
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+KERNEL = Path(os.environ.get('KERNEL_CACHE', Path.home() / '.cache/dtactd-kernel'))
+
+
+class GuestError(Exception):
+    """What a guest did not do; the message holds its last words."""
+
+
+class Guest:
+    """A running guest. It ends with the block that holds it, at the latest.
+
+    disc: an ext4 image. Without `changes` the guest writes into it; with it, what the guest writes
+    goes into that file (UML's copy-on-write), made where it is not there yet.
+    check_disc: e2fsck has a look before the disc is mounted for writing.
+    job: the folder that the guest sees as /job; its `run` is executed there, as root, by bash.
+    """
+
+    def __init__(self, disc: Path, job: Path, changes: Path | None = None, check_disc: bool = False):
+        self.job = job
+        for name in ('rc', 'log', 'journal'):
+            (job / name).unlink(missing_ok=True)
+        console = open(job / 'console', 'wb')
+        # Every write reaches the host's file when the guest is told so: a kill is a power cut of a
+        # disc without a cache that forgets.
+        # It ends with this process, however that ends: the namespace's first process takes all with it.
+        tied = ['setpriv', '--pdeathsig', 'KILL', 'unshare', '--pid', '--fork', '--kill-child=KILL']
+        self._process = subprocess.Popen(
+            [*tied, KERNEL / 'linux', 'mem=768M', f'ubd0={changes},{disc}' if changes else f'ubd0={disc}',
+             'root=/dev/ubda', *(('ro', 'fsck.mode=force') if check_disc else ('rw',)), 'init=/sbin/init',
+             f'hostfs={job}', f'uml_dir={job}/uml/', 'ssl=null', 'con=null', 'con0=fd:0,fd:1', 'quiet',
+             'systemd.show_status=false'],
+            stdin=subprocess.DEVNULL, stdout=console, stderr=console, start_new_session=True)
+        console.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.cut()
+
+    def cut(self):
+        """The power goes, now. The guest's kernel and its processes are processes of one group here."""
+        try:
+            os.killpg(self._process.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        self._process.wait()
+
+    def wait_for_file(self, name: str, limit_s: float):
+        """Returns once /job/name is there, which the guest's commands make."""
+        end = time.monotonic() + limit_s
+        while not (self.job / name).exists():
+            if self._process.poll() is not None:
+                raise GuestError(f'it ended before it made /job/{name}{self.last_words()}')
+            if time.monotonic() > end:
+                raise GuestError(f'it made no /job/{name} within {limit_s:.0f} s{self.last_words()}')
+            time.sleep(0.02)
+
+    def finish(self, limit_s: float, off: bool) -> int:
+        """The exit code of /job/run. With `off` the guest powers off by itself and its disc is in order."""
+        self.wait_for_file('rc', limit_s)
+        if off:
+            try:
+                self._process.wait(60)
+            except subprocess.TimeoutExpired as timeout:
+                raise GuestError(f'it does not power off{self.last_words()}') from timeout
+        return int((self.job / 'rc').read_text())
+
+    def last_words(self) -> str:
+        words = ''
+        for name in ('log', 'console'):
+            file = self.job / name
+            if file.exists():
+                lines = file.read_text(errors='replace').splitlines()[-40:]
+                words += f'\n--- {file}\n' + '\n'.join(lines)
+        return words

@@ -1,0 +1,60 @@
+# shellcheck shell=bash
+# What the cases have in common; the driver puts it before them.
+set -euo pipefail
+export LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive HOME=/root
+config=/etc/dtactd/dtactd.toml
+
+say() { echo "[$(date +%T)] $*"; }
+fail() {
+  say "FAILED: $*"
+  exit 1
+}
+# expect TEXT COMMAND...: the command's output, whatever its status, has the text.
+expect() {
+  local text=$1 output
+  shift
+  output=$("$@" 2>&1) || true
+  grep -qF -- "$text" <<< "$output" || fail "no \"$text\" in what '$*' printed:"$'\n'"$output"
+}
+# within SECONDS COMMAND...: the command succeeds at last. Generous, for the machine below may be busy.
+within() {
+  local end=$((SECONDS + $1))
+  shift
+  until "$@" > /tmp/within 2>&1; do
+    ((SECONDS < end)) || fail "never came true: $*"$'\n'"$(cat /tmp/within; systemctl status --no-pager dtactd)"
+    sleep 0.3
+  done
+}
+property() { systemctl show --value -p "$1" "${2:-dtactd}"; }
+pid() { property MainPID "${1:-dtactd}"; }
+other_pid() { [ "$(pid dtactd)" != "$1" ] && [ "$(pid dtactd)" != 0 ]; }
+journal_says() { journalctl --no-pager -o cat -b -u dtactd --since "$since" | grep -F -- "$*"; }
+serving() { systemctl is-active dtactd && dtactctl "$@" status; }
+is_still() { [ "$(pid dtactd)" = "$1" ] || fail "the daemon was started anew: $(systemctl status --no-pager dtactd)"; }
+
+# frames LEAST SECONDS [OPTION...]: a client gets so many frames, and the rate is printed.
+frames() {
+  local least=$1 seconds=$2 summary count
+  shift 2
+  summary=$(dtactctl "$@" watch --summary --seconds "$seconds" 2>&1) || fail "watch: $summary"
+  summary=$(tail -n 1 <<< "$summary")
+  say "$summary"
+  count=$(sed -n 's/^watched .* s: \([0-9]*\) frames.*/\1/p' <<< "$summary")
+  ((count >= least)) || fail "$count frames in $seconds s, at least $least were expected"
+}
+
+apt_get() { apt-get -y -qq --no-install-recommends "$@" > /tmp/apt 2>&1 || fail "apt-get $*: $(cat /tmp/apt)"; }
+
+# What was put into the file system: all but what changes by itself.
+files() {
+  find / -xdev \( -path /proc -o -path /sys -o -path /run -o -path /tmp -o -path /job -o -path /dev \
+    -o -path /var/cache -o -path /var/log -o -path /var/lib/apt -o -path /var/lib/dpkg \) -prune -o -print | sort
+}
+still_scene() { sed -i 's|^scene = ""|scene = "/usr/share/dtactd/scenes/nothing.toml"|' "$config"; }
+# Every case but the first and the last begins with it: whatever the case before left, the daemon runs.
+begin_case() {
+  cp /tmp/still.toml "$config"
+  systemctl restart dtactd || true
+  within 120 serving
+  since=$(date '+%F %T')
+}

@@ -1,0 +1,22 @@
+# shellcheck shell=bash
+# After a power cut or none: the disc is in order, the daemon is up, every calibration it has is one that was
+# sent, whole. Then sends calibrations until the power goes, but for "only_look".
+[ "$(property Result systemd-fsck-root.service)" = success ] || fail "the file system is broken"
+within 300 serving
+expect '*' dtactctl calibration list
+rm -rf /tmp/export
+dtactctl calibration export -o /tmp/export
+same() { cmp -s "/job/calibrations/$1/calibration.toml" /tmp/export/calibration.toml \
+  && cmp -s "/job/calibrations/$1/reference.png" /tmp/export/reference.png; }
+if same old; then say "has the old one"; elif same new; then say "has the new one"; else
+  fail "neither the old nor the new calibration: $(ls -la /tmp/export; dtactctl calibration list)"
+fi
+dtactctl status | grep -q uncalibrated && fail "the calibration is not used"
+[ "${1-}" = only_look ] && exit 0
+touch /job/begun
+while :; do
+  for name in new old; do
+    dtactctl calibration upload "/job/calibrations/$name" --name "$name"
+    echo sent >> /job/uploads
+  done
+done

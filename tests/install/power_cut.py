@@ -1,0 +1,75 @@
+"""Power cuts: a guest is killed while it uploads calibrations, or upgrades the packages."""
+
+import random
+import shutil
+import time
+from pathlib import Path
+
+from guest import Guest, GuestError
+
+HERE = Path(__file__).resolve().parent
+BOOT_S = 600  # A guest on a busy machine takes its time.
+
+
+def run_once(disc: Path, changes: Path, job: Path, script: str, arguments: str = '') -> str:
+    """Boots, runs guest/`script` and powers off; what it printed."""
+    _prepare(job, script, arguments)
+    with Guest(disc, job, changes, check_disc=True) as guest:
+        if guest.finish(BOOT_S, off=True) != 0:
+            raise GuestError(f'{script} {arguments} failed{guest.last_words()}')
+    return (job / 'log').read_text(errors='replace')
+
+
+def cut_uploads(disc: Path, installed: Path, job: Path, moments: random.Random, cuts: int):
+    """Whatever moment the power goes at, the next boot has the old or the new calibration, whole."""
+    _install(disc, installed, job)
+    changes = installed.with_name('uploads.cow')
+    shutil.copyfile(installed, changes)
+    for number in range(1, cuts + 1):
+        _prepare(job, 'upload.sh', '')
+        with Guest(disc, job, changes, check_disc=True) as guest:
+            guest.wait_for_file('begun', BOOT_S)
+            seconds = moments.uniform(0, 4)
+            time.sleep(seconds)
+            guest.cut()
+        uploads = (job / 'uploads').read_text().count('sent') if (job / 'uploads').exists() else 0
+        print(f'upload: power cut {number} after {seconds:.2f} s, {uploads} uploads')
+    print(run_once(disc, changes, job, 'upload.sh', 'only_look'), end='')
+    changes.unlink()
+
+
+def cut_upgrades(disc: Path, installed: Path, job: Path, moments: random.Random, cuts: int):
+    """Whatever moment the power goes at, dpkg finishes the upgrade and the daemon is back."""
+    _install(disc, installed, job)
+    changes = installed.with_name('upgrade.cow')
+    shutil.copyfile(installed, changes)
+    _prepare(job, 'upgrade.sh', '')
+    with Guest(disc, job, changes, check_disc=True) as guest:
+        guest.wait_for_file('begun', BOOT_S)
+        began = time.monotonic()
+        guest.wait_for_file('done', BOOT_S)
+        whole_s = time.monotonic() - began
+        guest.cut()
+    for number in range(1, cuts + 1):
+        shutil.copyfile(installed, changes)
+        _prepare(job, 'upgrade.sh', '')
+        with Guest(disc, job, changes, check_disc=True) as guest:
+            guest.wait_for_file('begun', BOOT_S)
+            seconds = moments.uniform(0, whole_s)
+            time.sleep(seconds)
+            guest.cut()
+        print(f'upgrade: power cut {number} after {seconds:.1f} of {whole_s:.1f} s')
+        print(run_once(disc, changes, job, 'upgrade.sh', 'repair'), end='')
+    changes.unlink()
+
+
+def _install(disc: Path, installed: Path, job: Path):
+    if not installed.exists():
+        run_once(disc, installed, job, 'installed.sh')
+
+
+def _prepare(job: Path, script: str, arguments: str):
+    for name in ('begun', 'done', 'uploads'):
+        (job / name).unlink(missing_ok=True)
+    text = (HERE / 'guest' / 'lib.sh').read_text() + (HERE / 'guest' / script).read_text()
+    (job / 'run').write_text(f'set -- {arguments}\n{text}')

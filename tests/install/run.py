@@ -1,0 +1,114 @@
+#!/usr/bin/python3
+"""Installs the Debian packages in a guest that boots Debian with systemd, and tries the service there.
+
+The cases, scripts in cases/, run one after another in one guest, as root; the first is install. The
+power cuts (--cuts) end guests of their own at random moments.
+
+Exit code: 0 all passed; 77 the guest cannot be had on this machine, which says why; else failed.
+"""
+
+import argparse
+import random
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import packages
+from guest import KERNEL, Guest, GuestError
+from power_cut import cut_uploads, cut_upgrades
+
+HERE = Path(__file__).resolve().parent
+SHORT = ('install', 'purge')
+ALL = ('install', 'restart', 'broken_configuration', 'reload', 'state_disc', 'clock', 'two_sensors',
+       'outside', 'devices', 'upgrade', 'purge')
+
+
+def job_folder(folder: Path, debs: Path) -> Path:
+    """The folder that the guest sees as /job, with all that a case needs but calibrations."""
+    for name in ('packages', 'newer', 'modules'):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    (folder / 'packages').mkdir(parents=True)
+    for deb in debs.glob('*.deb'):
+        shutil.copy(deb, folder / 'packages')
+    packages.make_newer(debs, folder / 'newer')
+    shutil.copytree(KERNEL / 'modules', folder / 'modules', ignore=lambda _, names: [
+        name for name in names if not name.endswith('.ko')])
+    return folder
+
+
+def run_cases(disc: Path, folder: Path, job: Path, names: list[str]) -> bool:
+    """True when all passed. A case that fails does not keep the others from running."""
+    lines = ['failed=0']
+    for name in names:
+        shutil.copy(HERE / 'cases' / f'{name}.sh', job)
+        lines.append(f"echo '== {name}'; began=$SECONDS")
+        begin = '' if name in SHORT else 'begin_case; '
+        lines.append(f"bash -c '. /job/lib.sh; {begin}. /job/{name}.sh' || {{ failed=1; echo 'FAILED: {name}'; "
+                     "journalctl --no-pager -b -o cat -u 'dtactd*' | tail -n 12; }")
+        lines.append(f'echo "{name} took $((SECONDS - began)) s"')
+    lines.append('exit $failed')
+    shutil.copy(HERE / 'guest' / 'lib.sh', job)
+    (job / 'run').write_text('\n'.join(lines) + '\n')
+    changes = folder / 'cases.cow'
+    changes.unlink(missing_ok=True)
+    try:
+        with Guest(disc, job, changes) as guest:
+            code = guest.finish(300 + 300 * len(names), off=False)
+    except GuestError as error:
+        print(f'run.py: the guest: {error}')
+        return False
+    finally:
+        changes.unlink(missing_ok=True)
+    print((job / 'log').read_text(errors='replace'), end='')
+    if code:
+        print(f"run.py: the guest's journal is {job}/journal")
+    return code == 0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--suite', default='bookworm', choices=('bookworm', 'trixie'))
+    parser.add_argument('--build', type=Path, default=HERE.parents[1] / 'build' / 'dev',
+                        help='the build folder; the discs and logs are below it (build/dev)')
+    parser.add_argument('--packages', type=Path, help='the folder of .deb files of that Debian (BUILD/packages)')
+    parser.add_argument('--all', action='store_true', help='every case, instead of installing and purging')
+    parser.add_argument('--cuts', type=int, default=0, help='so many power cuts of an upload, and of an upgrade')
+    parser.add_argument('--seed', type=int, default=14, help='of the moments of the power cuts')
+    parser.add_argument('case', nargs='*', help='these cases alone, after install')
+    arguments = parser.parse_args()
+    if not (KERNEL / 'linux').exists():
+        print(f'run.py: skipped: no guest kernel in {KERNEL}; run tests/kernel/setup.sh')
+        return 77
+    folder = arguments.build.resolve() / 'install' / arguments.suite
+    folder.mkdir(parents=True, exist_ok=True)
+    debs = arguments.packages or arguments.build / 'packages'
+    disc = folder / 'disc.ext4'
+    made = subprocess.run([HERE / 'root.sh', arguments.suite, debs, disc], check=False)
+    if made.returncode:
+        return made.returncode
+    began = time.monotonic()
+    job = job_folder(folder / 'job', debs)
+    names = list(ALL if arguments.all else SHORT)
+    if arguments.case:
+        names = ['install'] + [name for name in arguments.case if name != 'install']
+    if arguments.cuts or set(names) - set(SHORT):
+        subprocess.run([HERE / 'calibrations.sh', arguments.build, job / 'calibrations'], check=True)
+    passed = run_cases(disc, folder, job, names)
+    if arguments.cuts:
+        moments = random.Random(arguments.seed)
+        installed = folder / 'installed.cow'
+        installed.unlink(missing_ok=True)
+        for cut in (cut_uploads, cut_upgrades):
+            try:
+                cut(disc, installed, job, moments, arguments.cuts)
+            except GuestError as error:
+                print(f'run.py: {cut.__name__}: {error}')
+                passed = False
+    print(f'run.py: {"passed" if passed else "FAILED"} in {time.monotonic() - began:.0f} s')
+    return 0 if passed else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())
