@@ -202,6 +202,13 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
           self.hub_.number_calibration(change.key, kept.value);
         }
         self.tell_calibration(change, self.in_use_);
+        // The client may be gone before somebody wonders why the change did not outlive a restart.
+        if (kept.failed()) {
+          self.config_.log({LogLevel::warning,
+                            fmt::format("calibration {} is in use, but the daemon will start with "
+                                        "the one before: {}",
+                                        change.name, kept.error)});
+        }
         const auto session = weak.lock();
         if (session == nullptr) return;
         if (kept.failed()) {
