@@ -48,6 +48,9 @@ std::vector<File> all_files(const std::filesystem::path& root) {
       8,
       "System Administration",
       {{"/etc/dtactd/dtactd.toml", "The configuration that the unit dtactd.service names."},
+       {"/etc/dtactd/NAME.toml",
+        "Of the unit dtactd@NAME.service, for a further sensor; its state and socket lie in "
+        "/var/lib/dtactd/NAME and /run/dtactd/NAME."},
        {"/var/lib/dtactd",
         "Uploaded calibrations and the last good reference, unless `state_dir` or the unit names "
         "another folder."},
