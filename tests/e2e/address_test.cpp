@@ -10,11 +10,13 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <thread>
 
 #include "clients/cpp/client.hpp"
 #include "hal/base/unique_fd.hpp"
@@ -59,6 +61,18 @@ class LateAddress : public ::testing::Test {
     ASSERT_EQ(::ioctl(v6.get(), SIOCSIFADDR, &request), 0) << std::strerror(errno);
   }
 
+  /// The kernel makes an IPv6 address's route a little after the address.
+  static client::Client connect_soon(const client::Options& options) {
+    for (const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);;) {
+      try {
+        return client::Client(options);
+      } catch (const client::ConnectionError&) {
+        if (std::chrono::steady_clock::now() > end) throw;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  }
+
   /// The daemon serves nobody before `bring` and a client after it.
   void serves_once_it_comes(const std::string& address, const std::function<void()>& bring) {
     const TempFolder state;
@@ -71,7 +85,7 @@ class LateAddress : public ::testing::Test {
     const client::Options options{.host = address, .port = daemon.port()};
     EXPECT_THROW(client::Client{options}, client::ConnectionError);
     bring();
-    const client::Client client(options);
+    const client::Client client = connect_soon(options);
     EXPECT_EQ(client.server().major(), 1U);
     EXPECT_EQ(daemon.stop(SIGTERM), 0);
   }
