@@ -21,8 +21,8 @@ from power_cut import cut_uploads, cut_upgrades
 
 HERE = Path(__file__).resolve().parent
 SHORT = ('install', 'purge')
-ALL = ('install', 'restart', 'broken_configuration', 'reload', 'state_disc', 'clock', 'two_sensors',
-       'outside', 'devices', 'upgrade', 'purge')
+ALL = ('install', 'restart', 'hung_camera', 'broken_configuration', 'reload', 'state_disc', 'clock',
+       'two_sensors', 'outside', 'devices', 'upgrade', 'purge')
 
 
 def job_folder(folder: Path, debs: Path) -> Path:
