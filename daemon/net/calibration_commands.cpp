@@ -241,7 +241,7 @@ void Commands::get_reference(const Who& who) {
 }
 
 void Commands::send_reference(const Who& who,
-                              std::shared_ptr<const pipeline::ReferenceCopy> reference) {
+                              const std::shared_ptr<const pipeline::ReferenceCopy>& reference) {
   ++reading_;
   on_worker(
       [reference] {

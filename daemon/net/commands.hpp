@@ -84,7 +84,8 @@ class Commands : public std::enable_shared_from_this<Commands> {
   void keep_calibration(const Pending& pending, const CalibrationChange& change);
   void tell_calibration(const CalibrationChange& change, std::optional<std::uint64_t> number);
   void get_reference(const Who& who);
-  void send_reference(const Who& who, std::shared_ptr<const pipeline::ReferenceCopy> reference);
+  void send_reference(const Who& who,
+                      const std::shared_ptr<const pipeline::ReferenceCopy>& reference);
   /// Runs `work` on the worker and then `done`(its result) here.
   template <typename Work, typename Done>
   void on_worker(Work work, Done done);

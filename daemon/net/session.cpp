@@ -23,7 +23,7 @@ constexpr std::chrono::milliseconds kDenial{500};
 /// How long a large message may take to arrive: the longest at 1.1 Mbit/s.
 constexpr std::chrono::milliseconds kArrival{120'000};
 /// Bytes of a message that count neither as large nor as a second request.
-constexpr std::size_t kSmall = 64 * 1024;
+constexpr std::size_t kSmall = std::size_t{64} * 1024;
 /// Bytes read at once, before Hello and after it.
 constexpr std::size_t kInputBeforeHello = 1024;
 constexpr std::size_t kInput = 16384;
@@ -126,7 +126,8 @@ bool Session::has_room() {
 }
 
 void Session::on_message() {
-  const double cost = 1.0 + static_cast<double>(decoder_.message().size() / kSmall);
+  const std::size_t small_ones = 1 + decoder_.message().size() / kSmall;
+  const auto cost = static_cast<double>(small_ones);
   if (!requests_.take(cost)) {
     return end_with(0, v1::ERROR_FLOOD,
                     fmt::format("more than {} requests a second came, each 64 kB of one counted: "

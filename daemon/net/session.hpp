@@ -75,8 +75,8 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   [[nodiscard]] bool let_in() const noexcept { return rights_.has_value(); }
   /// It has not been let in, and may never be.
   [[nodiscard]] bool stranger() const noexcept { return !rights_ && state_ != State::closed; }
-  /// Once it is greeted.
-  [[nodiscard]] Rights rights() const { return rights_.value(); }
+  /// Once it is greeted; before that it has the least.
+  [[nodiscard]] Rights rights() const noexcept { return rights_.value_or(Rights::view); }
   [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
   [[nodiscard]] const std::string& program() const noexcept { return program_; }
   /// Of the version that the client speaks.

@@ -108,8 +108,10 @@ class TcpListener : public Listener {
 
   void start() override { loop_->accept(); }
   void stop() override { loop_->stop(); }
-  const std::string& address() const override { return address_; }
-  std::uint16_t port() const override { return loop_->acceptor().local_endpoint().port(); }
+  [[nodiscard]] const std::string& address() const override { return address_; }
+  [[nodiscard]] std::uint16_t port() const override {
+    return loop_->acceptor().local_endpoint().port();
+  }
 
  private:
   std::shared_ptr<AcceptLoop<tcp>> loop_;

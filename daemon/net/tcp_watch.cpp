@@ -31,8 +31,9 @@ bool PeerJudge::alive(const TcpProgress& progress, Clock::time_point now) {
   return std::min(standing_, progress.since_ack) < dead_after_ * 3 / 4;
 }
 
-TcpWatch::TcpWatch(boost::asio::any_io_executor executor, int socket, milliseconds dead_after)
-    : timer_(std::move(executor)), socket_(socket), judge_(dead_after, PeerJudge::Clock::now()) {
+TcpWatch::TcpWatch(const boost::asio::any_io_executor& executor, int socket,
+                   milliseconds dead_after)
+    : timer_(executor), socket_(socket), judge_(dead_after, PeerJudge::Clock::now()) {
   set(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, judge_.user_timeout().count());
   // An idle client has nothing unacknowledged: probe it, so that a vanished one is let go.
   const auto seconds = [](milliseconds time) {

@@ -47,7 +47,8 @@ class PeerJudge {
 class TcpWatch : public std::enable_shared_from_this<TcpWatch> {
  public:
   /// Sets the socket's keep-alive and TCP_USER_TIMEOUT. `socket` is only looked at.
-  TcpWatch(boost::asio::any_io_executor executor, int socket, std::chrono::milliseconds dead_after);
+  TcpWatch(const boost::asio::any_io_executor& executor, int socket,
+           std::chrono::milliseconds dead_after);
 
   /// Calls `on_dead` once when the peer is gone, unless stop() came before.
   void start(std::function<void()> on_dead);

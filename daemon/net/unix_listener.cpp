@@ -112,8 +112,8 @@ class UnixListener : public Listener {
 
   void start() override { loop_->accept(); }
   void stop() override { loop_->stop(); }
-  const std::string& address() const override { return address_; }
-  std::uint16_t port() const override { return 0; }
+  [[nodiscard]] const std::string& address() const override { return address_; }
+  [[nodiscard]] std::uint16_t port() const override { return 0; }
 
  private:
   std::string address_;
