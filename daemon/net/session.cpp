@@ -269,6 +269,7 @@ void Session::send(const v1::ServerMessage& message, bool first) {
 void Session::subscribe(const Subscription& subscription) {
   subscription_ = subscription;
   outbox_.drop_frame();
+  waiting_ = 0;
 }
 
 std::optional<FrameKind> Session::due(std::int64_t timestamp_ns, std::uint64_t missed) {

@@ -132,6 +132,34 @@ TEST(StoppedReader, IsNotMadeFramesForUntilItReadsOn) {
   EXPECT_EQ(encoded(asking), 63U);
 }
 
+TEST(StoppedReader, IsOwedNothingOfASubscriptionThatItHasLeft) {
+  Rig rig;
+  RawClient stopped(rig.tcp_port(), kSmallBuffer);
+  stopped.hello();
+  v1::ClientMessage both;
+  both.mutable_subscribe()->set_depth(v1::DEPTH_INT16);
+  both.mutable_subscribe()->set_jpeg(true);
+  ASSERT_TRUE(stopped.request(both).has_done());
+  auto frame = make_frame(1, 800, 600);
+  frame.has_jpeg = true;
+  frame.jpeg.assign(1000, 7);
+  for (frame.camera.sequence = 1; frame.camera.sequence <= 100; ++frame.camera.sequence) {
+    rig.port.publish(frame);
+    ASSERT_TRUE(rig.port.wait_fetched());
+  }
+  v1::ClientMessage depth;
+  depth.set_id(2);
+  depth.mutable_subscribe()->set_depth(v1::DEPTH_INT16);
+  stopped.send(depth);
+  EXPECT_TRUE(stopped.frame().has_jpeg());
+  EXPECT_TRUE(stopped.reply().has_done());
+
+  rig.port.publish(frame);
+  const auto next = stopped.frame();
+  EXPECT_TRUE(next.has_depth());
+  EXPECT_FALSE(next.has_jpeg());
+}
+
 /// The thread gets a network of its own, in which only loopback is up, and goes back at the end.
 class OwnNetwork {
  public:
