@@ -1,39 +1,74 @@
 #include "daemon/app/service.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <cstring>
 #include <stdexcept>
 
 #include "daemon/app/config.hpp"
+#include "hal/base/unique_fd.hpp"
 
 namespace dtact::app {
 
-void notify_ready(const std::string& status) {
-  sd_notify(0, ("READY=1\nSTATUS=" + status).c_str());
+namespace {
+
+/// What the manager waits for may wait for it: systemd that is busy reads on within moments.
+constexpr int kPatienceMs = 5000;
+
+/// sd_notify(3)'s datagram (its notes state the protocol). sd_notify() itself waits without end for
+/// a manager that does not read, and the network with it. False: not sent within `patience_ms`.
+bool notify(const std::string& message, int patience_ms) {
+  const char* name = std::getenv("NOTIFY_SOCKET");
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::size_t length = name == nullptr ? 0 : std::strlen(name);
+  if (length < 2 || length >= sizeof address.sun_path) return true;
+  std::memcpy(static_cast<char*>(address.sun_path), name, length);
+  // An abstract name: its first byte is zero, and its length counts.
+  if (name[0] == '@') address.sun_path[0] = '\0';
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + length);
+  const base::UniqueFd socket(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!socket || ::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0) {
+    return true;
+  }
+  pollfd writable{socket.get(), POLLOUT, 0};
+  if (patience_ms > 0) (void)::poll(&writable, 1, patience_ms);
+  return ::send(socket.get(), message.data(), message.size(), MSG_NOSIGNAL) >= 0 || errno != EAGAIN;
 }
-void notify_status(const std::string& status) { sd_notify(0, ("STATUS=" + status).c_str()); }
-void notify_stopping() { sd_notify(0, "STOPPING=1"); }
+
+}  // namespace
+
+void notify_ready(const std::string& status) {
+  (void)notify("READY=1\nSTATUS=" + status, kPatienceMs);
+}
+bool notify_status(const std::string& status) { return notify("STATUS=" + status, 0); }
+void notify_stopping() { (void)notify("STOPPING=1", kPatienceMs); }
 
 void notify_reloading() {
   using std::chrono::duration_cast;
   using std::chrono::microseconds;
   // CLOCK_MONOTONIC on Linux.
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
-  sd_notify(0,
-            fmt::format("RELOADING=1\nMONOTONIC_USEC={}", duration_cast<microseconds>(now).count())
-                .c_str());
+  (void)notify(
+      fmt::format("RELOADING=1\nMONOTONIC_USEC={}", duration_cast<microseconds>(now).count()),
+      kPatienceMs);
 }
 
 unsigned long long watchdog_interval_us() {
   std::uint64_t interval = 0;
   return sd_watchdog_enabled(0, &interval) > 0 ? interval / 2 : 0;
 }
-void notify_alive() { sd_notify(0, "WATCHDOG=1"); }
+void notify_alive() { (void)notify("WATCHDOG=1", 0); }
 
 namespace {
 

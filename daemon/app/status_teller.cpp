@@ -36,7 +36,7 @@ void StatusTeller::wait() {
     if (error) return;
     const pipeline::Status status = status_();
     const std::string text = status_text(status, note_, listening_);
-    if (std::exchange(told_, text) != text) notify_status(text);
+    if (told_ != text && notify_status(text)) told_ = text;
     for (const auto& line : conditions_.step(status, std::chrono::steady_clock::now())) {
       log_line(line.warning ? spdlog::level::warn : spdlog::level::info, line.text,
                {{"DTACT_CONDITION", line.condition}});

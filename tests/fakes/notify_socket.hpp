@@ -19,7 +19,8 @@
 
 namespace dtact::fakes {
 
-/// The service manager's end of sd_notify(3): what $NOTIFY_SOCKET names.
+/// The service manager's end of sd_notify(3): what $NOTIFY_SOCKET names, a file or, behind an @, an
+/// abstract name.
 class NotifySocket {
  public:
   explicit NotifySocket(std::filesystem::path path)
@@ -27,7 +28,10 @@ class NotifySocket {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::strncpy(address.sun_path, path_.c_str(), sizeof address.sun_path - 1);
-    if (::bind(receiver_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    if (address.sun_path[0] == '@') address.sun_path[0] = '\0';
+    const auto size =
+        static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + path_.native().size());
+    if (::bind(receiver_.get(), reinterpret_cast<const sockaddr*>(&address), size) != 0) {
       throw std::runtime_error("cannot bind " + path_.string());
     }
   }

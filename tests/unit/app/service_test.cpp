@@ -32,6 +32,30 @@ TEST(Service, TellsReadinessWithStatus) {
   EXPECT_EQ(manager.next(std::chrono::seconds(10)), "READY=1\nSTATUS=listening");
 }
 
+// The queue of such a socket holds net.unix.max_dgram_qlen messages.
+TEST(Service, DoesNotWaitForAManagerThatDoesNotRead) {
+  const fakes::NotifySocket manager(std::filesystem::path(::testing::TempDir()) /
+                                    ("dtact_notify_" + std::to_string(::getpid())));
+  ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
+  int told = 0;
+  while (told < 100'000 && notify_status("serving")) ++told;
+  notify_alive();
+  EXPECT_LT(told, 100'000);
+  EXPECT_GE(told, 1);
+  EXPECT_EQ(manager.next(std::chrono::seconds(10)), "STATUS=serving");
+  EXPECT_TRUE(notify_status("serving again"));
+  ::unsetenv("NOTIFY_SOCKET");
+}
+
+TEST(Service, FindsAManagerByAnAbstractName) {
+  const std::string name = "@dtact_notify_" + std::to_string(::getpid());
+  const fakes::NotifySocket manager(name);
+  ::setenv("NOTIFY_SOCKET", name.c_str(), 1);
+  notify_stopping();
+  ::unsetenv("NOTIFY_SOCKET");
+  EXPECT_EQ(manager.next(std::chrono::seconds(10)), "STOPPING=1");
+}
+
 TEST(Service, WatchdogIsFedTwiceAnInterval) {
   ::setenv("WATCHDOG_USEC", "10000000", 1);
   EXPECT_EQ(watchdog_interval_us(), 5'000'000U);
