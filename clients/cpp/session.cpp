@@ -69,10 +69,9 @@ void Session::open(const Limit& limit) {
 void Session::reopen(int wake) {
   const Limit limit{Clock::now() + options_.timeout, wake};
   const std::size_t before = inbox_.size();
-  inbox_.emplace_back(
-      Reconnected{loss_.value().reason,
-                  std::chrono::floor<std::chrono::milliseconds>(Clock::now() - loss_.value().since),
-                  last_sequence_});
+  inbox_.emplace_back(Reconnected{
+      loss_.reason, std::chrono::floor<std::chrono::milliseconds>(Clock::now() - loss_.since),
+      last_sequence_});
   try {
     open(limit);
     if (subscription_) {
@@ -90,23 +89,23 @@ void Session::reopen(int wake) {
     }
     throw;
   }
-  loss_.reset();
+  lost_ = false;
 }
 
 void Session::lose(const std::string& reason) {
   const auto now = Clock::now();
   connection_.reset();
-  if (!loss_) {
-    loss_ = Loss{reason, now, now};
+  if (!std::exchange(lost_, true)) {
+    loss_ = {reason, now, now};
     // A daemon that takes the connection and ends it at once is not asked any oftener for that.
-    if (now - opened_ > options_.reconnect.value().max) backoff_.reset();
+    if (options_.reconnect && now - opened_ > options_.reconnect->max) backoff_.reset();
   }
-  loss_->retry_at = now + backoff_.next();
+  loss_.retry_at = now + backoff_.next();
 }
 
 bool Session::wait_for_turn(const Limit& limit) const {
-  (void)wait(-1, 0, {std::min(limit.end, loss_.value().retry_at), limit.wake});
-  return Clock::now() >= loss_.value().retry_at;
+  (void)wait(-1, 0, {std::min(limit.end, loss_.retry_at), limit.wake});
+  return Clock::now() >= loss_.retry_at;
 }
 
 std::optional<v1::ServerMessage> Session::receive(const Limit& limit) {
@@ -161,7 +160,7 @@ v1::Reply Session::exchange(v1::ClientMessage& message, const Limit& limit) {
 
 v1::Reply Session::request(v1::ClientMessage& message, std::chrono::milliseconds timeout) {
   if (!connection_) {
-    if (Clock::now() < loss_.value().retry_at) throw ConnectionError(loss_.value().reason);
+    if (Clock::now() < loss_.retry_at) throw ConnectionError(loss_.reason);
     reopen(-1);
   }
   try {

@@ -59,7 +59,8 @@ class Session {
   std::uint64_t next_id_ = 1;
   std::uint64_t last_sequence_ = 0;
   std::deque<Item> inbox_;
-  std::optional<Loss> loss_;
+  Loss loss_;          ///< What the connection was lost by, while `lost_`.
+  bool lost_ = false;  ///< From then until one is open again, subscription and all.
   Clock::time_point opened_;
   BackOff backoff_;
 };

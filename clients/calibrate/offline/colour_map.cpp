@@ -74,7 +74,7 @@ void draw_map(Picture picture, const cli::DepthImage& depth, const Range& range)
 }
 
 void draw_legend(Picture& picture, const Range& range, int left, int top, int height) {
-  cv::Mat1b parts(height, kBarWidth);
+  const cv::Mat1b parts(height, kBarWidth);
   for (int y = 0; y < height; ++y) {
     parts.row(y) = cv::saturate_cast<std::uint8_t>(255 * (1 - (y + 0.5) / height));
   }

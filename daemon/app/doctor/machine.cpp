@@ -31,7 +31,7 @@ fs::path Machine::below_root(const std::string& path) const {
 }
 
 std::string Machine::text(const std::string& path) const {
-  std::ifstream file(below_root(path), std::ios::binary);
+  const std::ifstream file(below_root(path), std::ios::binary);
   std::ostringstream content;
   content << file.rdbuf();
   return content.str();
@@ -50,7 +50,7 @@ std::vector<std::string> Machine::list(const std::string& folder, const std::str
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(below_root(folder), ignored)) {
     const std::string name = entry.path().filename();
-    if (name.starts_with(prefix)) paths.push_back(folder + "/" + name);
+    if (name.starts_with(prefix)) paths.push_back(fs::path(folder) / name);
   }
   std::sort(paths.begin(), paths.end());
   return paths;
