@@ -45,14 +45,14 @@ Picture grey_of(int width, int height, const std::vector<float>& levels) {
 
 /// The camera's view of the board with the pins found and, twenty times as long, how far each is
 /// from where the lens through all others expects it.
-std::string pins_png(const FolderEvaluation& e) {
+std::string pins_png(const FolderEvaluation& e, const PinPress& pins) {
   constexpr double kLonger = 20;
   const cv::Mat1f levels(mean_levels(e.board_reference) - mean_levels(e.board));
   Picture picture = grey_of(levels.cols, levels.rows, {levels.begin(), levels.end()});
-  for (std::size_t i = 0; i < e.pins->marks.size(); ++i) {
-    const recon::Point px = e.pins->marks[i].px;
-    const recon::Point residual = e.pins->lens.left_out[i];
-    const double scale = kLonger / recon::central_mm_per_px(e.pins->lens.lens);
+  for (std::size_t i = 0; i < pins.marks.size(); ++i) {
+    const recon::Point px = pins.marks[i].px;
+    const recon::Point residual = pins.lens.left_out[i];
+    const double scale = kLonger / recon::central_mm_per_px(pins.lens.lens);
     cross(picture, px, 5, kFound);
     cv::line(picture, cv::Point2d(px.x, px.y),
              cv::Point2d(px.x + scale * residual.x, px.y + scale * residual.y), kIdeal);
@@ -61,9 +61,9 @@ std::string pins_png(const FolderEvaluation& e) {
 }
 
 /// The board as the lens rectifies it, with the ideal grid.
-std::string grid_png(const FolderEvaluation& e) {
+std::string grid_png(const FolderEvaluation& e, const PinPress& pins) {
   const cv::Mat1f levels(mean_levels(e.board_reference) - mean_levels(e.board));
-  const recon::Lens& lens = e.pins->lens.lens;
+  const recon::Lens& lens = pins.lens.lens;
   const recon::MapPlace place{0, 0, levels.cols, levels.rows, recon::central_mm_per_px(lens)};
   std::vector<std::uint8_t> outside;
   const recon::RectifyTable table = make_lens_table(lens, levels.cols, levels.rows, place, outside);
@@ -76,7 +76,7 @@ std::string grid_png(const FolderEvaluation& e) {
   }
   Picture picture = grey_of(place.width, place.height, rectified);
   const recon::Point corner = surface_point(lens, place, 0, 0);
-  for (const Mark& mark : e.pins->marks) {
+  for (const Mark& mark : pins.marks) {
     cross(picture,
           {(mark.mm.x - corner.x) / place.mm_per_px, (mark.mm.y - corner.y) / place.mm_per_px}, 7,
           kIdeal);
@@ -84,8 +84,7 @@ std::string grid_png(const FolderEvaluation& e) {
   return image::encode_png(to_image(picture));
 }
 
-std::string depth_png(const FolderEvaluation& e, const ImageSet& reference, const ImageSet& press) {
-  const recon::Model& model = *e.calibration->model;
+std::string depth_png(const recon::Model& model, const ImageSet& reference, const ImageSet& press) {
   std::vector<float> mm =
       calibration::mean_depth_um(model, reference.mean_q8().pixels, press.frames());
   for (float& value : mm) value *= 0.001F;
@@ -133,11 +132,14 @@ void write_page(const FolderEvaluation& e, const std::string& name,
                 const std::filesystem::path& folder) {
   base::FolderFiles files;
   if (e.pins) {
-    files.emplace_back("pins.png", pins_png(e));
-    files.emplace_back("grid.png", grid_png(e));
+    files.emplace_back("pins.png", pins_png(e, *e.pins));
+    files.emplace_back("grid.png", grid_png(e, *e.pins));
   }
-  if (e.ball) files.emplace_back("ball.png", depth_png(e, e.ball_reference, e.ball_images));
-  if (e.pin_depths) files.emplace_back("board.png", depth_png(e, e.board_reference, e.board));
+  if (e.calibration) {
+    const recon::Model& model = *e.calibration->model;
+    if (e.ball) files.emplace_back("ball.png", depth_png(model, e.ball_reference, e.ball_images));
+    if (e.pin_depths) files.emplace_back("board.png", depth_png(model, e.board_reference, e.board));
+  }
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>\n"
       "<style>body{{font-family:sans-serif;max-width:60em;margin:2em auto;padding:0 1em}}"
