@@ -1,12 +1,13 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <stdexcept>
 #include <string_view>
 
+#include "daemon/calibration/array_text.hpp"
 #include "daemon/calibration/gain_table.hpp"
 #include "daemon/calibration/lens_file.hpp"
+#include "daemon/calibration/list_tables.hpp"
 #include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/sensor_file.hpp"
 #include "daemon/calibration/sha256.hpp"
@@ -16,18 +17,6 @@
 
 namespace dtact::calibration {
 namespace {
-
-/// A TOML array, broken into lines that an editor can show.
-template <typename Value>
-std::string array_text(const std::vector<Value>& values) {
-  constexpr std::size_t kPerLine = 16;
-  std::string out = "[";
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    out += i % kPerLine == 0 ? "\n  " : " ";
-    out += fmt::format("{},", values[i]);
-  }
-  return out + "\n]";
-}
 
 bool same(const recon::RectifyTable& a, const recon::RectifyTable& b) {
   return std::ranges::equal(a.entries, b.entries, [](const auto& p, const auto& q) {
@@ -47,14 +36,6 @@ std::vector<std::int64_t> runs_of(const std::vector<std::uint8_t>& mask) {
     ++runs.back();
   }
   return runs;
-}
-
-std::vector<double> column(const std::vector<recon::Model::Uncertainty>& rows,
-                           double recon::Model::Uncertainty::* field) {
-  std::vector<double> values;
-  values.reserve(rows.size());
-  for (const auto& row : rows) values.push_back(row.*field);
-  return values;
 }
 
 }  // namespace
@@ -107,19 +88,7 @@ Files format(const Calibration& calibration) {
       calibration.lens ? format_lens(*calibration.lens) : "");
   t += "# Reserved for a curved surface. Empty: none.\n[surface]\n\n";
   t += format_gain(model.gain);
-  if (!model.uncertainty.empty()) {
-    t += "[uncertainty]  # of the list: mean absolute error in micrometres at some indentations\n";
-    t += fmt::format("depth_mm = {}\nerror_um = {}\n\n",
-                     array_text(column(model.uncertainty, &recon::Model::Uncertainty::depth_mm)),
-                     array_text(column(model.uncertainty, &recon::Model::Uncertainty::error_um)));
-  }
-  t += fmt::format(
-      "# Indentation in micrometres, positive = pressed, of the darkening first_q6/64 "
-      "grey levels and\n# on, 64 entries a level. Covered: what the calibration "
-      "vouches for.\n[list]\nfirst_q6 = {}\n"
-      "covered_from_q6 = {}\ncovered_to_q6 = {}\num = {}\n",
-      model.list.first_q6, model.list.covered_from_q6, model.list.covered_to_q6,
-      array_text(model.list.um));
+  t += format_lists(model);
   return files;
 }
 

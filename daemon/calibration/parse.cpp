@@ -6,6 +6,7 @@
 
 #include "daemon/calibration/gain_table.hpp"
 #include "daemon/calibration/lens_file.hpp"
+#include "daemon/calibration/list_tables.hpp"
 #include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/sensor_file.hpp"
 #include "daemon/calibration/sha256.hpp"
@@ -59,22 +60,6 @@ int small(tomlfile::KeyReader& reader, const char* key, int low, int high) {
   return static_cast<int>(reader.integer(key, low, high));
 }
 
-void read_list(tomlfile::KeyReader list, bool monotone, recon::DepthList& out) {
-  constexpr int kReach = 255 * recon::kEntriesPerLevel;
-  out.first_q6 = small(list, "first_q6", -kReach, kReach);
-  out.covered_from_q6 = small(list, "covered_from_q6", -kReach, kReach);
-  out.covered_to_q6 = small(list, "covered_to_q6", -kReach, kReach);
-  for (const std::int64_t um : list.integers("um", -16383, 16383)) {
-    out.um.push_back(static_cast<std::int16_t>(um));
-  }
-  list.finish();
-  try {
-    recon::check(out, monotone);
-  } catch (const std::invalid_argument& e) {
-    list.fail("", e.what());
-  }
-}
-
 void read_reference(tomlfile::KeyReader reader, const std::string& png, const std::string& where,
                     recon::Model& model) {
   const std::string expected = sha256_key(reader);
@@ -95,15 +80,6 @@ void read_reference(tomlfile::KeyReader reader, const std::string& png, const st
         "", fmt::format("{} has values above 65280 (grey level 255 times 256)", kReferenceName));
   }
   model.reference_q8 = std::move(image.pixels);
-}
-
-void read_uncertainty(tomlfile::KeyReader reader, std::vector<recon::Model::Uncertainty>& out) {
-  const std::vector<double> depths = reader.numbers("depth_mm", 0, 16.383);
-  const std::vector<double> errors = reader.numbers("error_um", 0, 16383);
-  if (depths.size() != errors.size()) reader.fail("error_um", "expected one for each depth_mm");
-  if (!std::ranges::is_sorted(depths)) reader.fail("depth_mm", "expected ascending values");
-  for (std::size_t i = 0; i < depths.size(); ++i) out.push_back({depths[i], errors[i]});
-  reader.finish();
 }
 
 /// Tables that later versions fill. What this program cannot apply it must not pass over.
@@ -160,9 +136,8 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
       calibration.lens, frame_width, frame_height,
       {calibration.crop_col, calibration.crop_row, width, height, model->mm_per_px}, outside);
 
-  read_list(top.table("list"), model->method == recon::Method::list, model->list);
+  read_lists(top, *model);
   if (top.has("gain")) model->gain = read_gain(top.table("gain"));
-  if (top.has("uncertainty")) read_uncertainty(top.table("uncertainty"), model->uncertainty);
   read_camera_and_light(top, calibration.origin);
   for (tomlfile::KeyReader& source : top.tables("source")) {
     calibration.origin.sources.push_back({source.text("name"), sha256_key(source)});

@@ -36,6 +36,18 @@ void check(const Model& model) {
           "untrusted: not the size of the depth map");
   require(model.mm_per_px > 0, "scale: mm_per_px must be positive");
   check(model.list, model.method == Method::list);
+  if (model.scattering) check(*model.scattering);
+  int before = 0;
+  for (const Model::Sharpened& sharpened : model.sharpened) {
+    require(model.method == Method::list, "sharpened: the published method has no such lists");
+    require(model.scattering.has_value(),
+            "sharpened: its lists need the scattering that their levels were sharpened by");
+    require(sharpened.steps >= 1 && sharpened.steps <= kMostSharpeningSteps,
+            "sharpened: steps must be 1 or 2");
+    require(sharpened.steps > before, "sharpened: steps must rise from one list to the next");
+    before = sharpened.steps;
+    check(sharpened.list, true);
+  }
 }
 
 }  // namespace dtact::recon

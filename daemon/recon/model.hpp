@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "daemon/recon/list.hpp"
 #include "daemon/recon/rectify.hpp"
+#include "daemon/recon/scattering.hpp"
 #include "daemon/recon/spatial_gain.hpp"
 
 namespace dtact::recon {
@@ -38,6 +40,16 @@ struct Model {
     double error_um = 0;
   };
   std::vector<Uncertainty> uncertainty;
+  /// How the layer spreads light sideways, as fitted. None: not known, nothing can be sharpened.
+  std::optional<Scattering> scattering;
+  /// A list holds for the levels of one filter only: these are for levels sharpened by so many
+  /// steps. Ascending, each of 1 and 2 at most once; with `scattering` and Method::list only.
+  struct Sharpened {
+    int steps = 0;
+    DepthList list;
+    std::vector<Uncertainty> uncertainty;
+  };
+  std::vector<Sharpened> sharpened;
   SpatialGain gain;  ///< Of Method::list.
   /// The untouched image at calibration time, frame sized, Q8 luma (0…65280), row-major without
   /// padding: brings a differently lit image back to the calibration's light.

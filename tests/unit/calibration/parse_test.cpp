@@ -157,9 +157,44 @@ TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {
   std::string old = files.toml;
   const auto from = old.find("[gain]");
   old.replace(from, old.find("# Indentation", from) - from, "[gain]\n");
+  old.resize(old.find("[[sharpened]]"));
   const Calibration parsed = parse(old, files.reference_png, "upload");
   EXPECT_EQ(parsed.model->gain.shape, recon::GainShape::none);
   EXPECT_TRUE(parsed.model->uncertainty.empty());
+  EXPECT_FALSE(parsed.model->scattering);
+  EXPECT_TRUE(parsed.model->sharpened.empty());
+}
+
+TEST(ParseCalibration, ScatteringIsChecked) {
+  expect_refused(with("narrow_mm = 0.28", "narrow_mm = 0.001"), "scattering.narrow_mm",
+                 "from 0.01 to 5");
+  expect_refused(with("narrow_mm = 0.28", "narrow_mm = 1.5"), "scattering.wide_mm",
+                 "above narrow_mm");
+  expect_refused(with("wide_mm = 1.23", "wide_mm = 20.5"), "scattering.wide_mm", "to 20");
+  expect_refused(with("narrow_weight = 0.7", "narrow_weight = 1.01"), "scattering.narrow_weight",
+                 "from 0 to 1");
+  expect_refused(with("narrow_weight = 0.7", ""), "scattering.narrow_weight", "missing");
+  expect_refused(with("narrow_weight = 0.7", "weight = 0.7\nnarrow_weight = 0.7"),
+                 "scattering.weight", "unknown key");
+}
+
+TEST(ParseCalibration, SharpenedListsAreChecked) {
+  expect_refused(with("steps = 1", "steps = 0"), "sharpened[0].steps", "from 1 to 2");
+  expect_refused(with("steps = 2", "steps = 3"), "sharpened[1].steps", "from 1 to 2");
+  expect_refused(with("steps = 2", "steps = 1"), "sharpened[1].steps", "which has 1");
+  expect_refused(with("-9, 0, 9", "-9, 0, -10"), "sharpened[0]", "entry 3");
+  expect_refused(with("-8, -4, -1, 0,", "-8,"), "sharpened[1]", "list.covered_from_q6");
+  expect_refused(with("  0.5,", "  0.5, 0.6,"), "sharpened[0].error_um", "one for each");
+  expect_refused(with("steps = 2", "steps = 2\nradius = 1"), "sharpened[1].radius", "unknown key");
+}
+
+TEST(ParseCalibration, SharpenedListsNeedTheirScattering) {
+  const std::string toml = format(sample()).toml;
+  const auto from = toml.find("[scattering]");
+  const std::string without = toml.substr(0, from) + toml.substr(toml.find("# Indentation", from));
+  expect_refused(without, "sharpened[0]", "[scattering]");
+  expect_refused(with("method = \"list\"", "method = \"published\""), "sharpened[0]",
+                 "\"published\" has no such lists");
 }
 
 TEST(ParseCalibration, RefusesAnotherReference) {

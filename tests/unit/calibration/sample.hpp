@@ -26,6 +26,14 @@ inline Calibration sample() {
   model->untrusted.assign(30, 0);
   model->untrusted[0] = model->untrusted[7] = model->untrusted[8] = model->untrusted[29] = 1;
   model->uncertainty = {{0.25, 12.5}, {1.1, 20}};
+  model->scattering = recon::Scattering{.narrow_mm = 0.28, .wide_mm = 1.23, .narrow_weight = 0.7};
+  model->sharpened = {
+      {.steps = 1,
+       .list = {.first_q6 = -1, .um = {-9, 0, 9, 18}, .covered_from_q6 = 0, .covered_to_q6 = 1},
+       .uncertainty = {{0.5, 15}}},
+      {.steps = 2,
+       .list = {.first_q6 = -3, .um = {-8, -4, -1, 0}, .covered_from_q6 = -2, .covered_to_q6 = 0},
+       .uncertainty = {}}};
   model->gain = {.shape = recon::GainShape::radial,
                  .centre_x_mm = 1.5,
                  .centre_y_mm = -2,
