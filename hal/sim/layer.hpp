@@ -7,7 +7,7 @@ namespace dtact::hal::sim {
 /// What a press does to the layer. Matrices are the grid's size, double.
 struct Pressed {
   cv::Mat1d indentation_mm;  ///< Positive = pressed, negative = bulge.
-  cv::Mat1d pressure;        ///< In units of Young's modulus per mm; > 0 exactly where they touch.
+  cv::Mat1d pressure;        ///< In units of Young's modulus; > 0 exactly where they touch.
   int iterations = 0;
 };
 
@@ -17,7 +17,8 @@ struct Pressed {
 ///     C(k) = 3/(2·E·k) · (sinh 2kh − 2kh) / (cosh 2kh + 1 + 2(kh)²),   C(0) = 0
 ///
 /// (K. L. Johnson, Contact Mechanics, section 5.8, for ν = 0.5; C(0) = 0 conserves the volume.) E
-/// cancels for a press of given depth and is 1 here.
+/// cancels for a press of given depth and is 1 here; the force on the object is the sum of the
+/// pressure times Young's modulus times a grid point's area.
 class Layer {
  public:
   /// Grid points `spacing_mm` apart; sizes whose prime factors are 2, 3, 5 are fast.

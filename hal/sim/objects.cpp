@@ -38,22 +38,33 @@ double threaded_rod(double x, double y, double diameter, double pitch, double le
   return std::abs(y) < r ? radius - std::sqrt(r * r - y * y) : kNoSurface;
 }
 
+// The same on its upper side: `radius` is where it is widest.
+Object round_all_over(Object object, double radius) {
+  object.top_mm = [radius, height = object.height_mm](double x, double y) {
+    return 2 * radius - height(x, y);
+  };
+  return object;
+}
+
 }  // namespace
 
 Object ball(double radius) {
-  return {"ball", radius, [=](double x, double y) { return round_top(radius, std::hypot(x, y)); }};
+  return round_all_over(
+      {"ball", radius, [=](double x, double y) { return round_top(radius, std::hypot(x, y)); }},
+      radius);
 }
 
 Object ball_array(double radius, double pitch, int rows, int columns) {
   const double right = (columns - 1) * pitch / 2;
   const double bottom = (rows - 1) * pitch / 2;
-  return {"ball_array", std::hypot(right, bottom) + radius, [=](double x, double y) {
-            const double nx =
-                std::clamp(std::round((x + right) / pitch), 0.0, static_cast<double>(columns - 1));
-            const double ny =
-                std::clamp(std::round((y + bottom) / pitch), 0.0, static_cast<double>(rows - 1));
-            return round_top(radius, std::hypot(x + right - nx * pitch, y + bottom - ny * pitch));
-          }};
+  const auto height = [=](double x, double y) {
+    const double nx =
+        std::clamp(std::round((x + right) / pitch), 0.0, static_cast<double>(columns - 1));
+    const double ny =
+        std::clamp(std::round((y + bottom) / pitch), 0.0, static_cast<double>(rows - 1));
+    return round_top(radius, std::hypot(x + right - nx * pitch, y + bottom - ny * pitch));
+  };
+  return round_all_over({"ball_array", std::hypot(right, bottom) + radius, height}, radius);
 }
 
 Object disc(double radius) {
@@ -68,9 +79,10 @@ Object cube(double side) {
 }
 
 Object cylinder(double radius, double length) {
-  return {"cylinder", std::hypot(radius, length / 2), [=](double x, double y) {
-            return std::abs(x) <= length / 2 ? round_top(radius, std::abs(y)) : kNoSurface;
-          }};
+  const auto height = [=](double x, double y) {
+    return std::abs(x) <= length / 2 ? round_top(radius, std::abs(y)) : kNoSurface;
+  };
+  return round_all_over({"cylinder", std::hypot(radius, length / 2), height}, radius);
 }
 
 Object grating(double pitch, double groove_depth, double side) {

@@ -9,13 +9,16 @@ namespace dtact::hal::sim {
 /// Height of the places where an object has no surface at all, mm.
 inline constexpr double kNoSurface = 1e3;
 
-/// A rigid thing that is pressed into the layer, in its own frame: origin at its centre, x and y in
-/// the plane of the layer.
+/// A rigid thing that is pressed into the layer, in its own frame: origin at its centre on the
+/// level of its lowest point, x and y in the plane of the layer, z away from the camera.
 struct Object {
   std::string kind;     ///< The name it has in a scene.
   double reach_mm = 0;  ///< Radius of a circle about the origin that holds all of it.
   /// Height of its surface at (x, y) above its lowest point, mm, ≥ 0; kNoSurface beside it.
   std::function<double(double x_mm, double y_mm)> height_mm;
+  /// The same of its upper surface, wherever it has a lower one. None: its outline goes on straight
+  /// up without end, which nothing but a tilt of most of a right angle could tell.
+  std::function<double(double x_mm, double y_mm)> top_mm = nullptr;
 };
 
 /// Lengths in mm. Sources of the real dimensions stand with each definition.

@@ -1,5 +1,6 @@
 // dtact-sim-render: frames of a simulated scene as PNG files, for calibration and for looking at.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <charconv>
@@ -28,6 +29,7 @@ struct Arguments {
   int brightness = 255;
   bool average = false;
   std::filesystem::path output;
+  std::filesystem::path truth;
 };
 
 struct Range {
@@ -49,6 +51,32 @@ Range parse_range(const std::string& text) {
       "--frames {}: must be a frame or first:end with end after first, as in 200:210", text));
 }
 
+// A line for each frame: its number, the scene's time, the force, and of every press (numbered as
+// in the scene) its object's pose, empty while that is away.
+std::string truth_csv(const sim::Truth& truth, const Range& range) {
+  const std::size_t presses = truth.scene().presses.size();
+  std::string csv = "frame,time_s,force_n";
+  for (std::size_t i = 0; i < presses; ++i) {
+    for (const char* column : {"x_mm", "y_mm", "z_mm", "turn_x_deg", "turn_y_deg", "turn_z_deg"}) {
+      csv += fmt::format(",{}_{}", column, i);
+    }
+  }
+  csv += '\n';
+  for (std::uint64_t n = range.first; n < range.end; ++n) {
+    csv += fmt::format("{},{},{}", n, truth.scene().time_s(n), truth.force_n(n));
+    for (std::size_t i = 0; i < presses; ++i) {
+      if (const auto pose = truth.pose(i, n)) {
+        csv += fmt::format(",{},{},{},{}", pose->x_mm, pose->y_mm, pose->z_mm,
+                           fmt::join(pose->turn_deg, ","));
+      } else {
+        csv += ",,,,,,";
+      }
+    }
+    csv += '\n';
+  }
+  return csv;
+}
+
 void render(const Arguments& arguments) {
   const sim::Scene scene =
       arguments.scene.empty() ? sim::default_scene() : sim::load_scene(arguments.scene);
@@ -57,6 +85,9 @@ void render(const Arguments& arguments) {
   Light light;
   light.brightness = static_cast<std::uint8_t>(arguments.brightness);
   const sim::LedLevels levels = sim::led_levels(light);
+  if (!arguments.truth.empty()) {
+    dtact::base::write_file_atomically(arguments.truth, truth_csv(renderer.truth(), range));
+  }
 
   const auto pixels =
       static_cast<std::size_t>(scene.camera.width) * static_cast<std::size_t>(scene.camera.height);
@@ -101,6 +132,8 @@ int main(int argc, char** argv) {
     app.add_flag("--average", arguments.average, "one 16-bit image, the mean of the frames");
     app.add_option("-o,--output", arguments.output, "PNG file for one image, folder for several")
         ->required();
+    app.add_option("--truth", arguments.truth,
+                   "CSV file: the true force and the objects' poses in each of the frames");
     CLI11_PARSE(app, argc, argv);
     render(arguments);
     return 0;

@@ -20,6 +20,10 @@ using tomlfile::KeyReader;
 // no longer holds.
 constexpr double kDeepest = 0.9;  // of the layer's thickness
 
+// About either axis. The lowest point of an object that is tilted farther may lie on its upper
+// side.
+constexpr double kMostTilt = 60;  // degrees
+
 const std::vector<std::string> kObjects = {
     "ball",      "ball_array", "disc",       "cube",        "cylinder",
     "grating",   "pin_board",  "m4_nut",     "m3_long_nut", "m5_hexagon_screw",
@@ -90,6 +94,8 @@ Press read_press(KeyReader& table, const std::filesystem::path& folder, double t
     entry.number_if("y", key.y_mm, -100, 100);
     entry.number_if("depth", key.depth_mm, -10, kDeepest * thickness_mm);
     entry.number_if("rotation", key.rotation_deg, -3600, 3600);
+    entry.number_if("tilt_x", key.tilt_x_deg, -kMostTilt, kMostTilt);
+    entry.number_if("tilt_y", key.tilt_y_deg, -kMostTilt, kMostTilt);
     entry.finish();
     press.keys.push_back(key);
   }
@@ -174,6 +180,7 @@ void read_scene(std::string_view toml_text, const std::string& name,
 
   KeyReader layer = root.table_if("layer");
   layer.number_if("thickness_mm", scene.layer.thickness_mm, 0.5, 5);
+  layer.number_if("youngs_modulus_mpa", scene.layer.youngs_modulus_mpa, 0.001, 10);
   layer.number_if("grid_mm", scene.layer.grid_mm, 0.05, 0.5);
   layer.number_if("solve_step_mm", scene.layer.solve_step_mm, 0.02, 5);
   layer.number_if("taper_x", scene.layer.taper_x, -0.02, 0.02);

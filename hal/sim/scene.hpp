@@ -26,6 +26,7 @@ struct CameraModel {
 
 struct LayerModel {
   double thickness_mm = 0;
+  double youngs_modulus_mpa = 0;
   double grid_mm = 0;
   double solve_step_mm = 0;
   double taper_x = 0;
@@ -63,6 +64,9 @@ struct PressKey {
   double y_mm = 0;  ///< From the image's centre, downwards.
   double depth_mm = 0;
   double rotation_deg = 0;  ///< Clockwise as the camera sees it.
+  /// After the rotation: a rotation vector in the sensor's axes, x right and y down.
+  double tilt_x_deg = 0;
+  double tilt_y_deg = 0;
 };
 
 struct Press {

@@ -17,21 +17,9 @@ constexpr int kBlendBits = 15;
 
 // Where a press is at time t; nothing while its object is away or above the surface.
 std::optional<PressKey> state_at(const Press& press, double t) {
-  const auto& keys = press.keys;
-  if (t < keys.front().time_s) return std::nullopt;
-  PressKey state = keys.back();
-  const auto next = std::upper_bound(
-      keys.begin(), keys.end(), t, [](double time, const PressKey& k) { return time < k.time_s; });
-  if (next != keys.end()) {
-    const PressKey& a = *std::prev(next);
-    const double w = (t - a.time_s) / (next->time_s - a.time_s);
-    state.x_mm = std::lerp(a.x_mm, next->x_mm, w);
-    state.y_mm = std::lerp(a.y_mm, next->y_mm, w);
-    state.depth_mm = std::lerp(a.depth_mm, next->depth_mm, w);
-    state.rotation_deg = std::lerp(a.rotation_deg, next->rotation_deg, w);
-  }
-  if (state.depth_mm <= 0) return std::nullopt;
-  return state;
+  auto key = key_at(press, t);
+  if (key && key->depth_mm <= 0) return std::nullopt;
+  return key;
 }
 
 // The farthest that anything of a touching object moves between two times, mm.
@@ -40,26 +28,11 @@ double movement(const Press& press, double t0, double t1) {
   const auto b = state_at(press, t1);
   if (!a && !b) return 0;
   if (!a || !b) return (a ? *a : *b).depth_mm;
-  const double turn = std::abs(b->rotation_deg - a->rotation_deg) * std::numbers::pi / 180;
+  const double turn = (std::abs(b->rotation_deg - a->rotation_deg) +
+                       std::hypot(b->tilt_x_deg - a->tilt_x_deg, b->tilt_y_deg - a->tilt_y_deg)) *
+                      std::numbers::pi / 180;
   return std::max({std::hypot(b->x_mm - a->x_mm, b->y_mm - a->y_mm),
                    std::abs(b->depth_mm - a->depth_mm), turn * press.object.reach_mm});
-}
-
-void lower_object(const Object& object, const PressKey& state, const Grid& grid,
-                  cv::Mat1d& target) {
-  const double angle = state.rotation_deg * std::numbers::pi / 180;
-  const double c = std::cos(angle);
-  const double s = std::sin(angle);
-  for (int i = 0; i < grid.height; ++i) {
-    const double dy = grid.y0_mm + i * grid.spacing_mm - state.y_mm;
-    if (std::abs(dy) > object.reach_mm) continue;
-    for (int j = 0; j < grid.width; ++j) {
-      const double dx = grid.x0_mm + j * grid.spacing_mm - state.x_mm;
-      if (std::abs(dx) > object.reach_mm) continue;
-      const double height = object.height_mm(c * dx + s * dy, c * dy - s * dx);
-      target(i, j) = std::max(target(i, j), state.depth_mm - height);
-    }
-  }
 }
 
 // Times at which the layer is solved.
@@ -95,11 +68,11 @@ Truth::Truth(const Scene& scene)
 void Truth::solve_all() {
   const Layer layer(grid_.width, grid_.height, grid_.spacing_mm, scene_.layer.thickness_mm);
   maps_.push_back(
-      {std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size())});
+      {std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size()), 0});
 
   // A press and its release pass through the same states: each is solved once. Lengths in
   // nanometres, so that states which differ by rounding are one.
-  using State = std::vector<std::array<long, 5>>;
+  using State = std::vector<std::array<long, 7>>;
   std::map<State, int> solved = {{{}, 0}};
   cv::Mat1d guess;
   for (const double time : solve_times(scene_)) {
@@ -110,19 +83,22 @@ void Truth::solve_all() {
       if (!at || at->depth_mm < 1e-6) continue;
       state.push_back({static_cast<long>(i), std::lround(at->x_mm * 1e6),
                        std::lround(at->y_mm * 1e6), std::lround(at->depth_mm * 1e6),
-                       std::lround(at->rotation_deg * 1e6)});
-      lower_object(scene_.presses[i].object, *at, grid_, target);
+                       std::lround(at->rotation_deg * 1e6), std::lround(at->tilt_x_deg * 1e6),
+                       std::lround(at->tilt_y_deg * 1e6)});
+      lower_object(scene_.presses[i].object, *at, scene_.layer.thickness_mm, grid_, target);
     }
     auto found = solved.find(state);
     if (found == solved.end()) {
       const Pressed pressed = layer.solve(target, guess);
       guess = pressed.pressure;
-      Map map{std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size())};
+      Map map{std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size()), 0};
       for (std::size_t i = 0; i < grid_.size(); ++i) {
         map.indentation[i] = static_cast<std::int16_t>(
             std::lround(pressed.indentation_mm.ptr<double>()[i] * kPerMm));
         map.contact[i] = pressed.pressure.ptr<double>()[i] > 0 ? 256 : 0;
       }
+      map.force_n = cv::sum(pressed.pressure)[0] * scene_.layer.youngs_modulus_mpa *
+                    grid_.spacing_mm * grid_.spacing_mm;  // 1 MPa = 1 N/mm²
       found = solved.emplace(state, static_cast<int>(maps_.size())).first;
       maps_.push_back(std::move(map));
     }
@@ -176,6 +152,20 @@ void Truth::contact(std::uint64_t sequence, std::vector<std::uint8_t>& out) cons
     std::transform(row.begin(), row.end(), out.begin() + y * static_cast<std::ptrdiff_t>(width),
                    [](std::int16_t v) { return static_cast<std::uint8_t>(v >= 128 ? 255 : 0); });
   }
+}
+
+std::optional<Pose> Truth::pose(std::size_t press, std::uint64_t sequence) const {
+  const Press& wanted = scene_.presses.at(press);
+  const auto key = key_at(wanted, scene_.time_s(sequence));
+  if (!key) return std::nullopt;
+  return pose_of(wanted.object, *key);
+}
+
+double Truth::force_n(std::uint64_t sequence) const noexcept {
+  const Moment at = moment(sequence);
+  return std::lerp(maps_[static_cast<std::size_t>(at.from)].force_n,
+                   maps_[static_cast<std::size_t>(at.to)].force_n,
+                   static_cast<double>(at.weight) / (1 << kBlendBits));
 }
 
 }  // namespace dtact::hal::sim

@@ -1,17 +1,21 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "hal/sim/grid.hpp"
+#include "hal/sim/placement.hpp"
 #include "hal/sim/scene.hpp"
 
 namespace dtact::hal::sim {
 
-/// The true indentation of every frame: a pure function of scene and sequence. Contact is solved
-/// once at construction, at the presses' keys and as often between them as solve_step_mm asks; in
-/// between, maps are blended linearly in time. Immutable afterwards: any thread may ask.
+/// What is true of every frame, a pure function of scene and sequence: the layer's indentation, the
+/// objects' poses and the force. Contact is solved once at construction, at the presses' keys and
+/// as often between them as solve_step_mm asks; in between, maps are blended linearly in time,
+/// while poses are exact: where a map is judged against a pose, solve_step_mm has to be small.
+/// Immutable afterwards: any thread may ask.
 class Truth {
  public:
   /// Units of the maps in a millimetre.
@@ -27,6 +31,13 @@ class Truth {
   /// 255 where the object touches, 0 elsewhere; of the nearer one of the two maps between which
   /// the truth is blended.
   void contact(std::uint64_t sequence, std::vector<std::uint8_t>& out) const;
+
+  /// Where the object of a press (its number in the scene, from 0) is, touching or not; nothing
+  /// before its first key.
+  [[nodiscard]] std::optional<Pose> pose(std::size_t press, std::uint64_t sequence) const;
+  /// Newtons that all objects together press with along the surface's normal, ≥ 0: the pressure
+  /// integrated, and so, the layer being linear, that of the blended map exactly.
+  [[nodiscard]] double force_n(std::uint64_t sequence) const noexcept;
 
   /// The state of the layer at one frame: `from` + (`to` − `from`)·weight/2^15.
   struct Moment {
@@ -49,6 +60,7 @@ class Truth {
   struct Map {
     std::vector<std::int16_t> indentation;
     std::vector<std::int16_t> contact;  // 256 where they touch
+    double force_n = 0;
   };
   struct Instant {
     double time_s = 0;

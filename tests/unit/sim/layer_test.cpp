@@ -115,6 +115,25 @@ TEST(Layer, AnswersACosineWithItsCompliance) {
   EXPECT_NEAR(layer.indentation(cv::Mat1d(p.t()))(0, 5), 1.5 * 0.64145, 1e-4);
 }
 
+// E. K. Dimitriadis et al., "Determination of elastic moduli of thin layers of soft material using
+// the atomic force microscope", Biophysical Journal 82 (2002): on a bonded layer with ν = 0.5
+// Hertz' 16/9 E √R d^1.5 is multiplied by 1 + 1.133 χ + 1.283 χ² + 0.769 χ³ + 0.0975 χ⁴, χ = √(R
+// d)/h. R = 2, d = 0.1, h = 1.5: 0.0795 · 1.473.
+TEST(Layer, PressureAddsUpToTheForceOnABondedLayer) {
+  constexpr int kN = 256;
+  constexpr double kFine = 0.03;
+  cv::Mat1d target(kN, kN);
+  for (int i = 0; i < kN; ++i) {
+    for (int j = 0; j < kN; ++j) {
+      const double r = std::hypot(i - kN / 2, j - kN / 2) * kFine;
+      target(i, j) = r < 2 ? 0.1 - (2 - std::sqrt(4 - r * r)) : -1e3;
+    }
+  }
+  const Layer layer(kN, kN, kFine, 1.5);
+  const double force = cv::sum(layer.solve(target, {}).pressure)[0] * kFine * kFine;
+  EXPECT_NEAR(force, 0.1171, 0.03 * 0.1171);
+}
+
 TEST(Layer, StaysFlatWhenNothingTouches) {
   const Layer layer(64, 64, 0.25, 2.0);
   const Pressed pressed = layer.solve(cv::Mat1d(64, 64, -1.0), {});

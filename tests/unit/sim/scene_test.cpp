@@ -63,6 +63,7 @@ TEST(Scene, KeysInheritFromTheOneBefore) {
   const PressKey& key = scene.presses.at(0).keys.at(1);
   EXPECT_EQ(key.x_mm, 3);
   EXPECT_EQ(key.rotation_deg, 10);
+  EXPECT_EQ(key.tilt_x_deg, 0);
   EXPECT_EQ(key.depth_mm, 0.5);
 }
 
@@ -102,6 +103,8 @@ TEST(Scene, RefusesWhatCannotBe) {
   EXPECT_THAT(error_of(nut + "keys = [ { t = 0.0, depth = 1.9 } ]\n"),
               HasSubstr("from -10 to 1.8"));  // nine tenths of 2 mm
   EXPECT_THAT(error_of(nut + "keys = []\n"), HasSubstr("at least one key"));
+  EXPECT_THAT(error_of(nut + "keys = [ { t = 0.0, tilt_y = 61.0 } ]\n"),
+              AllOf(HasSubstr("tilt_y"), HasSubstr("from -60 to 60")));
   EXPECT_THAT(error_of("[optics]\npressed_slope = 0.1\npressed_curve = -0.1\n"),
               AllOf(HasSubstr("x.toml:3: optics.pressed_curve"), HasSubstr("response fall")));
   EXPECT_THAT(error_of("[loop]\nfrom_s = 3.0\nto_s = 2.0\n"), HasSubstr("later than from_s"));

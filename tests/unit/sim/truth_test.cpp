@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <vector>
 
 #include "tests/unit/sim/small_scene.hpp"
@@ -94,6 +95,55 @@ keys = [ { t = 0.0, x = 4.0, y = -3.0, depth = 0.5, rotation = 45.0 } ]
   // Clockwise with y downwards: the axis turns from the right towards the lower right.
   EXPECT_GT(at(4 + 2.5, -3 + 2.5), 0.4F);
   EXPECT_LT(at(4 + 2.5, -3 - 2.5), 0.05F);
+}
+
+TEST(Truth, TellsWhereTheObjectIs) {
+  const Scene scene = small_scene(R"(
+[[press]]
+object = "ball"
+radius_mm = 4.0
+keys = [ { t = 1.0 }, { t = 2.0, depth = 1.0 }, { t = 3.0, x = 2.0, rotation = 10.0 } ]
+)");
+  const Truth truth(scene);
+  EXPECT_FALSE(truth.pose(0, 9));
+  const auto half_down = truth.pose(0, 15);
+  ASSERT_TRUE(half_down);
+  EXPECT_NEAR(half_down->z_mm, -0.5, 1e-12);
+  const auto sliding = truth.pose(0, 25);
+  ASSERT_TRUE(sliding);
+  EXPECT_NEAR(sliding->x_mm, 1, 1e-12);
+  EXPECT_NEAR(sliding->z_mm, -1, 1e-12);
+  EXPECT_NEAR(sliding->turn_deg[2], 5, 1e-12);
+  EXPECT_THROW((void)truth.pose(1, 0), std::out_of_range);
+}
+
+// Of a bonded layer no thicker than the contact is wide: more than the half-space's 16/9 E √R
+// d^1.5.
+TEST(Truth, ForceGrowsWithDepthAndIsYoungsModulusTimesAShape) {
+  Scene scene = small_scene();  // R = 4 mm, 1 mm at frame 20
+  scene.layer.youngs_modulus_mpa = 0.1;
+  const Truth soft(scene);
+  EXPECT_EQ(soft.force_n(5), 0);
+  EXPECT_GT(soft.force_n(20), 16.0 / 9 * 0.1 * 2);
+  EXPECT_LT(soft.force_n(15), soft.force_n(20) / std::pow(2, 1.5));
+  scene.layer.youngs_modulus_mpa = 0.3;
+  EXPECT_NEAR(Truth(scene).force_n(20), 3 * soft.force_n(20), 1e-9);
+}
+
+TEST(Truth, FollowsATilt) {
+  const Scene scene = small_scene(R"(
+[[press]]
+object = "ball"
+radius_mm = 4.0
+keys = [ { t = 0.0, depth = 0.8 }, { t = 1.0, tilt_y = 15.0 } ]
+)");
+  const Truth truth(scene);
+  std::vector<float> map;
+  truth.indentation_mm(10, map);
+  const auto deepest = std::max_element(map.begin(), map.end()) - map.begin();
+  EXPECT_NEAR((static_cast<double>(deepest % 160) - 79.5) * 0.2, 4 * std::sin(15 * 0.01745329),
+              0.2);
+  EXPECT_NEAR(truth.force_n(10), truth.force_n(0), 0.01 * truth.force_n(0));
 }
 
 TEST(Truth, BarrelPutsTheBorderFartherOut) {

@@ -1,0 +1,197 @@
+#include "hal/sim/placement.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numbers>
+
+namespace dtact::hal::sim {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+// Distance of the points on which the lowest one of a tilted object is looked for, mm.
+constexpr double kSearchStep = 0.05;
+constexpr double kSearchEnd = 1e-6;
+
+struct Quaternion {
+  double w = 1;
+  cv::Vec3d v;
+};
+
+Quaternion quaternion_of(const cv::Vec3d& turn_deg) {
+  const double angle = cv::norm(turn_deg) * kDegree;
+  if (angle == 0) return {};
+  return {std::cos(angle / 2), turn_deg * (kDegree * std::sin(angle / 2) / angle)};
+}
+
+Quaternion operator*(const Quaternion& a, const Quaternion& b) {
+  return {a.w * b.w - a.v.dot(b.v), a.w * b.v + b.w * a.v + a.v.cross(b.v)};
+}
+
+std::array<double, 3> vector_of(const Quaternion& q) {
+  const double sine = cv::norm(q.v);
+  if (sine == 0) return {};
+  // Of the two turns that end alike the one of at most 180 degrees.
+  const double angle = 2 * std::atan2(sine, std::abs(q.w)) / kDegree;
+  const cv::Vec3d v = q.v * ((q.w < 0 ? -angle : angle) / sine);
+  return {v[0], v[1], v[2]};
+}
+
+cv::Matx33d matrix_of(const Quaternion& q) {
+  const double x = q.v[0];
+  const double y = q.v[1];
+  const double z = q.v[2];
+  return {1 - 2 * (y * y + z * z), 2 * (x * y - q.w * z),   2 * (x * z + q.w * y),
+          2 * (x * y + q.w * z),   1 - 2 * (x * x + z * z), 2 * (y * z - q.w * x),
+          2 * (x * z - q.w * y),   2 * (y * z + q.w * x),   1 - 2 * (x * x + y * y)};
+}
+
+// First the turn in the plane, then the tilt.
+Quaternion turn_of(const PressKey& key) {
+  return quaternion_of({key.tilt_x_deg, key.tilt_y_deg, 0}) *
+         quaternion_of({0, 0, key.rotation_deg});
+}
+
+bool upright(const PressKey& key) { return key.tilt_x_deg == 0 && key.tilt_y_deg == 0; }
+
+// The height of the lowest point of the turned object over its turned origin, mm; at most 0.
+double lowest_mm(const Object& object, const cv::Matx33d& turn) {
+  const auto height = [&](double x, double y) {
+    return turn(2, 0) * x + turn(2, 1) * y + turn(2, 2) * object.height_mm(x, y);
+  };
+  double best_x = 0;
+  double best_y = 0;
+  double best = height(0, 0);
+  const auto offer = [&](double x, double y) {
+    const double here = height(x, y);
+    if (here >= best) return false;
+    best = here;
+    best_x = x;
+    best_y = y;
+    return true;
+  };
+  const int points = static_cast<int>(std::ceil(object.reach_mm / kSearchStep));
+  for (int i = -points; i <= points; ++i) {
+    for (int j = -points; j <= points; ++j) offer(j * kSearchStep, i * kSearchStep);
+  }
+  for (double step = kSearchStep; step > kSearchEnd;) {
+    bool lower = false;
+    const double x = best_x;
+    const double y = best_y;
+    for (int k = 0; k < 9; ++k) lower |= offer(x + (k % 3 - 1) * step, y + (k / 3 - 1) * step);
+    if (!lower) step /= 2;
+  }
+  return best;
+}
+
+// How far up the line through (x, y) of the sensor's plane, from `low` to `high`, the turned object
+// begins; kNoSurface where it does not.
+class Line {
+ public:
+  Line(const Object& object, const Pose& pose)
+      : object_(object), pose_(pose), back_(rotation_of(pose.turn_deg).t()) {}
+
+  [[nodiscard]] double meets(double x, double y, double low, double high, double step) const {
+    if (inside(x, y, low)) return low;
+    for (double above = low; above < high;) {
+      const double below = above;
+      above = std::min(above + step, high);
+      if (inside(x, y, above)) return crossing(x, y, below, above);
+    }
+    return kNoSurface;
+  }
+
+ private:
+  [[nodiscard]] bool inside(double x, double y, double z) const {
+    const cv::Vec3d p = back_ * cv::Vec3d(x - pose_.x_mm, y - pose_.y_mm, z - pose_.z_mm);
+    // The outline lies within the reach but for rounding.
+    if (std::hypot(p[0], p[1]) > object_.reach_mm + 1e-9) return false;
+    const double bottom = object_.height_mm(p[0], p[1]);
+    if (p[2] < bottom || bottom >= kNoSurface) return false;
+    return !object_.top_mm || p[2] <= object_.top_mm(p[0], p[1]);
+  }
+
+  [[nodiscard]] double crossing(double x, double y, double outside, double within) const {
+    while (within - outside > kSearchEnd) {
+      const double middle = (outside + within) / 2;
+      (inside(x, y, middle) ? within : outside) = middle;
+    }
+    return within;
+  }
+
+  const Object& object_;
+  const Pose& pose_;
+  cv::Matx33d back_;
+};
+
+void lower_upright(const Object& object, const PressKey& key, const Grid& grid, cv::Mat1d& target) {
+  const double angle = key.rotation_deg * kDegree;
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  for (int i = 0; i < grid.height; ++i) {
+    const double dy = grid.y0_mm + i * grid.spacing_mm - key.y_mm;
+    if (std::abs(dy) > object.reach_mm) continue;
+    for (int j = 0; j < grid.width; ++j) {
+      const double dx = grid.x0_mm + j * grid.spacing_mm - key.x_mm;
+      if (std::abs(dx) > object.reach_mm) continue;
+      const double height = object.height_mm(c * dx + s * dy, c * dy - s * dx);
+      target(i, j) = std::max(target(i, j), key.depth_mm - height);
+    }
+  }
+}
+
+}  // namespace
+
+cv::Matx33d rotation_of(const std::array<double, 3>& turn_deg) {
+  return matrix_of(quaternion_of({turn_deg[0], turn_deg[1], turn_deg[2]}));
+}
+
+std::optional<PressKey> key_at(const Press& press, double time_s) {
+  const auto& keys = press.keys;
+  if (time_s < keys.front().time_s) return std::nullopt;
+  PressKey key = keys.back();
+  const auto next =
+      std::upper_bound(keys.begin(), keys.end(), time_s,
+                       [](double time, const PressKey& k) { return time < k.time_s; });
+  if (next != keys.end()) {
+    const PressKey& a = *std::prev(next);
+    const double w = (time_s - a.time_s) / (next->time_s - a.time_s);
+    key.x_mm = std::lerp(a.x_mm, next->x_mm, w);
+    key.y_mm = std::lerp(a.y_mm, next->y_mm, w);
+    key.depth_mm = std::lerp(a.depth_mm, next->depth_mm, w);
+    key.rotation_deg = std::lerp(a.rotation_deg, next->rotation_deg, w);
+    key.tilt_x_deg = std::lerp(a.tilt_x_deg, next->tilt_x_deg, w);
+    key.tilt_y_deg = std::lerp(a.tilt_y_deg, next->tilt_y_deg, w);
+  }
+  return key;
+}
+
+Pose pose_of(const Object& object, const PressKey& key) {
+  const Quaternion turn = turn_of(key);
+  const double lowest = upright(key) ? 0 : lowest_mm(object, matrix_of(turn));
+  return {key.x_mm, key.y_mm, -key.depth_mm - lowest, vector_of(turn)};
+}
+
+void lower_object(const Object& object, const PressKey& key, double highest_mm, const Grid& grid,
+                  cv::Mat1d& target) {
+  if (upright(key)) return lower_upright(object, key, grid, target);
+  const Pose pose = pose_of(object, key);
+  const Line line(object, pose);
+  const double tilt = std::hypot(key.tilt_x_deg, key.tilt_y_deg) * kDegree;
+  // What lies below highest_mm of an endless column of the object's reach, leaning by the tilt.
+  const double reach =
+      object.reach_mm + (std::abs(highest_mm - pose.z_mm) + object.reach_mm) * std::tan(tilt);
+  const double step = grid.spacing_mm / 4;
+  for (int i = 0; i < grid.height; ++i) {
+    const double y = grid.y0_mm + i * grid.spacing_mm;
+    if (std::abs(y - pose.y_mm) > reach) continue;
+    for (int j = 0; j < grid.width; ++j) {
+      const double x = grid.x0_mm + j * grid.spacing_mm;
+      if (std::abs(x - pose.x_mm) > reach) continue;
+      const double z = line.meets(x, y, -key.depth_mm, highest_mm, step);
+      target(i, j) = std::max(target(i, j), -z);
+    }
+  }
+}
+
+}  // namespace dtact::hal::sim

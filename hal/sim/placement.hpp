@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "hal/sim/grid.hpp"
+#include "hal/sim/scene.hpp"
+
+namespace dtact::hal::sim {
+
+/// Where a rigid object is: its point p, in its own frame (Object), lies at turn · p + (x, y, z) in
+/// the sensor's frame, whose origin is the image's centre on the untouched surface, x to the right,
+/// y down, z away from the camera; right-handed, the wire's surface frame. An upright object whose
+/// lowest point is its origin, pressed d deep, has z = −d.
+struct Pose {
+  double x_mm = 0;
+  double y_mm = 0;
+  double z_mm = 0;
+  /// Rotation vector in the sensor's axes: its direction is the axis, its length the angle, 0 … 180
+  /// degrees, right-handed.
+  std::array<double, 3> turn_deg{};
+};
+
+/// The rotation matrix of a rotation vector in degrees.
+[[nodiscard]] cv::Matx33d rotation_of(const std::array<double, 3>& turn_deg);
+
+/// Where the keys of `press` put its object at `time_s`; nothing before the first one.
+[[nodiscard]] std::optional<PressKey> key_at(const Press& press, double time_s);
+
+/// The pose at such a key. The lowest point of a tilted object, which lies `depth_mm` deep, is
+/// searched for on its surface: within 0.01 mm, and what the pose says holds exactly.
+[[nodiscard]] Pose pose_of(const Object& object, const PressKey& key);
+
+/// Raises `target` (grid sized, mm below the untouched surface) to what `object` at `key` asks of
+/// the layer: the greatest depth that its surface reaches on the line along z through each point.
+/// Of a tilted one this line is followed up to `highest_mm` above the untouched surface, in steps
+/// that no wall hides in, and the crossing found by bisection.
+void lower_object(const Object& object, const PressKey& key, double highest_mm, const Grid& grid,
+                  cv::Mat1d& target);
+
+}  // namespace dtact::hal::sim
