@@ -13,17 +13,20 @@ constexpr int kMaxIterations = 2000;
 // hundredth of what a tenth of a grey level is worth.
 constexpr double kTolerance_mm = 3e-5;
 
-double compliance(double k, double h) {
-  if (k == 0) return 0;
+double compliance(double k, double h, double nu) {
+  if (k == 0) return h * (1 + nu) * (1 - 2 * nu) / (1 - nu);
   const double kh = k * h;
+  const double half_space = 2 * (1 - nu * nu) / k;
   // The ratio is 1 to the last digit long before cosh overflows.
-  if (kh > 20) return 3 / (2 * k);
-  return 3 / (2 * k) * (std::sinh(2 * kh) - 2 * kh) / (std::cosh(2 * kh) + 1 + 2 * kh * kh);
+  if (kh > 20) return half_space;
+  const double a = 3 - 4 * nu;
+  return half_space * (a * std::sinh(2 * kh) - 2 * kh) /
+         (a * std::cosh(2 * kh) + (5 - 12 * nu + 8 * nu * nu) + 2 * kh * kh);
 }
 
 }  // namespace
 
-Layer::Layer(int width, int height, double spacing_mm, double thickness_mm)
+Layer::Layer(int width, int height, double spacing_mm, double thickness_mm, double poisson)
     : compliance_(height, width) {
   const double dkx = 2 * std::numbers::pi / (width * spacing_mm);
   const double dky = 2 * std::numbers::pi / (height * spacing_mm);
@@ -34,7 +37,7 @@ Layer::Layer(int width, int height, double spacing_mm, double thickness_mm)
       const bool along_column = j == 0 || (j == width - 1 && width % 2 == 0);
       const int nx = (j + 1) / 2;
       const int ny = along_column ? (i + 1) / 2 : std::min(i, height - i);
-      compliance_(i, j) = compliance(std::hypot(nx * dkx, ny * dky), thickness_mm);
+      compliance_(i, j) = compliance(std::hypot(nx * dkx, ny * dky), thickness_mm, poisson);
     }
   }
 }

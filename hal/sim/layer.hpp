@@ -11,18 +11,21 @@ struct Pressed {
   int iterations = 0;
 };
 
-/// A linear-elastic, incompressible layer bonded to a stiff block, on a periodic grid. The surface
-/// answers a pressure p with û(k) = C(k)·p̂(k),
+/// A linear-elastic layer bonded to a stiff block, on a periodic grid. The surface answers a
+/// pressure p with û(k) = C(k)·p̂(k),
 ///
-///     C(k) = 3/(2·E·k) · (sinh 2kh − 2kh) / (cosh 2kh + 1 + 2(kh)²),   C(0) = 0
+///     C(k) = 2(1 − ν²)/(E·k) · ((3 − 4ν)·sinh 2kh − 2kh)
+///                            / ((3 − 4ν)·cosh 2kh + 2(kh)² + 5 − 12ν + 8ν²)
+///     C(0) = h·(1 + ν)(1 − 2ν)/(E·(1 − ν))
 ///
-/// (K. L. Johnson, Contact Mechanics, section 5.8, for ν = 0.5; C(0) = 0 conserves the volume.) E
-/// cancels for a press of given depth and is 1 here; the force on the object is the sum of the
-/// pressure times Young's modulus times a grid point's area.
+/// (K. L. Johnson, Contact Mechanics, section 5.8.) For ν = 0.5, an incompressible layer, C(0) = 0:
+/// the volume is conserved. E cancels for a press of given depth and is 1 here; the force on the
+/// object is the sum of the pressure times Young's modulus times a grid point's area.
 class Layer {
  public:
   /// Grid points `spacing_mm` apart; sizes whose prime factors are 2, 3, 5 are fast.
-  Layer(int width, int height, double spacing_mm, double thickness_mm);
+  /// `poisson`: Poisson's ratio ν, 0 to 0.5.
+  Layer(int width, int height, double spacing_mm, double thickness_mm, double poisson = 0.5);
 
   /// The frictionless contact with a rigid surface: indentation ≥ target everywhere, pressure ≥ 0,
   /// and no pressure where they part. `target_mm`: object's depth minus its height, grid sized,

@@ -1,6 +1,7 @@
 #include "hal/sim/optics.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "hal/sim/truth.hpp"
@@ -13,19 +14,40 @@ constexpr std::int32_t kHalf = kOne / 2;
 constexpr std::int32_t kShareOne = 1 << 12;
 constexpr double kThinnest = 0.2;  // of the mean thickness, beyond the field of a tapered layer
 
+// Shares of the thickness that widths are kept for, where they follow it; in between, two are
+// mixed. Nothing bulges or is pressed beyond the outer ones.
+constexpr std::array<double, 4> kThicknesses = {1.25, 1.0, 0.6, 0.1};
+
+// How much of the light that is lost at this thickness is scattered by the widths of
+// kThicknesses[part].
+double share_of(std::size_t part, double thickness) {
+  const double t = std::clamp(thickness, kThicknesses.back(), kThicknesses.front());
+  const double here = kThicknesses[part];
+  if (t >= here)
+    return part == 0
+               ? 1
+               : std::max(0.0, (kThicknesses[part - 1] - t) / (kThicknesses[part - 1] - here));
+  return std::max(0.0, (t - kThicknesses[part + 1]) / (here - kThicknesses[part + 1]));
+}
+
+// How many times as wide the scattering is there.
+double growth_at(const OpticsModel& optics, double thickness) {
+  return 1 + optics.growth * (thickness - 1);
+}
+
 std::size_t coarse_factor(const OpticsModel& optics, const Grid& grid) {
   // A quarter of the wide blur's width is fine enough to carry it.
-  return std::clamp<std::size_t>(static_cast<std::size_t>(optics.wide_mm / grid.spacing_mm / 4), 1,
-                                 8);
+  const double least = growth_at(optics, kThicknesses.back()) * optics.wide_mm;
+  return std::clamp<std::size_t>(static_cast<std::size_t>(least / grid.spacing_mm / 4), 1, 8);
 }
 
 std::size_t divide_up(std::size_t a, std::size_t b) { return (a + b - 1) / b; }
 
 // Width of the blur on the coarse grid. Averaging `factor` points and interpolating between coarse
 // ones blur by themselves; what they do is taken off (variances add).
-double wide_sigma(const OpticsModel& optics, const Grid& grid, std::size_t count) {
+double coarse_sigma(double sigma_mm, const Grid& grid, std::size_t count) {
   const auto factor = static_cast<double>(count);
-  const double sigma = optics.wide_mm / grid.spacing_mm;
+  const double sigma = sigma_mm / grid.spacing_mm;
   const double f2 = factor * factor;
   const double own = factor == 1 ? 0 : (f2 - 1) / 12 + f2 / 6;
   return std::sqrt(std::max(sigma * sigma - own, 0.0)) / factor;
@@ -46,9 +68,31 @@ std::vector<std::uint16_t> thickness_shares(const LayerModel& layer, const Grid&
   return shares;
 }
 
+// The integral from 0 to x of a slope that is linear between knots and constant beyond them.
+double integral(std::span<const double> knots, std::span<const double> slopes, double x) {
+  const auto slope = [&](double at) {
+    const auto next = static_cast<std::size_t>(std::ranges::upper_bound(knots, at) - knots.begin());
+    if (next == 0) return slopes.front();
+    if (next == knots.size()) return slopes.back();
+    return std::lerp(slopes[next - 1], slopes[next],
+                     (at - knots[next - 1]) / (knots[next] - knots[next - 1]));
+  };
+  double sum = 0;
+  double from = std::min(x, 0.0);
+  const double to = std::max(x, 0.0);
+  while (from < to) {
+    const auto next = std::ranges::upper_bound(knots, from);
+    const double end = next == knots.end() ? to : std::min(*next, to);
+    sum += (slope(from) + slope(end)) / 2 * (end - from);
+    from = end;
+  }
+  return x < 0 ? -sum : sum;
+}
+
 }  // namespace
 
-double response(const OpticsModel& optics, double d_mm) noexcept {
+double response(const OpticsModel& optics, double d_mm, double thickness_mm) noexcept {
+  if (!optics.knots.empty()) return integral(optics.knots, optics.slopes, d_mm / thickness_mm);
   if (d_mm >= 0) return (optics.pressed_slope + optics.pressed_curve * d_mm) * d_mm;
   return (optics.bulged_slope + optics.bulged_curve * d_mm) * d_mm;
 }
@@ -110,31 +154,64 @@ Optics::Optics(const OpticsModel& optics, const Grid& grid, const LayerModel& la
       coarse_width_(divide_up(width_, factor_)),
       coarse_height_(divide_up(height_, factor_)),
       narrow_weight_(static_cast<std::int32_t>(std::lround(optics.narrow_weight * kOne))),
-      responses_(1U << 16U),
+      far_weight_(optics.far_weight > 0
+                      ? static_cast<std::int32_t>(
+                            std::lround(optics.far_weight / (1 - optics.narrow_weight) * kOne))
+                      : 0),
       shares_(thickness_shares(layer, grid)),
-      narrow_(optics.narrow_mm / grid.spacing_mm, width_, height_),
-      wide_(wide_sigma(optics, grid, factor_), coarse_width_, coarse_height_),
       sharp_(grid.size()),
+      one_(optics.growth > 0 ? grid.size() : 0),
       coarse_(coarse_width_ * coarse_height_),
-      coarse_blurred_(coarse_.size()) {
-  for (int i = 0; i < 1 << 16; ++i) {
-    const double share = response(optics, static_cast<double>(i - kOne) / Truth::kPerMm);
-    // No more than everything can be lost, nor the light more than double.
-    responses_[static_cast<std::size_t>(i)] =
-        static_cast<std::int16_t>(std::lround(std::clamp(share, -0.9999, 0.9999) * kOne));
+      coarse_blurred_(coarse_.size()),
+      coarse_far_(far_weight_ > 0 ? coarse_.size() : 0) {
+  const std::size_t parts = optics.growth > 0 ? kThicknesses.size() : 1;
+  for (std::size_t part = 0; part < parts; ++part) {
+    const double scale = parts > 1 ? growth_at(optics, kThicknesses[part]) : 1;
+    const auto coarse = [&](double sigma_mm) {
+      return Blur(coarse_sigma(scale * sigma_mm, grid, factor_), coarse_width_, coarse_height_);
+    };
+    parts_.push_back({std::vector<std::int16_t>(1U << 16U),
+                      Blur(scale * optics.narrow_mm / grid.spacing_mm, width_, height_),
+                      coarse(optics.wide_mm), coarse(optics.far_mm)});
+    for (int i = 0; i < 1 << 16; ++i) {
+      const double d_mm = static_cast<double>(i - kOne) / Truth::kPerMm;
+      const double share = response(optics, d_mm, layer.thickness_mm);
+      const double of_part = parts > 1 ? share_of(part, 1 - d_mm / layer.thickness_mm) : 1;
+      // No more than everything can be lost, nor the light more than double.
+      parts_.back().responses[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(
+          std::lround(of_part * std::clamp(share, -0.9999, 0.9999) * kOne));
+    }
   }
 }
 
 void Optics::run(std::span<const std::int16_t> indentation, std::span<std::int16_t> loss) noexcept {
+  scatter(parts_.front(), indentation, loss);
+  for (std::size_t part = 1; part < parts_.size(); ++part) {
+    scatter(parts_[part], indentation, one_);
+    for (std::size_t i = 0; i < one_.size(); ++i) {
+      loss[i] = static_cast<std::int16_t>(std::clamp(loss[i] + one_[i], -kOne, kOne - 1));
+    }
+  }
+}
+
+void Optics::scatter(Part& part, std::span<const std::int16_t> indentation,
+                     std::span<std::int16_t> loss) noexcept {
   for (std::size_t i = 0; i < sharp_.size(); ++i) {
     std::int32_t d = indentation[i];
     if (!shares_.empty()) d = std::clamp((d * shares_[i]) / kShareOne, -kOne, kOne - 1);
-    sharp_[i] = responses_[static_cast<std::uint32_t>(d + kOne)];
+    sharp_[i] = part.responses[static_cast<std::uint32_t>(d + kOne)];
   }
-  narrow_.run(sharp_, loss);
+  part.narrow.run(sharp_, loss);
   if (narrow_weight_ == kOne) return;
   shrink(sharp_);
-  wide_.run(coarse_, coarse_blurred_);
+  part.wide.run(coarse_, coarse_blurred_);
+  if (far_weight_ > 0) {
+    part.far.run(coarse_, coarse_far_);
+    for (std::size_t i = 0; i < coarse_.size(); ++i) {
+      coarse_blurred_[i] = static_cast<std::int16_t>(
+          (coarse_blurred_[i] * (kOne - far_weight_) + coarse_far_[i] * far_weight_ + kHalf) >> 15);
+    }
+  }
   add_wide(loss);
 }
 

@@ -11,14 +11,19 @@
 namespace dtact::hal::sim {
 
 /// Share of the local light that is lost at an indentation of `d_mm` before it scatters sideways;
-/// negative on the bulge.
-[[nodiscard]] double response(const OpticsModel& optics, double d_mm) noexcept;
+/// negative on the bulge. The thickness counts where the response is given by knots.
+[[nodiscard]] double response(const OpticsModel& optics, double d_mm,
+                              double thickness_mm = 0) noexcept;
 
-/// Indentation to loss of light, on the grid: the response, then two Gaussian blurs. In integers,
-/// with the blurs' weights fixed at construction. One thread at a time.
+/// Indentation to loss of light, on the grid: the response, then a sum of Gaussian blurs. In
+/// integers, with the blurs' weights fixed at construction. One thread at a time.
+///
+/// Where the blurs' widths follow the local thickness, every point's loss is shared out between a
+/// few thicknesses, linearly between the two nearest, and each of them is blurred by its own
+/// widths.
 class Optics {
  public:
-  /// Of `layer` only the taper counts; left out: the layer is even.
+  /// Of `layer` the taper counts and, with knots or growth, the thickness; left out: it is even.
   Optics(const OpticsModel& optics, const Grid& grid, const LayerModel& layer = {});
 
   /// `indentation` in 1/Truth::kPerMm, `loss` as Q15 share of the local light; both grid sized.
@@ -41,22 +46,33 @@ class Optics {
     std::vector<std::int16_t> between_;
   };
 
+  /// What of the loss is scattered by the same widths.
+  struct Part {
+    std::vector<std::int16_t> responses;  // by indentation + 2^15, Q15
+    Blur narrow;
+    Blur wide;
+    Blur far;
+  };
+
+  void scatter(Part& part, std::span<const std::int16_t> indentation,
+               std::span<std::int16_t> loss) noexcept;
   void shrink(std::span<const std::int16_t> fine) noexcept;
   void add_wide(std::span<std::int16_t> loss) const noexcept;
 
   std::size_t width_;
   std::size_t height_;
-  std::size_t factor_;  // the wide blur runs on a grid this many times coarser
+  std::size_t factor_;  // the wide and the far blur run on a grid this many times coarser
   std::size_t coarse_width_;
   std::size_t coarse_height_;
-  std::int32_t narrow_weight_;           // Q15
-  std::vector<std::int16_t> responses_;  // by indentation + 2^15, Q15
-  std::vector<std::uint16_t> shares_;    // mean thickness over that at the point, Q12; empty: even
-  Blur narrow_;
-  Blur wide_;
+  std::int32_t narrow_weight_;         // Q15
+  std::int32_t far_weight_;            // of what is not narrow, Q15
+  std::vector<std::uint16_t> shares_;  // mean thickness over that at the point, Q12; empty: even
+  std::vector<Part> parts_;            // one, unless the widths follow the thickness
   std::vector<std::int16_t> sharp_;
+  std::vector<std::int16_t> one_;  // loss of one part of several
   std::vector<std::int16_t> coarse_;
   std::vector<std::int16_t> coarse_blurred_;
+  std::vector<std::int16_t> coarse_far_;
 };
 
 }  // namespace dtact::hal::sim

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <stdexcept>
 
 #include "hal/base/atomic_file.hpp"
@@ -140,6 +141,31 @@ void read_camera(KeyReader table, CameraModel& camera) {
   table.finish();
 }
 
+// The response as slopes between knots, where the file has it.
+void read_response(KeyReader& table, OpticsModel& optics) {
+  if (!table.has("knots") && !table.has("slopes")) return;
+  optics.knots = table.numbers("knots", -1, 1);
+  optics.slopes = table.numbers("slopes", 0.001, 20);
+  if (optics.knots.size() < 2 ||
+      std::ranges::adjacent_find(optics.knots, std::greater_equal()) != optics.knots.end()) {
+    table.fail("knots", "must be two or more, ascending");
+  }
+  if (optics.slopes.size() != optics.knots.size()) {
+    table.fail("slopes", fmt::format("must be as many as knots: {}", optics.knots.size()));
+  }
+}
+
+// A response that turns back would give two indentations the same grey. The bulge stays below a
+// fifth of the thickness even for the deepest press.
+void check_curves(KeyReader& table, const OpticsModel& optics, double thickness_mm) {
+  if (optics.pressed_slope + 2 * optics.pressed_curve * kDeepest * thickness_mm <= 0) {
+    table.fail("pressed_curve", "makes the response fall before the deepest indentation allowed");
+  }
+  if (optics.bulged_slope - 2 * optics.bulged_curve * 0.2 * thickness_mm <= 0) {
+    table.fail("bulged_curve", "makes the response fall before the highest bulge");
+  }
+}
+
 void read_optics(KeyReader table, OpticsModel& optics, double thickness_mm) {
   table.number_if("pressed_slope", optics.pressed_slope, 0.001, 2);
   table.number_if("pressed_curve", optics.pressed_curve, -1, 1);
@@ -148,14 +174,14 @@ void read_optics(KeyReader table, OpticsModel& optics, double thickness_mm) {
   table.number_if("narrow_mm", optics.narrow_mm, 0, 3);
   table.number_if("wide_mm", optics.wide_mm, 0, 6);
   table.number_if("narrow_weight", optics.narrow_weight, 0, 1);
-  // A response that turns back would give two indentations the same grey. The bulge stays below
-  // a fifth of the thickness even for the deepest press.
-  if (optics.pressed_slope + 2 * optics.pressed_curve * kDeepest * thickness_mm <= 0) {
-    table.fail("pressed_curve", "makes the response fall before the deepest indentation allowed");
+  table.number_if("far_mm", optics.far_mm, 0, 12);
+  table.number_if("far_weight", optics.far_weight, 0, 1);
+  table.number_if("growth", optics.growth, 0, 1);
+  if (optics.narrow_weight + optics.far_weight > 1) {
+    table.fail("far_weight", "must leave narrow_weight its share: together at most 1");
   }
-  if (optics.bulged_slope - 2 * optics.bulged_curve * 0.2 * thickness_mm <= 0) {
-    table.fail("bulged_curve", "makes the response fall before the highest bulge");
-  }
+  read_response(table, optics);
+  if (optics.knots.empty()) check_curves(table, optics, thickness_mm);
   table.finish();
 }
 
@@ -181,6 +207,7 @@ void read_scene(std::string_view toml_text, const std::string& name,
   KeyReader layer = root.table_if("layer");
   layer.number_if("thickness_mm", scene.layer.thickness_mm, 0.5, 5);
   layer.number_if("youngs_modulus_mpa", scene.layer.youngs_modulus_mpa, 0.001, 10);
+  layer.number_if("poisson", scene.layer.poisson, 0.4, 0.5);
   layer.number_if("grid_mm", scene.layer.grid_mm, 0.05, 0.5);
   layer.number_if("solve_step_mm", scene.layer.solve_step_mm, 0.02, 5);
   layer.number_if("taper_x", scene.layer.taper_x, -0.02, 0.02);

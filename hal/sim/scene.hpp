@@ -27,6 +27,7 @@ struct CameraModel {
 struct LayerModel {
   double thickness_mm = 0;
   double youngs_modulus_mpa = 0;
+  double poisson = 0.5;
   double grid_mm = 0;
   double solve_step_mm = 0;
   double taper_x = 0;
@@ -43,6 +44,12 @@ struct OpticsModel {
   double narrow_mm = 0;
   double wide_mm = 0;
   double narrow_weight = 0;
+  double far_mm = 0;
+  double far_weight = 0;
+  double growth = 0;
+  /// Not empty: instead of the four numbers above.
+  std::vector<double> knots;
+  std::vector<double> slopes;  ///< As many.
 };
 
 enum class Arrangement : std::uint8_t { ring, sides };

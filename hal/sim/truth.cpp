@@ -66,7 +66,8 @@ Truth::Truth(const Scene& scene)
 }
 
 void Truth::solve_all() {
-  const Layer layer(grid_.width, grid_.height, grid_.spacing_mm, scene_.layer.thickness_mm);
+  const Layer layer(grid_.width, grid_.height, grid_.spacing_mm, scene_.layer.thickness_mm,
+                    scene_.layer.poisson);
   maps_.push_back(
       {std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size()), 0});
 

@@ -134,6 +134,20 @@ TEST(Layer, PressureAddsUpToTheForceOnABondedLayer) {
   EXPECT_NEAR(force, 0.1171, 0.03 * 0.1171);
 }
 
+// The same for ν = 0.45: 2(1 − 0.2025) = 1.595; 1.2 · 27.2899 − 4 over 1.2 · 27.3082 + 1.22 + 8 is
+// 0.68464. And C(0) = 2 · 1.45 · 0.1 / 0.55 = 0.52727.
+TEST(Layer, ThatCanBeCompressedGivesWay) {
+  constexpr int kN = 64;
+  const double spacing = 2 * 3.14159265358979 * 4 / kN;
+  const Layer layer(kN, kN, spacing, 2.0, 0.45);
+  cv::Mat1d p(kN, kN);
+  for (int i = 0; i < kN; ++i) {
+    for (int j = 0; j < kN; ++j) p(i, j) = std::cos(j * spacing);
+  }
+  EXPECT_NEAR(layer.indentation(p)(5, 0), 1.595 * 0.68464, 1e-4);
+  EXPECT_NEAR(layer.indentation(cv::Mat1d(kN, kN, 1.0))(7, 9), 0.52727, 1e-5);
+}
+
 TEST(Layer, StaysFlatWhenNothingTouches) {
   const Layer layer(64, 64, 0.25, 2.0);
   const Pressed pressed = layer.solve(cv::Mat1d(64, 64, -1.0), {});

@@ -100,6 +100,73 @@ TEST(Optics, WithoutScatteringItIsTheResponse) {
   EXPECT_EQ(loss[kN * 50 + 51], 0);
 }
 
+TEST(Optics, AResponseByKnotsIsTheIntegralOfItsSlopes) {
+  OpticsModel optics;
+  optics.knots = {-0.2, 0, 0.5};
+  optics.slopes = {1.2, 0.4, 0.6};
+  // 2 mm thick: 1 mm is half of it, (0.4 + 0.6)/2 · 0.5; beyond the last knot the slope stays.
+  EXPECT_NEAR(response(optics, 1.0, 2.0), 0.25, 1e-12);
+  EXPECT_NEAR(response(optics, 1.4, 2.0), 0.25 + 0.6 * 0.2, 1e-12);
+  EXPECT_NEAR(response(optics, -0.4, 2.0), -0.16, 1e-12);  // (1.2 + 0.4)/2 · 0.2
+  EXPECT_NEAR(response(optics, -0.6, 2.0), -0.16 - 1.2 * 0.1, 1e-12);
+  EXPECT_DOUBLE_EQ(response(optics, 0.0, 2.0), 0.0);
+}
+
+// The variance across of the light that is lost round a small square, less the square's own; the
+// square is 8 points wide.
+double variance_of(const OpticsModel& optics, std::int16_t indentation_of_square) {
+  LayerModel layer;
+  layer.thickness_mm = 4.0;
+  Optics chain(optics, kGrid, layer);
+  std::vector<std::int16_t> indentation(kPoints, 0);
+  std::vector<std::int16_t> loss(kPoints);
+  for (int y = 96; y < 104; ++y) {
+    for (int x = 96; x < 104; ++x) indentation[at(x, y)] = indentation_of_square;
+  }
+  chain.run(indentation, loss);
+  const double sum = std::accumulate(loss.begin(), loss.end(), 0.0);
+  double variance = 0;
+  for (int y = 0; y < kN; ++y) {
+    for (int x = 0; x < kN; ++x) variance += loss[at(x, y)] * std::pow((x - 99.5) * 0.125, 2);
+  }
+  return variance / sum - 0.0833;
+}
+
+TEST(Optics, AThirdWidthHasItsShare) {
+  OpticsModel optics = model();
+  optics.wide_mm = 1.0;
+  optics.far_mm = 2.0;
+  optics.far_weight = 0.1;
+  // 0.7·0.3² + 0.2·1² + 0.1·2² mm²
+  EXPECT_NEAR(variance_of(optics, 16000), 0.663, 0.05);
+}
+
+TEST(Optics, WidthsFollowTheLocalThickness) {
+  OpticsModel optics = model();
+  optics.pressed_curve = 0;
+  optics.narrow_mm = 1.0;
+  optics.narrow_weight = 1;
+  optics.growth = 1;
+  // 1.6 mm of 4 leave 0.6 of the thickness; widths are kept for just that.
+  EXPECT_NEAR(variance_of(optics, 12800), 0.36, 0.02);
+  // 0.8 mm: half of the light goes 1 mm wide, half 0.6.
+  EXPECT_NEAR(variance_of(optics, 6400), 0.5 * (1 + 0.36), 0.02);
+  optics.growth = 0;
+  EXPECT_NEAR(variance_of(optics, 12800), 1.0, 0.02);
+}
+
+TEST(Optics, SharingOutBetweenThicknessesLosesNoLight) {
+  OpticsModel optics = model();
+  optics.growth = 1;
+  LayerModel layer;
+  layer.thickness_mm = 2.0;
+  Optics chain(optics, kGrid, layer);
+  const std::vector<std::int16_t> indentation(kPoints, 5600);  // 0.7 mm: 0.65 of the thickness
+  std::vector<std::int16_t> loss(kPoints);
+  chain.run(indentation, loss);
+  for (const std::int16_t value : loss) ASSERT_NEAR(value, 0.1302 * 32768, 4);
+}
+
 TEST(Optics, BuiltInResponseRises) {
   const Scene scene = default_scene();
   double last = -1;

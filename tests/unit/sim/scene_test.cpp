@@ -67,6 +67,27 @@ TEST(Scene, KeysInheritFromTheOneBefore) {
   EXPECT_EQ(key.depth_mm, 0.5);
 }
 
+TEST(Scene, TakesAnotherLaw) {
+  const Scene scene = parse_scene(
+      "[layer]\npoisson = 0.49\n[optics]\nnarrow_weight = 0.6\nfar_mm = 3.0\nfar_weight = 0.1\n"
+      "growth = 1.0\nknots = [-0.2, 0.0, 0.5]\nslopes = [1.0, 0.5, 0.4]\n",
+      "x.toml");
+  EXPECT_EQ(scene.layer.poisson, 0.49);
+  EXPECT_EQ(scene.optics.far_mm, 3);
+  EXPECT_EQ(scene.optics.growth, 1);
+  EXPECT_EQ(scene.optics.slopes.at(2), 0.4);
+}
+
+TEST(Scene, RefusesAResponseThatIsNone) {
+  EXPECT_THAT(error_of("[optics]\nnarrow_weight = 0.9\nfar_weight = 0.2\n"),
+              AllOf(HasSubstr("optics.far_weight"), HasSubstr("together at most 1")));
+  EXPECT_THAT(error_of("[optics]\nknots = [0.0, 0.5, 0.5]\nslopes = [1, 1, 1]\n"),
+              AllOf(HasSubstr("x.toml:2: optics.knots"), HasSubstr("ascending")));
+  EXPECT_THAT(error_of("[optics]\nknots = [0.0, 0.5]\nslopes = [1.0]\n"),
+              AllOf(HasSubstr("x.toml:3: optics.slopes"), HasSubstr("as many as knots: 2")));
+  EXPECT_THAT(error_of("[optics]\nknots = [0.0, 0.5]\n"), HasSubstr("optics.slopes"));
+}
+
 TEST(Scene, ErrorsNameFileLineKeyAndWhatIsAllowed) {
   EXPECT_THAT(error_of("[camera]\nwidth = 10\n"),
               AllOf(HasSubstr("scenes/x.toml:2: camera.width"), HasSubstr("from 64 to 4096")));
