@@ -72,6 +72,12 @@ Object disc(double radius) {
           [=](double x, double y) { return std::hypot(x, y) <= radius ? 0 : kNoSurface; }};
 }
 
+Object two_pillars(double radius, double spacing) {
+  return {"two_pillars", spacing / 2 + radius, [=](double x, double y) {
+            return std::hypot(std::abs(x) - spacing / 2, y) <= radius ? 0 : kNoSurface;
+          }};
+}
+
 Object cube(double side) {
   return {"cube", side * std::numbers::sqrt2 / 2, [=](double x, double y) {
             return std::max(std::abs(x), std::abs(y)) <= side / 2 ? 0 : kNoSurface;

@@ -26,6 +26,8 @@ struct Object {
 /// rows × columns balls, `pitch` apart.
 [[nodiscard]] Object ball_array(double radius, double pitch, int rows, int columns);
 [[nodiscard]] Object disc(double radius);
+/// Two upright discs side by side along x, their centres `spacing` apart.
+[[nodiscard]] Object two_pillars(double radius, double spacing);
 /// A cube on one face.
 [[nodiscard]] Object cube(double side);
 /// A cylinder on its side, its axis along x.

@@ -26,10 +26,10 @@ constexpr double kDeepest = 0.9;  // of the layer's thickness
 constexpr double kMostTilt = 60;  // degrees
 
 const std::vector<std::string> kObjects = {
-    "ball",      "ball_array", "disc",       "cube",        "cylinder",
-    "grating",   "pin_board",  "m4_nut",     "m3_long_nut", "m5_hexagon_screw",
-    "star",      "screw_cap",  "usb_c_plug", "key",         "three_set_screws",
-    "height_map"};
+    "ball",        "ball_array", "disc",       "cube",        "cylinder",
+    "grating",     "pin_board",  "m4_nut",     "m3_long_nut", "m5_hexagon_screw",
+    "star",        "screw_cap",  "usb_c_plug", "key",         "three_set_screws",
+    "two_pillars", "height_map"};
 
 Object read_object(KeyReader& press, const std::filesystem::path& folder) {
   press.require("object");
@@ -48,6 +48,10 @@ Object read_object(KeyReader& press, const std::filesystem::path& folder) {
     return ball_array(radius, pitch, rows, count("columns"));
   }
   if (kind == "disc") return disc(length("radius_mm", 0.2, 11));
+  if (kind == "two_pillars") {
+    const double radius = length("radius_mm", 0.2, 5);
+    return two_pillars(radius, length("spacing_mm", 0.4, 20));
+  }
   if (kind == "cube") return cube(length("side_mm", 0.5, 20));
   if (kind == "cylinder") {
     const double radius = length("radius_mm", 0.2, 50);

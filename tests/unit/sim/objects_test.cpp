@@ -36,6 +36,14 @@ TEST(Objects, FlatOnes) {
   EXPECT_EQ(cube(7).height_mm(3.6, 0), kNoSurface);
 }
 
+TEST(Objects, TwoPillars) {
+  const Object o = two_pillars(0.5, 1.5);
+  EXPECT_EQ(o.height_mm(0.75, 0.4), 0);
+  EXPECT_EQ(o.height_mm(-1.24, 0), 0);
+  EXPECT_EQ(o.height_mm(0, 0), kNoSurface);
+  EXPECT_DOUBLE_EQ(o.reach_mm, 1.25);
+}
+
 TEST(Objects, CylinderLiesAlongX) {
   const Object o = cylinder(2.5, 12);
   EXPECT_DOUBLE_EQ(o.height_mm(6, 0), 0);

@@ -70,12 +70,15 @@ TEST(Scene, KeysInheritFromTheOneBefore) {
 TEST(Scene, TakesAnotherLaw) {
   const Scene scene = parse_scene(
       "[layer]\npoisson = 0.49\n[optics]\nnarrow_weight = 0.6\nfar_mm = 3.0\nfar_weight = 0.1\n"
-      "growth = 1.0\nknots = [-0.2, 0.0, 0.5]\nslopes = [1.0, 0.5, 0.4]\n",
+      "growth = 1.0\nknots = [-0.2, 0.0, 0.5]\nslopes = [1.0, 0.5, 0.4]\n"
+      "[[press]]\nobject = \"two_pillars\"\nradius_mm = 0.5\nspacing_mm = 1.5\n"
+      "keys = [ { t = 1.0 } ]\n",
       "x.toml");
   EXPECT_EQ(scene.layer.poisson, 0.49);
   EXPECT_EQ(scene.optics.far_mm, 3);
   EXPECT_EQ(scene.optics.growth, 1);
   EXPECT_EQ(scene.optics.slopes.at(2), 0.4);
+  EXPECT_EQ(scene.presses.at(0).object.reach_mm, 1.25);
 }
 
 TEST(Scene, RefusesAResponseThatIsNone) {
