@@ -41,7 +41,9 @@ ROOMS = {
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
-    "clients/common": ["hal/image", "proto", "clients/cpp"],
+    # Of the reconstruction the surface's shape alone.
+    "clients/perceive/geometry": ["daemon/recon"],
+    "clients/common": ["hal/image", "proto", "daemon/recon", "clients/cpp", "clients/perceive/geometry"],
     "clients/recording": ["hal/mcap", "proto", "clients/cpp"],
     "clients/calibrate/fit": ["hal/image", "daemon/recon", "daemon/calibration"],
     "clients/calibrate/lens": ["daemon/recon"],

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+
+namespace dtact::recon {
+
+/// The untouched gel's outer surface, in the surface frame: origin where the camera's axis leaves
+/// it, z away from the camera. Indentation is measured from it, along its normal.
+struct Surface {
+  enum class Kind : std::uint8_t {
+    plane,
+    sphere,   ///< Bulging towards the object, centre at (0, 0, −radius).
+    cylinder  ///< The same about an axis in the plane z = −radius.
+  };
+  Kind kind = Kind::plane;
+
+  // All that follows says nothing of a plane.
+  double radius_mm = 0;
+  double axis_deg = 0;  ///< Of a cylinder: its axis' direction, from x towards y.
+  /// The camera looks along z through air and then through the flat back of the gel.
+  double air_mm = 0;      ///< From the camera's pinhole to the gel.
+  double gel_mm = 0;      ///< From there to the surface's origin.
+  double refraction = 1;  ///< Of the gel; the air's is 1.
+
+  bool operator==(const Surface&) const = default;
+};
+
+}  // namespace dtact::recon

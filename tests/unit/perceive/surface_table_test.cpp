@@ -1,0 +1,83 @@
+#include "clients/perceive/geometry/surface_table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace dtact::perceive {
+namespace {
+
+using Kind = recon::Surface::Kind;
+
+void expect_near(const Vector& actual, const Vector& expected, double tolerance) {
+  for (std::size_t i = 0; i < 3; ++i)
+    EXPECT_NEAR(actual[i], expected[i], tolerance) << "axis " << i;
+}
+
+TEST(CastRay, APlaneIsTheMapItself) {
+  const auto found = cast_ray({}, 3, -2);
+  ASSERT_TRUE(found.has_value());
+  expect_near(found->point, {3e-3, -2e-3, 0}, 1e-15);
+  expect_near(found->normal, {0, 0, 1}, 0);
+}
+
+TEST(CastRay, TheAxisLeavesASphereAtTheOrigin) {
+  const auto found = cast_ray({Kind::sphere, 12, 0, 20, 8, 1.41}, 0, 0);
+  ASSERT_TRUE(found.has_value());
+  expect_near(found->point, {0, 0, 0}, 1e-12);
+  expect_near(found->normal, {0, 0, 1}, 1e-12);
+}
+
+// With no refraction the camera, at (0, 0, −25), sees (3, 0, 0) along a straight line: from it by
+// t · (3, 0, 25). On the sphere of 10 mm about (0, 0, −10): 634 t² − 750 t + 125 = 0,
+// t = (375 + √(375² − 634 · 125)) / 634 = 0.98224 …
+TEST(CastRay, WithoutRefractionItIsAStraightLine) {
+  const auto found = cast_ray({Kind::sphere, 10, 0, 20, 5, 1}, 3, 0);
+  ASSERT_TRUE(found.has_value());
+  const double t = (375 + std::sqrt(375.0 * 375 - 634 * 125.0)) / 634;
+  EXPECT_NEAR(t, 0.98224, 1e-5);
+  expect_near(found->point, {3e-3 * t, 0, 25e-3 * (t - 1)}, 1e-12);
+  expect_near(found->normal, {0.3 * t, 0, 2.5 * (t - 1) + 1}, 1e-12);
+}
+
+// Chosen backwards: in the gel (index 1.5) the ray climbs 4 mm in 3 (sin = 0.6 would be 0.9 in the
+// air, tan 0.9 / √0.19); it enters at 2 mm and crosses z = 0, 4 mm on, at 5 mm.
+TEST(CastRay, SnellsLaw) {
+  const double air_mm = 2 * std::sqrt(0.19) / 0.9;
+  const auto found = cast_ray({Kind::cylinder, 50, 90, air_mm, 4, 1.5}, 5, 0);
+  ASSERT_TRUE(found.has_value());
+  // The point lies on that ray and on the cylinder about y.
+  EXPECT_NEAR((found->point[0] - 2e-3) / (found->point[2] + 4e-3), 0.75, 1e-9);
+  EXPECT_NEAR(std::hypot(found->point[0], found->point[2] + 50e-3), 50e-3, 1e-12);
+  EXPECT_EQ(found->point[1], 0);
+}
+
+TEST(CastRay, ACylinderIsStraightAlongItsAxis) {
+  const recon::Surface finger{Kind::cylinder, 9, 0, 15, 6, 1.41};
+  const auto found = cast_ray(finger, 4, 0);
+  ASSERT_TRUE(found.has_value());
+  expect_near(found->point, {4e-3, 0, 0}, 1e-12);
+  expect_near(found->normal, {0, 0, 1}, 1e-12);
+  const auto beside = cast_ray(finger, 0, 4);
+  ASSERT_TRUE(beside.has_value());
+  EXPECT_LT(beside->point[2], -0.5e-3);
+}
+
+TEST(CastRay, BesideTheSphereThereIsNothing) {
+  EXPECT_FALSE(cast_ray({Kind::sphere, 3, 0, 20, 5, 1.41}, 9, 0).has_value());
+}
+
+TEST(SurfaceTable, HasTheMapsPixels) {
+  const SurfaceTable table = make_surface_table({Kind::sphere, 3, 0, 20, 5, 1.41}, 21, 11, 1);
+  ASSERT_EQ(table.point[0].size(), 231U);
+  EXPECT_NEAR(table.point[2][5 * 21 + 10], 0, 1e-9);
+  EXPECT_FLOAT_EQ(table.normal[2][5 * 21 + 10], 1);
+  EXPECT_TRUE(std::isnan(table.point[2][0]));
+  EXPECT_TRUE(std::isnan(table.normal[0][0]));
+  // Right of the middle, and below it.
+  EXPECT_GT(table.point[0][5 * 21 + 11], 0.5e-3F);
+  EXPECT_GT(table.point[1][6 * 21 + 10], 0.5e-3F);
+}
+
+}  // namespace
+}  // namespace dtact::perceive
