@@ -7,8 +7,10 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <vector>
 
 #include "clients/common/exit_codes.hpp"
+#include "clients/perceive/geometry/cloud_file.hpp"
 #include "hal/image/png.hpp"
 
 namespace dtact::cli {
@@ -58,35 +60,45 @@ std::string encode_micrometre_png(const DepthImage& depth) {
   return image::encode_png(picture);
 }
 
-std::string encode_ply(const DepthImage& depth) {
-  std::string points;
-  std::size_t count = 0;
-  std::size_t pixel = 0;
-  for (int y = 0; y < depth.height; ++y) {
-    for (int x = 0; x < depth.width; ++x) {
-      const float mm = depth.mm[pixel++];
-      if (std::isnan(mm)) continue;
-      append_float(points, static_cast<float>((x - 0.5 * (depth.width - 1)) * depth.mm_per_px));
-      append_float(points, static_cast<float>((y - 0.5 * (depth.height - 1)) * depth.mm_per_px));
-      append_float(points, -mm);
-      ++count;
-    }
+namespace {
+
+perceive::PointCloud points_of(const DepthImage& depth) {
+  // Micrometres, as they came.
+  std::vector<std::int16_t> values;
+  values.reserve(depth.mm.size());
+  perceive::DepthGrid grid{.width = depth.width,
+                           .height = depth.height,
+                           .full_width = depth.width,
+                           .full_height = depth.height,
+                           .mm_per_px = depth.mm_per_px,
+                           .values = {}};
+  for (const float mm : depth.mm) {
+    values.push_back(static_cast<std::int16_t>(
+        std::isnan(mm) ? grid.untrusted : std::clamp(std::lround(1000 * mm), -32767L, 32767L)));
   }
-  return fmt::format(
-             "ply\nformat binary_little_endian 1.0\n"
-             "comment millimetres; x right, y down, z away from the camera; pressed is negative z\n"
-             "element vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
-             "end_header\n",
-             count) +
-         points;
+  grid.values = values;
+  perceive::PointCloud cloud;
+  perceive::CloudMaker(depth.surface).make(grid, 1, cloud);
+  return cloud;
 }
+
+std::string encode_points_ply(const DepthImage& depth) {
+  return perceive::encode_ply(points_of(depth));
+}
+
+std::string encode_points_pcd(const DepthImage& depth) {
+  return perceive::encode_pcd(points_of(depth));
+}
+
+}  // namespace
 
 DepthEncoder encoder_for(const std::string& path, DepthEncoder png) {
   const std::string ending = std::filesystem::path(path).extension().string();
   if (ending == ".npy") return encode_npy;
   if (ending == ".png") return png;
-  if (ending == ".ply") return encode_ply;
-  throw Failure(kUsage, path + ": the name must end in .npy, .png or .ply");
+  if (ending == ".ply") return encode_points_ply;
+  if (ending == ".pcd") return encode_points_pcd;
+  throw Failure(kUsage, path + ": the name must end in .npy, .png, .ply or .pcd");
 }
 
 }  // namespace dtact::cli

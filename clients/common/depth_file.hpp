@@ -3,6 +3,8 @@
 #include <span>
 #include <string>
 
+#include "daemon/recon/surface.hpp"
+
 namespace dtact::cli {
 
 /// A depth map to write: millimetres, NaN where untrusted, row-major.
@@ -11,6 +13,7 @@ struct DepthImage {
   int height = 0;
   double mm_per_px = 0;
   std::span<const float> mm;
+  recon::Surface surface = {};  ///< That it is measured from.
 };
 
 /// The head of NumPy's .npy, format 1.0, for float32 little-endian: 128 bytes. `shape`: "(2, 3)".
@@ -20,18 +23,13 @@ struct DepthImage {
 /// Both, of shape (height, width).
 [[nodiscard]] std::string encode_npy(const DepthImage& depth);
 
-/// PLY, binary little-endian: a point for each trusted pixel, millimetres, in the surface's frame:
-/// origin at the middle of the map, x to the right, y down, z away from the camera, so a pressed
-/// point has negative z.
-[[nodiscard]] std::string encode_ply(const DepthImage& depth);
-
 /// A 16-bit PNG in micrometres: 0 where untrusted or less, 65535 where more.
 [[nodiscard]] std::string encode_micrometre_png(const DepthImage& depth);
 
 using DepthEncoder = std::string (*)(const DepthImage&);
 
-/// What writes a file of this name: by its ending .npy, .ply or, with `png`, .png. Throws Failure
-/// (wrong usage) for another.
+/// What writes a file of this name: by its ending .npy, .ply or .pcd (points with normals, in the
+/// surface's frame, metres) or, with `png`, .png. Throws Failure (wrong usage) for another.
 [[nodiscard]] DepthEncoder encoder_for(const std::string& path, DepthEncoder png);
 
 }  // namespace dtact::cli

@@ -277,10 +277,10 @@ void add_export(CLI::App& app, cli::Context& context) {
       ->add_option("--to", options->format,
                    "npy: depth.npy, float32 mm (maps, rows, columns), NaN where untrusted; "
                    "png: a file a frame, 16-bit micrometres, 0 where untrusted or not pressed; "
-                   "ply: a file a frame, points in mm in the surface frame, without the untrusted; "
+                   "ply, pcd: a file a frame, points with normals in m in the surface frame; "
                    "csv: none. All write frames.csv (contact, times) and events.csv")
       ->required()
-      ->check(CLI::IsMember({"npy", "png", "ply", "csv"}));
+      ->check(CLI::IsMember({"npy", "png", "ply", "pcd", "csv"}));
   command->add_option("-o,--output", options->output, "The folder to write")
       ->type_name("FOLDER")
       ->required();

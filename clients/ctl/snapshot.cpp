@@ -120,7 +120,7 @@ void add_snapshot(CLI::App& app, Context& context) {
       ->add_option(
           "-o,--output", options->output,
           "depth.npy (float32 mm, NaN where untrusted), depth.png (the deeper, the lighter) "
-          "or depth.ply (points, mm); with --luma a .png")
+          "or depth.ply or .pcd (points with normals, m); with --luma a .png")
       ->type_name("FILE")
       ->required();
   command->add_flag("--luma", options->luma, "The camera's grey image instead of the depth");

@@ -71,7 +71,7 @@ void add_reconstruct(CLI::App& app) {
       ->required();
   reconstruct
       ->add_option("-o,--output", options->output,
-                   "depth.npy (float32 mm), depth.png (colours) or depth.ply (points)")
+                   "depth.npy (float32 mm), depth.png (colours), depth.ply or .pcd (points)")
       ->type_name("FILE")
       ->required();
   reconstruct->callback([options] { run(*options); });

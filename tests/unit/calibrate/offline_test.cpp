@@ -206,7 +206,7 @@ TEST_F(Offline, NamesWhatIsWrong) {
               ThrowsMessage<std::runtime_error>(HasSubstr("no such folder")));
   run(calibrate());
   EXPECT_THAT([&] { run(reconstruct("depth.tif")); },
-              ThrowsMessage<std::runtime_error>(HasSubstr(".npy, .png or .ply")));
+              ThrowsMessage<std::runtime_error>(HasSubstr(".npy, .png, .ply or .pcd")));
   std::vector<std::string> missing = calibrate();
   missing[2] = at("none.png");
   EXPECT_THAT([&] { run(missing); }, ThrowsMessage<std::runtime_error>(HasSubstr("none.png")));
@@ -236,12 +236,16 @@ TEST(DepthFile, NpyIsLittleEndianFloats) {
   EXPECT_EQ(npy.substr(128, 12), std::string("\0\0\0\0\0\0\xC0\x3F\0\0\x80\xBE", 12));
 }
 
-TEST(DepthFile, PlyLeavesUntrustedOutAndPressesDown) {
-  const std::vector<float> mm{std::numeric_limits<float>::quiet_NaN(), 0.5F};
-  const std::string ply = cli::encode_ply({2, 1, 0.1, mm});
-  EXPECT_THAT(ply, AllOf(HasSubstr("binary_little_endian"), HasSubstr("element vertex 1\n")));
-  const std::string point = ply.substr(ply.size() - 12);
-  EXPECT_EQ(point, std::string("\xCD\xCC\x4C\x3D\0\0\0\0\0\0\0\xBF", 12)) << "0.05, 0, -0.5";
+TEST(DepthFile, PointsLeaveUntrustedOutAndPressDown) {
+  const float hole = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<float> mm{hole, 0.5F, 0.5F, hole, 0.5F, 0.5F};
+  const std::string ply = cli::encoder_for("a.ply", nullptr)({3, 2, 0.1, mm});
+  EXPECT_THAT(ply, AllOf(HasSubstr("binary_little_endian"), HasSubstr("element vertex 4\n"),
+                         HasSubstr("element face 2\n")));
+  const std::string point = ply.substr(ply.find("end_header\n") + 11 + 24, 12);
+  EXPECT_EQ(point, std::string("\x17\xB7\xD1\x38\x17\xB7\x51\xB8\x6F\x12\x03\xBA", 12))
+      << "1e-4, -5e-5, -5e-4";
+  EXPECT_THAT(cli::encoder_for("a.pcd", nullptr)({3, 2, 0.1, mm}), HasSubstr("WIDTH 3\n"));
 }
 
 TEST(DepthFile, APictureOfNothingStillHasItsLegend) {

@@ -114,7 +114,7 @@ TEST_F(Zsh, OffersValuesAndFiles) {
   fs::create_directory(folder_ / "calibration");
   const Words files{"calibration", "press.mcap", "_dtactctl", "_dtact-calibrate", "_dtactd"};
   const std::map<std::string, Words> expected{
-      {"dtactctl export press.mcap --to ", {"npy", "png", "ply", "csv"}},
+      {"dtactctl export press.mcap --to ", {"npy", "png", "ply", "pcd", "csv"}},
       {"dtact-calibrate depth --method=p", {"published"}},
       {"dtactctl token --new ", {"view", "control"}},
       {"dtactctl export ", files},

@@ -14,8 +14,8 @@ FITS = ["dtact::calibration::fit_chain", "dtact::calibration::find_contact",
 RULES = {
     "dtactd": (["core"], [], FITS),
     # OpenSSL it may: it speaks TLS to the daemon and makes certificates. libsystemd it may: it asks Avahi over
-    # D-Bus.
-    "dtactctl": ([], ["tomlplusplus", "hwy", "gpiod", "camera", "spdlog"],
+    # D-Bus. Highway it may: it writes point clouds.
+    "dtactctl": ([], ["tomlplusplus", "gpiod", "camera", "spdlog"],
                  FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
     "dtact-calibrate": (["core", "imgproc", "calib3d"],
                         ["systemd", "gpiod", "camera", "spdlog"], []),
