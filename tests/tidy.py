@@ -5,9 +5,14 @@ BUILD is up to date. A file that passed is not looked at again until something t
 changes: its own text, every header's, the compiler's command line, the rules or the tool's version.
 What passed is kept by a digest of all that in $TIDY_CACHE (default ~/.cache/dtactd-tidy).
 
+The tool spends most of its time in the system's headers. So files of one folder that are compiled
+alike are looked at together, as one that includes them, which takes a tenth of the time; where their
+names get in each other's way, one by one.
+
 Prints what clang-tidy says of each file that does not pass; status 1 when there is one.
 """
 
+import collections
 import concurrent.futures
 import functools
 import hashlib
@@ -15,11 +20,15 @@ import json
 import os
 import pathlib
 import re
+import shlex
 import subprocess
 import sys
+import tempfile
 
 TOOL = "clang-tidy-19"
 OURS = re.compile(r"/(hal|daemon|proto|clients|tests)/.*\.cpp$")
+OURS_TOGETHER = r"/(hal|daemon|proto|clients|tests)/.*\.[ch]pp$"
+TOGETHER = 10  # files; more take a gigabyte of memory
 
 
 @functools.cache
@@ -50,6 +59,37 @@ def key(entry, read, common):
     return hashlib.sha256("\n".join([common, entry["command"], *texts]).encode()).hexdigest()
 
 
+def flags(entry):
+    """The command line without what to compile into what."""
+    words = shlex.split(entry["command"])[1:]
+    return words[: words.index("-o")]
+
+
+def groups(entries):
+    """Of one folder and compiled alike, at most TOGETHER each."""
+    alike = collections.defaultdict(list)
+    for entry in entries:
+        alike[os.path.dirname(entry["file"]), *flags(entry)].append(entry)
+    return [same[i : i + TOGETHER] for same in alike.values() for i in range(0, len(same), TOGETHER)]
+
+
+def run(arguments):
+    return subprocess.run([TOOL, "-quiet", *arguments], capture_output=True, text=True)
+
+
+def run_together(entries):
+    first = entries[0]
+    # The rules are those of the files' folder, not of where the file that includes them lies.
+    rules = subprocess.run(
+        [TOOL, "--dump-config", first["file"], "--"], check=True, capture_output=True, text=True
+    ).stdout
+    with tempfile.NamedTemporaryFile("w", suffix=".cpp") as file:
+        file.writelines(f'#include "{entry["file"]}"\n' for entry in entries)
+        file.flush()
+        seen = ["--checks=-bugprone-suspicious-include", f"--header-filter={OURS_TOGETHER}"]
+        return run([f"--config={rules}", *seen, file.name, "--", *flags(first)])
+
+
 def main():
     build = sys.argv[1]
     cache = pathlib.Path(os.environ.get("TIDY_CACHE") or pathlib.Path.home() / ".cache/dtactd-tidy")
@@ -62,23 +102,37 @@ def main():
     ours = [e for e in entries if e["file"].startswith(source) and OURS.match(e["file"][len(source) - 1 :])]
     read = headers(build)
 
-    def check(entry):
+    def passed(entry):
         in_tests = entry["file"].startswith(source + "tests/")
-        passed = cache / key(entry, read, version + (rules_of_tests if in_tests else rules))
-        if passed.exists():
-            return "known"
-        told = subprocess.run([TOOL, "-quiet", "-p", build, entry["file"]], capture_output=True, text=True)
-        if told.returncode == 0:
-            passed.touch()
-            return "passed"
-        print(told.stdout + told.stderr, flush=True)
-        return "failed"
+        return cache / key(entry, read, version + (rules_of_tests if in_tests else rules))
 
+    def verdict(entries, told):
+        if told.returncode == 0:
+            for entry in entries:
+                passed(entry).touch()
+            return {"passed": len(entries)}
+        print(told.stdout + told.stderr, flush=True)
+        return {"failed": len(entries)}
+
+    def check(entries):
+        if len(entries) > 1:
+            told = run_together(entries)
+            # What does not compile together was not looked at.
+            if told.returncode == 0 or "clang-diagnostic-error" not in told.stdout:
+                return verdict(entries, told)
+        verdicts = collections.Counter()
+        for entry in entries:
+            verdicts.update(verdict([entry], run(["-p", build, entry["file"]])))
+        return verdicts
+
+    unknown = [entry for entry in ours if not passed(entry).exists()]
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        verdicts = list(pool.map(check, ours))
-    count = verdicts.count
-    print(f"tidy: {len(ours)} files: {count('known')} known, {count('passed')} passed, {count('failed')} failed")
-    sys.exit(1 if count("failed") else 0)
+        count = sum(pool.map(check, groups(unknown)), collections.Counter())
+    print(
+        f"tidy: {len(ours)} files: {len(ours) - len(unknown)} known, {count['passed']} passed, "
+        f"{count['failed']} failed or together with one that failed"
+    )
+    sys.exit(1 if count["failed"] else 0)
 
 
 if __name__ == "__main__":
