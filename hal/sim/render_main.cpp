@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/sim/calibrated.hpp"
 #include "hal/sim/renderer.hpp"
 #include "version.hpp"
 
@@ -24,6 +25,7 @@ namespace sim = dtact::hal::sim;
 
 struct Arguments {
   std::filesystem::path scene;
+  std::filesystem::path calibration;
   std::string frames = "0:1";
   std::uint64_t seed = 1;
   int brightness = 255;
@@ -78,8 +80,9 @@ std::string truth_csv(const sim::Truth& truth, const Range& range) {
 }
 
 void render(const Arguments& arguments) {
-  const sim::Scene scene =
+  sim::Scene scene =
       arguments.scene.empty() ? sim::default_scene() : sim::load_scene(arguments.scene);
+  if (!arguments.calibration.empty()) sim::take_from_calibration(arguments.calibration, scene);
   const Range range = parse_range(arguments.frames);
   sim::Renderer renderer(scene, arguments.seed);
   Light light;
@@ -125,6 +128,9 @@ int main(int argc, char** argv) {
     Arguments arguments;
     app.add_option("--scene", arguments.scene, "scene file; left out: the built-in scene")
         ->check(CLI::ExistingFile);
+    app.add_option("--calibration", arguments.calibration,
+                   "folder of a calibration made by a model: render that sensor's layer and light")
+        ->check(CLI::ExistingDirectory);
     app.add_option("--frames", arguments.frames, "frame, or first:end without the end");
     app.add_option("--seed", arguments.seed, "noise seed");
     app.add_option("--brightness", arguments.brightness, "all LEDs white at this brightness")

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/sim/calibrated.hpp"
 #include "hal/sim/default_scene.hpp"
 #include "hal/toml/key_reader.hpp"
 
@@ -206,6 +207,9 @@ void read_scene(std::string_view toml_text, const std::string& name,
   const toml::table parsed = tomlfile::parse(toml_text, name);
   KeyReader root(parsed, name);
   root.text_if("sensor", scene.sensor);
+  std::string calibration;
+  root.text_if("calibration", calibration);
+  if (!calibration.empty()) take_from_calibration(folder / calibration, scene);
   read_camera(root.table_if("camera"), scene.camera);
 
   KeyReader layer = root.table_if("layer");

@@ -1,12 +1,18 @@
 #include "hal/sim/scene.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <exception>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
 
+#include "hal/base/atomic_file.hpp"
+#include "hal/sim/calibrated.hpp"
+#include "hal/sim/optics.hpp"
 #include "tests/unit/sim/small_scene.hpp"
 
 namespace dtact::hal::sim {
@@ -89,6 +95,49 @@ TEST(Scene, RefusesAResponseThatIsNone) {
   EXPECT_THAT(error_of("[optics]\nknots = [0.0, 0.5]\nslopes = [1.0]\n"),
               AllOf(HasSubstr("x.toml:3: optics.slopes"), HasSubstr("as many as knots: 2")));
   EXPECT_THAT(error_of("[optics]\nknots = [0.0, 0.5]\n"), HasSubstr("optics.slopes"));
+}
+
+class CalibratedScene : public ::testing::Test {
+ protected:
+  void write(const std::string& toml) {
+    std::filesystem::create_directories(folder_);
+    base::write_file_atomically(folder_ / "calibration.toml", toml);
+  }
+  ~CalibratedScene() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path folder_ =
+      std::filesystem::path(::testing::TempDir()) / fmt::format("calibrated_scene_{}", ::getpid());
+};
+
+constexpr const char* kModel =
+    "[layer]\nthickness_mm = 2.4\nthickness_sd_mm = 0.1\nslopes = [2.5, 2.4, 0.6, 0.4, 0.5]\n"
+    "[scattering]\nnarrow_mm = 0.12\nwide_mm = 1.16\nnarrow_weight = 0.7\n";
+
+TEST_F(CalibratedScene, IsThatSensor) {
+  write(kModel);
+  const Scene scene = parse_scene(
+      fmt::format("calibration = \"{}\"\n[optics]\nwide_mm = 1.5\n", folder_.string()), "x.toml");
+  EXPECT_EQ(scene.layer.thickness_mm, 2.4);
+  EXPECT_EQ(scene.optics.narrow_mm, 0.12);
+  EXPECT_EQ(scene.optics.wide_mm, 1.5);  // the scene's own
+  // A tenth of the thickness in: half of (0.6 + 0.55) · 0.1.
+  EXPECT_NEAR(response(scene.optics, 0.24, scene.layer.thickness_mm), 0.0575, 1e-12);
+}
+
+TEST_F(CalibratedScene, MayHaveAKinkAtZero) {
+  write(std::string(kModel).insert(8, "bulge_factor = 2.0\n"));
+  Scene scene = default_scene();
+  take_from_calibration(folder_, scene);
+  EXPECT_NEAR(response(scene.optics, 0.24, 2.4), 0.0575, 1e-6);
+  // A tenth out: slopes from 2 · 0.6 to 2 · 2.1.
+  EXPECT_NEAR(response(scene.optics, -0.24, 2.4), -0.27, 1e-5);
+}
+
+TEST_F(CalibratedScene, NeedsAModel) {
+  write("[list]\nfirst_q6 = 0\n");
+  Scene scene = default_scene();
+  EXPECT_THROW(take_from_calibration(folder_, scene), std::runtime_error);
+  EXPECT_THROW(take_from_calibration(folder_ / "absent", scene), std::exception);
 }
 
 TEST(Scene, ErrorsNameFileLineKeyAndWhatIsAllowed) {
