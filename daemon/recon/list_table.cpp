@@ -72,9 +72,9 @@ std::unique_ptr<const Knots> knots_of(std::span<const std::int16_t> um) {
 
 }  // namespace
 
-ListTable::ListTable(const Model& model)
-    : first_q6_(model.list.first_q6), covered_q6_(model.list.covered_to_q6), um_(model.list.um) {
-  if (model.method == Method::list) {
+ListTable::ListTable(const DepthList& list, Method method)
+    : first_q6_(list.first_q6), covered_q6_(list.covered_to_q6), um_(list.um) {
+  if (method == Method::list) {
     um_.resize(static_cast<std::size_t>(covered_q6_ - first_q6_) + 1);
     knots_ = knots_of(um_);
     if (knots_) {

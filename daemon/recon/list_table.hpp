@@ -19,7 +19,7 @@ class ListTable {
   /// ten or more. Other lists are looked up entry by entry.
   static constexpr double kKnotsWithinUm = 0.6;
 
-  explicit ListTable(const Model& model);
+  ListTable(const DepthList& list, Method method);
 
   /// Refers to this table.
   [[nodiscard]] kernels::LookUp look_up() const noexcept;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "daemon/recon/reconstructor_impl.hpp"
@@ -16,10 +17,22 @@ namespace {
 /// table (getSmallGaussianKernel in its smooth.cpp): 1/32, 7/64, 7/32, 9/32, in Q14.
 std::vector<std::int16_t> published_taps() { return {4608, 3584, 1792, 512}; }
 
+const DepthList& list_for(const Model& model, int steps) {
+  if (steps == 0) return model.list;
+  const auto found = std::ranges::find(model.sharpened, steps, &Model::Sharpened::steps);
+  if (found == model.sharpened.end()) {
+    throw std::invalid_argument("sharpened: the calibration has no list for " +
+                                std::to_string(steps) + (steps == 1 ? " step" : " steps") +
+                                " of sharpening");
+  }
+  return found->list;
+}
+
 }  // namespace
 
-Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model)
+Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, int the_steps)
     : model(std::move(the_model)),
+      steps(the_steps),
       grid(model->rectify.width, model->rectify.height),
       all_tiles(static_cast<std::size_t>(grid.rows()), grid.all()),
       plan(model->rectify),
@@ -31,13 +44,18 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model)
       fine(model->rectify.decimation, model->rectify.fine_width()),
       between(2, grid.width),
       out(2 * kStrip, grid.width),
-      list(*model),
+      sharpener_tiles(static_cast<std::size_t>(grid.rows())),
+      list(list_for(*model, steps), model->method),
       calibration_q6(at(grid.height)),
       taken_q6(at(grid.height)),
       taken_gain_q12(at(grid.height)),
       reference_q6(at(grid.height)),
       gain_q12(at(grid.height)),
       untrusted(at(grid.height)) {
+  if (steps > 0) {
+    sharpener.emplace(*model->scattering, steps, model->mm_per_px, grid.width, grid.height);
+    marks_q12.resize(at(grid.height));
+  }
   rectify_reference(model->reference_q8);
   smooth_reference(calibration_q6);
   apply(model->gain, {grid.width, grid.height, vec::padded(grid.width), model->mm_per_px},
@@ -102,6 +120,11 @@ void Reconstructor::Impl::set_reference(std::span<const std::uint16_t> reference
   }
   std::ranges::copy(taken_q6, reference_q6.begin());
   std::ranges::copy(taken_gain_q12, gain_q12.begin());
+  if (sharpener) {
+    std::ranges::transform(gain_q12, marks_q12.begin(), [](std::int16_t gain) {
+      return static_cast<std::int16_t>(gain == 0 ? 0 : kernels::kGainOne);
+    });
+  }
 }
 
 void Reconstructor::Impl::set_light(double factor) noexcept {
@@ -114,10 +137,10 @@ void Reconstructor::Impl::set_light(double factor) noexcept {
   kernels::scale_row(taken_gain_q12.data(), q15(1 / factor), count, gain_q12.data());
 }
 
-Reconstructor::Reconstructor(std::shared_ptr<const Model> model) {
+Reconstructor::Reconstructor(std::shared_ptr<const Model> model, int sharpen_steps) {
   if (!model) throw std::invalid_argument("model: missing");
   check(*model);
-  impl_ = std::make_unique<Impl>(std::move(model));
+  impl_ = std::make_unique<Impl>(std::move(model), sharpen_steps);
 }
 
 Reconstructor::~Reconstructor() = default;
@@ -125,6 +148,8 @@ Reconstructor::Reconstructor(Reconstructor&&) noexcept = default;
 Reconstructor& Reconstructor::operator=(Reconstructor&&) noexcept = default;
 
 const Model& Reconstructor::model() const noexcept { return *impl_->model; }
+
+int Reconstructor::sharpen_steps() const noexcept { return impl_->steps; }
 
 int Reconstructor::beyond_pixels() const noexcept { return impl_->beyond; }
 
@@ -176,6 +201,8 @@ void Reconstructor::run_active(const std::uint8_t* luma, std::ptrdiff_t stride,
 
 const TileGrid& Reconstructor::grid() const noexcept { return impl_->grid; }
 
-int Reconstructor::radius() const noexcept { return impl_->smoother.radius(); }
+int Reconstructor::radius() const noexcept {
+  return impl_->smoother.radius() + (impl_->sharpener ? impl_->sharpener->reach() : 0);
+}
 
 }  // namespace dtact::recon

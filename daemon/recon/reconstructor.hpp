@@ -14,9 +14,9 @@ namespace dtact::recon {
 /// Nanoseconds of each step of one reconstruction.
 struct StepTimes {
   std::int64_t rectify_ns = 0;  ///< Rectify and difference.
-  std::int64_t smooth_ns = 0;
-  std::int64_t list_ns = 0;  ///< Gain, list, untrusted mark.
-  std::int64_t sums_ns = 0;  ///< DepthSums; run_active() only.
+  std::int64_t smooth_ns = 0;   ///< And sharpen.
+  std::int64_t list_ns = 0;     ///< Gain, list, untrusted mark.
+  std::int64_t sums_ns = 0;     ///< DepthSums; run_active() only.
 };
 
 /// What a depth buffer holds besides the untouched map: kept beside each buffer that run_active()
@@ -34,13 +34,16 @@ inline constexpr std::size_t kLumaPadding = 64;
 /// int16 micrometres). Holds its scratch rows, so run() never allocates. One thread at a time.
 class Reconstructor {
  public:
-  /// Throws std::invalid_argument when the model's parts disagree in size.
-  explicit Reconstructor(std::shared_ptr<const Model> model);
+  /// `sharpen_steps` 1 or 2: levels are sharpened by so many steps (sharpener.hpp) and looked up in
+  /// the model's list for that. Throws std::invalid_argument when the model's parts disagree in
+  /// size, it has no such list or its scattering is too wide for its map.
+  explicit Reconstructor(std::shared_ptr<const Model> model, int sharpen_steps = 0);
   ~Reconstructor();
   Reconstructor(Reconstructor&&) noexcept;
   Reconstructor& operator=(Reconstructor&&) noexcept;
 
   [[nodiscard]] const Model& model() const noexcept;
+  [[nodiscard]] int sharpen_steps() const noexcept;
 
   /// Takes the untouched image under the present light: frame sized, Q8 luma, row-major without
   /// padding. Until then the model's own reference is used. Does not allocate, and takes about as

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "daemon/recon/kernels.hpp"
 #include "daemon/recon/list_table.hpp"
 #include "daemon/recon/reconstructor.hpp"
+#include "daemon/recon/sharpener.hpp"
 #include "daemon/recon/smoother.hpp"
 #include "daemon/recon/strip_sums.hpp"
 #include "daemon/recon/tiles.hpp"
@@ -42,7 +44,7 @@ class Stopwatch {
 };
 
 struct Reconstructor::Impl {
-  explicit Impl(std::shared_ptr<const Model> the_model);
+  Impl(std::shared_ptr<const Model> the_model, int the_steps);
 
   /// Where row y begins in the planes below, whose rows are whole blocks.
   [[nodiscard]] std::size_t at(int y) const noexcept {
@@ -64,6 +66,7 @@ struct Reconstructor::Impl {
                      Stopwatch& watch) noexcept;
 
   std::shared_ptr<const Model> model;
+  int steps;  ///< Of sharpening.
   TileGrid grid;
   TileRows all_tiles;
   RectifyPlan plan;
@@ -73,6 +76,8 @@ struct Reconstructor::Impl {
   RowBuffer fine;   ///< The rows of one row of a coarse map.
   RowBuffer between;
   RowBuffer out;  ///< A strip after smoothing.
+  std::optional<Sharpener> sharpener;
+  TileRows sharpener_tiles;  ///< Whose levels it reads.
   ListTable list;
   std::vector<std::int16_t> calibration_q6;  ///< Smoothed reference of the calibration.
   // The reference as it was taken and its gain, 0 where untrusted; and both in the present light.
@@ -81,6 +86,8 @@ struct Reconstructor::Impl {
   std::vector<std::int16_t> reference_q6;
   std::vector<std::int16_t> gain_q12;
   std::vector<std::uint8_t> untrusted;
+  /// Sharpened levels are under their gain already: one, 0 where untrusted.
+  std::vector<std::int16_t> marks_q12;
   std::uint64_t rest = 0;  ///< Counts the references: each has its own untouched map.
   int beyond = 0;
 
@@ -89,6 +96,21 @@ struct Reconstructor::Impl {
   [[nodiscard]] const RectifyTable::Entry* entries(int y) const noexcept {
     return model->rectify.entries.data() + std::ptrdiff_t{y} * model->rectify.fine_width();
   }
+  /// Smooths what `tiles` hold, one row of tiles after the other. Calls begin_row(row), then
+  /// made(row, first, last) with each run of its blocks, whose rows lie in `out`, then done(row).
+  template <typename Begin, typename Made, typename Done>
+  void smooth_tiles(const std::uint8_t* luma, const TileRows& tiles, StepTimes& times,
+                    Stopwatch& watch, Begin begin_row, Made made, Done done) noexcept;
+  /// The list for the blocks [first, last) of a row of tiles. `rows`: levels and gains from the
+  /// row's first pixel on.
+  void look_up_rows(vec::ListRows rows, int row, int first, int last, std::int16_t* depth) noexcept;
+  void finish(int row, StripSums* sums, StepTimes& times, Stopwatch& watch) const noexcept;
+  /// The smallest area that holds the tiles, and the tiles that hold an area.
+  [[nodiscard]] MapArea area_of(const TileRows& tiles) const noexcept;
+  void set_tiles(const MapArea& area, TileRows& tiles) const noexcept;
+  /// Levels of the rows of tiles, sharpened and looked up.
+  void run_sharpened(const std::uint8_t* luma, const TileRows& tiles, std::int16_t* depth,
+                     StripSums* sums, StepTimes& times, Stopwatch& watch) noexcept;
   /// The map's pixels [x0, x1) of row `y` before smoothing.
   void rectify(const std::uint8_t* luma, int y, int x0, int x1, std::int16_t* row) noexcept;
   /// Fetches what the last step on a row of tiles reads and writes. Whole maps are fetched by the

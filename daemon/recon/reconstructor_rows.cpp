@@ -1,5 +1,6 @@
 // What is done to the rows of a frame: rectified, smoothed and looked up, strip by strip.
 #include <algorithm>
+#include <bit>
 
 #include "daemon/recon/reconstructor_impl.hpp"
 
@@ -64,15 +65,16 @@ void Reconstructor::Impl::push_pair(int pair, std::uint64_t tiles, int slot) noe
   });
 }
 
-void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& tiles,
-                                   std::int16_t* depth, StripSums* sums, StepTimes& times,
-                                   Stopwatch& watch) noexcept {
+template <typename Begin, typename Made, typename Done>
+void Reconstructor::Impl::smooth_tiles(const std::uint8_t* luma, const TileRows& tiles,
+                                       StepTimes& times, Stopwatch& watch, Begin begin_row,
+                                       Made made, Done done) noexcept {
   int pushed = 0;
   for (int row = 0; row < grid.rows(); ++row) {
     const int begin = row * kStrip;
     const int end = std::min(begin + kStrip, smoother.pairs());
     const int needed = std::min(end + smoother.reach(), smoother.pairs());
-    prefetch(tiles, row, depth);
+    begin_row(row);
     while (pushed < needed) {
       const int strip = pushed;
       const int strip_end = std::min(strip + kStrip, needed);
@@ -95,20 +97,101 @@ void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& til
         smoother.take(pair, out.row(slot), out.row(slot + 1), first, last);
       }
       times.smooth_ns += watch.lap();
-      const int x = first * vec::kBlock;
-      const int columns = std::min(last * vec::kBlock, grid.width) - x;
-      const int y = 2 * begin;
-      const std::size_t here = at(y) + static_cast<std::size_t>(x);
-      beyond += vec::gain_list_mask(
-          {out.row(0) + x, out.stride(), gain_q12.data() + here, vec::padded(grid.width),
-           depth + packed(y) + x, grid.width, columns, std::min(2 * end, grid.height) - y},
-          list.look_up());
-      times.list_ns += watch.lap();
+      made(row, first, last);
     });
-    if (sums != nullptr) {
-      sums->finished(row);
-      times.sums_ns += watch.lap();
+    done(row);
+  }
+}
+
+void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& tiles,
+                                   std::int16_t* depth, StripSums* sums, StepTimes& times,
+                                   Stopwatch& watch) noexcept {
+  if (sharpener) return run_sharpened(luma, tiles, depth, sums, times, watch);
+  const auto look_up = [&](int row, int first, int last) {
+    const std::size_t here = at(row * TileGrid::kRows);
+    look_up_rows({out.row(0), out.stride(), gain_q12.data() + here, vec::padded(grid.width)}, row,
+                 first, last, depth);
+    times.list_ns += watch.lap();
+  };
+  smooth_tiles(
+      luma, tiles, times, watch, [&](int row) { prefetch(tiles, row, depth); }, look_up,
+      [&](int row) { finish(row, sums, times, watch); });
+}
+
+void Reconstructor::Impl::look_up_rows(vec::ListRows rows, int row, int first, int last,
+                                       std::int16_t* depth) noexcept {
+  const int x = first * vec::kBlock;
+  const int y = row * TileGrid::kRows;
+  rows.difference_q6 += x;
+  rows.gain_q12 += x;
+  rows.depth_um = depth + packed(y) + x;
+  rows.depth_stride = grid.width;
+  rows.width = std::min(last * vec::kBlock, grid.width) - x;
+  rows.height = std::min(TileGrid::kRows, grid.height - y);
+  beyond += vec::gain_list_mask(rows, list.look_up());
+}
+
+void Reconstructor::Impl::finish(int row, StripSums* sums, StepTimes& times,
+                                 Stopwatch& watch) const noexcept {
+  if (sums == nullptr) return;
+  sums->finished(row);
+  times.sums_ns += watch.lap();
+}
+
+MapArea Reconstructor::Impl::area_of(const TileRows& tiles) const noexcept {
+  std::uint64_t columns = 0;
+  int first = grid.rows();
+  int last = 0;
+  for (int row = 0; row < grid.rows(); ++row) {
+    if (tiles[static_cast<std::size_t>(row)] == 0) continue;
+    columns |= tiles[static_cast<std::size_t>(row)];
+    first = std::min(first, row);
+    last = row + 1;
+  }
+  if (columns == 0) return {};
+  return {
+      first * TileGrid::kRows, std::min(last * TileGrid::kRows, grid.height),
+      std::countr_zero(columns) * grid.blocks_per_tile,
+      std::min(static_cast<int>(std::bit_width(columns)) * grid.blocks_per_tile, grid.blocks())};
+}
+
+void Reconstructor::Impl::set_tiles(const MapArea& area, TileRows& tiles) const noexcept {
+  const int first = area.first / grid.blocks_per_tile;
+  const int last = (area.last + grid.blocks_per_tile - 1) / grid.blocks_per_tile;
+  const std::uint64_t columns = grid.all() << first & grid.all() >> (grid.columns() - last);
+  for (int row = 0; row < grid.rows(); ++row) {
+    const bool inside = row * TileGrid::kRows < area.y1 && (row + 1) * TileGrid::kRows > area.y0;
+    tiles[static_cast<std::size_t>(row)] = inside ? columns : 0;
+  }
+}
+
+void Reconstructor::Impl::run_sharpened(const std::uint8_t* luma, const TileRows& tiles,
+                                        std::int16_t* depth, StripSums* sums, StepTimes& times,
+                                        Stopwatch& watch) noexcept {
+  // The filter reaches over several tiles: what it reads is nearly a rectangle anyway.
+  const MapArea area = area_of(tiles);
+  set_tiles(sharpener->needed(area), sharpener_tiles);
+  const auto take_levels = [&](int row, int first, int last) {
+    const int y0 = row * TileGrid::kRows;
+    for (int y = y0; y < std::min(y0 + TileGrid::kRows, grid.height); ++y) {
+      vec::lit_row(out.row(y - y0), gain_q12.data() + at(y), first, last, sharpener->level(y));
     }
+    times.list_ns += watch.lap();
+  };
+  const auto nothing = [](int) {};
+  smooth_tiles(luma, sharpener_tiles, times, watch, nothing, take_levels, nothing);
+  sharpener->run(area);
+  times.smooth_ns += watch.lap();
+  for (int row = 0; row < grid.rows(); ++row) {
+    const int y = row * TileGrid::kRows;
+    for_each_run(tiles[static_cast<std::size_t>(row)], [&](int first, int last) {
+      look_up_rows({sharpener->sharpened(y), sharpener->stride(), marks_q12.data() + at(y),
+                    vec::padded(grid.width)},
+                   row, first * grid.blocks_per_tile,
+                   std::min(last * grid.blocks_per_tile, grid.blocks()), depth);
+    });
+    times.list_ns += watch.lap();
+    finish(row, sums, times, watch);
   }
 }
 

@@ -45,6 +45,7 @@ struct PairSum {
 
 #include "daemon/recon/vector_list-inl.hpp"
 #include "daemon/recon/vector_rectify-inl.hpp"
+#include "daemon/recon/vector_sharpen-inl.hpp"
 #include "daemon/recon/vector_smooth-inl.hpp"
 #include "daemon/recon/vector_sums-inl.hpp"
 
@@ -61,6 +62,9 @@ HWY_EXPORT(RectifyMeanDifference);
 HWY_EXPORT(SmoothAcross);
 HWY_EXPORT(SmoothDown);
 HWY_EXPORT(GainListMask);
+HWY_EXPORT(LitRow);
+HWY_EXPORT(ShrinkRow);
+HWY_EXPORT(SharpenRow);
 HWY_EXPORT(SumRows);
 HWY_EXPORT(BendRow);
 HWY_EXPORT(TargetName);
@@ -92,6 +96,21 @@ void smooth_down(const std::int16_t* const* pairs, const TapPairs& taps, int fir
 
 int gain_list_mask(const ListRows& rows, const kernels::LookUp& list) noexcept {
   return HWY_DYNAMIC_DISPATCH(GainListMask)(rows, list);
+}
+
+void lit_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12, int first, int last,
+             std::int16_t* level_q6) noexcept {
+  HWY_DYNAMIC_DISPATCH(LitRow)(difference_q6, gain_q12, first, last, level_q6);
+}
+
+void shrink_row(const std::int16_t* const* rows, int first, int last,
+                std::int16_t* coarse) noexcept {
+  HWY_DYNAMIC_DISPATCH(ShrinkRow)(rows, first, last, coarse);
+}
+
+void sharpen_row(const SharpenRows& rows, std::int16_t wide_share_q15, int first, int last,
+                 std::int16_t* after) noexcept {
+  HWY_DYNAMIC_DISPATCH(SharpenRow)(rows, wide_share_q15, first, last, after);
 }
 
 void sum_rows(const std::int16_t* depth_um, std::ptrdiff_t stride, int x0, int x1, int y0, int y1,

@@ -7,6 +7,7 @@
 
 #include "daemon/recon/kernels.hpp"
 #include "daemon/recon/rectify_plan.hpp"
+#include "daemon/recon/sharpen_kernels.hpp"
 
 /// The scalar kernels of kernels.hpp with the machine's vector instructions, chosen at run time.
 /// Same bits, other shapes: rows come in pairs and in blocks of 32 pixels.
@@ -82,6 +83,26 @@ struct ListRows {
 /// blocks. The depth may be written over the difference. After the list's last entry must stand
 /// kUntrusted once more: untrusted pixels look that up.
 int gain_list_mask(const ListRows& rows, const kernels::LookUp& list) noexcept;
+
+/// kernels::lit_row for the blocks [first, last).
+void lit_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12, int first, int last,
+             std::int16_t* level_q6) noexcept;
+
+/// kernels::shrink_row of the blocks [first, last) of the fine rows, kBlock / kCoarse values each.
+void shrink_row(const std::int16_t* const* rows, int first, int last,
+                std::int16_t* coarse) noexcept;
+
+/// What kernels::sharpen_row reads, from each row's first pixel on.
+struct SharpenRows {
+  const std::int16_t* level = nullptr;
+  const std::int16_t* before = nullptr;
+  const std::int16_t* narrow = nullptr;
+  kernels::WideRows wide;
+};
+
+/// kernels::sharpen_row for the blocks [first, last). `after` begins at the row's first pixel, too.
+void sharpen_row(const SharpenRows& rows, std::int16_t wide_share_q15, int first, int last,
+                 std::int16_t* after) noexcept;
 
 /// kernels::sum_row of the pixels [x0, x1) of the rows [y0, y1) of a map whose rows are `stride`
 /// values apart. Reads no other pixel.

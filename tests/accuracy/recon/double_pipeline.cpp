@@ -35,9 +35,9 @@ Plane rectified(const RectifyTable& table, std::span<const Pixel> frame, double 
   return out;
 }
 
-/// Gaussian cut at three standard deviations, edges replicated.
-Plane smoothed(Plane in, Size size, double sigma) {
-  const int radius = static_cast<int>(std::ceil(3 * sigma));
+/// Gaussian cut at three standard deviations or `cut` of them, edges replicated.
+Plane smoothed(Plane in, Size size, double sigma, double cut = 3) {
+  const int radius = static_cast<int>(std::ceil(cut * sigma));
   Plane weight;
   double sum = 0;
   for (int k = -radius; k <= radius; ++k) {
@@ -73,11 +73,26 @@ double look_up(const DepthList& list, double level) {
   return std::lerp(list.um[low], list.um[high], place - static_cast<double>(low));
 }
 
+/// x ← x + L − Hx, so often, from x = L on; H is two Gaussians, cut where nothing is left of them.
+Plane sharpened(const Model& model, const Plane& levels, Size size, int steps) {
+  constexpr double kCut = 5;
+  Plane x = levels;
+  for (int i = 0; i < steps; ++i) {
+    const Scattering& s = *model.scattering;
+    const Plane narrow = smoothed(x, size, s.narrow_mm / model.mm_per_px, kCut);
+    const Plane wide = smoothed(x, size, s.wide_mm / model.mm_per_px, kCut);
+    for (std::size_t p = 0; p < x.size(); ++p) {
+      x[p] += levels[p] - std::lerp(wide[p], narrow[p], s.narrow_weight);
+    }
+  }
+  return x;
+}
+
 }  // namespace
 
 std::vector<double> reconstruct_in_double(const Model& model,
                                           std::span<const std::uint16_t> reference_q8,
-                                          std::span<const std::uint8_t> luma) {
+                                          std::span<const std::uint8_t> luma, int steps) {
   const Size size{model.rectify.width, model.rectify.height};
   const Plane then =
       smoothed(rectified<std::uint16_t>(model.rectify, model.reference_q8, 1 / 256.0), size,
@@ -87,12 +102,16 @@ std::vector<double> reconstruct_in_double(const Model& model,
   Plane difference = rectified(model.rectify, luma, 1.0);
   std::ranges::transform(reference, difference, difference.begin(), std::minus{});
   difference = smoothed(std::move(difference), size, model.smoothing_px);
+  Plane level(difference.size());
+  for (std::size_t i = 0; i < level.size(); ++i) level[i] = difference[i] * then[i] / now[i];
+  level = sharpened(model, level, size, steps);
+  const auto of_steps = std::ranges::find(model.sharpened, steps, &Model::Sharpened::steps);
+  const DepthList& list = steps == 0 ? model.list : of_steps->list;
   Plane depth(difference.size());
   for (std::size_t i = 0; i < depth.size(); ++i) {
-    const double level = difference[i] * then[i] / now[i];
     const bool trusted = then[i] >= 8 && now[i] >= 8 && then[i] < 8 * now[i] &&
-                         level * kEntriesPerLevel <= model.list.covered_to_q6;
-    depth[i] = trusted ? look_up(model.list, level) : std::numeric_limits<double>::quiet_NaN();
+                         level[i] * kEntriesPerLevel <= list.covered_to_q6;
+    depth[i] = trusted ? look_up(list, level[i]) : std::numeric_limits<double>::quiet_NaN();
   }
   return depth;
 }

@@ -10,10 +10,12 @@ namespace dtact::recon {
 
 /// The method `list` in double precision, written from its definition and sharing no code with the
 /// fixed-point version: nothing is rounded or saturated between luma and the list, and the list is
-/// interpolated. Micrometres; NaN where the darkening is beyond the list's covered range on the
-/// deep side or the light too weak. `luma` is frame sized without padding.
+/// interpolated. `steps`: of sharpening, whose Gaussians both run on the map. Micrometres; NaN
+/// where the darkening is beyond the list's covered range on the deep side or the light too weak.
+/// `luma` is frame sized without padding.
 [[nodiscard]] std::vector<double> reconstruct_in_double(const Model& model,
                                                         std::span<const std::uint16_t> reference_q8,
-                                                        std::span<const std::uint8_t> luma);
+                                                        std::span<const std::uint8_t> luma,
+                                                        int steps = 0);
 
 }  // namespace dtact::recon

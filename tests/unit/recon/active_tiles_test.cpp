@@ -32,21 +32,31 @@ Model make_model() {
   for (int q6 = -40 * 64; q6 <= 110 * 64; ++q6) {
     model.list.um.push_back(static_cast<std::int16_t>(q6 / 2));  // 32 µm a level
   }
+  model.scattering = Scattering{.narrow_mm = 0.08, .wide_mm = 0.25, .narrow_weight = 0.7};
+  model.sharpened = {{.steps = 1, .list = model.list, .uncertainty = {}},
+                     {.steps = 2, .list = model.list, .uncertainty = {}}};
   model.reference_q8.assign(pixel(0, kFrameHeight, kFrameWidth), 150 * 256);
   return model;
 }
 
 /// The whole of run_active against the specification, on every instruction set.
-class ActiveTiles : public EveryTarget {};
+class ActiveTiles : public EveryTarget {
+ protected:
+  static void expect_the_full_result(int steps);
+};
 
-TEST_P(ActiveTiles, HoldTheFullResultAndTheRestIsCleared) {
+TEST_P(ActiveTiles, HoldTheFullResultAndTheRestIsCleared) { expect_the_full_result(0); }
+TEST_P(ActiveTiles, HoldTheFullResultOfOneStep) { expect_the_full_result(1); }
+TEST_P(ActiveTiles, HoldTheFullResultOfTwoSteps) { expect_the_full_result(2); }
+
+void ActiveTiles::expect_the_full_result(int steps) {
   Model made = make_model();
   made.untrusted.assign(made.rectify.entries.size(), 0);
   made.untrusted[5] = 1;
   made.untrusted[made.untrusted.size() / 2] = 1;
   const auto model = std::make_shared<const Model>(std::move(made));
-  Reconstructor reconstructor(model);
-  Specification specification(*model);
+  Reconstructor reconstructor(model, steps);
+  Specification specification(*model, steps);
   const TileGrid& grid = reconstructor.grid();
   // Two buffers, as a frame pool has, in unequal turns.
   std::vector<std::int16_t> depth[2];
@@ -77,6 +87,14 @@ TEST_P(ActiveTiles, HoldTheFullResultAndTheRestIsCleared) {
     TileRows tiles(static_cast<std::size_t>(grid.rows()));
     for (std::uint64_t& row : tiles) row = random() & random() & grid.all();
     if (i % 10 == 0) std::ranges::fill(tiles, i % 20 == 0 ? grid.all() : 0);
+    // A few beside each other: a filter then reads less than everything.
+    if (i % 3 == 0) {
+      const std::uint64_t mask = (random() % 3 + 1) << (random() % 6);
+      const std::size_t row = random() % tiles.size();
+      for (std::size_t y = 0; y < tiles.size(); ++y) {
+        tiles[y] = y == row || y == row + 1 ? mask & grid.all() : 0;
+      }
+    }
     reconstructor.run_active(luma.data(), kFrameWidth, tiles, depth[b], drawn[b]);
     ASSERT_EQ(drawn[b].tiles, tiles);
     if (count_tiles(tiles) > 0 && count_tiles(tiles) < 70) ++partly;

@@ -56,6 +56,20 @@ class Equality : public EveryTarget {
                                                         : shape.width % 2 == 0 ? q6 / 2
                                                                                : 2 * q6));
     }
+    // The narrow one reaches 1 to 6 pixels; the wide one, on its coarse grid, 1 to 9.
+    if (method == Method::list) {
+      model.scattering = Scattering{.narrow_mm = 0.012 + shape.smoothing_px * 0.008,
+                                    .wide_mm = 0.21 + shape.smoothing_px * 0.03,
+                                    .narrow_weight = 0.6};
+      // Each list says otherwise at any level.
+      model.sharpened = {{.steps = 1, .list = model.list, .uncertainty = {}},
+                         {.steps = 2, .list = model.list, .uncertainty = {}}};
+      for (Model::Sharpened& sharpened : model.sharpened) {
+        for (std::int16_t& um : sharpened.list.um) {
+          um = static_cast<std::int16_t>(um + sharpened.steps);
+        }
+      }
+    }
     model.reference_q8 = reference(model);
     model.untrusted.resize(table.entries.size());
     for (std::uint8_t& mark : model.untrusted) {
@@ -82,10 +96,10 @@ class Equality : public EveryTarget {
     }
     return luma;
   }
-  void check(const Shape& shape, Method method, int factor = 1) {
+  void check(const Shape& shape, Method method, int factor = 1, int steps = 0) {
     const auto model = std::make_shared<const Model>(decimate(make_model(shape, method), factor));
-    Reconstructor reconstructor(model);
-    Specification specification(*model);
+    Reconstructor reconstructor(model, steps);
+    Specification specification(*model, steps);
     std::vector<std::int16_t> depth(
         static_cast<std::size_t>(model->rectify.width * model->rectify.height));
     for (int round = 0; round < 3; ++round) {
@@ -126,6 +140,16 @@ TEST_P(Equality, HalfAndQuarterResolution) {
       if (shape.width < factor || shape.height < factor) continue;
       check(shape, Method::list, factor);
       check(shape, Method::published, factor);
+    }
+  }
+}
+
+TEST_P(Equality, Sharpened) {
+  for (const int steps : {1, 2}) {
+    for (const Shape& shape : kShapes) check(shape, Method::list, 1, steps);
+    // As the daemon has it.
+    for (const Shape& shape : {Shape{581, 163, 2}, Shape{130, 70, 1.4}}) {
+      check(shape, Method::list, 4, steps);
     }
   }
 }

@@ -42,7 +42,7 @@ TEST(Between, IsRoundedTwice) {
 
 TEST(ListTable, AStraightListStaysWhatItIs) {
   const Model model = model_of(-40, 100, [](double level) { return level < 0 ? 0 : 64 * level; });
-  const ListTable table(model);
+  const ListTable table(model.list, model.method);
   const kernels::LookUp list = table.look_up();
   ASSERT_NE(list.knots, nullptr);
   EXPECT_EQ(list.knots->step_bits, 6);
@@ -57,7 +57,7 @@ TEST(ListTable, AStraightListStaysWhatItIs) {
 
 TEST(ListTable, ACurvedListIsFollowedWithinAMicrometreAndRises) {
   const Model model = model_of(-20, 80, curve);
-  const ListTable table(model);
+  const ListTable table(model.list, model.method);
   const kernels::LookUp list = table.look_up();
   ASSERT_NE(list.knots, nullptr);
   double squares = 0;
@@ -74,7 +74,7 @@ TEST(ListTable, ACurvedListIsFollowedWithinAMicrometreAndRises) {
 TEST(ListTable, OnlyTheCoveredRangeCounts) {
   Model model = model_of(-20, 120, [](double level) { return level > 50 ? 3000 : 20 * level; });
   model.list.covered_to_q6 = 50 * 64;
-  const ListTable table(model);
+  const ListTable table(model.list, model.method);
   ASSERT_NE(table.look_up().knots, nullptr);
   EXPECT_EQ(table.look_up().um[70 * 64], 1000);
   EXPECT_EQ(table.look_up().um[70 * 64 + 1], kUntrusted);
@@ -82,16 +82,19 @@ TEST(ListTable, OnlyTheCoveredRangeCounts) {
 
 TEST(ListTable, ALongListHasAKnotEveryOtherLevel) {
   const auto line = [](double level) { return 15 * level; };
-  const auto bits = [](const Model& model) { return ListTable(model).look_up().knots->step_bits; };
+  const auto bits = [](const Model& model) {
+    return ListTable(model.list, model.method).look_up().knots->step_bits;
+  };
   EXPECT_EQ(bits(model_of(-40, 127, line)), 6);
   EXPECT_EQ(bits(model_of(-40, 128, line)), 7);
   EXPECT_EQ(bits(model_of(-40, 254, line)), 7);
-  EXPECT_EQ(ListTable(model_of(-100, 255, line)).look_up().knots, nullptr);
+  const Model longest = model_of(-100, 255, line);
+  EXPECT_EQ(ListTable(longest.list, longest.method).look_up().knots, nullptr);
 }
 
 TEST(ListTable, AListThatIsNotStraightBetweenKnotsIsLookedUpEntryByEntry) {
   const auto expect_kept = [](const Model& model) {
-    const ListTable table(model);
+    const ListTable table(model.list, model.method);
     EXPECT_EQ(table.look_up().knots, nullptr);
     for (std::size_t i = 0; i < model.list.um.size(); ++i) {
       ASSERT_EQ(table.look_up().um[i], model.list.um[i]) << i;
@@ -107,7 +110,7 @@ TEST(ListTable, ThePublishedListHasNoKnotsAndHoldsItsEnd) {
   Model model = model_of(0, 40, [](double level) { return 32 * level; });
   model.method = Method::published;
   model.list.covered_to_q6 = 30 * 64;
-  const ListTable table(model);
+  const ListTable table(model.list, model.method);
   const kernels::LookUp list = table.look_up();
   EXPECT_EQ(list.knots, nullptr);
   EXPECT_EQ(list.last_q6, 2560);
@@ -117,8 +120,8 @@ TEST(ListTable, ThePublishedListHasNoKnotsAndHoldsItsEnd) {
 
 TEST(ListTable, AListOfOneEntry) {
   Model model = model_of(-5, 0, [](double) { return -45; });
-  EXPECT_EQ(ListTable(model).look_up().um[0], -45);
-  EXPECT_EQ(ListTable(model).look_up().um[1], kUntrusted);
+  EXPECT_EQ(ListTable(model.list, model.method).look_up().um[0], -45);
+  EXPECT_EQ(ListTable(model.list, model.method).look_up().um[1], kUntrusted);
 }
 
 }  // namespace

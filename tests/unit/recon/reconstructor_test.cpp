@@ -139,6 +139,18 @@ TEST(ReconstructorList, TheSameFrameGivesTheSameDepth) {
   EXPECT_EQ(bench.run(137), first);
 }
 
+TEST(ReconstructorList, SharpenedLevelsNeedTheirOwnList) {
+  Model model = model_of(Method::list);
+  model.scattering = Scattering{.narrow_mm = 0.1, .wide_mm = 0.4, .narrow_weight = 0.7};
+  model.sharpened = {{.steps = 2, .list = model.list, .uncertainty = {}}};
+  const auto shared = std::make_shared<const Model>(std::move(model));
+  EXPECT_EQ(Reconstructor(shared, 2).sharpen_steps(), 2);
+  EXPECT_EQ(Reconstructor(shared).sharpen_steps(), 0);
+  EXPECT_THAT([&] { Reconstructor(shared, 1); },
+              testing::ThrowsMessage<std::invalid_argument>(
+                  testing::HasSubstr("no list for 1 step of sharpening")));
+}
+
 TEST(ReconstructorList, TimesAreReportedWhenAskedFor) {
   Bench bench(model_of(Method::list));
   StepTimes times{-1, -1, -1};

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "daemon/recon/kernels.hpp"
+#include "daemon/recon/sharpener.hpp"
 #include "daemon/recon/smoother.hpp"
 
 namespace dtact::recon {
@@ -22,8 +23,15 @@ std::vector<const std::int16_t*> rows_of(const std::vector<std::int16_t>& fine,
 
 }  // namespace
 
-Specification::Specification(const Model& model)
-    : model_(model), width_(model.rectify.width), height_(model.rectify.height), list_(model) {
+Specification::Specification(const Model& model, int sharpen_steps)
+    : model_(model),
+      steps_(sharpen_steps),
+      width_(model.rectify.width),
+      height_(model.rectify.height),
+      list_(steps_ == 0
+                ? model.list
+                : std::ranges::find(model.sharpened, steps_, &Model::Sharpened::steps)->list,
+            model.method) {
   set_reference(model.reference_q8);
 }
 
@@ -61,19 +69,20 @@ Specification::Plane Specification::difference(const std::uint8_t* luma,
   return out;
 }
 
-Specification::Plane Specification::smooth(const Plane& in,
-                                           std::span<const std::int16_t> taps) const {
+Specification::Plane Specification::smooth(const Plane& in, int width, int height,
+                                           std::span<const std::int16_t> taps) {
   const int radius = static_cast<int>(taps.size()) - 1;
-  const int padded = kernels::padded(width_);
+  const int padded = kernels::padded(width);
   const auto row_of = [padded](Plane& plane, int y) {
     return plane.data() + std::ptrdiff_t{y} * padded;
   };
+  const auto at = [width](int y) { return std::ptrdiff_t{y} * width; };
   Plane row(static_cast<std::size_t>(padded) + std::size_t{2} * kernels::kMaxRadius);
-  Plane across(static_cast<std::size_t>(padded) * static_cast<std::size_t>(height_));
-  for (int y = 0; y < height_; ++y) {
+  Plane across(static_cast<std::size_t>(padded) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y) {
     std::int16_t* const middle = row.data() + kernels::kMaxRadius;
-    for (int x = -radius; x < width_ + radius; ++x) {
-      middle[x] = in[static_cast<std::size_t>(at(y) + std::clamp(x, 0, width_ - 1))];
+    for (int x = -radius; x < width + radius; ++x) {
+      middle[x] = in[static_cast<std::size_t>(at(y) + std::clamp(x, 0, width - 1))];
     }
     kernels::smooth_horizontal_row(row.data() + kernels::kMaxRadius, taps, padded,
                                    row_of(across, y));
@@ -81,22 +90,64 @@ Specification::Plane Specification::smooth(const Plane& in,
   Plane out(in.size());
   Plane down(static_cast<std::size_t>(padded));
   std::vector<const std::int16_t*> rows(2 * taps.size() - 1);
-  for (int y = 0; y < height_; ++y) {
+  for (int y = 0; y < height; ++y) {
     for (std::size_t k = 0; k < rows.size(); ++k) {
-      rows[k] = row_of(across, std::clamp(y - radius + static_cast<int>(k), 0, height_ - 1));
+      rows[k] = row_of(across, std::clamp(y - radius + static_cast<int>(k), 0, height - 1));
     }
     kernels::smooth_vertical_row(rows.data(), taps, padded, down.data());
-    std::copy_n(down.begin(), width_, out.begin() + at(y));
+    std::copy_n(down.begin(), width, out.begin() + at(y));
   }
   return out;
+}
+
+Specification::Plane Specification::sharpen(const Plane& level, const Plane& before) const {
+  constexpr int kCoarse = kernels::kCoarse;
+  const Plane narrow =
+      smooth(before, width_, height_, Sharpener::narrow_taps(*model_.scattering, model_.mm_per_px));
+  const int width = (width_ + kCoarse - 1) / kCoarse;
+  const int height = (height_ + kCoarse - 1) / kCoarse;
+  Plane means(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int row = 0; row < height; ++row) {
+    Plane fine[kCoarse];
+    const std::int16_t* rows[kCoarse];
+    for (int i = 0; i < kCoarse; ++i) {
+      const std::ptrdiff_t from = at(std::min(kCoarse * row + i, height_ - 1));
+      for (int x = 0; x < kCoarse * width; ++x) {
+        fine[i].push_back(before[static_cast<std::size_t>(from + std::min(x, width_ - 1))]);
+      }
+      rows[i] = fine[i].data();
+    }
+    kernels::shrink_row(rows, width, means.data() + std::ptrdiff_t{row} * width);
+  }
+  means = smooth(means, width, height, Sharpener::wide_taps(*model_.scattering, model_.mm_per_px));
+  // A column more on either side, as its own last one.
+  const auto widened = [&](int row) {
+    const auto from = means.begin() + std::ptrdiff_t{std::clamp(row, 0, height - 1)} * width;
+    Plane out{*from};
+    out.insert(out.end(), from, from + width);
+    out.push_back(out.back());
+    return out;
+  };
+  Plane after(level.size());
+  for (int y = 0; y < height_; ++y) {
+    const int in = y % kCoarse;
+    const Plane near = widened(y / kCoarse);
+    const Plane other = widened(in < kCoarse / 2 ? y / kCoarse - 1 : y / kCoarse + 1);
+    const auto share = static_cast<std::int16_t>(in % 3 == 0 ? 12288 : 4096);  // 3/8, 1/8
+    kernels::sharpen_row(level.data() + at(y), before.data() + at(y), narrow.data() + at(y),
+                         {near.data() + 1, other.data() + 1, share},
+                         Sharpener::wide_share_q15(*model_.scattering), width_,
+                         after.data() + at(y));
+  }
+  return after;
 }
 
 void Specification::set_reference(std::span<const std::uint16_t> reference_q8) {
   const std::vector<std::int16_t> taps =
       model_.method == Method::list ? gaussian_taps(model_.smoothing_px) : kPublishedTaps;
   reference_q6_ = rectify(reference_q8);
-  const Plane calibration = smooth(rectify(model_.reference_q8), taps);
-  const Plane now = smooth(reference_q6_, taps);
+  const Plane calibration = smooth(rectify(model_.reference_q8), width_, height_, taps);
+  const Plane now = smooth(reference_q6_, width_, height_, taps);
   gain_q12_.resize(reference_q6_.size());
   untrusted_ = model_.untrusted;
   untrusted_.resize(reference_q6_.size());
@@ -118,10 +169,18 @@ Specification::Plane Specification::look_up(const Plane& in, const std::int16_t*
 std::vector<std::int16_t> Specification::run(const std::uint8_t* luma, std::ptrdiff_t stride) {
   const Plane before = difference(luma, stride);
   if (model_.method == Method::list) {
-    return look_up(smooth(before, gaussian_taps(model_.smoothing_px)), gain_q12_.data(),
-                   untrusted_.data());
+    const Plane smoothed = smooth(before, width_, height_, gaussian_taps(model_.smoothing_px));
+    if (steps_ == 0) return look_up(smoothed, gain_q12_.data(), untrusted_.data());
+    std::vector<std::int16_t> gain = gain_q12_;
+    for (std::size_t i = 0; i < gain.size(); ++i) gain[i] = untrusted_[i] != 0 ? 0 : gain[i];
+    Plane level(smoothed.size());
+    kernels::lit_row(smoothed.data(), gain.data(), static_cast<int>(gain.size()), level.data());
+    Plane sharpened = level;
+    for (int i = 0; i < steps_; ++i) sharpened = sharpen(level, sharpened);
+    return look_up(sharpened, nullptr, untrusted_.data());
   }
-  Plane depth = smooth(smooth(look_up(before, nullptr, nullptr), kPublishedTaps), kPublishedTaps);
+  Plane depth = look_up(before, nullptr, nullptr);
+  for (int i = 0; i < 2; ++i) depth = smooth(depth, width_, height_, kPublishedTaps);
   kernels::mask_row(untrusted_.data(), static_cast<int>(depth.size()), depth.data());
   return depth;
 }

@@ -14,7 +14,7 @@ namespace dtact::recon {
 /// strips, rings or tiles. Slow and plain; whatever runs in the daemon gives the same bits.
 class Specification {
  public:
-  explicit Specification(const Model& model);
+  explicit Specification(const Model& model, int sharpen_steps = 0);
   void set_reference(std::span<const std::uint16_t> reference_q8);
   /// Depth in micrometres, width × height of the model's table, row-major.
   [[nodiscard]] std::vector<std::int16_t> run(const std::uint8_t* luma, std::ptrdiff_t stride);
@@ -26,11 +26,16 @@ class Specification {
   [[nodiscard]] std::ptrdiff_t at(int y) const { return std::ptrdiff_t{y} * model_.rectify.width; }
   [[nodiscard]] Plane rectify(std::span<const std::uint16_t> reference_q8) const;
   [[nodiscard]] Plane difference(const std::uint8_t* luma, std::ptrdiff_t stride) const;
-  [[nodiscard]] Plane smooth(const Plane& in, std::span<const std::int16_t> taps) const;
+  [[nodiscard]] static Plane smooth(const Plane& in, int width, int height,
+                                    std::span<const std::int16_t> taps);
   [[nodiscard]] Plane look_up(const Plane& in, const std::int16_t* gain,
                               const std::uint8_t* untrusted);
 
+  /// One of Van Cittert's steps.
+  [[nodiscard]] Plane sharpen(const Plane& level, const Plane& before) const;
+
   const Model& model_;
+  int steps_;
   int width_;
   int height_;
   ListTable list_;
