@@ -1,5 +1,6 @@
 #include "clients/calibrate/calibrate.hpp"
 
+#include "clients/calibrate/force/force_command.hpp"
 #include "clients/calibrate/guided_command.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "clients/calibrate/reprocess/reprocess.hpp"
@@ -13,6 +14,7 @@ void set_up(CLI::App& app, cli::Context& context) {
   cli::add_global_options(app, context);
   ctl::add_guided(app, context);
   ctl::add_offline_commands(app, context.json);
+  force::add_force(app, context);
   reprocess::add_reprocess(app, context);
 }
 

@@ -114,17 +114,18 @@ class Stack {
 
 constexpr const char* kFrameColumns =
     "frame,sequence,time_ns,monotonic_ns,touching,area_mm2,x_mm,y_mm,deepest_mm,deepest_x_mm,"
-    "deepest_y_mm,volume_mm3,brightness,calibration,health,map\n";
+    "deepest_y_mm,volume_mm3,force_n,force_uncertainty_n,brightness,calibration,health,map\n";
 
 /// What was not measured is empty.
 std::string line_of(const v1::Frame& frame, std::uint64_t index, std::uint64_t time,
                     const std::string& map) {
-  std::string contact = ",,,,,,,";
+  std::string contact = ",,,,,,,,,";
   if (frame.has_contact()) {
     const v1::Contact& c = frame.contact();
-    contact =
-        fmt::format("{},{},{},{},{},{},{},{}", c.touching() ? 1 : 0, c.area_mm2(), c.x_mm(),
-                    c.y_mm(), c.deepest_mm(), c.deepest_x_mm(), c.deepest_y_mm(), c.volume_mm3());
+    contact = fmt::format("{},{},{},{},{},{},{},{},{},{}", c.touching() ? 1 : 0, c.area_mm2(),
+                          c.x_mm(), c.y_mm(), c.deepest_mm(), c.deepest_x_mm(), c.deepest_y_mm(),
+                          c.volume_mm3(), c.has_force_n() ? fmt::to_string(c.force_n()) : "",
+                          c.has_force_n() ? fmt::to_string(c.force_uncertainty_n()) : "");
   }
   return fmt::format("{},{},{},{},{},{},{},{},{}\n", index, frame.sequence(), time,
                      frame.monotonic_ns(), contact, frame.light().brightness(),

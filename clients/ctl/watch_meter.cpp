@@ -34,9 +34,14 @@ std::string watch_line(const WatchMeter& meter, const v1::Frame& last) {
                                          latency.percentile_ms(0.99));
   const std::string worth =
       last.has_depth() ? fmt::format(" +- {:.3f}", last.depth().uncertainty_um() / 1000) : "";
+  const std::string force =
+      last.contact().has_force_n()
+          ? fmt::format("  force {:.2f} N +- {:.2f}", last.contact().force_n(),
+                        last.contact().force_uncertainty_n())
+          : "";
   return fmt::format(
-      "{:5.1f} fps  contact {:6.1f} mm2  deepest {:6.3f} mm{}  latency {}  drops {}  {}",
-      meter.fps(), last.contact().area_mm2(), last.contact().deepest_mm(), worth, delay,
+      "{:5.1f} fps  contact {:6.1f} mm2  deepest {:6.3f} mm{}{}  latency {}  drops {}  {}",
+      meter.fps(), last.contact().area_mm2(), last.contact().deepest_mm(), worth, force, delay,
       last.dropped(),
       last.health().empty() ? "ok"
                             : fmt::format("{}", fmt::join(client::names_of(last.health()), ",")));

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "daemon/calibration/array_text.hpp"
+#include "daemon/calibration/force_table.hpp"
 #include "daemon/calibration/gain_table.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/list_tables.hpp"
@@ -83,6 +84,7 @@ Files format(const Calibration& calibration) {
         "runs = {}\n\n",
         array_text(runs_of(model.untrusted)));
   }
+  if (model.force) t += format_force(*model.force);
   t += fmt::format(
       "[lens]  # where the surface appears in the frame; empty: the frame as it is\n{}\n",
       calibration.lens ? format_lens(*calibration.lens) : "");

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "daemon/calibration/force_table.hpp"
 #include "daemon/calibration/gain_table.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/list_tables.hpp"
@@ -148,6 +149,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
     model->untrusted = mask_of(untrusted, model->rectify.entries.size());
     untrusted.finish();
   }
+  if (top.has("force")) model->force = read_force(top.table("force"));
   add_untrusted(*model, outside);
   refuse_reserved(top);
   read_reference(top.table("reference"), reference_png, where, *model);

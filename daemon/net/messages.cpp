@@ -164,6 +164,10 @@ void fill(const pipeline::ContactSummary& contact, v1::Contact& out) {
   out.set_deepest_x_mm(contact.deepest_x_mm);
   out.set_deepest_y_mm(contact.deepest_y_mm);
   out.set_volume_mm3(contact.volume_mm3);
+  if (contact.force) {
+    out.set_force_n(contact.force->newtons);
+    out.set_force_uncertainty_n(contact.force->uncertainty_n);
+  }
 }
 
 void fill(const pipeline::DepthFrame& frame, v1::Frame& out) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "daemon/pipeline/health.hpp"
+#include "daemon/recon/force.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "hal/frame.hpp"
 #include "hal/light_ring.hpp"
@@ -32,6 +33,9 @@ struct ContactSummary {
   double deepest_x_mm = 0;
   double deepest_y_mm = 0;
   double volume_mm3 = 0;  ///< Indentation summed over the contact area.
+  /// Along the surface's normal; 0 N when nothing touches. None: not calibrated, or for another
+  /// contact threshold.
+  std::optional<recon::Force> force;
 };
 
 /// Why a frame says nothing of contact: what is not measured may touch all the same.

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "daemon/recon/force.hpp"
 #include "daemon/recon/list.hpp"
 #include "daemon/recon/rectify.hpp"
 #include "daemon/recon/scattering.hpp"
@@ -56,6 +57,7 @@ struct Model {
   std::vector<std::uint16_t> reference_q8;
   /// Depth-map sized; non-zero marks pixels that are never trusted. Empty: none.
   std::vector<std::uint8_t> untrusted;
+  std::optional<ForceModel> force;  ///< None: not calibrated.
 };
 
 /// Throws std::invalid_argument, naming the part, where the parts do not fit each other.

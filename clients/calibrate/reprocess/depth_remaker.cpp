@@ -66,6 +66,7 @@ void DepthRemaker::remake(const hal::LumaView& luma, v1::Frame& frame) {
   resolution.reconstructor.run_active(luma.data, luma.stride, resolution.tiles, depth_um_, drawn_,
                                       nullptr, &sums);
   summary_ = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
+  contact_.weigh(model.force, summary_);
 
   v1::DepthMap map;
   map.set_encoding(v1::DEPTH_PREDICT_ZSTD);
@@ -98,6 +99,12 @@ void DepthRemaker::describe(const recon::DepthSums& sums, bool beyond, v1::Frame
   contact.set_deepest_x_mm(summary_.deepest_x_mm);
   contact.set_deepest_y_mm(summary_.deepest_y_mm);
   contact.set_volume_mm3(summary_.volume_mm3);
+  contact.clear_force_n();
+  contact.clear_force_uncertainty_n();
+  if (summary_.force) {
+    contact.set_force_n(summary_.force->newtons);
+    contact.set_force_uncertainty_n(summary_.force->uncertainty_n);
+  }
   frame.clear_contact_absence();
   frame.clear_calibration();  // of the daemon's numbers it has none
   frame.clear_times();

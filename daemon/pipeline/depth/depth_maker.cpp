@@ -64,6 +64,7 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   out.contact_um = rules.made_um;
   out.contact_absence = ContactAbsence::none;
   out.contact = contact_.inspect(sums, out.width, out.height, out.mm_per_px);
+  contact_.weigh(model.force, out.contact);
   beyond_ = reconstructor.beyond_pixels() * out.decimation * out.decimation > config_.beyond_pixels;
   judge(untouched.trust(), bend_um(sums, out.mm_per_px), out);
   out.times.inspect_ns = steps.sums_ns + clock_.monotonic_ns() - began_ns;

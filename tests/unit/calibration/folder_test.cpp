@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <stdexcept>
 
@@ -55,6 +56,16 @@ TEST(CalibrationFolder, EverythingComesBack) {
   EXPECT_TRUE(loaded.model->sharpened[1].uncertainty.empty());
   EXPECT_EQ(loaded.model->reference_q8, saved.model->reference_q8);
   EXPECT_EQ(loaded.model->untrusted, saved.model->untrusted);
+  ASSERT_TRUE(loaded.model->force);
+  EXPECT_EQ(loaded.model->force->per_mm3, 0.125);
+  EXPECT_EQ(loaded.model->force->per_mm2, -0.25);
+  EXPECT_EQ(loaded.model->force->per_mm5, 0.002);
+  EXPECT_EQ(loaded.model->force->threshold_mm, 0.1);
+  EXPECT_EQ(loaded.model->force->error_n, 0.03);
+  EXPECT_EQ(loaded.model->force->spread, (std::array<double, 6>{1, -2, 3, 4, -5, 6.5}));
+  EXPECT_EQ(loaded.model->force->pairs, 12);
+  EXPECT_EQ(loaded.model->force->from_n, 0.1);
+  EXPECT_EQ(loaded.model->force->to_n, 2);
   EXPECT_EQ(loaded.origin.camera, "usb-0:1.2 \"left\"\\");
   EXPECT_EQ(loaded.origin.pixel_format, "MJPEG");
   EXPECT_EQ(loaded.origin.fps, 59.94);

@@ -165,6 +165,17 @@ TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {
   EXPECT_TRUE(parsed.model->sharpened.empty());
 }
 
+TEST(ParseCalibration, ForceIsCheckedAndMayBeAbsent) {
+  expect_refused(with("per_mm3 = 0.125", ""), "force.per_mm3", "missing");
+  expect_refused(with("spread = [1, -2, 3, 4, -5, 6.5]", "spread = [1]"), "force.spread", "six");
+  expect_refused(with("to_n = 2", "to_n = 0.05"), "force.to_n", "from 0.1");
+  const Files files = format(sample());
+  std::string old = files.toml;
+  const auto from = old.find("[force]");
+  old.erase(from, old.find("[lens]") - from);
+  EXPECT_FALSE(parse(old, files.reference_png, "upload").model->force);
+}
+
 TEST(ParseCalibration, ScatteringIsChecked) {
   expect_refused(with("narrow_mm = 0.28", "narrow_mm = 0.001"), "scattering.narrow_mm",
                  "from 0.01 to 5");

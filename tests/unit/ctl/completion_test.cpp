@@ -107,9 +107,15 @@ TEST(Completion, KnowsEveryOptionOfEveryCommand) {
                   {"calibration", "show"},
                   {"calibration", "activate"},
                   {"calibration", "export"}});
-  expect_options(
-      "dtact-calibrate", calibrate::run,
-      {{}, {"guided"}, {"depth"}, {"lens"}, {"reconstruct"}, {"reprocess"}, {"evaluate"}});
+  expect_options("dtact-calibrate", calibrate::run,
+                 {{},
+                  {"guided"},
+                  {"depth"},
+                  {"lens"},
+                  {"reconstruct"},
+                  {"reprocess"},
+                  {"evaluate"},
+                  {"force"}});
   // What dtactctl hands over.
   EXPECT_THAT(options_of(calibrate::run, {"depth"}),
               IsSubsetOf(complete("dtactctl calibrate depth --")));

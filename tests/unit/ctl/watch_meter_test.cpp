@@ -86,6 +86,15 @@ TEST(WatchMeter, PrintsALine) {
       "ok");
 }
 
+TEST(WatchMeter, PrintsTheForceWhereItIsCalibrated) {
+  WatchMeter meter;
+  auto f = frame(0);
+  f.mutable_contact()->set_force_n(0.517);
+  f.mutable_contact()->set_force_uncertainty_n(0.0312);
+  EXPECT_NE(watch_line(meter, f).find("deepest  0.513 mm  force 0.52 N +- 0.03  latency"),
+            std::string::npos);
+}
+
 TEST(WatchMeter, PrintsNoLatencyBetweenMachines) {
   WatchMeter meter;
   auto f = frame(0);

@@ -186,11 +186,19 @@ TEST(FrameEncoder, CarriesWhatIsNewIn11) {
   EXPECT_EQ(message.calibration(), 7U);
   EXPECT_EQ(message.contact_absence(), v1::CONTACT_ABSENCE_NONE);
   EXPECT_TRUE(message.contact().touching());
+  EXPECT_FALSE(message.contact().has_force_n()) << "not calibrated is not 0 N";
   EXPECT_EQ(message.jpeg().width(), 8U);
   EXPECT_EQ(message.jpeg().height(), 4U);
   EXPECT_EQ(message.jpeg().data(), "\xff\xd8\xff\xd9");
   EXPECT_FALSE(message.has_depth());
   EXPECT_FALSE(message.has_luma());
+
+  frame.contact.force = recon::Force{0, 0.03};
+  encoder.begin(frame);
+  ASSERT_TRUE(message.ParseFromString(encoder.encode({})->body));
+  EXPECT_TRUE(message.contact().has_force_n());
+  EXPECT_EQ(message.contact().force_n(), 0);
+  EXPECT_EQ(message.contact().force_uncertainty_n(), 0.03);
 
   frame.light_since_ns.reset();
   frame.contact_absence = pipeline::ContactAbsence::referencing;

@@ -160,6 +160,25 @@ TEST(CaptureLoop, ACameraOpenedAnewBeginsAnew) {
   EXPECT_NEAR(loop.frame->contact.deepest_mm, 0.5, 0.02);
 }
 
+TEST(CaptureLoop, EveryFrameTellsTheForceThatTheCalibrationKnows) {
+  auto calibration = toy_calibration();
+  auto model = std::make_shared<recon::Model>(*calibration->model);
+  model->force = recon::ForceModel{.per_mm3 = 2, .threshold_mm = 0.1, .error_n = 0.05};
+  calibration->model = std::move(model);
+  SteppedLoop loop;
+  loop.begin(calibration);
+  ASSERT_TRUE(loop.until_fresh());
+  loop.step(3);
+  ASSERT_TRUE(loop.frame->contact.force);
+  EXPECT_EQ(loop.frame->contact.force->newtons, 0);
+  loop.camera.scene.press_mm = 0.5;
+  loop.step(10);
+  ASSERT_TRUE(loop.frame->contact.force);
+  EXPECT_GT(loop.frame->contact.force->newtons, 0);
+  EXPECT_DOUBLE_EQ(loop.frame->contact.force->newtons, 2 * loop.frame->contact.volume_mm3);
+  EXPECT_EQ(loop.frame->contact.force->uncertainty_n, 0.05);
+}
+
 TEST(CaptureLoop, ARezeroOfACameraThatWentAwayIsGivenUp) {
   SteppedLoop loop;
   loop.begin(toy_calibration());

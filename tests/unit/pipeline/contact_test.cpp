@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "daemon/recon/kernels.hpp"
@@ -112,6 +114,37 @@ TEST_F(ContactTest, AMapOfWhichNothingWasComputedIsNoContact) {
   EXPECT_FALSE(summary.touching);
   EXPECT_EQ(summary.deepest_mm, 0);
   EXPECT_EQ(summary.deepest_x_mm, 0);
+}
+
+// F = 2 V + 1 A of 0.3 mm³ and 0.5 mm²; the error grows by √(1 + 4 · 0.5²) of the area alone.
+TEST_F(ContactTest, TellsTheForceOfAContactByTheCalibration) {
+  const recon::ForceModel model{.per_mm3 = 2,
+                                .per_mm2 = 1,
+                                .per_mm5 = 0,
+                                .threshold_mm = 0.10,
+                                .error_n = 0.05,
+                                .spread = {0, 0, 0, 4, 0, 0},
+                                .pairs = 8,
+                                .from_n = 0,
+                                .to_n = 2};
+  fill(600, 2);
+  ContactSummary summary = summarise();
+  detector.weigh(model, summary);  // not yet a contact
+  ASSERT_TRUE(summary.force);
+  EXPECT_EQ(summary.force->newtons, 0);
+  EXPECT_EQ(summary.force->uncertainty_n, 0.05);
+  summary = summarise();
+  detector.weigh(model, summary);
+  EXPECT_NEAR(summary.force->newtons, 1.1, 1e-12);
+  EXPECT_NEAR(summary.force->uncertainty_n, 0.05 * std::sqrt(2), 1e-12);
+
+  summary = summarise();
+  detector.weigh(std::nullopt, summary);
+  EXPECT_FALSE(summary.force);
+  recon::ForceModel other = model;
+  other.threshold_mm = 0.15;
+  detector.weigh(other, summary);
+  EXPECT_FALSE(summary.force);
 }
 
 TEST_F(ContactTest, AsksForItsOwnThresholdsAndForNoBend) {

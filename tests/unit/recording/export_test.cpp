@@ -87,11 +87,13 @@ TEST_F(Export, Points) {
 
 TEST_F(Export, Tables) {
   ASSERT_EQ(run({"--to", "csv", "--frames", "3:"}), 0) << said_;
-  EXPECT_EQ(read("frames.csv"),
-            "frame,sequence,time_ns,monotonic_ns,touching,area_mm2,x_mm,y_mm,deepest_mm,"
-            "deepest_x_mm,deepest_y_mm,volume_mm3,brightness,calibration,health,map\n"
-            "3,13,1700000000216666671,1216666671,0,0,0,0,1.25,0,0,0,128,,,\n"
-            "4,14,1700000000233333338,1233333338,0,0,0,0,1.25,0,0,0,128,,,\n");
+  EXPECT_EQ(
+      read("frames.csv"),
+      "frame,sequence,time_ns,monotonic_ns,touching,area_mm2,x_mm,y_mm,deepest_mm,"
+      "deepest_x_mm,deepest_y_mm,volume_mm3,force_n,force_uncertainty_n,brightness,calibration,"
+      "health,map\n"
+      "3,13,1700000000216666671,1216666671,0,0,0,0,1.25,0,0,0,,,128,,,\n"
+      "4,14,1700000000233333338,1233333338,0,0,0,0,1.25,0,0,0,,,128,,,\n");
   EXPECT_EQ(read("events.csv"),
             "time_ns,sequence,monotonic_ns,event,detail\n"
             "1700000000233333338,14,1233333338,contact_made,deepest_mm=0.5\n");

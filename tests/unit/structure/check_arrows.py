@@ -51,7 +51,9 @@ ROOMS = {
     "clients/calibrate/guided": ["hal/base", "hal/image", "hal/toml", "proto", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
     # Depth of a recording, made by what makes it in the daemon.
     "clients/calibrate/reprocess": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mcap", "hal/mjpeg", "proto", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/cpp", "clients/recording"],
-    "clients/calibrate": ["clients/common", "clients/cpp", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
+    # Contacts of pictures and of recordings.
+    "clients/calibrate/force": ["hal/base", "hal/image", "hal/mcap", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/offline", "clients/recording"],
+    "clients/calibrate": ["clients/common", "clients/cpp", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
     # A daemon's administration: neither a fit nor OpenCV.
     "clients/ctl": ["hal/base", "hal/image", "hal/mcap", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
 }

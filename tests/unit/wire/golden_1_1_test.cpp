@@ -132,6 +132,11 @@ TEST(Golden11, FrameWithEveryField) {
       "80 01 00 8a 01 0a 08 02 10 01 1a 04 ff d8 ff d9");
 }
 
+TEST(Golden11, ContactWithForce) {
+  expect_golden<ServerMessage>(R"(frame { contact { force_n: 1.5 force_uncertainty_n: 0.25 } })",
+                               "12 14 4a 12 49 00 00 00 00 00 00 f8 3f 51 00 00 00 00 00 00 d0 3f");
+}
+
 TEST(Golden11, ErrorCodes) {
   EXPECT_EQ(ERROR_UNSUPPORTED, 10);
   EXPECT_EQ(ERROR_DENIED, 11);

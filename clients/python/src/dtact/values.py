@@ -34,11 +34,15 @@ class Contact:
     deepest_x_mm: float
     deepest_y_mm: float
     volume_mm3: float
+    #: Newtons along the surface's normal, 0 when nothing touches; None: not calibrated.
+    force_n: float | None = None
+    force_uncertainty_n: float | None = None  #: mean absolute error to expect of it
 
     @classmethod
     def of(cls, m: Message) -> Contact:
+        force = (m.force_n, m.force_uncertainty_n) if m.HasField("force_n") else (None, None)
         return cls(m.touching, m.area_mm2, m.x_mm, m.y_mm, m.deepest_mm, m.deepest_x_mm,
-                   m.deepest_y_mm, m.volume_mm3)
+                   m.deepest_y_mm, m.volume_mm3, *force)
 
 
 @dataclass(frozen=True)

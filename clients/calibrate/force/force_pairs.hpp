@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "clients/calibrate/force/force_fit.hpp"
+#include "daemon/calibration/calibration.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::force {
+
+/// What the user gave: frames, and what the scale said while they were taken.
+struct Reading {
+  std::string frames;  ///< A PNG file, a folder of them, or a recording: press.mcap[:frame[:end]].
+  double value = 0;    ///< As the scale shows it.
+};
+
+/// "FRAMES@VALUE". Throws std::runtime_error.
+[[nodiscard]] Reading parse_reading(const std::string& text);
+
+/// A CSV file of two columns with the heading `frames,force`; frames are relative to its folder,
+/// empty lines and those with a # first are passed over. Throws std::runtime_error with file and
+/// line.
+[[nodiscard]] std::vector<Reading> read_readings(const std::filesystem::path& csv);
+
+/// The contacts of frames as the daemon sums them up, averaged over each reading's frames.
+class ContactReader {
+ public:
+  /// Pictures are measured against `reference_q8`, the untouched image in their light.
+  ContactReader(const calibration::Calibration& calibration,
+                std::span<const std::uint16_t> reference_q8, double threshold_mm);
+
+  /// Volume and area; the reading itself is left to the caller. A recording's are those that the
+  /// daemon measured. Throws std::runtime_error when the frames cannot be read, are of another size
+  /// or, recorded, of another calibration, or reach deeper than the calibration covers.
+  [[nodiscard]] Pair measure(const std::string& frames) const;
+  /// The same of pictures at hand.
+  [[nodiscard]] Pair measure(std::span<const image::Grey8> frames, const std::string& name) const;
+
+ private:
+  [[nodiscard]] Pair measure_recording(const std::string& path, std::uint64_t first,
+                                       std::uint64_t end) const;
+
+  const calibration::Calibration& calibration_;
+  std::span<const std::uint16_t> reference_q8_;
+  double threshold_mm_;
+};
+
+}  // namespace dtact::force
