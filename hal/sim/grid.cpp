@@ -10,6 +10,21 @@ namespace {
 // The bulge of a press has fallen to a thousandth at about this many thicknesses.
 constexpr double kMargin = 4;
 
+// The greatest distances from the centre that the camera sees, along either axis: on the image's
+// rim.
+Place reach_of(const Scene& scene) {
+  const CameraModel& camera = scene.camera;
+  Place reach;
+  const auto see = [&](int column, int row) {
+    const Place place = unrolled(scene.surface, pixel_place(camera, column, row));
+    reach.x_mm = std::max(reach.x_mm, -place.x_mm);
+    reach.y_mm = std::max(reach.y_mm, -place.y_mm);
+  };
+  for (int column = 0; column < camera.width; ++column) see(column, 0);
+  for (int row = 0; row < camera.height; ++row) see(0, row);
+  return reach;
+}
+
 }  // namespace
 
 Place pixel_place(const CameraModel& camera, double column, double row) noexcept {
@@ -25,14 +40,14 @@ Place pixel_place(const CameraModel& camera, double column, double row) noexcept
 Grid make_grid(const Scene& scene) {
   Grid grid;
   grid.spacing_mm = scene.layer.grid_mm;
-  const Place corner = pixel_place(scene.camera, 0, 0);
+  const Place reach = reach_of(scene);
   const double margin = 2 * kMargin * scene.layer.thickness_mm;
   const auto side = [&](double field_mm) {
     return cv::getOptimalDFTSize(
         static_cast<int>(std::ceil((field_mm + margin) / grid.spacing_mm)));
   };
-  grid.width = side(-2 * corner.x_mm);
-  grid.height = side(-2 * corner.y_mm);
+  grid.width = side(2 * reach.x_mm);
+  grid.height = side(2 * reach.y_mm);
   // Whole points to the left of and above the centre: an object at the origin is sampled the same
   // way for every size of image.
   const int left = grid.width / 2;
@@ -42,12 +57,12 @@ Grid make_grid(const Scene& scene) {
   return grid;
 }
 
-PixelMap::PixelMap(const CameraModel& camera, const Grid& grid)
+PixelMap::PixelMap(const CameraModel& camera, const SurfaceModel& surface, const Grid& grid)
     : width_(static_cast<std::size_t>(camera.width)), pitch_(static_cast<std::size_t>(grid.width)) {
   entries_.reserve(width_ * static_cast<std::size_t>(camera.height));
   for (int row = 0; row < camera.height; ++row) {
     for (int column = 0; column < camera.width; ++column) {
-      const Place place = pixel_place(camera, column, row);
+      const Place place = unrolled(surface, pixel_place(camera, column, row));
       // Q8 positions, so that the split into point and weight is one integer division.
       const auto x = static_cast<std::uint32_t>(
           std::lround((place.x_mm - grid.x0_mm) / grid.spacing_mm * 256));

@@ -9,8 +9,8 @@
 
 namespace dtact::hal::sim {
 
-/// The points on which contact is solved. Point (column, row) lies at x = x0_mm + column·spacing,
-/// y = y0_mm + row·spacing from the image's centre.
+/// The points on which contact is solved, of a curved layer unrolled (Place). Point (column, row)
+/// lies at x = x0_mm + column·spacing, y = y0_mm + row·spacing from the image's centre.
 struct Grid {
   int width = 0;
   int height = 0;
@@ -27,17 +27,14 @@ struct Grid {
 /// a free border; sides are lengths the FFT likes.
 [[nodiscard]] Grid make_grid(const Scene& scene);
 
-/// Where pixel (column, row) lies on the layer, lens included, mm from the image's centre.
-struct Place {
-  double x_mm = 0;
-  double y_mm = 0;
-};
+/// Where pixel (column, row) lies on the layer, lens included; of a curved layer on the plane that
+/// touches it in its apex.
 [[nodiscard]] Place pixel_place(const CameraModel& camera, double column, double row) noexcept;
 
-/// For every pixel the four grid points around it. Bilinear, in Q8.
+/// For every pixel the four grid points around the place that it shows. Bilinear, in Q8.
 class PixelMap {
  public:
-  PixelMap(const CameraModel& camera, const Grid& grid);
+  PixelMap(const CameraModel& camera, const SurfaceModel& surface, const Grid& grid);
 
   /// Reads `grid_values` (grid sized) at the pixels of one image row.
   void sample_row(int row, std::span<const std::int16_t> grid_values,

@@ -84,26 +84,35 @@ double lowest_mm(const Object& object, const cv::Matx33d& turn) {
   return best;
 }
 
-// How far up the line through (x, y) of the sensor's plane, from `low` to `high`, the turned object
-// begins; kNoSurface where it does not.
+// Where the turned object begins on a line.
 class Line {
  public:
   Line(const Object& object, const Pose& pose)
-      : object_(object), pose_(pose), back_(rotation_of(pose.turn_deg).t()) {}
+      : object_(object),
+        origin_(pose.x_mm, pose.y_mm, pose.z_mm),
+        back_(rotation_of(pose.turn_deg).t()) {}
 
-  [[nodiscard]] double meets(double x, double y, double low, double high, double step) const {
-    if (inside(x, y, low)) return low;
+  /// How far beside the object's outline a point of the sensor's frame lies at most, mm.
+  [[nodiscard]] double beside(const cv::Vec3d& point) const {
+    const cv::Vec3d p = back_ * (point - origin_);
+    return std::hypot(p[0], p[1]) - object_.reach_mm;
+  }
+
+  /// How far along the normal from the surface's point, from `low` to `high`; kNoSurface where the
+  /// line meets nothing.
+  [[nodiscard]] double meets(const SurfacePoint& from, double low, double high, double step) const {
+    if (inside(from, low)) return low;
     for (double above = low; above < high;) {
       const double below = above;
       above = std::min(above + step, high);
-      if (inside(x, y, above)) return crossing(x, y, below, above);
+      if (inside(from, above)) return crossing(from, below, above);
     }
     return kNoSurface;
   }
 
  private:
-  [[nodiscard]] bool inside(double x, double y, double z) const {
-    const cv::Vec3d p = back_ * cv::Vec3d(x - pose_.x_mm, y - pose_.y_mm, z - pose_.z_mm);
+  [[nodiscard]] bool inside(const SurfacePoint& from, double along) const {
+    const cv::Vec3d p = back_ * (from.at + along * from.normal - origin_);
     // The outline lies within the reach but for rounding.
     if (std::hypot(p[0], p[1]) > object_.reach_mm + 1e-9) return false;
     const double bottom = object_.height_mm(p[0], p[1]);
@@ -111,16 +120,16 @@ class Line {
     return !object_.top_mm || p[2] <= object_.top_mm(p[0], p[1]);
   }
 
-  [[nodiscard]] double crossing(double x, double y, double outside, double within) const {
+  [[nodiscard]] double crossing(const SurfacePoint& from, double outside, double within) const {
     while (within - outside > kSearchEnd) {
       const double middle = (outside + within) / 2;
-      (inside(x, y, middle) ? within : outside) = middle;
+      (inside(from, middle) ? within : outside) = middle;
     }
     return within;
   }
 
   const Object& object_;
-  const Pose& pose_;
+  cv::Vec3d origin_;
   cv::Matx33d back_;
 };
 
@@ -166,29 +175,30 @@ std::optional<PressKey> key_at(const Press& press, double time_s) {
   return key;
 }
 
-Pose pose_of(const Object& object, const PressKey& key) {
+Pose pose_of(const SurfaceModel& surface, const Object& object, const PressKey& key) {
+  const SurfacePoint touched = point_at(surface, {key.x_mm, key.y_mm});
   const Quaternion turn = turn_of(key);
   const double lowest = upright(key) ? 0 : lowest_mm(object, matrix_of(turn));
-  return {key.x_mm, key.y_mm, -key.depth_mm - lowest, vector_of(turn)};
+  const cv::Vec3d origin = touched.at + (-key.depth_mm - lowest) * touched.normal;
+  const auto& lean = touched.turn_deg;
+  return {origin[0], origin[1], origin[2],
+          vector_of(quaternion_of({lean[0], lean[1], lean[2]}) * turn)};
 }
 
-void lower_object(const Object& object, const PressKey& key, double highest_mm, const Grid& grid,
-                  cv::Mat1d& target) {
-  if (upright(key)) return lower_upright(object, key, grid, target);
-  const Pose pose = pose_of(object, key);
-  const Line line(object, pose);
-  const double tilt = std::hypot(key.tilt_x_deg, key.tilt_y_deg) * kDegree;
-  // What lies below highest_mm of an endless column of the object's reach, leaning by the tilt.
-  const double reach =
-      object.reach_mm + (std::abs(highest_mm - pose.z_mm) + object.reach_mm) * std::tan(tilt);
+void lower_object(const SurfaceModel& surface, const Object& object, const PressKey& key,
+                  double highest_mm, const Grid& grid, cv::Mat1d& target) {
+  if (surface.shape == SurfaceShape::plane && upright(key)) {
+    return lower_upright(object, key, grid, target);
+  }
+  const Line line(object, pose_of(surface, object, key));
+  const double span = highest_mm + key.depth_mm;
   const double step = grid.spacing_mm / 4;
   for (int i = 0; i < grid.height; ++i) {
-    const double y = grid.y0_mm + i * grid.spacing_mm;
-    if (std::abs(y - pose.y_mm) > reach) continue;
     for (int j = 0; j < grid.width; ++j) {
-      const double x = grid.x0_mm + j * grid.spacing_mm;
-      if (std::abs(x - pose.x_mm) > reach) continue;
-      const double z = line.meets(x, y, -key.depth_mm, highest_mm, step);
+      const SurfacePoint from =
+          point_at(surface, {grid.x0_mm + j * grid.spacing_mm, grid.y0_mm + i * grid.spacing_mm});
+      if (line.beside(from.at) > span) continue;
+      const double z = line.meets(from, -key.depth_mm, highest_mm, step);
       target(i, j) = std::max(target(i, j), -z);
     }
   }

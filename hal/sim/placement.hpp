@@ -28,15 +28,17 @@ struct Pose {
 /// Where the keys of `press` put its object at `time_s`; nothing before the first one.
 [[nodiscard]] std::optional<PressKey> key_at(const Press& press, double time_s);
 
-/// The pose at such a key. The lowest point of a tilted object, which lies `depth_mm` deep, is
-/// searched for on its surface: within 0.01 mm, and what the pose says holds exactly.
-[[nodiscard]] Pose pose_of(const Object& object, const PressKey& key);
+/// The pose at such a key. On a curved surface a key speaks of the plane that touches it at the
+/// key's place, its axes those of the sensor after the shortest turn to the surface's normal there.
+/// The lowest point of a tilted object, which lies `depth_mm` below that plane, is searched for on
+/// its surface: within 0.01 mm, and what the pose says holds exactly.
+[[nodiscard]] Pose pose_of(const SurfaceModel& surface, const Object& object, const PressKey& key);
 
 /// Raises `target` (grid sized, mm below the untouched surface) to what `object` at `key` asks of
-/// the layer: the greatest depth that its surface reaches on the line along z through each point.
-/// Of a tilted one this line is followed up to `highest_mm` above the untouched surface, in steps
-/// that no wall hides in, and the crossing found by bisection.
-void lower_object(const Object& object, const PressKey& key, double highest_mm, const Grid& grid,
-                  cv::Mat1d& target);
+/// the layer: the greatest depth that it reaches on the surface's normal through each point. Unless
+/// it stands upright on a plane, the normal is followed up to `highest_mm` above the untouched
+/// surface in steps of a quarter of the grid's spacing, and the crossing found by bisection.
+void lower_object(const SurfaceModel& surface, const Object& object, const PressKey& key,
+                  double highest_mm, const Grid& grid, cv::Mat1d& target);
 
 }  // namespace dtact::hal::sim

@@ -190,6 +190,19 @@ void read_optics(KeyReader table, OpticsModel& optics, double thickness_mm) {
   table.finish();
 }
 
+void read_surface(KeyReader table, SurfaceModel& surface) {
+  int shape = static_cast<int>(surface.shape);
+  table.choice_if("shape", shape, {"plane", "sphere", "cylinder"});
+  surface.shape = static_cast<SurfaceShape>(shape);
+  if (surface.shape != SurfaceShape::plane) {
+    table.require("radius_mm");
+    table.require("camera_mm");
+    surface.radius_mm = table.number("radius_mm", 5, 500);
+    surface.camera_mm = table.number("camera_mm", 1, surface.radius_mm);
+  }
+  table.finish();
+}
+
 void read_light(KeyReader table, LightModel& light) {
   int arrangement = static_cast<int>(light.arrangement);
   table.choice_if("arrangement", arrangement, {"ring", "sides"});
@@ -224,6 +237,7 @@ void read_scene(std::string_view toml_text, const std::string& name,
   layer.number_if("texture_mm", scene.layer.texture_mm, 0.05, 5);
   layer.finish();
 
+  read_surface(root.table_if("surface"), scene.surface);
   read_optics(root.table_if("optics"), scene.optics, scene.layer.thickness_mm);
   read_light(root.table_if("light"), scene.light);
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "hal/sim/objects.hpp"
+#include "hal/sim/surface.hpp"
 
 namespace dtact::hal::sim {
 
@@ -67,7 +68,7 @@ struct LightModel {
 /// before the first and stays as it is after the last.
 struct PressKey {
   double time_s = 0;
-  double x_mm = 0;  ///< From the image's centre, to the right.
+  double x_mm = 0;  ///< From the image's centre, to the right (Place).
   double y_mm = 0;  ///< From the image's centre, downwards.
   double depth_mm = 0;
   double rotation_deg = 0;  ///< Clockwise as the camera sees it.
@@ -103,6 +104,7 @@ struct Scene {
   std::string sensor;  ///< Names the simulated sensor: its camera's identity.
   CameraModel camera;
   LayerModel layer;
+  SurfaceModel surface;
   OpticsModel optics;
   LightModel light;
   double loop_from_s = 0;  ///< After loop_to_s the time goes on here.

@@ -61,7 +61,7 @@ std::vector<double> solve_times(const Scene& scene) {
 }  // namespace
 
 Truth::Truth(const Scene& scene)
-    : scene_(scene), grid_(make_grid(scene)), pixels_(scene.camera, grid_) {
+    : scene_(scene), grid_(make_grid(scene)), pixels_(scene.camera, scene.surface, grid_) {
   solve_all();
 }
 
@@ -86,7 +86,8 @@ void Truth::solve_all() {
                        std::lround(at->y_mm * 1e6), std::lround(at->depth_mm * 1e6),
                        std::lround(at->rotation_deg * 1e6), std::lround(at->tilt_x_deg * 1e6),
                        std::lround(at->tilt_y_deg * 1e6)});
-      lower_object(scene_.presses[i].object, *at, scene_.layer.thickness_mm, grid_, target);
+      lower_object(scene_.surface, scene_.presses[i].object, *at, scene_.layer.thickness_mm, grid_,
+                   target);
     }
     auto found = solved.find(state);
     if (found == solved.end()) {
@@ -159,7 +160,12 @@ std::optional<Pose> Truth::pose(std::size_t press, std::uint64_t sequence) const
   const Press& wanted = scene_.presses.at(press);
   const auto key = key_at(wanted, scene_.time_s(sequence));
   if (!key) return std::nullopt;
-  return pose_of(wanted.object, *key);
+  return pose_of(scene_.surface, wanted.object, *key);
+}
+
+SurfacePoint Truth::surface_at(double column, double row) const {
+  return point_at(scene_.surface,
+                  unrolled(scene_.surface, pixel_place(scene_.camera, column, row)));
 }
 
 double Truth::force_n(std::uint64_t sequence) const noexcept {

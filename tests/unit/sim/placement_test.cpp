@@ -26,7 +26,7 @@ PressKey key_of(double depth_mm, double tilt_x_deg, double tilt_y_deg, double ro
 
 cv::Mat1d target_of(const Object& object, const PressKey& key) {
   cv::Mat1d target(kGrid.height, kGrid.width, -kNoSurface);
-  lower_object(object, key, 2, kGrid, target);
+  lower_object({}, object, key, 2, kGrid, target);
   return target;
 }
 
@@ -48,7 +48,7 @@ TEST(Placement, UprightPoseIsDepthPlaceAndRotation) {
   PressKey key = key_of(0.7, 0, 0, 20);
   key.x_mm = 1;
   key.y_mm = -2;
-  const Pose pose = pose_of(m4_nut(), key);
+  const Pose pose = pose_of({}, m4_nut(), key);
   EXPECT_DOUBLE_EQ(pose.x_mm, 1);
   EXPECT_DOUBLE_EQ(pose.y_mm, -2);
   EXPECT_DOUBLE_EQ(pose.z_mm, -0.7);
@@ -57,12 +57,12 @@ TEST(Placement, UprightPoseIsDepthPlaceAndRotation) {
 }
 
 TEST(Placement, ATurnBeyondHalfARoundIsTheShorterOneBack) {
-  EXPECT_NEAR(pose_of(cube(4), key_of(0, 0, 0, 270)).turn_deg[2], -90, 1e-9);
+  EXPECT_NEAR(pose_of({}, cube(4), key_of(0, 0, 0, 270)).turn_deg[2], -90, 1e-9);
 }
 
 // First the rotation, then the tilt, about the sensor's axes.
 TEST(Placement, TiltTurnsAfterTheRotation) {
-  const Pose pose = pose_of(cube(4), key_of(0.5, 15, 0, 90));
+  const Pose pose = pose_of({}, cube(4), key_of(0.5, 15, 0, 90));
   const cv::Vec3d edge = rotation_of(pose.turn_deg) * cv::Vec3d(1, 0, 0);  // 90: downwards
   EXPECT_NEAR(edge[1], std::cos(15 * kDegree), 1e-9);
   EXPECT_NEAR(edge[2], std::sin(15 * kDegree), 1e-9);  // tilt_x lifts the lower edge
@@ -94,7 +94,7 @@ TEST(Placement, ACylinderRollsAboutItsAxis) {
 // the right stands at 75°.
 TEST(Placement, ACubeRocksOnItsEdge) {
   const double tan15 = std::tan(15 * kDegree);
-  const Pose pose = pose_of(cube(4), key_of(0.6, 0, 15));
+  const Pose pose = pose_of({}, cube(4), key_of(0.6, 0, 15));
   EXPECT_NEAR(pose.z_mm, -0.6 + 2 * std::sin(15 * kDegree), 1e-5);
   const cv::Mat1d target = target_of(cube(4), key_of(0.6, 0, 15));
   const double edge = 2 * std::cos(15 * kDegree);  // 1.932

@@ -180,6 +180,10 @@ TEST(Scene, RefusesWhatCannotBe) {
               AllOf(HasSubstr("tilt_y"), HasSubstr("from -60 to 60")));
   EXPECT_THAT(error_of("[optics]\npressed_slope = 0.1\npressed_curve = -0.1\n"),
               AllOf(HasSubstr("x.toml:3: optics.pressed_curve"), HasSubstr("response fall")));
+  EXPECT_THAT(error_of("[surface]\nshape = \"sphere\"\n"),
+              AllOf(HasSubstr("surface.radius_mm"), HasSubstr("missing")));
+  EXPECT_THAT(error_of("[surface]\nshape = \"sphere\"\nradius_mm = 20.0\ncamera_mm = 21.0\n"),
+              AllOf(HasSubstr("surface.camera_mm"), HasSubstr("from 1 to 20")));
   EXPECT_THAT(error_of("[loop]\nfrom_s = 3.0\nto_s = 2.0\n"), HasSubstr("later than from_s"));
   EXPECT_THAT(error_of("[[press]]\nobject = \"height_map\"\nimage = \"none.png\"\n"
                        "mm_per_px = 0.1\nrelief_mm = 1.0\nkeys = [ { t = 1.0 } ]\n"),
