@@ -10,6 +10,7 @@
 
 #include "daemon/recon/reconstructor.hpp"
 #include "hal/sim/scene.hpp"
+#include "tests/accuracy/table/another_law.hpp"
 #include "tests/accuracy/table/methods.hpp"
 
 namespace dtact::table {
@@ -44,10 +45,10 @@ struct Spread {
 
 template <typename Value>
 Spread spread(const std::vector<Cell>& cells, std::size_t configuration, std::size_t method,
-              const Value& value) {
+              Law law, const Value& value) {
   Spread spread;
   for (const Cell& cell : cells) {
-    if (cell.configuration != configuration || cell.method != method) continue;
+    if (cell.configuration != configuration || cell.method != method || cell.law != law) continue;
     const double v = value(cell);
     spread.mean += v;
     spread.least = std::min(spread.least, v);
@@ -59,13 +60,14 @@ Spread spread(const std::vector<Cell>& cells, std::size_t configuration, std::si
 }
 
 template <typename Value>
-void add_rows(std::string& out, const std::vector<Cell>& cells, std::size_t columns,
+void add_rows(std::string& out, const std::vector<Cell>& cells, std::size_t columns, Law law,
               const char* truth, const Value& value) {
   for (std::size_t m = 0; m < methods().size(); ++m) {
     out += fmt::format("| {}, {} |", methods()[m].name, truth);
     for (std::size_t c = 0; c < columns; ++c) {
-      const Spread s = spread(cells, c, m, value);
-      out += fmt::format(" {:.4f} ({:.4f}–{:.4f}) |", s.mean, s.least, s.greatest);
+      const Spread s = spread(cells, c, m, law, value);
+      out += s.count == 0 ? " – |"
+                          : fmt::format(" {:.4f} ({:.4f}–{:.4f}) |", s.mean, s.least, s.greatest);
     }
     out += '\n';
   }
@@ -73,8 +75,9 @@ void add_rows(std::string& out, const std::vector<Cell>& cells, std::size_t colu
 
 }  // namespace
 
-std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count) {
-  const auto truth = solve(hal::sim::default_scene(), trial.all());
+std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count, Law law) {
+  const auto truth =
+      solve(law == Law::built_in ? hal::sim::default_scene() : another_law(), trial.all());
   std::vector<TruePress> indentations;
   for (std::size_t i = 0; i < trial.tests.size(); ++i) {
     indentations.push_back(
@@ -88,7 +91,7 @@ std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count)
     const auto tests = photograph(sensor, trial, crop8(material.reference_q8));
     for (std::size_t m = 0; m < methods().size(); ++m) {
       recon::Reconstructor reconstructor(methods()[m].calibrate(material));
-      Cell cell{trial.seed, c, m, {}, {}};
+      Cell cell{trial.seed, c, m, law, {}, {}};
       for (std::size_t t = 0; t < tests.size(); ++t) {
         reconstructor.run(tests[t].luma.data(), kFrameWidth, depth);
         cell.circle += against_circle(depth, tests[t].circle, tests[t].radius_mm);
@@ -103,15 +106,16 @@ std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count)
 std::string to_csv(const std::vector<Cell>& cells) {
   std::string out =
       "seed,configuration,method,circle_mae_mm,circle_untrusted,indentation_mae_mm,"
-      "indentation_untrusted\n";
+      "indentation_untrusted,law\n";
   const auto share = [](const Error& e) {
     return static_cast<double>(e.untrusted) / static_cast<double>(e.untrusted + e.pixels);
   };
   for (const Cell& cell : cells) {
-    fmt::format_to(std::back_inserter(out), "{},{},\"{}\",{:.5f},{:.5f},{:.5f},{:.5f}\n", cell.seed,
-                   configurations()[cell.configuration].name, methods()[cell.method].name,
-                   cell.circle.mean_mm(), share(cell.circle), cell.indentation.mean_mm(),
-                   share(cell.indentation));
+    fmt::format_to(std::back_inserter(out), "{},{},\"{}\",{:.5f},{:.5f},{:.5f},{:.5f},{}\n",
+                   cell.seed, configurations()[cell.configuration].name,
+                   methods()[cell.method].name, cell.circle.mean_mm(), share(cell.circle),
+                   cell.indentation.mean_mm(), share(cell.indentation),
+                   cell.law == Law::built_in ? "built-in" : "another");
   }
   return out;
 }
@@ -138,10 +142,11 @@ std::string to_markdown(const std::vector<Cell>& cells) {
     regression += paper ? fmt::format(" {:.4f} |", paper->regression_mm) : " – |";
   }
   out += '\n' + rule + '\n' + deviation + '\n' + single + '\n' + regression + '\n';
-  add_rows(out, cells, columns, "circle truth",
+  add_rows(out, cells, columns, Law::built_in, "circle truth",
            [](const Cell& cell) { return cell.circle.mean_mm(); });
-  add_rows(out, cells, columns, "true indentation",
-           [](const Cell& cell) { return cell.indentation.mean_mm(); });
+  const auto indentation = [](const Cell& cell) { return cell.indentation.mean_mm(); };
+  add_rows(out, cells, columns, Law::built_in, "true indentation", indentation);
+  add_rows(out, cells, columns, Law::another, "true indentation, another law", indentation);
   out += fmt::format(
       "\nMeans over {} seeds, least and greatest seed in brackets. Simulated sensor, "
       "apart from the paper's two rows.\n",

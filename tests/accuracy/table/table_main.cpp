@@ -27,7 +27,11 @@ std::vector<Cell> run_all(int seeds, int threads, std::size_t columns) {
   const auto work = [&] {
     for (std::size_t i = next++; i < trials.size(); i = next++) {
       try {
-        trials[i] = dtact::table::run_trial(dtact::table::draw(i + 1), columns);
+        const auto trial = dtact::table::draw(i + 1);
+        trials[i] = dtact::table::run_trial(trial, columns);
+        // One row that no method's model can have made.
+        const auto other = dtact::table::run_trial(trial, 1, dtact::table::Law::another);
+        trials[i].insert(trials[i].end(), other.begin(), other.end());
         fmt::print(stderr, "seed {} done\n", i + 1);
       } catch (...) {
         failures[i] = std::current_exception();

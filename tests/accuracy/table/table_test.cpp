@@ -59,6 +59,19 @@ TEST(Table, OursIsBetterThanThePublishedMethodByBothTruths) {
             0.6 * mean_of("published single image", indentation));
 }
 
+// Its press is the same, its light and its layer are not.
+TEST(Table, AnotherLawHasARowOfItsOwn) {
+  std::vector<Cell> both = cells();
+  const auto other =
+      run_trial(draw(1, {.calibration_presses = 10, .test_presses = 2}), 1, Law::another);
+  both.insert(both.end(), other.begin(), other.end());
+  EXPECT_NE(to_csv(both).find(",another\n"), std::string::npos);
+  const std::string table = to_markdown(both);
+  EXPECT_NE(table.find("| ours, one press, true indentation, another law | 0."),
+            std::string::npos);
+  EXPECT_EQ(to_markdown(cells()).find("another law | 0"), std::string::npos);
+}
+
 TEST(Table, SameSeedDrawsTheSamePresses) {
   EXPECT_EQ(draw(3).tests.at(19).x_mm, draw(3).tests.at(19).x_mm);
   EXPECT_NE(draw(3).tests.at(19).x_mm, draw(4).tests.at(19).x_mm);
