@@ -72,6 +72,10 @@ double RadialProfile::at(double radius_mm) const {
   return std::lerp(levels[inner], levels[outer], place - static_cast<double>(inner));
 }
 
+double sag_mm(double ball_radius_mm, double r) noexcept {
+  return ball_radius_mm - std::sqrt(std::max(0.0, ball_radius_mm * ball_radius_mm - r * r));
+}
+
 double distance_mm(const DifferenceMap& map, const Contact& contact, int x, int y) {
   return std::hypot(x - contact.col, y - contact.row) * map.mm_per_px;
 }

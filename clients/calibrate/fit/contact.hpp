@@ -29,6 +29,9 @@ struct RadialProfile {
 /// of a 4 mm ball it ends at about 8 mm.
 inline constexpr double kFarField = 2.25;
 
+/// How much higher than its lowest point a ball's surface lies `r` millimetres beside it.
+[[nodiscard]] double sag_mm(double ball_radius_mm, double r) noexcept;
+
 /// Distance of a pixel from the contact's centre, millimetres.
 [[nodiscard]] double distance_mm(const DifferenceMap& map, const Contact& contact, int x, int y);
 

@@ -15,10 +15,6 @@ constexpr double kBinsPerLevel = 2;  // of the monotone fit
 constexpr int kFewest = 4;           // pixels that make a grey level's vote
 constexpr std::size_t kRange = 256;  // grey levels
 
-double sag(double ball_radius, double r) {
-  return ball_radius - std::sqrt(std::max(0.0, ball_radius * ball_radius - r * r));
-}
-
 /// Means of (level, sag) over pixels within `reach_mm` of the centre, `per_level` bins a level.
 std::vector<Knot> sag_by_level(const DifferenceMap& map, const Contact& contact,
                                const PixelFilter& use, double reach_mm, double per_level) {
@@ -30,7 +26,7 @@ std::vector<Knot> sag_by_level(const DifferenceMap& map, const Contact& contact,
       if (r >= reach_mm || !(level >= 0) || (use && !use(x, y))) continue;
       Knot& bin = bins[static_cast<std::size_t>(level * per_level)];
       bin.level += level;
-      bin.depth_mm += sag(contact.ball_radius_mm, r);
+      bin.depth_mm += sag_mm(contact.ball_radius_mm, r);
       bin.weight += 1;
     }
   }

@@ -61,11 +61,10 @@ std::vector<recon::Model::Uncertainty> uncertainty_by_zero(const recon::DepthLis
         const double level = press.map.at(x, y);
         if (!(r < press.contact.radius_mm) || std::isnan(level)) continue;
         const double read = look_up_mm(list, level);
-        const double sag = ball - std::sqrt(ball * ball - r * r);
         const auto at = static_cast<std::size_t>(std::max(0.0, read) / kDepthBinMm);
         if (at >= bins.size()) bins.resize(at + 1);
         bins[at].depth += read;
-        bins[at].error += std::abs(read - (line->depth_mm - sag));
+        bins[at].error += std::abs(read - (line->depth_mm - sag_mm(ball, r)));
         bins[at].zero += zero;
         bins[at].pixels += 1;
       }

@@ -11,10 +11,6 @@ namespace {
 constexpr double kSure = 0.6;
 constexpr int kRounds = 4;  // until the contacts' radii have followed the depths
 
-double sag_mm(double ball_radius, double r) {
-  return ball_radius - std::sqrt(std::max(0.0, ball_radius * ball_radius - r * r));
-}
-
 /// The sure contact's radius for a depth. One that is far off in the first rounds must not empty or
 /// flood the contact.
 double reach_mm(const PressRings& press, double depth_mm) {
