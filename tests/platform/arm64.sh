@@ -16,7 +16,7 @@ root=${CHROOT_CACHE:-$HOME/.cache/dtactd-chroots}/$suite-arm64
 foreign=()
 for package in "$@"; do
   case $package in
-    libcli11-dev) foreign+=("$package") ;;  # has no architecture
+    libcli11-dev | libeigen3-dev) foreign+=("$package") ;;  # have no architecture
     lib* | prometheus-cpp-dev | umockdev) foreign+=("$package:arm64") ;;
     *) foreign+=("$package") ;;
   esac

@@ -17,6 +17,7 @@ namespace {
 
 /// Part of the contact that may be black or white before the press is refused.
 constexpr double kClipped = 0.01;
+constexpr double kShareWorth = 0.8;  // of the left-out error
 
 /// An image as the depth map shows it: for each of its pixels the nearest of the frame.
 template <typename Pixel>
@@ -80,6 +81,33 @@ recon::SpatialGain gain_of(const BallPress& press, const Calibration& calibratio
       {calibration.crop_col, calibration.crop_row, map.width, map.height, press.mm_per_px},
       0.5 * (map.width - 1), 0.5 * (map.height - 1));
   return moved(press.gain, centre.x, centre.y);
+}
+
+ChosenPressGain press_gain_of(const SettledPress& press) {
+  return choose_press_gain(sure_samples(press.map, press.contact), press.contact.ball_radius_mm);
+}
+
+/// Chooses the press's own gain and, where it may, the model's; `settled` becomes the press under
+/// it.
+PressChoices choose(const BallPress& press, recon::Model& model, SettledPress& settled) {
+  PressChoices chosen{press_gain_of(settled), {}};
+  const recon::SpatialGain& given = press.gain;
+  if (!press.may_share_light || given.shape != recon::GainShape::none ||
+      !given.polynomial.empty()) {
+    return chosen;
+  }
+  recon::Model shared = model;
+  shared.gain.shape = recon::GainShape::uniform;
+  SettledPress under =
+      settle(shared, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
+  const ChosenPressGain gain = press_gain_of(under);
+  chosen.light = {false, chosen.press_gain.left_out_mm[0], gain.left_out_mm[0]};
+  if (!(chosen.light->shared_mm < kShareWorth * chosen.light->plain_mm)) return chosen;
+  chosen.light->shared = true;
+  chosen.press_gain = gain;
+  model = std::move(shared);
+  settled = std::move(under);
+  return chosen;
 }
 
 void check(const BallPress& press) {
@@ -156,7 +184,16 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
   return press;
 }
 
-Calibration build(const BallPress& press) {
+std::string PressChoices::describe() const {
+  if (!light) return press_gain.describe();
+  return fmt::format(
+      "light: sectors that were left out are {:.4f} mm off the sphere, {:.4f} with darkening as a "
+      "share of the light: {}\n{}",
+      light->plain_mm, light->shared_mm, light->shared ? "the share is used" : "as it is",
+      press_gain.describe());
+}
+
+Calibration build(const BallPress& press, PressChoices* choices) {
   check(press);
   Calibration calibration =
       empty_calibration(press.reference_q8, press.crop, press.mm_per_px, press.lens);
@@ -164,7 +201,7 @@ Calibration build(const BallPress& press) {
   model->method = press.method;
   if (press.method == recon::Method::list) model->gain = gain_of(press, calibration);
 
-  const SettledPress settled =
+  SettledPress settled =
       settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
   const image::Grey8 reference = rectified_reference(model->rectify, press.reference_q8);
   const image::Grey8 ball = rectified_mean(model->rectify, press.frames);
@@ -172,9 +209,14 @@ Calibration build(const BallPress& press) {
                  "the reference is white at the contact; lower the exposure or the light");
   refuse_clipped(ball, settled.contact, press.mm_per_px, 0,
                  "the ball's image is black at the contact; raise the exposure or the light");
-  model->list = press.method == recon::Method::list
-                    ? fit_list(settled.map, settled.contact)
-                    : fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
+  if (press.method == recon::Method::list) {
+    const PressChoices chosen = choose(press, *model, settled);
+    const LevelledPress level = levelled(settled.map, settled.contact, chosen.press_gain.gain);
+    model->list = fit_list(level.map, level.contact);
+    if (choices != nullptr) *choices = chosen;
+  } else {
+    model->list = fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
+  }
   model->uncertainty = uncertainty_by_zero(model->list, std::span(&settled, 1));
   calibration.model = std::move(model);
   return calibration;

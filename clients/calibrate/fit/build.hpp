@@ -3,9 +3,11 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "clients/calibrate/fit/contact.hpp"
+#include "clients/calibrate/fit/press_gain.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/image/png.hpp"
 
@@ -46,6 +48,24 @@ struct BallPress {
   /// published method has none.
   recon::SpatialGain gain = {};
   recon::Method method = recon::Method::list;
+  /// Where `gain` says nothing, the press may: whether darkening is a share of the light.
+  bool may_share_light = false;
+};
+
+/// What one press chose, and why.
+struct PressChoices {
+  ChosenPressGain press_gain;
+  /// Whether the calibration takes darkening as a share of the light: the error that sectors left
+  /// out have without, mm, and with; without a gain of the press's own.
+  struct Light {
+    bool shared = false;
+    double plain_mm = 0;
+    double shared_mm = 0;
+  };
+  std::optional<Light> light;  ///< None: not asked.
+
+  /// In a sentence or two.
+  [[nodiscard]] std::string describe() const;
 };
 
 /// A calibration without a list: frame, crop (none: all that the frame shows), scale, lens,
@@ -68,8 +88,14 @@ struct BallPress {
 inline constexpr double kSmoothingMm = 0.1;
 
 /// Builds a calibration from images alone, with what it is worth (uncertainty_by_zero()). `origin`
-/// is left for the caller to fill. Throws std::runtime_error saying what is wrong with the images
-/// and what to do, std::invalid_argument when sizes or numbers cannot be.
-[[nodiscard]] Calibration build(const BallPress& press);
+/// is left for the caller to fill. The list is fitted to the press without its own gain
+/// (choose_press_gain()); `choices` says what was chosen.
+///
+/// The share of the light is taken where left-out sectors lose a fifth of their error by it. A
+/// light that falls to one side and a layer that is thicker there look alike in one press, but the
+/// light shows in the reference, too, and is right far from the press as well. Throws
+/// std::runtime_error saying what is wrong with the images and what to do, std::invalid_argument
+/// when sizes or numbers cannot be.
+[[nodiscard]] Calibration build(const BallPress& press, PressChoices* choices = nullptr);
 
 }  // namespace dtact::calibration

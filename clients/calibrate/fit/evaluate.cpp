@@ -49,20 +49,56 @@ double look_up_mm(const recon::DepthList& list, double level) {
   return 0.001 * list.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))];
 }
 
-double half_error(const DifferenceMap& map, const Contact& contact, double angle) {
-  const double dx = std::cos(angle);
-  const double dy = std::sin(angle);
-  const auto fitted = [&](int x, int y) {
-    return (x - contact.col) * dx + (y - contact.row) * dy > 0;
-  };
-  const recon::DepthList list = fit_list(map, contact, fitted);
+/// Of a list from the pixels `fitted` on the others.
+double left_out_error(const LevelledPress& press, const PixelFilter& fitted) {
+  const recon::DepthList list = fit_list(press.map, press.contact, fitted);
   std::vector<double> errors;
-  for_contact(map, contact, [&](int x, int y, double sphere) {
-    const double level = map.at(x, y);
+  for_contact(press.map, press.contact, [&](int x, int y, double sphere) {
+    const double level = press.map.at(x, y);
     if (fitted(x, y) || std::isnan(level)) return;
     errors.push_back(look_up_mm(list, level) - sphere);
   });
   return spread_of(std::move(errors)).mean;
+}
+
+double half_error(const LevelledPress& press, double angle) {
+  const double dx = std::cos(angle);
+  const double dy = std::sin(angle);
+  return left_out_error(press, [&](int x, int y) {
+    return (x - press.contact.col) * dx + (y - press.contact.row) * dy > 0;
+  });
+}
+
+/// From the even sectors or from the odd ones.
+double sector_error(const SettledPress& press, double turned, bool even) {
+  constexpr double kSector = 45;  // degrees; those that choose among them half as wide
+  const Contact& contact = press.contact;
+  const PixelFilter fitted = [&](int x, int y) {
+    return in_even_sector(x - contact.col, y - contact.row, kSector, turned) == even;
+  };
+  const ChosenPressGain chosen = choose_press_gain(sure_samples(press.map, contact, fitted),
+                                                   contact.ball_radius_mm, kSector / 2);
+  return left_out_error(levelled(press.map, contact, chosen.gain), fitted);
+}
+
+void leave_out(const SettledPress& press, Evaluation& result) {
+  const Contact& contact = press.contact;
+  result.press_gain = choose_press_gain(sure_samples(press.map, contact), contact.ball_radius_mm);
+  const LevelledPress level = levelled(press.map, contact, result.press_gain.gain);
+  double sum = 0;
+  double worst = 0;
+  for (int i = 0; i < kHalves; ++i) {
+    const double error = half_error(level, i * 2 * std::numbers::pi / kHalves);
+    sum += error;
+    worst = std::max(worst, error);
+  }
+  result.half_mae_mm = sum / kHalves;
+  result.half_worst_mm = worst;
+  double sectors = 0;
+  for (const double turned : {0.0, 22.5}) {
+    for (const bool even : {true, false}) sectors += sector_error(press, turned, even);
+  }
+  result.sector_mae_mm = sectors / 4;
 }
 
 Evaluation read(const recon::Model& model, const SettledPress& press,
@@ -106,17 +142,7 @@ Evaluation evaluate(const Calibration& calibration, std::span<const std::uint16_
   const recon::Model& model = *calibration.model;
   const SettledPress press = settle(model, reference_q8, frames, ball_radius_mm);
   Evaluation result = read(model, press, frames);
-  if (model.method == recon::Method::list) {
-    double sum = 0;
-    double worst = 0;
-    for (int i = 0; i < kHalves; ++i) {
-      const double error = half_error(press.map, press.contact, i * 2 * std::numbers::pi / kHalves);
-      sum += error;
-      worst = std::max(worst, error);
-    }
-    result.half_mae_mm = sum / kHalves;
-    result.half_worst_mm = worst;
-  }
+  if (model.method == recon::Method::list) leave_out(press, result);
   return result;
 }
 

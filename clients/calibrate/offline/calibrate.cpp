@@ -44,8 +44,12 @@ Made make_from_one(const Options& options) {
       .lens = map.lens,
       .crop = map.crop,
       .gain = map.gain,
-      .method = options.method == "published" ? recon::Method::published : recon::Method::list};
-  calibration::Calibration made = calibration::build(press);
+      .method = options.method == "published" ? recon::Method::published : recon::Method::list,
+      // A lens file says what its board's pins ask for.
+      .may_share_light = options.map.lens.empty()};
+  calibration::PressChoices choices;
+  calibration::Calibration made = calibration::build(press, &choices);
+  if (press.method == recon::Method::list) fmt::print("{}\n", choices.describe());
   made.origin = recorded_origin(options.reference);
   made.origin.created = utc_now();
   made.origin.sources = reference.sources;

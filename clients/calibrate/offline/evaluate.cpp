@@ -6,6 +6,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
@@ -39,6 +40,12 @@ cli::BallReport report_of(const calibration::Evaluation& e) {
   if (e.half_worst_mm) report.set_half_worst_mm(*e.half_worst_mm);
   report.set_contact_pixels(e.pixels);
   report.set_untrusted_pixels(e.untrusted);
+  if (e.sector_mae_mm) report.set_sector_mae_mm(*e.sector_mae_mm);
+  const auto& gain = e.press_gain.gain;
+  for (std::size_t i = 0; i < 2 * static_cast<std::size_t>(gain.order); ++i) {
+    report.add_press_gain(gain.factors[i]);
+  }
+  for (const std::string& doubt : calibration::doubts_about(e)) report.add_doubts(doubt);
   return report;
 }
 
@@ -70,7 +77,12 @@ cli::FolderReport report_of(const FolderEvaluation& e) {
   report.set_lens_skipped(e.no_pins);
   if (e.pins) *report.mutable_lens() = report_of(*e.pins);
   report.set_ball_skipped(e.no_ball);
-  if (e.ball) *report.mutable_ball() = report_of(*e.ball);
+  if (e.ball) {
+    *report.mutable_ball() = report_of(*e.ball);
+    for (const std::string& doubt : calibration::doubts_about(e.calibration->model->list)) {
+      report.mutable_ball()->add_doubts(doubt);
+    }
+  }
   report.set_pin_depths_skipped(e.no_pin_depths);
   if (e.pin_depths) *report.mutable_pin_depths() = report_of(*e.pin_depths);
   return report;
@@ -96,9 +108,13 @@ void print_text(const calibration::Evaluation& e) {
         "list from one half of the disc, error on the other: {:.4f} mm, at worst {:.4f} mm "
         "of eight halves\n",
         *e.half_mae_mm, e.half_worst_mm.value_or(0));
+    fmt::print("list from every other sector of the disc, error on the rest: {:.4f} mm\n",
+               e.sector_mae_mm.value_or(0));
+    fmt::print("{}\n", e.press_gain.describe());
   }
   fmt::print("untrusted: {} of {} pixels in the contact ({:.2f} %)\n", e.untrusted, e.pixels,
              100.0 * static_cast<double>(e.untrusted) / static_cast<double>(e.pixels));
+  for (const std::string& doubt : calibration::doubts_about(e)) fmt::print("doubtful: {}\n", doubt);
 }
 
 void run_folder(const Options& options, bool json) {

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/offline/board_images.hpp"
 
 namespace dtact::ctl {
@@ -181,9 +182,19 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
     lines.push_back(fmt::format(
         "ball: contact at row {:.1f}, column {:.1f} of the rectified image, offset {:+.4f} mm "
         "taken "
-        "off; mean absolute error {:.4f} mm in sample, {:.4f} mm half-disc (worst of eight {:.4f})",
+        "off; mean absolute error {:.4f} mm in sample, {:.4f} mm half-disc (worst of eight "
+        "{:.4f}), "
+        "{:.4f} mm in left-out sectors",
         e.ball->contact.row, e.ball->contact.col, e.ball->offset_mm, e.ball->mae_mm,
-        e.ball->half_mae_mm.value_or(0), e.ball->half_worst_mm.value_or(0)));
+        e.ball->half_mae_mm.value_or(0), e.ball->half_worst_mm.value_or(0),
+        e.ball->sector_mae_mm.value_or(0)));
+    lines.push_back(e.ball->press_gain.describe());
+    for (const auto& doubts : {calibration::doubts_about(*e.ball),
+                               calibration::doubts_about(e.calibration->model->list)}) {
+      for (const std::string& doubt : doubts) {
+        lines.push_back("ball: a calibration would be refused: " + doubt);
+      }
+    }
   } else {
     lines.push_back("ball: skipped: " + e.no_ball);
   }

@@ -6,12 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <string>
 
 #include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/offline/folder_evaluation.hpp"
-#include "tests/accuracy/real/press_images.hpp"
+#include "tests/accuracy/real/ball_press.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -20,21 +19,6 @@ using calibration::BallPress;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::IsEmpty;
-
-BallPress press_of(const PressImages& images, double mm_per_px, double radius_mm = 4) {
-  BallPress press;
-  press.reference_q8 = {images.reference.cols, images.reference.rows, {}};
-  for (const float level : images.reference) {
-    press.reference_q8.pixels.push_back(static_cast<std::uint16_t>(std::lround(256 * level)));
-  }
-  press.frames = {{images.frame.cols, images.frame.rows, {}}};
-  for (const float level : images.frame) {
-    press.frames[0].pixels.push_back(static_cast<std::uint8_t>(std::lround(level)));
-  }
-  press.mm_per_px = mm_per_px;
-  press.ball_radius_mm = radius_mm;
-  return press;
-}
 
 std::vector<std::string> doubts_of(const BallPress& press) {
   return calibration::doubts_about(calibration::build(press), press);
@@ -57,13 +41,13 @@ class PlausiblePress : public testing::TestWithParam<const char*> {
 TEST_P(PlausiblePress, NothingIsSaidOfHealthyOnes) {
   for (const PressImages& images :
        {images_, turned(images_), dark_corners(images_), leaking(images_)}) {
-    EXPECT_THAT(doubts_of(press_of(images, scale())), IsEmpty());
+    EXPECT_THAT(doubts_of(ball_press(images, scale())), IsEmpty());
   }
-  BallPress published = press_of(images_, scale());
+  BallPress published = ball_press(images_, scale());
   published.method = recon::Method::published;
   EXPECT_THAT(doubts_of(published), IsEmpty());
   // A tenth of the scale less: told by nothing in one press.
-  EXPECT_THAT(doubts_of(press_of(images_, 0.9 * scale())), IsEmpty());
+  EXPECT_THAT(doubts_of(ball_press(images_, 0.9 * scale())), IsEmpty());
 }
 
 TEST_P(PlausiblePress, NothingIsSaidOfThemThroughTheirLens) {
@@ -76,8 +60,9 @@ TEST_P(PlausiblePress, NothingIsSaidOfThemThroughTheirLens) {
 }
 
 TEST_P(PlausiblePress, ADecimalPointOff) {
-  EXPECT_THAT(doubts_of(press_of(images_, 0.1 * scale())), Contains(HasSubstr("a grey level is")));
-  EXPECT_THAT(doubts_of(press_of(images_, scale(), 40)), Contains(HasSubstr("a grey level is")));
+  EXPECT_THAT(doubts_of(ball_press(images_, 0.1 * scale())),
+              Contains(HasSubstr("a grey level is")));
+  EXPECT_THAT(doubts_of(ball_press(images_, scale(), 40)), Contains(HasSubstr("a grey level is")));
 }
 
 TEST_P(PlausiblePress, APressHalfInTheDark) {
@@ -88,7 +73,7 @@ TEST_P(PlausiblePress, APressHalfInTheDark) {
     for (cv::Mat1f* image : {&dark.reference, &dark.frame}) {
       image->colRange(from, image->cols) *= 0.03F;
     }
-    EXPECT_FALSE(doubts_of(press_of(dark, scale())).empty()) << part;
+    EXPECT_FALSE(doubts_of(ball_press(dark, scale())).empty()) << part;
   }
 }
 
@@ -101,11 +86,11 @@ TEST(PlausibleDeepPress, AWrongScaleRadiusOrLight) {
   if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
   const PressImages images = load_pair(*folder, "ball");
   const auto disagree = Contains(HasSubstr("list and sphere disagree"));
-  EXPECT_THAT(doubts_of(press_of(images, 0.0552)), disagree);
-  EXPECT_THAT(doubts_of(press_of(images, 1.05 * 0.0510)), disagree);
-  EXPECT_THAT(doubts_of(press_of(images, 0.0510, 3.5)), disagree);
-  EXPECT_THAT(doubts_of(press_of(images, 0.0510, 3)), disagree);
-  EXPECT_THAT(doubts_of(press_of(tilted(images), 0.0510)), disagree);
+  EXPECT_THAT(doubts_of(ball_press(images, 0.0552)), disagree);
+  EXPECT_THAT(doubts_of(ball_press(images, 1.05 * 0.0510)), disagree);
+  EXPECT_THAT(doubts_of(ball_press(images, 0.0510, 3.5)), disagree);
+  EXPECT_THAT(doubts_of(ball_press(images, 0.0510, 3)), disagree);
+  EXPECT_THAT(doubts_of(ball_press(tilted(images), 0.0510)), disagree);
 }
 
 }  // namespace

@@ -16,6 +16,7 @@ std::shared_ptr<const recon::Model> from_one(const Material& material, recon::Me
   press.mm_per_px = kMmPerPx;
   press.crop = calibration::Crop{kCropCol, kCropRow, kCrop, kCrop};
   press.method = method;
+  press.may_share_light = true;
   return calibration::build(press).model;
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <stdexcept>
 
@@ -33,6 +34,7 @@ TEST(Build, ACalibrationThatReadsItsOwnBall) {
   EXPECT_LE(e.mae_mm, 0.01);
   EXPECT_LE(e.half_mae_mm.value_or(1), 0.012);
   EXPECT_GE(e.half_worst_mm.value_or(0), e.half_mae_mm.value_or(1));
+  EXPECT_LE(e.sector_mae_mm.value_or(1), 0.012);
   EXPECT_EQ(e.untrusted, 0U);
   EXPECT_NEAR(static_cast<double>(e.pixels), 11600, 300) << "π·(3.04/0.05)²";
   // The sphere is put to zero where the ball is still 0.1 mm deep.
@@ -105,11 +107,50 @@ TEST(Build, ADriftedLightIsFollowed) {
   EXPECT_NEAR(e.contact.peak_levels, 45, 0.5);
 }
 
+/// Light that grows by 2 % a millimetre to the right.
+void tilt(image::Grey16& reference, image::Grey8& frame) {
+  for (std::size_t i = 0; i < frame.pixels.size(); ++i) {
+    const double light = 0.8 * (1 + 0.02 * 0.05 * (static_cast<double>(i % 260) - 129.5));
+    reference.pixels[i] = static_cast<std::uint16_t>(std::lround(light * reference.pixels[i]));
+    frame.pixels[i] = static_cast<std::uint8_t>(std::lround(light * frame.pixels[i]));
+  }
+}
+
+TEST(Build, ALightThatFallsToOneSideIsSeenInOnePress) {
+  BallPress press = press_of(Ball{});
+  tilt(press.reference_q8, press.frames[0]);
+  Ball beside{.col = 190, .depth_mm = 1.2};  // 3.5 mm away, where the light is 7 % stronger
+  image::Grey16 reference = beside.untouched_q8();
+  std::vector<image::Grey8> frames{beside.frame()};
+  tilt(reference, frames[0]);
+
+  PressChoices choices;
+  const Calibration plain = build(press, &choices);
+  EXPECT_FALSE(choices.light) << "it was not asked";
+  EXPECT_EQ(plain.model->gain.shape, recon::GainShape::none);
+  EXPECT_EQ(choices.press_gain.gain.order, GainOrder::plane);
+
+  press.may_share_light = true;
+  const Calibration shared = build(press, &choices);
+  EXPECT_EQ(shared.model->gain.shape, recon::GainShape::uniform);
+  EXPECT_EQ(choices.press_gain.gain.order, GainOrder::none);
+  EXPECT_THAT(choices.describe(), HasSubstr("as a share of the light: the share is used"));
+  EXPECT_NEAR(read_ball(shared, reference.pixels, frames, 4).offset_mm, 0.1, 0.03);
+  EXPECT_GT(read_ball(plain, reference.pixels, frames, 4).offset_mm,
+            read_ball(shared, reference.pixels, frames, 4).offset_mm + 0.02);
+
+  BallPress even = press_of(Ball{});
+  even.may_share_light = true;
+  EXPECT_EQ(build(even, &choices).model->gain.shape, recon::GainShape::none);
+  EXPECT_THAT(choices.describe(), HasSubstr("as a share of the light: as it is"));
+}
+
 TEST(Build, ThePublishedMethodHasNoHalves) {
   BallPress press = press_of(Ball{});
   press.method = recon::Method::published;
   const Evaluation e = evaluate(build(press), press.reference_q8.pixels, press.frames, 4);
   EXPECT_FALSE(e.half_mae_mm.has_value());
+  EXPECT_FALSE(e.sector_mae_mm.has_value());
   EXPECT_LE(e.mae_mm, 0.03);
 }
 

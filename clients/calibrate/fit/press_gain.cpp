@@ -1,0 +1,252 @@
+#include "clients/calibrate/fit/press_gain.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace dtact::calibration {
+namespace {
+
+constexpr double kSure = 0.9;         // of the contact radius, as fit_list() has it
+constexpr double kApartMm = 0.1;      // what the map is smoothed by
+constexpr double kKnotLevels = 3;     // grey levels from knot to knot
+constexpr double kStraight = 0.3;     // weight of a knot's bend, in shares of all samples
+constexpr double kLeastWorth = 5e-4;  // mm
+constexpr double kWorth = 0.05;       // of the left-out error
+/// What is left of a real press goes together over half a millimetre and more, so that a contact
+/// has about so many samples of it.
+constexpr double kIndependent = 30;
+/// How far middle and factors are expected from zero: the middle is the centroid, off by at most a
+/// tenth of a millimetre when the light falls by 5 % a millimetre; a plane of 3 % a millimetre is
+/// more than any light here has. A quadratic of 2 % a square millimetre is an eighth on the rim.
+constexpr double kMiddleMm = 0.1;
+constexpr std::array<double, 4> kFactors = {0.03, 0.03, 0.02, 0.02};
+constexpr int kRounds = 8;
+constexpr std::size_t kFewest = 200;
+
+Eigen::Index terms_of(GainOrder order) { return 2 * static_cast<Eigen::Index>(order); }
+
+std::array<double, 4> terms_at(double x, double y) { return {x, y, x * x - y * y, 2 * x * y}; }
+
+/// A press's gain with the list that was fitted along, as indentation less the press's depth.
+struct Fit {
+  PressGain gain;
+  Eigen::VectorXd knots;  ///< kKnotLevels apart, the first at no darkening.
+
+  /// Of the list; beyond the last knot along the last two.
+  [[nodiscard]] double depth_at(double level) const {
+    const auto below = std::clamp<Eigen::Index>(static_cast<Eigen::Index>(level / kKnotLevels), 0,
+                                                knots.size() - 2);
+    return std::lerp(knots(below), knots(below + 1),
+                     level / kKnotLevels - static_cast<double>(below));
+  }
+  [[nodiscard]] double slope_at(double level) const {
+    return (depth_at(level + kKnotLevels) - depth_at(level - kKnotLevels)) / (2 * kKnotLevels);
+  }
+};
+
+double darkening(const PressGain& gain, const PressSample& s) {
+  return std::max(0.0, gain.at(s.x_mm, s.y_mm) * s.level);
+}
+
+/// List minus sphere, but for the press's depth.
+double error_of(const Fit& fit, const PressSample& s, double ball) {
+  const double r = std::hypot(s.x_mm - fit.gain.right_mm, s.y_mm - fit.gain.down_mm);
+  return fit.depth_at(darkening(fit.gain, s)) + sag_mm(ball, r);
+}
+
+/// One round: knots anew, gain and middle moved along their slopes at `before`.
+Fit solve(std::span<const PressSample> samples, double ball, const Fit* before,
+          const PressGain& start, double mean_square) {
+  const auto n = static_cast<Eigen::Index>(samples.size());
+  const auto terms = before == nullptr ? 0 : terms_of(start.order);
+  const auto middle = terms > 0 ? 2 : 0;  // what it gains alone is nothing, without a gain
+  double deepest = kKnotLevels;
+  for (const PressSample& s : samples) deepest = std::max(deepest, darkening(start, s));
+  const auto knots = static_cast<Eigen::Index>(std::ceil(deepest / kKnotLevels)) + 1;
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n, knots + terms + middle);
+  Eigen::VectorXd values(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const PressSample& s = samples[static_cast<std::size_t>(i)];
+    const double level = darkening(start, s);
+    const auto below = std::min(knots - 2, static_cast<Eigen::Index>(level / kKnotLevels));
+    const double part = level / kKnotLevels - static_cast<double>(below);
+    rows(i, below) = 1 - part;
+    rows(i, below + 1) = part;
+    const double dx = s.x_mm - start.right_mm;
+    const double dy = s.y_mm - start.down_mm;
+    const double r = std::hypot(dx, dy);
+    values(i) = -sag_mm(ball, r);
+    if (before == nullptr) continue;
+    const std::array<double, 4> place = terms_at(s.x_mm, s.y_mm);
+    const double per_factor = before->slope_at(level) * s.level;
+    for (Eigen::Index t = 0; t < terms; ++t) {
+      rows(i, knots + t) = per_factor * place[static_cast<std::size_t>(t)];
+      values(i) += rows(i, knots + t) * start.factors[static_cast<std::size_t>(t)];
+    }
+    if (middle == 0) continue;
+    const double height = std::sqrt(std::max(0.01 * ball * ball, ball * ball - r * r));
+    rows(i, knots + terms) = -dx / height;
+    rows(i, knots + terms + 1) = -dy / height;
+    values(i) += rows(i, knots + terms) * start.right_mm;
+    values(i) += rows(i, knots + terms + 1) * start.down_mm;
+  }
+  Eigen::MatrixXd normal = rows.transpose() * rows;
+  const auto count = static_cast<double>(n);
+  const Eigen::RowVector3d bend(1, -2, 1);
+  for (Eigen::Index k = 0; k + 2 < knots; ++k) {
+    normal.block<3, 3>(k, k) += kStraight * count * bend.transpose() * bend;
+  }
+  const double expected = count / kIndependent * mean_square;
+  for (Eigen::Index t = 0; t < terms; ++t) {
+    const double factor = kFactors[static_cast<std::size_t>(t)];
+    normal(knots + t, knots + t) += expected / (factor * factor);
+  }
+  for (Eigen::Index m = 0; m < middle; ++m) {
+    normal(knots + terms + m, knots + terms + m) += expected / (kMiddleMm * kMiddleMm);
+  }
+  normal.diagonal().array() += 1e-9 * count;  // a knot that no sample sees
+  const Eigen::VectorXd found = normal.ldlt().solve(rows.transpose() * values);
+  Fit fit{start, found.head(knots)};
+  for (Eigen::Index t = 0; t < terms; ++t) {
+    fit.gain.factors[static_cast<std::size_t>(t)] = found(knots + t);
+  }
+  if (middle > 0) {
+    fit.gain.right_mm = found(knots + terms);
+    fit.gain.down_mm = found(knots + terms + 1);
+  }
+  return fit;
+}
+
+Fit fit_jointly(std::span<const PressSample> samples, double ball, GainOrder order) {
+  const auto count = static_cast<double>(samples.size());
+  Fit fit = solve(samples, ball, nullptr, {.order = order}, 0);
+  for (int round = 0; round < kRounds; ++round) {
+    double squares = 0;
+    for (const PressSample& s : samples) squares += std::pow(error_of(fit, s, ball), 2);
+    fit = solve(samples, ball, &fit, fit.gain, squares / count);
+  }
+  return fit;
+}
+
+/// The mean distance from the errors' median: nobody measured the press's depth.
+double mean_error(const Fit& fit, std::span<const PressSample> samples, double ball) {
+  std::vector<double> errors;
+  errors.reserve(samples.size());
+  for (const PressSample& s : samples) errors.push_back(error_of(fit, s, ball));
+  if (errors.empty()) return 0;
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::ranges::nth_element(errors, middle);
+  const double median = *middle;
+  double sum = 0;
+  for (const double error : errors) sum += std::abs(error - median);
+  return sum / static_cast<double>(errors.size());
+}
+
+double left_out_error(std::span<const PressSample> samples, double ball, GainOrder order,
+                      double sector_deg) {
+  double sum = 0;
+  for (const double turned : {0.0, sector_deg / 2}) {
+    std::array<std::vector<PressSample>, 2> parts;
+    for (const PressSample& s : samples) {
+      parts[in_even_sector(s.x_mm, s.y_mm, sector_deg, turned) ? 0 : 1].push_back(s);
+    }
+    for (const int fitted : {0, 1}) {
+      const auto& judged = parts[static_cast<std::size_t>(1 - fitted)];
+      sum += mean_error(fit_jointly(parts[static_cast<std::size_t>(fitted)], ball, order), judged,
+                        ball);
+    }
+  }
+  return sum / 4;
+}
+
+}  // namespace
+
+double PressGain::at(double x_mm, double y_mm) const noexcept {
+  const std::array<double, 4> terms = terms_at(x_mm, y_mm);
+  double gain = 1;
+  for (std::size_t t = 0; t < terms.size(); ++t) gain += factors[t] * terms[t];
+  return gain;
+}
+
+std::vector<PressSample> sure_samples(const DifferenceMap& map, const Contact& contact,
+                                      const PixelFilter& use) {
+  const int step = std::max(1, static_cast<int>(std::lround(kApartMm / map.mm_per_px)));
+  std::vector<PressSample> samples;
+  for (int y = 0; y < map.height; y += step) {
+    for (int x = 0; x < map.width; x += step) {
+      if (distance_mm(map, contact, x, y) >= kSure * contact.radius_mm) continue;
+      if (std::isnan(map.at(x, y)) || (use && !use(x, y))) continue;
+      samples.push_back(
+          {(x - contact.col) * map.mm_per_px, (y - contact.row) * map.mm_per_px, map.at(x, y)});
+    }
+  }
+  return samples;
+}
+
+PressGain fit_press_gain(std::span<const PressSample> samples, double ball_radius_mm,
+                         GainOrder order) {
+  return fit_jointly(samples, ball_radius_mm, order).gain;
+}
+
+ChosenPressGain choose_press_gain(std::span<const PressSample> samples, double ball_radius_mm,
+                                  double sector_deg) {
+  ChosenPressGain chosen;
+  if (samples.size() < kFewest) return chosen;
+  auto best = GainOrder::none;
+  double least = 0;
+  for (const GainOrder order : {GainOrder::none, GainOrder::plane, GainOrder::quadratic}) {
+    const double error = left_out_error(samples, ball_radius_mm, order, sector_deg);
+    chosen.left_out_mm[static_cast<std::size_t>(order)] = error;
+    if (order != GainOrder::none && error > least - std::max(kLeastWorth, kWorth * least)) {
+      continue;
+    }
+    best = order;
+    least = error;
+  }
+  chosen.gain = fit_press_gain(samples, ball_radius_mm, best);
+  return chosen;
+}
+
+std::string ChosenPressGain::describe() const {
+  std::string text = fmt::format(
+      "press: sectors that were left out are {:.4f} mm off the sphere with no gain of its own, "
+      "{:.4f} with a plane, {:.4f} with a quadratic: ",
+      left_out_mm[0], left_out_mm[1], left_out_mm[2]);
+  if (gain.order == GainOrder::none) return text + "it has none";
+  const double tilt = 100 * std::hypot(gain.factors[0], gain.factors[1]);
+  text += fmt::format("a plane of {:.1f} % a mm", tilt);
+  if (gain.order == GainOrder::quadratic) {
+    text += fmt::format(" and a quadratic of {:.1f} % a mm²",
+                        100 * std::hypot(gain.factors[2], gain.factors[3]));
+  }
+  return text +
+         " was taken off this press before its list was fitted, and is not part of the "
+         "calibration; whether it belongs to the sensor only several presses tell";
+}
+
+bool in_even_sector(double x_mm, double y_mm, double sector_deg, double turned_deg) noexcept {
+  const double degrees = std::atan2(y_mm, x_mm) * 180 / std::numbers::pi + 360 - turned_deg;
+  return static_cast<int>(degrees / sector_deg) % 2 == 0;
+}
+
+LevelledPress levelled(const DifferenceMap& map, const Contact& contact, const PressGain& gain) {
+  LevelledPress press{map, contact};
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const double r = std::max(1e-9, distance_mm(map, contact, x, y));
+      const double held = map.mm_per_px * std::min(1.0, contact.radius_mm / r);
+      press.map.levels[static_cast<std::size_t>(y) * static_cast<std::size_t>(map.width) +
+                       static_cast<std::size_t>(x)] *=
+          static_cast<float>(gain.at(held * (x - contact.col), held * (y - contact.row)));
+    }
+  }
+  press.contact.col += gain.right_mm / map.mm_per_px;
+  press.contact.row += gain.down_mm / map.mm_per_px;
+  return press;
+}
+
+}  // namespace dtact::calibration
