@@ -101,11 +101,36 @@ void leave_out(const SettledPress& press, Evaluation& result) {
   result.sector_mae_mm = sectors / 4;
 }
 
+/// Evaluation::dim.
+double dim_share(const recon::Model& model, const SettledPress& press) {
+  constexpr double kWithRing = 1.5;  // contact radii
+  const image::Grey8 light = rectified_reference(
+      model.rectify, {model.rectify.frame_width, model.rectify.frame_height, press.reference_q8});
+  std::vector<std::uint8_t> levels;
+  for (int y = 0, i = 0; y < light.height; ++y) {
+    for (int x = 0; x < light.width; ++x, ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      if (distance_mm(press.map, press.contact, x, y) >= kWithRing * press.contact.radius_mm ||
+          (!model.untrusted.empty() && model.untrusted[at] != 0)) {
+        continue;
+      }
+      levels.push_back(light.pixels[at]);
+    }
+  }
+  if (levels.empty()) return 1;
+  const auto middle = levels.begin() + static_cast<std::ptrdiff_t>(levels.size() / 2);
+  std::ranges::nth_element(levels, middle);
+  const int half = *middle / 2;
+  return static_cast<double>(std::ranges::count_if(levels, [half](int v) { return v < half; })) /
+         static_cast<double>(levels.size());
+}
+
 Evaluation read(const recon::Model& model, const SettledPress& press,
                 std::span<const image::Grey8> frames) {
   Evaluation result;
   result.contact = press.contact;
   result.drift_levels = press.drift_levels;
+  result.dim = dim_share(model, press);
 
   const std::vector<float> depth = mean_depth_um(model, press.reference_q8, frames);
   std::vector<double> errors;

@@ -32,6 +32,9 @@ struct Evaluation {
   std::size_t pixels = 0;     ///< In the contact.
   std::size_t untrusted = 0;  ///< Of them, marked.
   std::size_t unseen = 0;     ///< Of them, too dark or masked, whatever the list says.
+  /// Share of the contact and of the ring about it (half a radius wide) that has less than half of
+  /// their median light.
+  double dim = 0;
 };
 
 /// `reference_q8`: frame sized Q8 luma under the frames' light. Throws std::runtime_error when no

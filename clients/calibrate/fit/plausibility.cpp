@@ -58,6 +58,13 @@ std::vector<std::string> doubts_about(const Evaluation& press) {
         "place of the map (--centre, --crop)",
         100 * unseen));
   }
+  if (press.dim > kMostDim) {
+    doubts.push_back(
+        fmt::format("{:.0f} % of the contact and the ring about it has less than half of the light "
+                    "that the rest "
+                    "has; press where the light is even, nearer to the middle",
+                    100 * press.dim));
+  }
   return doubts;
 }
 

@@ -23,6 +23,10 @@ namespace dtact::calibration {
 ///   sphere is. At most 0.01 on sensor_a and in the simulator, 0.06 on sensor_b, whose ring is
 ///   lopsided. kMostShape is 0.09. With half of the contact in the dark it is 0.10 to 0.22.
 /// - How much of the contact is too dark to be seen: none, or up to a quarter in such a press.
+/// - How evenly it is lit: darkening is a share of the light, and a list of one press takes it as
+/// it
+///   is. Refused is a press with a tenth of it and its ring under less than half of its light; on
+///   sensor_a and sensor_b none is, nor with corners at a quarter of the light.
 /// - The list's slope: real sensors have 31 to 64 micrometres a grey level, simulated layers of 1
 /// to
 ///   3 mm 15 to 65. Refused are those beyond 12 to 120: a scale or a radius that is a decimal point
@@ -46,6 +50,7 @@ inline constexpr double kMostOffsetMm = 0.22;
 inline constexpr double kMostShape = 0.09;     ///< Of the sphere's depth.
 inline constexpr double kLeastShapeMm = 0.05;  ///< What a light press may be off in any case.
 inline constexpr double kMostUnseen = 0.02;    ///< Of the contact.
+inline constexpr double kMostDim = 0.1;        ///< Of the contact and its ring.
 inline constexpr double kLeastSlopeUm = 12;    ///< A grey level.
 inline constexpr double kMostSlopeUm = 120;    ///< A grey level.
 

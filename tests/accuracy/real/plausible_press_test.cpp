@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "clients/calibrate/fit/plausibility.hpp"
@@ -75,6 +76,19 @@ TEST_P(PlausiblePress, APressHalfInTheDark) {
     }
     EXPECT_FALSE(doubts_of(ball_press(dark, scale())).empty()) << part;
   }
+}
+
+TEST_P(PlausiblePress, APressInACornerThatIsDark) {
+  // Light that falls to a third from the contact's middle to the left, within 3 mm.
+  PressImages dark{images_.reference.clone(), images_.frame.clone()};
+  for (cv::Mat1f* image : {&dark.reference, &dark.frame}) {
+    for (int x = 0; x < image->cols; ++x) {
+      const double mm = scale() * (x - 0.55 * image->cols);
+      image->col(x) *= 1 - (2.0 / 3) / (1 + std::exp(2 * (mm + 1.5)));
+    }
+  }
+  EXPECT_THAT(doubts_of(ball_press(dark, scale())),
+              Contains(HasSubstr("less than half of the light")));
 }
 
 INSTANTIATE_TEST_SUITE_P(Sensors, PlausiblePress, testing::Values("sensor_a", "sensor_b"),

@@ -57,6 +57,15 @@ TEST(Doubts, AShapeThatIsNoBall) {
   EXPECT_THAT(doubts_about(press), ElementsAre(HasSubstr("not the shape of a ball")));
 }
 
+TEST(Doubts, AContactPartlyInDimLight) {
+  Evaluation press = healthy();
+  press.dim = 0.09;
+  EXPECT_THAT(doubts_about(press), IsEmpty());
+  press.dim = 0.11;
+  EXPECT_THAT(doubts_about(press),
+              ElementsAre(AllOf(HasSubstr("11 %"), HasSubstr("less than half of the light"))));
+}
+
 TEST(Doubts, AContactInTheDark) {
   Evaluation press = healthy();
   press.unseen = 190;
