@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "clients/perceive/pose/alignment.hpp"
+
+namespace dtact::perceive {
+
+/// Follows an object from the frame in which it is first touched. What is seen of it then, and at
+/// keyframes later, is kept as surfels where they lay in that first frame; a frame is aligned with
+/// the keyframe that it shares most with, so that errors add up over keyframes and not over frames.
+class Tracker {
+ public:
+  enum class State : std::uint8_t {
+    idle,     ///< Nothing touches.
+    started,  ///< From this frame on.
+    tracked,
+    lost,      ///< No motion explains the frame; `motion` is the last one that was known.
+    recovered  ///< Tracked again.
+  };
+  struct Pose {
+    State state = State::idle;
+    std::uint64_t since = 0;  ///< Sequence of the frame that it is measured from.
+    Alignment alignment;
+  };
+
+  /// The next frame, seen as ContactView says.
+  const Pose& follow(const ContactView& view, std::uint64_t sequence);
+  /// Nothing touches any more: what comes is another contact.
+  void release();
+  [[nodiscard]] const Pose& pose() const noexcept { return pose_; }
+
+ private:
+  struct Keyframe {
+    std::vector<Surfel> surfels;  ///< As they lay in the first frame.
+    Motion motion;
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Of the contact then, surface frame.
+  };
+
+  void add_keyframe(const ContactView& view);
+  [[nodiscard]] Alignment best(const ContactView& view, const Motion& from);
+  [[nodiscard]] bool recover(const ContactView& view);
+
+  std::vector<Keyframe> keyframes_;
+  std::size_t current_ = 0;
+  int attempt_ = 0;
+  Pose pose_;
+};
+
+}  // namespace dtact::perceive

@@ -1,0 +1,79 @@
+#include "clients/perceive/pose/alignment.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/perceive/balls.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+using namespace test;
+using Eigen::Vector3d;
+
+Alignment align_to(const Balls& object, const Motion& motion, double noise_um = 0) {
+  const Frame before(object, {}, noise_um, 1);
+  const Frame after(object, motion, noise_um, 2);
+  return align(before.view().choose(600), after.view(), {});
+}
+
+TEST(Align, NothingMoved) {
+  const Alignment found = align_to(bumps(), {});
+  EXPECT_TRUE(found.unobservable.empty());
+  EXPECT_GT(found.overlap, 0.8);
+  EXPECT_LT(error_of(found, {}).um, 0.1);
+}
+
+TEST(Align, FindsASlideATurnATiltAndAPress) {
+  for (const Motion& motion :
+       {moved({0.15, -0.1, 0}), moved({0, 0, 0}, Vector3d::UnitZ(), 4), moved({0, 0, -0.08}),
+        moved({0, 0, 0}, {1, 0.5, 0}, 2), moved({0.1, 0.05, -0.03}, {0.3, -0.2, 1}, 3)}) {
+    const Alignment found = align_to(bumps(), motion);
+    EXPECT_TRUE(found.unobservable.empty());
+    EXPECT_LT(error_of(found, motion).degrees, 0.1);
+    EXPECT_LT(error_of(found, motion).um, 3);
+  }
+}
+
+TEST(Align, NoiseOfTenMicrometres) {
+  const Motion motion = moved({0.1, 0.05, -0.03}, {0.3, -0.2, 1}, 3);
+  const Alignment found = align_to(bumps(), motion, 10);
+  EXPECT_LT(error_of(found, motion).degrees, 0.5);
+  EXPECT_LT(error_of(found, motion).um, 10);
+}
+
+TEST(Align, ABallDoesNotShowItsRotationAndDoesNotRoll) {
+  const Balls ball{{{{0, 0, 3.0}, 4.0}}};
+  const Motion motion = moved({0.2, -0.1, -0.05});
+  for (const double noise_um : {0.0, 10.0}) {
+    const Alignment found = align_to(ball, motion, noise_um);
+    ASSERT_EQ(found.unobservable.size(), 3U);
+    EXPECT_LT(error_of(found, motion).um, 6);
+    // Nothing turned: so the whole slide is found, though part of it might have been a roll.
+    EXPECT_LT(Eigen::AngleAxisd(found.motion.rotation).angle(), 0.002);
+    EXPECT_LT((found.motion.translation - motion.translation).norm(), 1e-5);
+  }
+}
+
+TEST(Align, APlateDoesNotShowItsSlidingNorItsTurning) {
+  // A ball of ten metres: flat over the map.
+  const Balls plate{{{{0, 0, 9999.5}, 10000}}};
+  const Motion motion = moved({0.2, -0.1, -0.1});
+  for (const double noise_um : {0.0, 10.0}) {
+    const Alignment found = align_to(plate, motion, noise_um);
+    ASSERT_EQ(found.unobservable.size(), 3U);
+    EXPECT_LT(error_of(found, motion).um, 3);
+    EXPECT_NEAR(found.motion.translation.z(), -1e-4, 3e-6);
+    EXPECT_LT(found.motion.translation.head<2>().norm(), 1e-6) << "not filled with noise";
+  }
+}
+
+TEST(Align, WhatLiesElsewhereHasNoPoints) {
+  const Frame before(bumps(), {});
+  const Frame after(bumps(), moved({0, 0, 3}));
+  const Alignment found = align(before.view().choose(600), after.view(), {});
+  EXPECT_EQ(found.points, 0U);
+  EXPECT_EQ(found.overlap, 0);
+}
+
+}  // namespace
+}  // namespace dtact::perceive

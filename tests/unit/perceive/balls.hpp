@@ -1,0 +1,107 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "clients/perceive/pose/contact_view.hpp"
+#include "clients/perceive/pose/tracker.hpp"
+
+namespace dtact::perceive::test {
+
+/// A rigid thing of balls whose indentation is known exactly wherever it is: the deepest of theirs.
+struct Balls {
+  struct Ball {
+    Eigen::Vector3d middle;  ///< Millimetres, surface frame.
+    double radius = 0;
+  };
+  std::vector<Ball> balls;
+};
+
+/// Four balls of 1.5 to 2.5 mm: no motion leaves their surface as it was.
+inline Balls bumps() {
+  return {{{{-1.3, -0.9, 0.95}, 1.5},
+           {{1.2, -1.1, 1.5}, 2.0},
+           {{0.2, 1.3, 1.9}, 2.5},
+           {{2.2, 1.2, 1.1}, 1.5}}};
+}
+
+/// Turns by `degrees` about `axis` through the origin and then shifts by `mm`.
+inline Motion moved(const Eigen::Vector3d& mm,
+                    const Eigen::Vector3d& axis = Eigen::Vector3d::UnitZ(), double degrees = 0) {
+  return {Eigen::AngleAxisd(degrees * M_PI / 180, axis.normalized()).toRotationMatrix(), mm * 1e-3};
+}
+
+/// One frame: the map, its points and the view of them.
+struct Frame {
+  /// The balls after `motion`, with `noise_um` of noise that is alike over some pixels, as the
+  /// daemon's smoothing leaves it.
+  Frame(const Balls& object, const Motion& motion, double noise_um = 0, unsigned seed = 1) {
+    constexpr int kSize = 160;
+    constexpr double kPx = 0.05;
+    values.resize(std::size_t{kSize} * kSize);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::vector<double> noise(values.size());
+    for (double& one : noise) one = normal(random);
+    for (int row = 0; row < kSize; ++row) {
+      for (int column = 0; column < kSize; ++column) {
+        const double x = (column - 0.5 * (kSize - 1)) * kPx;
+        const double y = (row - 0.5 * (kSize - 1)) * kPx;
+        double depth = 0;
+        for (const auto& ball : object.balls) {
+          const Eigen::Vector3d at = 1e3 * (motion * (1e-3 * ball.middle));
+          const double rest =
+              ball.radius * ball.radius - (x - at.x()) * (x - at.x()) - (y - at.y()) * (y - at.y());
+          if (rest > 0) depth = std::max(depth, std::sqrt(rest) - at.z());
+        }
+        double error = 0;
+        int count = 0;
+        for (int r = std::max(0, row - 1); r <= std::min(kSize - 1, row + 1); ++r) {
+          for (int c = std::max(0, column - 1); c <= std::min(kSize - 1, column + 1);
+               ++c, ++count) {
+            error += noise[static_cast<std::size_t>(r * kSize + c)];
+          }
+        }
+        // The mean of n values has 1/√n of their deviation.
+        depth += 1e-3 * noise_um * error / std::sqrt(count);
+        values[static_cast<std::size_t>(row * kSize + column)] =
+            static_cast<std::int16_t>(std::lround(1000 * depth));
+      }
+    }
+    grid.width = grid.height = grid.full_width = grid.full_height = kSize;
+    grid.mm_per_px = kPx;
+    grid.values = values;
+    CloudMaker().make(grid, 1, cloud);
+  }
+  [[nodiscard]] ContactView view(double uncertainty_um = 10) const {
+    return ContactView(grid, cloud, uncertainty_um);
+  }
+
+  std::vector<std::int16_t> values;
+  DepthGrid grid;
+  PointCloud cloud;
+};
+
+/// How far `found` is from `truth` about the contact: rotation in degrees and the shift of the
+/// contact's centre in micrometres, without what the shape does not show.
+struct Error {
+  double degrees = 0;
+  double um = 0;
+};
+inline Error error_of(const Alignment& found, const Motion& truth) {
+  const Eigen::Matrix3d turn = found.motion.rotation * truth.rotation.transpose();
+  const Eigen::AngleAxisd angle(turn);
+  Twist twist;
+  // Where the truth puts what is found at the centre.
+  const Eigen::Vector3d there =
+      truth * (found.motion.rotation.transpose() * (found.centre - found.motion.translation));
+  twist << found.arm * angle.angle() * angle.axis(), found.centre - there;
+  for (const Twist& hidden : found.unobservable) twist -= hidden * hidden.dot(twist);
+  return {twist.head<3>().norm() / found.arm * 180 / M_PI, twist.tail<3>().norm() * 1e6};
+}
+
+}  // namespace dtact::perceive::test

@@ -1,0 +1,102 @@
+#include "clients/perceive/pose/tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/unit/perceive/balls.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+using namespace test;
+using Eigen::Vector3d;
+using State = Tracker::State;
+
+/// Moved over `frames` frames to `end_mm` and `degrees` about `axis`; the error at the end.
+Error follow(Tracker& tracker, const Vector3d& end_mm, const Vector3d& axis, double degrees,
+             int frames, double noise_um) {
+  Error error;
+  for (int i = 0; i <= frames; ++i) {
+    const double part = static_cast<double>(i) / frames;
+    const Motion truth = moved(part * end_mm, axis, part * degrees);
+    const Frame frame(bumps(), truth, noise_um, static_cast<unsigned>(i));
+    const auto& pose = tracker.follow(frame.view(), 100 + static_cast<unsigned>(i));
+    EXPECT_EQ(pose.state, i == 0 ? State::started : State::tracked) << i;
+    EXPECT_EQ(pose.since, 100U);
+    error = error_of(pose.alignment, truth);
+  }
+  return error;
+}
+
+TEST(Tracker, SlidesFourMillimetresPartlyOutOfView) {
+  Tracker tracker;
+  const Error error = follow(tracker, {3, 2.6, 0}, Vector3d::UnitZ(), 0, 40, 5);
+  EXPECT_LT(error.um, 40);
+  EXPECT_LT(error.degrees, 1.0);
+}
+
+TEST(Tracker, TwistsByThirtyDegrees) {
+  Tracker tracker;
+  const Error error = follow(tracker, {0, 0, 0}, Vector3d::UnitZ(), 30, 30, 5);
+  EXPECT_LT(error.um, 30);
+  EXPECT_LT(error.degrees, 0.8);
+}
+
+TEST(Tracker, RollsAndPressesDeeper) {
+  Tracker tracker;
+  const Error error = follow(tracker, {0, 0, -0.2}, Vector3d::UnitX(), 8, 30, 5);
+  EXPECT_LT(error.um, 30);
+  EXPECT_LT(error.degrees, 0.8);
+}
+
+TEST(Tracker, StandsStillWithoutDrifting) {
+  Tracker tracker;
+  const Error error = follow(tracker, {0, 0, 0}, Vector3d::UnitZ(), 0, 60, 10);
+  EXPECT_LT(error.um, 6);
+  EXPECT_LT(error.degrees, 0.3);
+}
+
+TEST(Tracker, AJumpIsALossAndIsFoundAgain) {
+  Tracker tracker;
+  const Frame first(bumps(), {});
+  (void)tracker.follow(first.view(), 1);
+  const Motion away = moved({1.5, -1.0, 0}, Vector3d::UnitZ(), 12);
+  const Frame jumped(bumps(), away);
+  const auto lost = tracker.follow(jumped.view(), 2);
+  EXPECT_EQ(lost.state, State::lost);
+  EXPECT_EQ(lost.alignment.motion.translation, Vector3d::Zero()) << "the last one known";
+  auto pose = lost;
+  for (unsigned i = 3; i < 20 && pose.state == State::lost; ++i) {
+    pose = tracker.follow(jumped.view(), i);
+  }
+  ASSERT_EQ(pose.state, State::recovered);
+  EXPECT_LT(error_of(pose.alignment, away).um, 5);
+  EXPECT_LT(error_of(pose.alignment, away).degrees, 0.2);
+  EXPECT_EQ(tracker.follow(jumped.view(), 20).state, State::tracked);
+}
+
+TEST(Tracker, AnotherObjectIsNotTakenForIt) {
+  Tracker tracker;
+  const Frame first(bumps(), {});
+  (void)tracker.follow(first.view(), 1);
+  const Frame other({{{{0, 0, 3.2}, 4.0}}}, {});
+  for (unsigned i = 2; i < 20; ++i) {
+    EXPECT_EQ(tracker.follow(other.view(), i).state, State::lost);
+  }
+}
+
+TEST(Tracker, ANewContactBeginsAnew) {
+  Tracker tracker;
+  const Frame first(bumps(), {});
+  (void)tracker.follow(first.view(), 1);
+  tracker.release();
+  EXPECT_EQ(tracker.pose().state, State::idle);
+  const auto& pose = tracker.follow(first.view(), 7);
+  EXPECT_EQ(pose.state, State::started);
+  EXPECT_EQ(pose.since, 7U);
+  const Frame nothing({}, {});
+  tracker.release();
+  EXPECT_EQ(tracker.follow(nothing.view(), 8).state, State::idle);
+}
+
+}  // namespace
+}  // namespace dtact::perceive
