@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/calibration/layer.hpp"
 #include "daemon/recon/lens.hpp"
 #include "daemon/recon/model.hpp"
 
@@ -42,6 +43,7 @@ struct Calibration {
   int crop_col = 0;
   int crop_row = 0;
   std::optional<recon::Lens> lens;  ///< None: the depth map is a part of the frame as it is.
+  std::optional<Layer> layer;  ///< Where a layer was fitted to the presses.
   Origin origin;
 };
 

@@ -7,6 +7,7 @@
 #include "daemon/calibration/array_text.hpp"
 #include "daemon/calibration/force_table.hpp"
 #include "daemon/calibration/gain_table.hpp"
+#include "daemon/calibration/layer_table.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/list_tables.hpp"
 #include "daemon/calibration/map_table.hpp"
@@ -90,6 +91,7 @@ Files format(const Calibration& calibration) {
       calibration.lens ? format_lens(*calibration.lens) : "");
   t += "# Reserved for a curved surface. Empty: none.\n[surface]\n\n";
   t += format_gain(model.gain);
+  if (calibration.layer) t += format_layer(*calibration.layer);
   t += format_lists(model);
   return files;
 }

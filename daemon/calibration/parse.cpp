@@ -6,6 +6,7 @@
 
 #include "daemon/calibration/force_table.hpp"
 #include "daemon/calibration/gain_table.hpp"
+#include "daemon/calibration/layer_table.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/list_tables.hpp"
 #include "daemon/calibration/map_table.hpp"
@@ -138,6 +139,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
       {calibration.crop_col, calibration.crop_row, width, height, model->mm_per_px}, outside);
 
   read_lists(top, *model);
+  if (top.has("layer")) calibration.layer = read_layer(top.table("layer"));
   if (top.has("gain")) model->gain = read_gain(top.table("gain"));
   read_camera_and_light(top, calibration.origin);
   for (tomlfile::KeyReader& source : top.tables("source")) {

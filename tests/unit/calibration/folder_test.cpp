@@ -41,6 +41,7 @@ TEST(CalibrationFolder, EverythingComesBack) {
   EXPECT_EQ(loaded.model->list.um, saved.model->list.um);
   EXPECT_EQ(loaded.model->list.covered_from_q6, -1);
   EXPECT_EQ(loaded.model->list.covered_to_q6, 2);
+  EXPECT_EQ(loaded.layer, sample().layer);
   EXPECT_EQ(loaded.model->scattering, (recon::Scattering{0.28, 1.23, 0.7}));
   ASSERT_EQ(loaded.model->sharpened.size(), 2U);
   const recon::Model::Sharpened& once = loaded.model->sharpened[0];

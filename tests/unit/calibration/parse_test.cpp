@@ -51,6 +51,17 @@ TEST(ParseCalibration, RefusesWhatIsNotToml) {
   expect_refused("", "upload:1: version", "missing");
 }
 
+TEST(ParseCalibration, ALayerIsOptionalAndWhole) {
+  const Files files = format(sample());
+  std::string without = files.toml;
+  const auto begin = without.find("[layer]");
+  without.erase(begin, without.find("[uncertainty]") - begin);
+  EXPECT_FALSE(parse(without, files.reference_png, "upload").layer);
+  expect_refused(with("thickness_mm = [2.1, 0.05]", "thickness_mm = [2.1]"), "layer.thickness_mm",
+                 "standard error");
+  expect_refused(with("slope = [1.5, 1, ", "slope = [1.5, "), "layer.slope", "five numbers");
+}
+
 TEST(ParseCalibration, RefusesImpossibleValues) {
   expect_refused(with("version = 1", "version = 2"), "version", "2 is not allowed");
   expect_refused(with("\"list\"", "\"magic\""), "method", "\"published\"");

@@ -49,6 +49,14 @@ inline Calibration sample() {
                                    .from_n = 0.1,
                                    .to_n = 2};
   Calibration calibration;
+  calibration.layer = {.thickness_mm = {2.1, 0.05},
+                       .narrow_mm = {0.28, 0.01},
+                       .wide_mm = {1.23, 0.2},
+                       .narrow_weight = {0.7, 0.03},
+                       .indentation = {-0.24, -0.12, 0, 0.4, 0.8},
+                       .slope = {{{1.5, 0.2}, {1, 0.1}, {0.4, 0.01}, {0.5, 0.02}, {0.6, 0.3}}},
+                       .bulge_factor = 1.5,
+                       .residual_levels = 0.21};
   calibration.crop_col = 3;
   calibration.crop_row = 2;
   calibration.origin.camera = "usb-0:1.2 \"left\"\\";
