@@ -1,0 +1,170 @@
+#include "clients/calibrate/fit/model/model_build.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "clients/calibrate/fit/model/model_list.hpp"
+#include "daemon/recon/kernels.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+constexpr double kMostResidual = 0.5;  // grey levels
+/// Grey levels themselves are taken for shares of the light where that leaves so much less: on
+/// sensor_a 0.7 of the error, on sensor_b 1.02 (half-disc); in the simulator it is a share.
+constexpr double kRounder = 0.8;
+constexpr double kDeepest = 0.92;  // of the thickness
+
+/// Mean of the reference over what is not dark: what GainShape::uniform brings darkening to.
+double light_of(const recon::RectifyTable& table, const image::Grey16& reference_q8) {
+  double sum = 0;
+  double count = 0;
+  for (const std::uint8_t level : rectified_reference(table, reference_q8).pixels) {
+    if (level * 64 < recon::kernels::kDarkest_q6) continue;
+    sum += level;
+    count += 1;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+/// How far the contacts are from round in the picture: root mean square distance from the mean at
+/// each radius over the peak's level, over all presses.
+double lopsided(std::span<const SettledPress> presses) {
+  double sum = 0;
+  double count = 0;
+  for (const SettledPress& press : presses) {
+    const double reach = press.contact.radius_mm;
+    const RadialProfile profile = radial_profile(press.map, press.contact, reach);
+    for (int y = 0; y < press.map.height; ++y) {
+      for (int x = 0; x < press.map.width; ++x) {
+        const double r = distance_mm(press.map, press.contact, x, y);
+        const double level = press.map.at(x, y);
+        if (r >= reach || std::isnan(level)) continue;
+        const double off = (level - profile.at(r)) / press.contact.peak_levels;
+        sum += off * off;
+        count += 1;
+      }
+    }
+  }
+  return std::sqrt(sum / count);
+}
+
+/// The presses in which a contact is found, and the names of the others with reasons.
+struct Seen {
+  std::vector<SettledPress> presses;
+  std::vector<std::string> names;
+  std::vector<std::string> left_out;
+};
+
+Seen look(const recon::Model& model, const BallPresses& set) {
+  Seen seen;
+  for (const BallPresses::Press& press : set.presses) {
+    try {
+      seen.presses.push_back(
+          settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm));
+      seen.names.push_back(press.name);
+    } catch (const std::runtime_error& e) {
+      seen.left_out.push_back(fmt::format("{}: {}", press.name, e.what()));
+    }
+  }
+  return seen;
+}
+
+void refuse(const FittedCalibration& made) {
+  const double residual = made.fit.residual * made.light_levels;
+  if (residual > kMostResidual) {
+    throw ModelRefused(fmt::format(
+        "no layer explains the press: what is left is {:.2f} grey levels (at most {}); check the "
+        "ball's radius and the scale, that the ball was clean and at rest, and that the light is "
+        "even",
+        residual, kMostResidual));
+  }
+  const double thickness = made.fit.layer.thickness_mm;
+  if (made.fit.deepest_mm() > kDeepest * thickness) {
+    throw ModelRefused(fmt::format(
+        "the press fits only as {:.2f} mm deep in a layer of {:.2f} mm, deeper than can be; check "
+        "the ball's radius and the scale, press lighter, and look for dark corners in the "
+        "reference",
+        made.fit.deepest_mm(), thickness));
+  }
+}
+
+/// The fit with its errors, carried from logarithms to what they stand for.
+Layer describe(const ModelFit& fit, double light_levels) {
+  const auto deviation = [&](Eigen::Index i) { return std::sqrt(fit.covariance(i, i)); };
+  const recon::Scattering& scattering = fit.layer.scattering;
+  const double weight = scattering.narrow_weight;
+  Layer layer;
+  layer.thickness_mm = {fit.layer.thickness_mm,
+                        fit.layer.thickness_mm * deviation(ModelFit::kThickness)};
+  layer.narrow_mm = {scattering.narrow_mm, scattering.narrow_mm * deviation(ModelFit::kNarrow)};
+  layer.wide_mm = {scattering.wide_mm, scattering.wide_mm * deviation(ModelFit::kWide)};
+  layer.narrow_weight = {weight, weight * (1 - weight) * deviation(ModelFit::kOdds)};
+  for (std::size_t i = 0; i < layer.slope.size(); ++i) {
+    const double slope = fit.layer.response.slopes[i];
+    layer.indentation[i] = Response::kKnots[i];
+    layer.slope[i] = {slope, slope * deviation(ModelFit::kSlopes + static_cast<Eigen::Index>(i))};
+  }
+  layer.bulge_factor = fit.layer.response.bulge_factor;
+  layer.residual_levels = fit.residual * light_levels;
+  return layer;
+}
+
+}  // namespace
+
+FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& gain) {
+  FittedCalibration made;
+  made.calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
+  auto model = std::make_shared<recon::Model>(*made.calibration.model);
+  model->gain = gain;
+  Seen seen = look(*model, set);
+  if (gain.shape == recon::GainShape::none && gain.polynomial.empty()) {
+    // The loss is a share of the light. Rings do not tell whether a sensor's picture is one, but
+    // where it is not, a share of uneven light makes a round dent lopsided.
+    recon::Model uniform = *model;
+    uniform.gain.shape = recon::GainShape::uniform;
+    Seen shares = look(uniform, set);
+    if (shares.presses.size() >= seen.presses.size() && !shares.presses.empty() &&
+        lopsided(seen.presses) > kRounder * lopsided(shares.presses)) {
+      model->gain = uniform.gain;
+      seen = std::move(shares);
+    }
+  }
+  made.left_out = std::move(seen.left_out);
+  if (seen.presses.empty()) {
+    throw std::runtime_error(fmt::format("{}", fmt::join(made.left_out, "; ")));
+  }
+  made.light_levels = light_of(model->rectify, set.reference_q8);
+  const MapOptics optics{made.light_levels, model->smoothing_px * set.mm_per_px, set.mm_per_px};
+  std::vector<PressProfile> profiles;
+  for (const SettledPress& press : seen.presses) {
+    profiles.push_back(profile_of(press, optics.light_levels, optics.smoothing_mm));
+  }
+  made.fit = fit_model(profiles);
+  refuse(made);
+  for (std::size_t i = 0; i < seen.names.size(); ++i) {
+    made.presses.push_back({seen.names[i], made.fit.presses[i].depth_mm});
+  }
+
+  model->scattering = made.fit.layer.scattering;
+  std::array<ListOfModel, kLists> lists = lists_of(made.fit, optics);
+  model->list = std::move(lists.front().list);
+  model->uncertainty = std::move(lists.front().uncertainty);
+  for (std::size_t i = 1; i < lists.size(); ++i) {
+    model->sharpened.push_back(
+        {static_cast<int>(i), std::move(lists[i].list), std::move(lists[i].uncertainty)});
+  }
+  made.calibration.layer = describe(made.fit, optics.light_levels);
+  made.calibration.model = std::move(model);
+  return made;
+}
+
+}  // namespace dtact::calibration

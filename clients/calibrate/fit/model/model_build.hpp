@@ -1,0 +1,35 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+#include "clients/calibrate/fit/model/model_fit.hpp"
+#include "clients/calibrate/fit/press_set.hpp"
+
+namespace dtact::calibration {
+
+/// No layer explains the presses: what() says what to check.
+class ModelRefused : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A calibration by a layer that was fitted to presses of a ball (fit_model()), one or several, and
+/// the fit. Darkening is a share of the light at its place, unless the dents are much rounder in
+/// grey levels or `gain`, the lens file's, says another thing. Measured depths play no part.
+/// `origin` is left for the caller to fill.
+struct FittedCalibration {
+  Calibration calibration;
+  ModelFit fit;
+  double light_levels = 0;                  ///< Grey levels that are all of the light.
+  std::vector<PressReport::Depth> presses;  ///< Those that were used.
+  std::vector<std::string> left_out;        ///< Presses without a usable contact: name and reason.
+};
+
+/// Throws ModelRefused when the fit's residual is above half a grey level or a press is deeper than
+/// 0.92 of the layer; std::runtime_error and std::invalid_argument as build() on images that show
+/// no press.
+[[nodiscard]] FittedCalibration build_model(const BallPresses& presses,
+                                            const recon::SpatialGain& gain = {});
+
+}  // namespace dtact::calibration

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
+#include "clients/calibrate/fit/model/layer_model.hpp"
+
+namespace dtact::calibration {
+
+/// The darkening of a press on rings about the contact's centre, as a share of the light there.
+struct PressProfile {
+  std::vector<double> radius_mm;
+  std::vector<double> loss;
+  std::vector<double> noise;  ///< Standard error of each mean by the pixels' noise.
+  double ball_radius_mm = 0;
+  double contact_radius_mm = 0;  ///< As find_contact() has it: to start from.
+  double smoothing_mm = 0;       ///< Of the map.
+};
+
+/// `light_levels`: the grey level that the press's map counts as all of the light: the mean of the
+/// reference where the gain is uniform. Rings of which the map, or `use`, leaves less than a third
+/// are left out.
+[[nodiscard]] PressProfile profile_of(const SettledPress& press, double light_levels,
+                                      double smoothing_mm, const PixelFilter& use = {});
+
+/// A layer fitted to presses.
+struct ModelFit {
+  /// Places in `parameters`: logarithms of thickness, the two widths, the odds of the narrow one,
+  /// five slopes, and the bulge's factor.
+  enum Parameter : std::uint8_t {
+    kThickness,
+    kNarrow,
+    kWide,
+    kOdds,
+    kSlopes,
+    kBulge = kSlopes + 5
+  };
+
+  LayerModel layer;
+  struct Press {
+    double contact_radius_mm = 0;
+    double depth_mm = 0;
+    double offset = 0;    ///< Share of the light that the whole press is darker by.
+    double residual = 0;  ///< Root mean square over the rings, share of the light.
+  };
+  std::vector<Press> presses;
+  double residual = 0;  ///< Over all.
+  /// As fitted (Parameter), and their covariance: (JᵀJ)⁻¹ with the priors, and the residual for the
+  /// noise.
+  Eigen::VectorXd parameters;
+  Eigen::MatrixXd covariance;
+
+  [[nodiscard]] double deepest_mm() const;
+};
+
+/// The layer of such parameters.
+[[nodiscard]] LayerModel layer_of(const Eigen::VectorXd& parameters);
+
+/// Analysis by synthesis: thickness, response and scattering that all presses share, each with its
+/// own contact radius and offset, by Levenberg and Marquardt (Ceres) from several thicknesses. The
+/// priors are wide (model_fit.cpp): thickness 2 mm ± 35 %, widths 0.3 and 1.5 mm ± 50 %. A kink of
+/// the response at zero is held narrower (± 30 %): one press hardly tells it from thickness.
+/// Throws std::runtime_error when the fit does not end.
+[[nodiscard]] ModelFit fit_model(std::span<const PressProfile> presses);
+
+}  // namespace dtact::calibration

@@ -1,0 +1,272 @@
+#include "clients/calibrate/fit/model/model_list.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+#include <random>
+#include <stdexcept>
+#include <utility>
+
+#include "clients/calibrate/fit/list_shape.hpp"
+#include "clients/calibrate/fit/model/radial_transform.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+constexpr std::array<double, 7> kBalls = {1.5, 2, 3, 4, 5, 6, 8};  // mm
+constexpr int kDepths = 8;
+/// Beyond it the linear layer is no model of a real one, nor the response known.
+constexpr double kMostOfLayer = 0.92;
+constexpr double kKnotLevels = 2;
+constexpr double kVouchedBeyond = 2;  // grey levels
+constexpr int kDraws = 20;
+constexpr double kFrameNoise = 1;  // grey levels a pixel
+constexpr double kDepthBinMm = 0.2;
+
+/// A ball as the maps of all lists show it, on RadialTransform's grid.
+struct Shown {
+  Eigen::VectorXd indentation_mm;
+  std::array<Eigen::VectorXd, kLists> levels;
+  double ball_radius_mm = 0;
+  double contact_radius_mm = 0;
+};
+
+/// What each list's map keeps of every wave number of a loss. The filter may believe in another
+/// scattering than the layer's.
+std::array<Eigen::VectorXd, kLists> transfers(const recon::Scattering& scattering,
+                                              const recon::Scattering& believed,
+                                              const MapOptics& optics) {
+  std::array<Eigen::VectorXd, kLists> transfers;
+  const Eigen::VectorXd seen =
+      optics.light_levels * scattered(scattering).cwiseProduct(blurred(optics.smoothing_mm));
+  const Eigen::VectorXd back = scattered(believed);
+  for (int steps = 0; steps < kLists; ++steps) {
+    transfers[static_cast<std::size_t>(steps)] = seen.cwiseProduct(sharpened(back, steps));
+  }
+  return transfers;
+}
+
+Shown show(const LayerModel& layer, const BallContact& contact,
+           const std::array<Eigen::VectorXd, kLists>& light) {
+  ImaginedPress press = imagine(layer, contact);
+  Shown shown{
+      std::move(press.indentation_mm), {}, contact.ball_radius_mm, contact.contact_radius_mm};
+  for (std::size_t i = 0; i < light.size(); ++i) {
+    shown.levels[i] = RadialTransform::instance().values(press.spectrum.cwiseProduct(light[i]));
+  }
+  return shown;
+}
+
+/// Balls of every size at every depth on a layer.
+std::vector<Shown> show_balls(const LayerModel& layer, const MapOptics& optics, double deepest_mm) {
+  const auto light = transfers(layer.scattering, layer.scattering, optics);
+  std::vector<Shown> balls;
+  for (const double radius : kBalls) {
+    const double most = std::min({deepest_mm, kMostOfLayer * layer.thickness_mm, 0.75 * radius});
+    for (int i = 1; i <= kDepths; ++i) {
+      balls.push_back(
+          show(layer, press_ball_to(radius, most * i / kDepths, layer.thickness_mm), light));
+    }
+  }
+  return balls;
+}
+
+/// Calls `add(level, indentation, weight)` for the places of a ball that make a list: where it
+/// touches, and the bulge around. Every place weighs the same.
+template <typename Add>
+void for_places(const Shown& ball, std::size_t list, const Add& add) {
+  const Eigen::VectorXd& levels = ball.levels[list];
+  const double a = ball.contact_radius_mm;
+  for (Eigen::Index i = 0; i < RadialTransform::kPoints; ++i) {
+    const double r = RadialTransform::kStepMm * static_cast<double>(i);
+    const bool touches = r <= a;
+    if (!touches && (levels[i] >= 0 || r > 4 * a)) continue;
+    add(levels[i], ball.indentation_mm[i], r);
+  }
+}
+
+struct Knots {
+  int first = 0;  ///< Of the knot at `first`·kKnotLevels.
+  Eigen::VectorXd depth_mm;
+
+  [[nodiscard]] double at(double level) const {
+    const double place = level / kKnotLevels - first;
+    const auto last = depth_mm.size() - 1;
+    const auto i =
+        std::clamp(static_cast<Eigen::Index>(std::floor(place)), Eigen::Index{0}, last - 1);
+    return depth_mm[i] + (place - static_cast<double>(i)) * (depth_mm[i + 1] - depth_mm[i]);
+  }
+};
+
+/// Straight lines between knots by least squares, zero at zero, held straight where few places say
+/// anything, rising.
+Knots fit_knots(const std::vector<Shown>& balls, std::size_t list) {
+  double low = 0;
+  double high = 0;
+  for (const Shown& ball : balls) {
+    for_places(ball, list, [&](double level, double, double) {
+      low = std::min(low, level);
+      high = std::max(high, level);
+    });
+  }
+  Knots knots;
+  knots.first = std::min(-1, static_cast<int>(std::floor(low / kKnotLevels)));
+  const int last = std::max(2, static_cast<int>(std::ceil(high / kKnotLevels)));
+  const Eigen::Index count = last - knots.first + 1;
+  const Eigen::Index zero = -knots.first;
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(count, count);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
+  for (const Shown& ball : balls) {
+    for_places(ball, list, [&](double level, double depth, double weight) {
+      const double place = level / kKnotLevels - knots.first;
+      const Eigen::Index i =
+          std::clamp(static_cast<Eigen::Index>(place), Eigen::Index{0}, count - 2);
+      const double part = place - static_cast<double>(i);
+      normal(i, i) += weight * (1 - part) * (1 - part);
+      normal(i, i + 1) += weight * part * (1 - part);
+      normal(i + 1, i) += weight * part * (1 - part);
+      normal(i + 1, i + 1) += weight * part * part;
+      right[i] += weight * (1 - part) * depth;
+      right[i + 1] += weight * part * depth;
+    });
+  }
+  const double stiff = 0.02 * normal.trace() / static_cast<double>(count);
+  for (Eigen::Index i = 1; i + 1 < count; ++i) {
+    if (i == zero) continue;  // the layer answers otherwise on either side
+    const std::array<double, 3> second = {1, -2, 1};
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      for (Eigen::Index k = 0; k < 3; ++k) {
+        normal(i - 1 + j, i - 1 + k) +=
+            stiff * second[static_cast<std::size_t>(j)] * second[static_cast<std::size_t>(k)];
+      }
+    }
+  }
+  normal(zero, zero) += 1e6 * normal.trace();  // depth 0
+  knots.depth_mm = normal.ldlt().solve(right);
+  knots.depth_mm[zero] = 0;
+  for (Eigen::Index i = zero + 1; i < count; ++i) {
+    knots.depth_mm[i] = std::max(knots.depth_mm[i], knots.depth_mm[i - 1]);
+  }
+  for (Eigen::Index i = zero; i-- > 0;) {
+    knots.depth_mm[i] = std::min(knots.depth_mm[i], knots.depth_mm[i + 1]);
+  }
+  return knots;
+}
+
+recon::DepthList tabulate(const Knots& knots, double deepest_mm) {
+  constexpr int kFirst = kListFirstLevel * recon::kEntriesPerLevel;
+  constexpr int kLast = kListLastLevel * recon::kEntriesPerLevel;
+  const double low = knots.first * kKnotLevels;
+  recon::DepthList list{kFirst, {}, 0, 0};
+  list.covered_from_q6 =
+      std::max(kFirst, static_cast<int>(std::lround(low * recon::kEntriesPerLevel)));
+  for (int q6 = kFirst; q6 <= kLast; ++q6) {
+    const double level = static_cast<double>(q6) / recon::kEntriesPerLevel;
+    const double depth_mm = knots.at(std::max(level, low));
+    list.um.push_back(
+        static_cast<std::int16_t>(std::lround(std::clamp(1000 * depth_mm, -16383.0, 16383.0))));
+    if (depth_mm <= deepest_mm) list.covered_to_q6 = q6;
+  }
+  list.covered_to_q6 = std::min(
+      kLast, list.covered_to_q6 + static_cast<int>(kVouchedBeyond * recon::kEntriesPerLevel));
+  return list;
+}
+
+/// Standard deviation of a frame's noise in the map, grey levels: white noise through the transfer
+/// function, σ²·px²/2π·∫|T|² k dk.
+double noise_levels(const LayerModel& layer, const MapOptics& optics, int steps) {
+  const Eigen::VectorXd& k = RadialTransform::instance().wave_numbers();
+  const Eigen::ArrayXd through =
+      (blurred(optics.smoothing_mm).array() * sharpened(scattered(layer.scattering), steps).array())
+          .square();
+  double sum = 0;
+  for (Eigen::Index i = 1; i < k.size(); ++i) {
+    sum += 0.5 * (k[i] - k[i - 1]) * (through[i] * k[i] + through[i - 1] * k[i - 1]);
+  }
+  return kFrameNoise * optics.mm_per_px * std::sqrt(sum / (2 * std::numbers::pi));
+}
+
+/// Every third ball on layers drawn from the covariance, in contacts as wide as on the fitted one.
+std::vector<Shown> show_drawn(const ModelFit& fit, const MapOptics& optics,
+                              const std::vector<Shown>& balls) {
+  const Eigen::MatrixXd root = fit.covariance.llt().matrixL();
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  std::vector<Shown> drawn;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    Eigen::VectorXd steps(fit.parameters.size());
+    for (double& step : steps) step = normal(random);
+    const LayerModel layer = layer_of(fit.parameters + root * steps);
+    const auto light = transfers(layer.scattering, fit.layer.scattering, optics);
+    for (auto i = static_cast<std::size_t>(draw % 3); i < balls.size(); i += 3) {
+      try {
+        drawn.push_back(show(
+            layer,
+            press_ball(balls[i].ball_radius_mm, balls[i].contact_radius_mm, layer.thickness_mm),
+            light));
+      } catch (const std::invalid_argument&) {
+        continue;  // a layer too far off for this contact
+      }
+    }
+  }
+  return drawn;
+}
+
+std::vector<recon::Model::Uncertainty> errors_of(const Knots& knots, double noise,
+                                                 double deepest_mm, const std::vector<Shown>& balls,
+                                                 std::size_t list) {
+  struct Bin {
+    double depth = 0;
+    double square = 0;
+    double weight = 0;
+  };
+  std::vector<Bin> bins(static_cast<std::size_t>(deepest_mm / kDepthBinMm) + 1);
+  for (const Shown& ball : balls) {
+    for_places(ball, list, [&](double level, double depth, double weight) {
+      if (depth < 0) return;
+      const double error = knots.at(level) - depth;
+      const double wobble = 0.5 * (knots.at(level + noise) - knots.at(level - noise));
+      Bin& bin = bins[std::min(bins.size() - 1, static_cast<std::size_t>(depth / kDepthBinMm))];
+      bin.depth += weight * depth;
+      bin.square += weight * (error * error + wobble * wobble);
+      bin.weight += weight;
+    });
+  }
+  std::vector<recon::Model::Uncertainty> rows;
+  for (const Bin& bin : bins) {
+    if (bin.weight == 0) continue;
+    rows.push_back({std::round(1000 * bin.depth / bin.weight) / 1000,
+                    std::round(1e4 * std::sqrt(bin.square / bin.weight)) / 10});
+  }
+  return rows;
+}
+
+}  // namespace
+
+std::array<recon::DepthList, kLists> lists_of(const LayerModel& layer, const MapOptics& optics,
+                                              double deepest_mm) {
+  const std::vector<Shown> balls = show_balls(layer, optics, deepest_mm);
+  std::array<recon::DepthList, kLists> lists;
+  for (std::size_t i = 0; i < lists.size(); ++i) {
+    lists[i] = tabulate(fit_knots(balls, i), deepest_mm);
+  }
+  return lists;
+}
+
+std::array<ListOfModel, kLists> lists_of(const ModelFit& fit, const MapOptics& optics) {
+  const double deepest = fit.deepest_mm();
+  const std::vector<Shown> balls = show_balls(fit.layer, optics, deepest);
+  const std::vector<Shown> drawn = show_drawn(fit, optics, balls);
+  std::array<ListOfModel, kLists> lists;
+  for (std::size_t i = 0; i < lists.size(); ++i) {
+    const Knots knots = fit_knots(balls, i);
+    const double noise = noise_levels(fit.layer, optics, static_cast<int>(i));
+    lists[i] = {tabulate(knots, deepest), errors_of(knots, noise, deepest, drawn, i)};
+  }
+  return lists;
+}
+
+}  // namespace dtact::calibration

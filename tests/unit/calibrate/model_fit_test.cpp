@@ -1,0 +1,89 @@
+// The fit and its lists on presses that the model itself makes: what it must find then is known.
+// How it does on sensors that another simulator makes: tests/accuracy/model.
+#include "clients/calibrate/fit/model/model_fit.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "clients/calibrate/fit/model/model_list.hpp"
+#include "clients/calibrate/fit/model/radial_transform.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+constexpr double kLight = 160;      // grey levels
+constexpr double kSmoothing = 0.1;  // mm
+
+LayerModel layer() {
+  return {.thickness_mm = 2.2,
+          .response = {.slopes = {1.6, 1.1, 0.42, 0.4, 0.36}, .bulge_factor = 1},
+          .scattering = {0.28, 1.3, 0.72}};
+}
+
+Eigen::VectorXd levels(const BallContact& contact, int steps) {
+  const LayerModel made = layer();
+  const Eigen::VectorXd scattering = scattered(made.scattering);
+  return kLight *
+         RadialTransform::instance().values(imagine(made, contact)
+                                                .spectrum.cwiseProduct(scattering)
+                                                .cwiseProduct(blurred(kSmoothing))
+                                                .cwiseProduct(sharpened(scattering, steps)));
+}
+
+double look_up_mm(const recon::DepthList& list, double level) {
+  return 0.001 * list.um[static_cast<std::size_t>(std::lround(64 * level) - list.first_q6)];
+}
+
+TEST(ModelFit, FindsTheLayerThatMadeAPress) {
+  const BallContact contact = press_ball(4, 2.8, 2.2);
+  const Eigen::VectorXd seen = levels(contact, 0);
+  PressProfile press;
+  press.ball_radius_mm = 4;
+  press.contact_radius_mm = 3.1;  // as a circle of three grey levels has it
+  press.smoothing_mm = kSmoothing;
+  for (Eigen::Index i = 1; i < 300; i += 3) {
+    press.radius_mm.push_back(RadialTransform::kStepMm * static_cast<double>(i));
+    press.loss.push_back(seen[i] / kLight + 0.003);
+    press.noise.push_back(1e-4);
+  }
+  const ModelFit fit = fit_model({&press, 1});
+  EXPECT_NEAR(fit.layer.thickness_mm, 2.2, 0.06);
+  EXPECT_NEAR(fit.layer.scattering.narrow_mm, 0.28, 0.03);
+  EXPECT_NEAR(fit.layer.scattering.wide_mm, 1.3, 0.15);
+  EXPECT_NEAR(fit.deepest_mm(), contact.depth_mm, 0.015);
+  EXPECT_NEAR(fit.presses[0].offset, 0.003, 5e-4);
+  EXPECT_LT(fit.residual * kLight, 0.03);
+  // The truth lies within what the covariance allows.
+  const double thickness_error = std::sqrt(fit.covariance(0, 0));
+  EXPECT_GT(thickness_error, 1e-4);
+  EXPECT_LT(std::abs(std::log(fit.layer.thickness_mm / 2.2)), 3 * thickness_error);
+}
+
+TEST(ModelList, ReadsABallThroughEveryFilter) {
+  const MapOptics optics{kLight, kSmoothing, 0.04};
+  const auto lists = lists_of(layer(), optics, 1.5);
+  const BallContact contact = press_ball_to(5, 1, 2.2);
+  // Each step of the filter takes away what the shape of an object does to its reading.
+  const std::vector<double> allowed = {0.03, 0.02, 0.015};
+  for (int steps = 0; steps < kLists; ++steps) {
+    const recon::DepthList& list = lists[static_cast<std::size_t>(steps)];
+    EXPECT_EQ(look_up_mm(list, 0), 0) << steps;
+    EXPECT_NO_THROW(recon::check(list, true)) << steps;
+    EXPECT_NEAR(look_up_mm(list, list.covered_to_q6 / 64.0), 1.5, 0.15) << steps;
+    const Eigen::VectorXd seen = levels(contact, steps);
+    double sum = 0;
+    double area = 0;
+    for (Eigen::Index i = 0;
+         RadialTransform::kStepMm * static_cast<double>(i) < contact.contact_radius_mm; ++i) {
+      const double r = RadialTransform::kStepMm * static_cast<double>(i);
+      sum += r * std::abs(look_up_mm(list, seen[i]) - contact.indentation_mm(r));
+      area += r;
+    }
+    EXPECT_LT(sum / area, allowed[static_cast<std::size_t>(steps)]) << steps;
+  }
+}
+
+}  // namespace
+}  // namespace dtact::calibration
