@@ -20,6 +20,8 @@ struct Response {
 
   /// At an indentation of so many thicknesses; 0 at 0.
   [[nodiscard]] double loss(double indentation) const;
+
+  bool operator==(const Response&) const = default;
 };
 
 /// What a press is imagined with.

@@ -148,8 +148,15 @@ FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& 
   for (const SettledPress& press : seen.presses) {
     profiles.push_back(profile_of(press, optics.light_levels, optics.smoothing_mm));
   }
-  made.fit = fit_model(profiles);
+  // What does not fit one press fits several even less, and costs as much for each.
+  const auto deepest = std::ranges::max_element(
+      seen.presses, {}, [](const SettledPress& press) { return press.contact.peak_levels; });
+  made.fit = fit_model({&profiles[static_cast<std::size_t>(deepest - seen.presses.begin())], 1});
   refuse(made);
+  if (profiles.size() > 1) {
+    made.fit = fit_model(profiles, made.fit);
+    refuse(made);
+  }
   for (std::size_t i = 0; i < seen.names.size(); ++i) {
     made.presses.push_back({seen.names[i], made.fit.presses[i].depth_mm});
   }

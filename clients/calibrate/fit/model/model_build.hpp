@@ -1,18 +1,12 @@
 #pragma once
 
-#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "clients/calibrate/fit/model/model_fit.hpp"
 #include "clients/calibrate/fit/press_set.hpp"
 
 namespace dtact::calibration {
-
-/// No layer explains the presses: what() says what to check.
-class ModelRefused : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// A calibration by a layer that was fitted to presses of a ball (fit_model()), one or several, and
 /// the fit. Darkening is a share of the light at its place, unless the dents are much rounder in

@@ -29,6 +29,7 @@ constexpr std::array<double, 3> kStartThicknesses = {1.5, 2, 2.8};
 /// that is believed. Shares of the light.
 constexpr double kFirstDoubt = 1e-3;
 constexpr double kLeastDoubt = 6e-5;
+constexpr int kMostIterations = 30;
 constexpr double kFrameNoise = 1;  // grey levels a pixel
 
 LayerModel layer_of(std::span<const double> x) {
@@ -46,55 +47,46 @@ LayerModel layer_of(std::span<const double> x) {
   return layer;
 }
 
-/// Between the grid's points, cubic (Catmull and Rom 1974).
-double between(const Eigen::VectorXd& values, double r_mm) {
-  const double place = r_mm / RadialTransform::kStepMm;
-  const auto i = std::min(static_cast<Eigen::Index>(place), RadialTransform::kPoints - 3);
-  const double t = place - static_cast<double>(i);
-  const double p0 = values[std::abs(i - 1)];  // even about the axis
-  const double p1 = values[i];
-  const double p2 = values[i + 1];
-  const double p3 = values[i + 2];
-  return p1 +
-         0.5 * t * (p2 - p0 + t * (2 * p0 - 5 * p1 + 4 * p2 - p3 + t * (3 * (p1 - p2) + p3 - p0)));
-}
-
 /// One press's rings against what the model makes of it.
 class RingCost {
  public:
   RingCost(const PressProfile& press, double doubt, std::size_t shared)
-      : press_(press), doubt_(doubt), shared_(shared), smoothing_(blurred(press.smoothing_mm)) {}
+      : press_(press),
+        doubt_(doubt),
+        shared_(shared),
+        smoothing_(blurred(press.smoothing_mm)),
+        to_rings_(RadialTransform::instance().back_to(press.radius_mm)) {}
 
   bool operator()(const double* const* parameters, double* residuals) const {
-    const std::span<const double> shared(parameters[0], shared_);
-    const LayerModel layer = layer_of(shared);
+    const LayerModel layer = layer_of(std::span(parameters[0], shared_));
     const double* own = parameters[1];
-    if (!solve(std::exp(own[kRadius]), layer.thickness_mm)) return false;
+    if (!press(std::exp(own[kRadius]), layer)) return false;
     const Eigen::VectorXd seen =
-        RadialTransform::instance().values(imagine(layer, *contact_)
-                                               .spectrum.cwiseProduct(scattered(layer.scattering))
-                                               .cwiseProduct(smoothing_));
+        to_rings_ * spectrum_.cwiseProduct(scattered(layer.scattering)).cwiseProduct(smoothing_);
     for (std::size_t i = 0; i < press_.radius_mm.size(); ++i) {
-      residuals[i] = (between(seen, press_.radius_mm[i]) + own[kOffset] - press_.loss[i]) /
+      residuals[i] = (seen[static_cast<Eigen::Index>(i)] + own[kOffset] - press_.loss[i]) /
                      std::hypot(doubt_, press_.noise[i]);
     }
     return true;
   }
 
  private:
-  /// The contact is solved anew only when its radius or the thickness moved, which two of a dozen
-  /// derivatives ask for.
-  bool solve(double radius_mm, double thickness_mm) const {
-    if (contact_ && contact_->contact_radius_mm == radius_mm && thickness_mm_ == thickness_mm) {
-      return true;
+  /// The contact is solved anew only when its radius or the thickness moved, and the loss only when
+  /// they or the response did: half of the derivatives need neither.
+  bool press(double radius_mm, const LayerModel& layer) const {
+    const bool same_contact = contact_ && contact_->contact_radius_mm == radius_mm &&
+                              pressed_.thickness_mm == layer.thickness_mm;
+    if (same_contact && pressed_.response == layer.response) return true;
+    if (!same_contact) {
+      try {
+        contact_ = press_ball(press_.ball_radius_mm, radius_mm, layer.thickness_mm);
+      } catch (const std::invalid_argument&) {
+        contact_.reset();
+        return false;
+      }
     }
-    try {
-      contact_ = press_ball(press_.ball_radius_mm, radius_mm, thickness_mm);
-    } catch (const std::invalid_argument&) {
-      contact_.reset();
-      return false;
-    }
-    thickness_mm_ = thickness_mm;
+    pressed_ = layer;
+    spectrum_ = imagine(layer, *contact_).spectrum;
     return true;
   }
 
@@ -102,8 +94,10 @@ class RingCost {
   double doubt_;
   std::size_t shared_;
   Eigen::VectorXd smoothing_;
+  Eigen::MatrixXd to_rings_;
   mutable std::optional<BallContact> contact_;
-  mutable double thickness_mm_ = 0;
+  mutable LayerModel pressed_;
+  mutable Eigen::VectorXd spectrum_;
 };
 
 /// Rows (x − mean)/deviation, and of differences between slopes.
@@ -155,7 +149,7 @@ void solve(std::span<const PressProfile> presses, double doubt, State& state) {
   const std::unique_ptr<ceres::Problem> problem = make_problem(presses, doubt, state);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = 60;
+  options.max_num_iterations = kMostIterations;
   options.function_tolerance = 1e-5;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
@@ -177,6 +171,67 @@ double mean_square(std::span<const double> residuals) {
   double sum = 0;
   for (const double r : residuals) sum += r * r;
   return sum / static_cast<double>(residuals.size());
+}
+
+/// The fit from a first solution, each ring believed as far as it deserves.
+ModelFit refine(std::span<const PressProfile> presses, State best) {
+  if (best.cost == std::numeric_limits<double>::infinity()) {
+    throw ModelRefused(
+        "no layer can be fitted to the press: check the ball's radius, the scale, and that "
+        "reference and frame are not exchanged");
+  }
+  const auto residuals_of = [&](std::size_t p, double doubt) {
+    RingCost cost(presses[p], doubt, best.shared.size());
+    std::vector<double> residuals(presses[p].loss.size());
+    const std::array<const double*, 2> parameters = {best.shared.data(), best.own[p].data()};
+    (void)cost(parameters.data(), residuals.data());
+    for (std::size_t i = 0; i < residuals.size(); ++i) {
+      residuals[i] *= std::hypot(doubt, presses[p].noise[i]);
+    }
+    return residuals;
+  };
+  double doubt = kFirstDoubt;
+  for (int pass = 0; pass < 2; ++pass) {
+    double square = 0;
+    for (std::size_t p = 0; p < presses.size(); ++p) square += mean_square(residuals_of(p, doubt));
+    doubt = std::max(kLeastDoubt, std::sqrt(square / static_cast<double>(presses.size())));
+    solve(presses, doubt, best);
+  }
+
+  ModelFit fit;
+  fit.parameters = Eigen::Map<Eigen::VectorXd>(best.shared.data(),
+                                               static_cast<Eigen::Index>(best.shared.size()));
+  fit.layer = layer_of(best.shared);
+  double square = 0;
+  for (std::size_t p = 0; p < presses.size(); ++p) {
+    const double radius = std::exp(best.own[p][kRadius]);
+    const double residual = mean_square(residuals_of(p, doubt));
+    square += residual;
+    fit.presses.push_back(
+        {radius, press_ball(presses[p].ball_radius_mm, radius, fit.layer.thickness_mm).depth_mm,
+         best.own[p][kOffset], std::sqrt(residual)});
+  }
+  fit.residual = std::sqrt(square / static_cast<double>(presses.size()));
+
+  const std::unique_ptr<ceres::Problem> problem = make_problem(presses, doubt, best);
+  ceres::CRSMatrix sparse;
+  ceres::Problem::EvaluateOptions options;
+  options.parameter_blocks = {best.shared.data()};
+  for (auto& own : best.own) options.parameter_blocks.push_back(own.data());
+  problem->Evaluate(options, nullptr, nullptr, nullptr, &sparse);
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(sparse.num_rows); ++row) {
+    for (int i = sparse.rows[row]; i < sparse.rows[row + 1]; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      jacobian(static_cast<Eigen::Index>(row), sparse.cols[at]) = sparse.values[at];
+    }
+  }
+  const Eigen::MatrixXd covariance =
+      (jacobian.transpose() * jacobian)
+          .ldlt()
+          .solve(Eigen::MatrixXd::Identity(jacobian.cols(), jacobian.cols()));
+  fit.covariance = covariance.topLeftCorner(fit.parameters.size(), fit.parameters.size());
+  return fit;
 }
 
 }  // namespace
@@ -236,64 +291,14 @@ ModelFit fit_model(std::span<const PressProfile> presses) {
     solve(presses, kFirstDoubt, state);
     if (state.cost < best.cost) best = std::move(state);
   }
-  if (best.shared.empty()) {
-    throw std::runtime_error(
-        "no layer can be fitted to the press: check the ball's radius, the "
-        "scale, and that reference and frame are not exchanged");
-  }
-  // Again, each ring believed as far as the fit deserves.
-  const auto residuals_of = [&](std::size_t p, double doubt) {
-    RingCost cost(presses[p], doubt, best.shared.size());
-    std::vector<double> residuals(presses[p].loss.size());
-    const std::array<const double*, 2> parameters = {best.shared.data(), best.own[p].data()};
-    (void)cost(parameters.data(), residuals.data());
-    for (std::size_t i = 0; i < residuals.size(); ++i) {
-      residuals[i] *= std::hypot(doubt, presses[p].noise[i]);
-    }
-    return residuals;
-  };
-  double doubt = kFirstDoubt;
-  for (int pass = 0; pass < 2; ++pass) {
-    double square = 0;
-    for (std::size_t p = 0; p < presses.size(); ++p) square += mean_square(residuals_of(p, doubt));
-    doubt = std::max(kLeastDoubt, std::sqrt(square / static_cast<double>(presses.size())));
-    solve(presses, doubt, best);
-  }
+  return refine(presses, std::move(best));
+}
 
-  ModelFit fit;
-  fit.parameters = Eigen::Map<Eigen::VectorXd>(best.shared.data(),
-                                               static_cast<Eigen::Index>(best.shared.size()));
-  fit.layer = layer_of(fit.parameters);
-  double square = 0;
-  for (std::size_t p = 0; p < presses.size(); ++p) {
-    const double radius = std::exp(best.own[p][kRadius]);
-    const double residual = mean_square(residuals_of(p, doubt));
-    square += residual;
-    fit.presses.push_back(
-        {radius, press_ball(presses[p].ball_radius_mm, radius, fit.layer.thickness_mm).depth_mm,
-         best.own[p][kOffset], std::sqrt(residual)});
-  }
-  fit.residual = std::sqrt(square / static_cast<double>(presses.size()));
-
-  const std::unique_ptr<ceres::Problem> problem = make_problem(presses, doubt, best);
-  ceres::CRSMatrix sparse;
-  ceres::Problem::EvaluateOptions options;
-  options.parameter_blocks = {best.shared.data()};
-  for (auto& own : best.own) options.parameter_blocks.push_back(own.data());
-  problem->Evaluate(options, nullptr, nullptr, nullptr, &sparse);
-  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(sparse.num_rows, sparse.num_cols);
-  for (std::size_t row = 0; row < static_cast<std::size_t>(sparse.num_rows); ++row) {
-    for (int i = sparse.rows[row]; i < sparse.rows[row + 1]; ++i) {
-      const auto at = static_cast<std::size_t>(i);
-      jacobian(static_cast<Eigen::Index>(row), sparse.cols[at]) = sparse.values[at];
-    }
-  }
-  const Eigen::MatrixXd covariance =
-      (jacobian.transpose() * jacobian)
-          .ldlt()
-          .solve(Eigen::MatrixXd::Identity(jacobian.cols(), jacobian.cols()));
-  fit.covariance = covariance.topLeftCorner(fit.parameters.size(), fit.parameters.size());
-  return fit;
+ModelFit fit_model(std::span<const PressProfile> presses, const ModelFit& from) {
+  State state = start(presses, from.layer.thickness_mm);
+  state.shared.assign(from.parameters.begin(), from.parameters.end());
+  solve(presses, kFirstDoubt, state);
+  return refine(presses, std::move(state));
 }
 
 }  // namespace dtact::calibration

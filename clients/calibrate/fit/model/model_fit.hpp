@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "clients/calibrate/fit/build.hpp"
@@ -10,6 +11,12 @@
 #include "clients/calibrate/fit/model/layer_model.hpp"
 
 namespace dtact::calibration {
+
+/// No layer explains the presses: what() says what to check.
+class ModelRefused : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 /// The darkening of a press on rings about the contact's centre, as a share of the light there.
 struct PressProfile {
@@ -64,7 +71,9 @@ struct ModelFit {
 /// own contact radius and offset, by Levenberg and Marquardt (Ceres) from several thicknesses. The
 /// priors are wide (model_fit.cpp): thickness 2 mm ± 35 %, widths 0.3 and 1.5 mm ± 50 %. A kink of
 /// the response at zero is held narrower (± 30 %): one press hardly tells it from thickness.
-/// Throws std::runtime_error when the fit does not end.
+/// Throws ModelRefused when the fit does not end.
 [[nodiscard]] ModelFit fit_model(std::span<const PressProfile> presses);
+/// The same from the parameters of another fit, as of one of the presses.
+[[nodiscard]] ModelFit fit_model(std::span<const PressProfile> presses, const ModelFit& from);
 
 }  // namespace dtact::calibration

@@ -31,8 +31,8 @@ RadialTransform::RadialTransform() {
   }
   const auto count = static_cast<Eigen::Index>(nodes.size());
   k_ = Eigen::Map<Eigen::VectorXd>(nodes.data(), count);
+  weights_ = Eigen::Map<Eigen::VectorXd>(weights.data(), count);
   forward_.setZero(count, kPoints);
-  back_.resize(kPoints, count);
   for (Eigen::Index n = 0; n < count; ++n) {
     for (Eigen::Index i = 0; i + 1 < kPoints; ++i) {
       const double from = kStepMm * static_cast<double>(i);
@@ -43,11 +43,20 @@ RadialTransform::RadialTransform() {
         forward_(n, i + 1) += share * value;
       });
     }
-    for (Eigen::Index i = 0; i < kPoints; ++i) {
-      back_(i, n) = weights[static_cast<std::size_t>(n)] * k_[n] *
-                    ::j0(k_[n] * kStepMm * static_cast<double>(i));
+  }
+  std::vector<double> places(static_cast<std::size_t>(kPoints));
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = kStepMm * static_cast<double>(i);
+  back_ = back_to(places);
+}
+
+Eigen::MatrixXd RadialTransform::back_to(std::span<const double> places_mm) const {
+  Eigen::MatrixXd back(static_cast<Eigen::Index>(places_mm.size()), k_.size());
+  for (Eigen::Index n = 0; n < k_.size(); ++n) {
+    for (Eigen::Index i = 0; i < back.rows(); ++i) {
+      back(i, n) = weights_[n] * k_[n] * ::j0(k_[n] * places_mm[static_cast<std::size_t>(i)]);
     }
   }
+  return back;
 }
 
 }  // namespace dtact::calibration

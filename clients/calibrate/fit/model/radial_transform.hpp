@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 
 namespace dtact::calibration {
 
@@ -26,11 +27,14 @@ class RadialTransform {
   [[nodiscard]] Eigen::VectorXd values(const Eigen::VectorXd& spectrum) const {
     return back_ * spectrum;
   }
+  /// The matrix that takes a spectrum back to other places, millimetres.
+  [[nodiscard]] Eigen::MatrixXd back_to(std::span<const double> places_mm) const;
 
  private:
   RadialTransform();
 
   Eigen::VectorXd k_;
+  Eigen::VectorXd weights_;  ///< Of the quadrature over wave numbers.
   Eigen::MatrixXd forward_;
   Eigen::MatrixXd back_;
 };
