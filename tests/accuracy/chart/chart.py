@@ -148,7 +148,7 @@ def mark_pareto(rows):
 
 
 COLOURS = {"published": "#b2182b", "regression": "#d98200", "list": "#2166ac", "ours": "#1b7837",
-           "sharpened": "#8e44ad",
+           "virtual balls": "#8e44ad",
            "paper": "#222222"}
 # The wider the smoothing, the paler.
 SHADES = {0.05: 1.0, 0.1: 0.8, 0.2: 0.5, 0.4: 0.28}
@@ -209,7 +209,7 @@ def plot(rows, shots, file, label):
     have = {r["method"] for r in rows}
     names = {"published": "published list", "regression": "published regression",
              "list": "ours, one press", "ours": "ours, several presses",
-             "sharpened": "ours, one press, sharpened",
+             "virtual balls": "virtual balls, sharpened 0 to 2x",
              "paper": "paper's pipeline, Python + OpenCV"}
     legend = [Line2D([], [], marker="o", linestyle="", color=COLOURS[m], label=names[m])
               for m in names if m in have]

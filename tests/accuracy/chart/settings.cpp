@@ -8,10 +8,8 @@
 #include <optional>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "clients/calibrate/fit/contact.hpp"
-#include "clients/calibrate/fit/difference.hpp"
-#include "clients/calibrate/fit/list_fit.hpp"
 #include "daemon/recon/decimate.hpp"
+#include "tests/accuracy/chart/virtual_balls.hpp"
 
 namespace dtact::chart {
 namespace {
@@ -48,37 +46,6 @@ std::optional<double> bilinear(const std::vector<std::int16_t>& map, int width, 
     sum += wx * wy * um;
   }
   return sum;
-}
-
-/// What undoes the blur that was fitted to real images (config/scenes/default.toml: 0.70 of the
-/// light spread by 0.20 mm, the rest by 1.23 mm, seen through a smoothing of 0.1 mm): the wide
-/// part, the narrow one to first order, and half of the wide one.
-constexpr std::array<Sharpening, 3> kSharpenings{{{1.23, 0.43}, {0.22, 1.0}, {1.23, 0.2}}};
-
-/// The list of one press with the darkening sharpened, in calibration as at work.
-Setting sharpened(const recon::Model& model, const image::Grey16& reference, const Shot& press,
-                  const Sharpening& sharpening) {
-  recon::Model levels = model;
-  calibration::answer_darkening(levels);
-  calibration::DifferenceMap map =
-      calibration::smoothed_difference(model, reference.pixels, press.frames);
-  std::vector<std::int16_t> q6;
-  q6.reserve(map.levels.size());
-  for (const float level : map.levels) {
-    q6.push_back(static_cast<std::int16_t>(std::lround(level * recon::kEntriesPerLevel)));
-  }
-  std::vector<std::int16_t> sharp(q6.size());
-  Sharpener(map.width, map.height, map.mm_per_px, sharpening).sharpen(q6, sharp);
-  std::ranges::transform(sharp, map.levels.begin(), [](std::int16_t value) {
-    return static_cast<float>(value) / recon::kEntriesPerLevel;
-  });
-  return {.name = fmt::format("list full sharpened {:.2f} x {:.2f}", sharpening.sigma_mm,
-                              sharpening.strength),
-          .method = "sharpened",
-          .smoothing_mm = calibration::kSmoothingMm,
-          .model = std::make_shared<const recon::Model>(std::move(levels)),
-          .sharpening = sharpening,
-          .sharpened_list = calibration::fit_list(map, calibration::find_contact(map, 4.0))};
 }
 
 }  // namespace
@@ -120,8 +87,14 @@ std::vector<Setting> make_settings(const image::Grey16& reference) {
       }
     }
   }
-  for (const Sharpening& sharpening : kSharpenings) {
-    settings.push_back(sharpened(*list, reference, calibration_press, sharpening));
+  const auto balls = std::make_shared<const recon::Model>(
+      recon::decimate(with_lists_of_virtual_balls(*list, reference), 4));
+  for (const bool tiles : {false, true}) {
+    for (const int steps : {0, 1, 2}) {
+      settings.push_back({fmt::format("virtual balls quarter{} 0.10{}", tiles ? " tiles" : "",
+                                      steps == 0 ? "" : fmt::format(" sharpened {}x", steps)),
+                          "virtual balls", 4, tiles, 0.1, balls, steps});
+    }
   }
   for (const int decimation : {1, 2, 4}) {
     const auto model = std::make_shared<const recon::Model>(recon::decimate(*ours, decimation));
@@ -135,7 +108,7 @@ std::vector<Setting> make_settings(const image::Grey16& reference) {
 Worker::Worker(const Setting& setting, const image::Grey16& reference, const Shot& shot)
     : setting_(setting),
       shot_(shot),
-      reconstructor_(setting.model),
+      reconstructor_(setting.model, setting.steps),
       cells_(recon::CellLattice(setting.model->rectify)),
       readers_(cells_.lattice(), setting.model->rectify, reconstructor_.radius()),
       tiles_(static_cast<std::size_t>(readers_.grid().rows())) {
@@ -147,19 +120,12 @@ Worker::Worker(const Setting& setting, const image::Grey16& reference, const Sho
   }
   const recon::RectifyTable& table = setting.model->rectify;
   depth_um_.resize(static_cast<std::size_t>(table.width) * static_cast<std::size_t>(table.height));
-  if (setting.sharpening) {
-    sharpener_.emplace(table.width, table.height, setting.model->mm_per_px, *setting.sharpening);
-    level_q6_.resize(depth_um_.size());
-  }
 }
 
 void Worker::once() {
   const std::uint8_t* luma = frames_[next_].data();
   next_ = (next_ + 1) % frames_.size();
-  if (sharpener_) {
-    reconstructor_.run(luma, kWidth, level_q6_);
-    sharpener_->look_up(level_q6_, setting_.sharpened_list, depth_um_);
-  } else if (setting_.tiles) {
+  if (setting_.tiles) {
     (void)cells_.look({luma, kWidth, kHeight, kWidth});
     readers_.mark(cells_.active(), tiles_);
     reconstructor_.run_active(luma, kWidth, tiles_, depth_um_, drawn_);

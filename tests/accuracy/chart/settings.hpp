@@ -1,7 +1,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,25 +10,23 @@
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
 #include "tests/accuracy/chart/scenes.hpp"
-#include "tests/accuracy/chart/sharpen.hpp"
 
 namespace dtact::chart {
 
 /// One way to reconstruct.
 struct Setting {
   std::string name;           ///< "list full tiles 0.10", unique.
-  std::string method;         ///< "published", "regression", "list", "ours", "sharpened".
+  std::string method;         ///< "published", "regression", "list", "ours", "virtual balls".
   int decimation = 1;         ///< 1, 2 or 4.
   bool tiles = false;         ///< Only what changed.
   double smoothing_mm = 0.1;  ///< Standard deviation; 0: the method's own.
   std::shared_ptr<const recon::Model> model;
-  /// After the smoothing, before the list; the model answers with the darkening then.
-  std::optional<Sharpening> sharpening = {};
-  recon::DepthList sharpened_list = {};
+  int steps = 0;  ///< Of sharpening.
 };
 
 /// All of them, calibrated with make_calibration_press() or, "regression" and "ours", with
-/// make_calibration_presses(), and nothing else.
+/// make_calibration_presses(), "virtual balls" as with_lists_of_virtual_balls() says, and nothing
+/// else.
 [[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference);
 
 struct Error {
@@ -64,8 +61,6 @@ class Worker {
   recon::TileRows tiles_;
   std::vector<std::vector<std::uint8_t>> frames_;  // padded for vector loads
   std::vector<std::int16_t> depth_um_;
-  std::optional<Sharpener> sharpener_;
-  std::vector<std::int16_t> level_q6_;  // what it sharpens
   recon::DrawnTiles drawn_;
   std::size_t next_ = 0;
 };
