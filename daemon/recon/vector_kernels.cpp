@@ -6,6 +6,7 @@
 
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/vector_targets.hpp"
+#include "daemon/recon/vector_upsample.hpp"
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "daemon/recon/vector_kernels.cpp"
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
@@ -48,6 +49,7 @@ struct PairSum {
 #include "daemon/recon/vector_sharpen-inl.hpp"
 #include "daemon/recon/vector_smooth-inl.hpp"
 #include "daemon/recon/vector_sums-inl.hpp"
+#include "daemon/recon/vector_upsample-inl.hpp"
 
 const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
 
@@ -67,6 +69,8 @@ HWY_EXPORT(ShrinkRow);
 HWY_EXPORT(SharpenRow);
 HWY_EXPORT(SumRows);
 HWY_EXPORT(BendRow);
+HWY_EXPORT(WidenRow);
+HWY_EXPORT(BetweenRow);
 HWY_EXPORT(TargetName);
 
 void rectify_difference(const RectifyPlan& plan, int y, int first, int last,
@@ -121,6 +125,16 @@ void sum_rows(const std::int16_t* depth_um, std::ptrdiff_t stride, int x0, int x
 void bend_row(const std::int16_t* row_um, std::ptrdiff_t stride, int x0, int x1,
               DepthSums& sums) noexcept {
   HWY_DYNAMIC_DISPATCH(BendRow)(row_um, stride, x0, x1, sums);
+}
+
+void widen_row(const std::int16_t* coarse, const kernels::Phases& phases, int count,
+               std::int16_t* fine) noexcept {
+  HWY_DYNAMIC_DISPATCH(WidenRow)(coarse, phases, count, fine);
+}
+
+void between_row(const std::int16_t* near, const std::int16_t* other, std::int16_t share_q15,
+                 int width, std::int16_t* out) noexcept {
+  HWY_DYNAMIC_DISPATCH(BetweenRow)(near, other, share_q15, width, out);
 }
 
 const char* target_name() noexcept { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
