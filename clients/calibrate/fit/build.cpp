@@ -17,7 +17,8 @@ namespace {
 
 /// Part of the contact that may be black or white before the press is refused.
 constexpr double kClipped = 0.01;
-constexpr double kShareWorth = 0.8;  // of the left-out error
+constexpr double kLeans = 0.004;         // per mm; an even press leans by 0.001
+constexpr double kLeftByTheLight = 0.5;  // of that
 
 /// An image as the depth map shows it: for each of its pixels the nearest of the frame.
 template <typename Pixel>
@@ -83,6 +84,13 @@ recon::SpatialGain gain_of(const BallPress& press, const Calibration& calibratio
   return moved(press.gain, centre.x, centre.y);
 }
 
+/// Size of the press's own plane, per mm.
+double lean_of(const SettledPress& press) {
+  const PressGain gain = fit_press_gain(sure_samples(press.map, press.contact),
+                                        press.contact.ball_radius_mm, GainOrder::plane);
+  return std::hypot(gain.factors[0], gain.factors[1]);
+}
+
 ChosenPressGain press_gain_of(const SettledPress& press) {
   return choose_press_gain(sure_samples(press.map, press.contact), press.contact.ball_radius_mm);
 }
@@ -101,8 +109,12 @@ PressChoices choose(const BallPress& press, recon::Model& model, SettledPress& s
   SettledPress under =
       settle(shared, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
   const ChosenPressGain gain = press_gain_of(under);
-  chosen.light = {false, chosen.press_gain.left_out_mm[0], gain.left_out_mm[0]};
-  if (!(chosen.light->shared_mm < kShareWorth * chosen.light->plain_mm)) return chosen;
+  chosen.light = {false, lean_of(settled), lean_of(under)};
+  if (!(chosen.light->plain_per_mm > kLeans &&
+        chosen.light->shared_per_mm < kLeftByTheLight * chosen.light->plain_per_mm &&
+        gain.left_out_mm[0] <= chosen.press_gain.left_out_mm[0])) {
+    return chosen;
+  }
   chosen.light->shared = true;
   chosen.press_gain = gain;
   model = std::move(shared);
@@ -187,10 +199,10 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
 std::string PressChoices::describe() const {
   if (!light) return press_gain.describe();
   return fmt::format(
-      "light: sectors that were left out are {:.4f} mm off the sphere, {:.4f} with darkening as a "
-      "share of the light: {}\n{}",
-      light->plain_mm, light->shared_mm, light->shared ? "the share is used" : "as it is",
-      press_gain.describe());
+      "light: the press leans by {:.1f} % a mm, by {:.1f} with darkening as a share of the light: "
+      "{}\n{}",
+      100 * light->plain_per_mm, 100 * light->shared_per_mm,
+      light->shared ? "the share is used" : "as it is", press_gain.describe());
 }
 
 Calibration build(const BallPress& press, PressChoices* choices) {

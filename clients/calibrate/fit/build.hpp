@@ -55,12 +55,12 @@ struct BallPress {
 /// What one press chose, and why.
 struct PressChoices {
   ChosenPressGain press_gain;
-  /// Whether the calibration takes darkening as a share of the light: the error that sectors left
-  /// out have without, mm, and with; without a gain of the press's own.
+  /// Whether the calibration takes darkening as a share of the light, and by how much the press
+  /// leans (the size of its own plane, per mm) without and with.
   struct Light {
     bool shared = false;
-    double plain_mm = 0;
-    double shared_mm = 0;
+    double plain_per_mm = 0;
+    double shared_per_mm = 0;
   };
   std::optional<Light> light;  ///< None: not asked.
 
@@ -91,11 +91,13 @@ inline constexpr double kSmoothingMm = 0.1;
 /// is left for the caller to fill. The list is fitted to the press without its own gain
 /// (choose_press_gain()); `choices` says what was chosen.
 ///
-/// The share of the light is taken where left-out sectors lose a fifth of their error by it. A
-/// light that falls to one side and a layer that is thicker there look alike in one press, but the
-/// light shows in the reference, too, and is right far from the press as well. Throws
-/// std::runtime_error saying what is wrong with the images and what to do, std::invalid_argument
-/// when sizes or numbers cannot be.
+/// The share of the light is taken where the press leans by more than 0.4 % a millimetre, half of
+/// that at most under the share, and sectors that are left out lose nothing by it. A light that
+/// falls to one side and a layer that is thicker there look alike in one press, but the light shows
+/// in the reference, too, and is right far from the press as well.
+///
+/// Throws std::runtime_error saying what is wrong with the images and what to do,
+/// std::invalid_argument when sizes or numbers cannot be.
 [[nodiscard]] Calibration build(const BallPress& press, PressChoices* choices = nullptr);
 
 }  // namespace dtact::calibration

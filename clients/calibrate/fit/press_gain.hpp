@@ -28,7 +28,7 @@ enum class GainOrder : std::uint8_t {
 /// It belongs to the press and is no part of a calibration. A camera at a finite height shows deep
 /// places farther out than shallow ones, which looks like a plane of 1 % a millimetre on a press
 /// one millimetre off the axis; a ball that was dragged looks like a quadratic. On sensor_b the
-/// pins near the ball are alike within 6 % where the press would have them differ by 35 %.
+/// pins near the ball are alike within 6 % where the press would have them differ by 27 %.
 struct PressGain {
   GainOrder order = GainOrder::none;
   /// a, b per mm and c, d per mm², from the contact's centre, x right, y down.
