@@ -1,6 +1,12 @@
 #include "hal/sim/calibrated.hpp"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <functional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
@@ -11,9 +17,16 @@ namespace {
 
 using tomlfile::KeyReader;
 
-// Where the slopes of [layer] stand, in thicknesses (clients/calibrate/fit/model/layer_model.hpp).
-const std::vector<double> kKnots = {-0.24, -0.12, 0, 0.4, 0.8};
 constexpr double kHair = 1e-6;  // of the thickness: a kink is two knots so far apart
+
+// A number and its standard error, which is not the simulator's.
+double estimate(KeyReader& table, const std::string& key, double low, double high) {
+  const std::vector<double> pair = table.numbers(key, 0, 1e6);
+  if (pair.size() != 2 || pair[0] < low || pair[0] > high) {
+    table.fail(key, fmt::format("must be a number from {} to {} and its error", low, high));
+  }
+  return pair[0];
+}
 
 }  // namespace
 
@@ -21,34 +34,36 @@ void take_from_calibration(const std::filesystem::path& folder, Scene& scene) {
   const std::filesystem::path file = folder / "calibration.toml";
   const toml::table parsed = tomlfile::parse(base::read_file(file), file.string());
   KeyReader root(parsed, file.string());
-  if (!root.has("layer") || !root.has("scattering")) {
+  if (!root.has("layer")) {
     throw std::runtime_error(file.string() +
-                             ": has no [layer] and [scattering]: its list was not made by a model "
-                             "of the sensor, which a simulator of it needs");
+                             ": has no [layer]: its list was not made by a model of the sensor, "
+                             "which a simulator of it needs");
   }
-  // What else the tables hold (uncertainties) is not the simulator's.
   KeyReader layer = root.table("layer");
-  scene.layer.thickness_mm = layer.number("thickness_mm", 0.5, 5);
+  scene.layer.thickness_mm = estimate(layer, "thickness_mm", 0.5, 5);
   OpticsModel& optics = scene.optics;
-  optics.knots = kKnots;
-  optics.slopes = layer.numbers("slopes", 0.001, 20);
-  if (optics.slopes.size() != optics.knots.size()) {
-    layer.fail("slopes", "must be as many as the model has knots: 5");
-  }
-  double bulge_factor = 1;
-  layer.number_if("bulge_factor", bulge_factor, 0.05, 20);
-  if (bulge_factor != 1) {
-    optics.knots = {-0.24, -0.12, -kHair, 0, 0.4, 0.8};
-    const std::vector<double> s = optics.slopes;
-    optics.slopes = {
-        bulge_factor * s[0], bulge_factor * s[1], bulge_factor * s[2], s[2], s[3], s[4]};
-  }
-  KeyReader scattering = root.table("scattering");
-  optics.narrow_mm = scattering.number("narrow_mm", 0, 3);
-  optics.wide_mm = scattering.number("wide_mm", 0, 6);
-  optics.narrow_weight = scattering.number("narrow_weight", 0, 1);
+  optics.narrow_mm = estimate(layer, "narrow_mm", 0, 3);
+  optics.wide_mm = estimate(layer, "wide_mm", 0, 6);
+  optics.narrow_weight = estimate(layer, "narrow_weight", 0, 1);
   optics.far_weight = 0;
   optics.growth = 0;
+  const std::vector<double> knots = layer.numbers("indentation", -1, 1);
+  const std::vector<double> slopes = layer.numbers("slope", 1e-4, 1e3);
+  if (knots.size() < 2 || slopes.size() != knots.size() ||
+      std::ranges::adjacent_find(knots, std::greater_equal()) != knots.end()) {
+    layer.fail("indentation", "must ascend and be as many as slope");
+  }
+  const double bulge_factor = layer.number("bulge_factor", 1e-3, 1e3);
+  optics.knots.clear();
+  optics.slopes.clear();
+  for (std::size_t i = 0; i < knots.size(); ++i) {
+    if (knots[i] == 0 && bulge_factor != 1) {
+      optics.knots.push_back(-kHair);
+      optics.slopes.push_back(bulge_factor * slopes[i]);
+    }
+    optics.knots.push_back(knots[i]);
+    optics.slopes.push_back(knots[i] < 0 ? bulge_factor * slopes[i] : slopes[i]);
+  }
 }
 
 }  // namespace dtact::hal::sim

@@ -109,12 +109,18 @@ class CalibratedScene : public ::testing::Test {
       std::filesystem::path(::testing::TempDir()) / fmt::format("calibrated_scene_{}", ::getpid());
 };
 
-constexpr const char* kModel =
-    "[layer]\nthickness_mm = 2.4\nthickness_sd_mm = 0.1\nslopes = [2.5, 2.4, 0.6, 0.4, 0.5]\n"
-    "[scattering]\nnarrow_mm = 0.12\nwide_mm = 1.16\nnarrow_weight = 0.7\n";
+// As dtact-calibrate writes it, errors beside the numbers.
+std::string model(double bulge_factor) {
+  return fmt::format(
+      "[layer]\nthickness_mm = [2.4, 0.1]\nnarrow_mm = [0.12, 0.01]\nwide_mm = [1.16, 0.1]\n"
+      "narrow_weight = [0.7, 0.02]\nindentation = [-0.24, -0.12, 0, 0.4, 0.8]\n"
+      "slope = [2.5, 2.4, 0.6, 0.4, 0.5]\nslope_error = [1, 1, 0.1, 0.1, 0.2]\n"
+      "bulge_factor = {}\nresidual_levels = 0.2\n",
+      bulge_factor);
+}
 
 TEST_F(CalibratedScene, IsThatSensor) {
-  write(kModel);
+  write(model(1));
   const Scene scene = parse_scene(
       fmt::format("calibration = \"{}\"\n[optics]\nwide_mm = 1.5\n", folder_.string()), "x.toml");
   EXPECT_EQ(scene.layer.thickness_mm, 2.4);
@@ -125,7 +131,7 @@ TEST_F(CalibratedScene, IsThatSensor) {
 }
 
 TEST_F(CalibratedScene, MayHaveAKinkAtZero) {
-  write(std::string(kModel).insert(8, "bulge_factor = 2.0\n"));
+  write(model(2));
   Scene scene = default_scene();
   take_from_calibration(folder_, scene);
   EXPECT_NEAR(response(scene.optics, 0.24, 2.4), 0.0575, 1e-6);
