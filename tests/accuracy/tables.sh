@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Makes the tables, plots and pages that lie beside this file from the simulated sensor:
-# tables.sh BIN [table|atlas|thickness ...], all of them without a name. BIN: where the accuracy
+# tables.sh BIN [table|atlas|thickness|study ...], all of them without a name. BIN: where the accuracy
 # tests were built.
 set -euo pipefail
 here=$(dirname "$(readlink -f "$0")")
 bin=$1
 shift
-(($#)) || set -- table atlas thickness
+(($#)) || set -- table atlas thickness study
 for part in "$@"; do
   case $part in
     table)
@@ -23,8 +23,12 @@ for part in "$@"; do
       /usr/bin/python3 "$here/thickness/plot.py" "$here/thickness/thickness.csv" "$here/thickness/thickness.svg"
       echo "thickness: tests/accuracy/thickness/thickness.svg"
       ;;
+    study)
+      "$bin/study/robot_study" --out "$here/study" >/dev/null
+      echo "study: tests/accuracy/study/study.md"
+      ;;
     *)
-      echo "tables.sh: '$part' is none of table, atlas, thickness" >&2
+      echo "tables.sh: '$part' is none of table, atlas, thickness, study" >&2
       exit 2
       ;;
   esac

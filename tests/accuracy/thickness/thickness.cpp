@@ -114,20 +114,6 @@ class Bench {
 
 }  // namespace
 
-hal::sim::Scene sensor_of(double thickness_mm) {
-  constexpr double kFittedMm = 2.0;  // the built-in scene's layer
-  hal::sim::Scene scene = hal::sim::default_scene();
-  const double scale = thickness_mm / kFittedMm;
-  scene.layer.thickness_mm = thickness_mm;
-  scene.optics.narrow_mm *= scale;
-  scene.optics.wide_mm *= scale;
-  scene.optics.pressed_slope /= scale;
-  scene.optics.pressed_curve /= scale * scale;
-  scene.optics.bulged_slope /= scale;
-  scene.optics.bulged_curve /= scale * scale;
-  return scene;
-}
-
 std::optional<double> Result::finest_mm() const {
   std::optional<double> finest;
   for (const Groove& groove : grooves) {

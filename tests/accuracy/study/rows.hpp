@@ -1,0 +1,26 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tests/accuracy/study/study.hpp"
+
+namespace dtact::study {
+
+/// One figure of the study beside the simulator's.
+struct Row {
+  std::string what;
+  std::string study;
+  std::vector<std::string> simulated;  ///< By law; "–" where it was not pressed.
+  bool agrees = false;                 ///< The first law's figure, within the study's spread.
+  std::string remark;                  ///< Why it does not, as far as it is known.
+};
+
+/// `results`: of the layers of 1, 2 and 3 mm, each with the same laws; at least one.
+[[nodiscard]] std::vector<Row> compare(const std::vector<Result>& results);
+
+/// One table; remarks only where a row disagrees.
+[[nodiscard]] std::string to_markdown(std::span<const Row> rows, std::span<const std::string> laws);
+
+}  // namespace dtact::study
