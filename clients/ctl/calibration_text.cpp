@@ -1,6 +1,7 @@
 #include "clients/ctl/calibration_text.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <charconv>
@@ -24,10 +25,15 @@ char mark_of(const v1::StoredCalibration& stored) {
 }  // namespace
 
 std::string text_of(const v1::CalibrationSummary& summary) {
-  return fmt::format("{}, method {}, {} of {} at {:.4f} mm/px, covers {:.2f} to {:.2f} mm, {}",
+  const std::string sharpens =
+      summary.sharpen_steps().empty()
+          ? ""
+          : fmt::format(", sharpens by {}", fmt::join(summary.sharpen_steps(), " or "));
+  return fmt::format("{}, method {}, {} of {} at {:.4f} mm/px, covers {:.2f} to {:.2f} mm{}, {}",
                      summary.name(), summary.method(), size_text(summary.width(), summary.height()),
                      size_text(summary.frame_width(), summary.frame_height()), summary.mm_per_px(),
-                     summary.covered_from_mm(), summary.covered_to_mm(), summary.created());
+                     summary.covered_from_mm(), summary.covered_to_mm(), sharpens,
+                     summary.created());
 }
 
 std::string id_of(std::uint64_t number) {

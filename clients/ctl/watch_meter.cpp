@@ -32,8 +32,11 @@ std::string watch_line(const WatchMeter& meter, const v1::Frame& last) {
       latency.count() == 0 ? "-"
                            : fmt::format("p50 {:.1f} p99 {:.1f} ms", latency.percentile_ms(0.5),
                                          latency.percentile_ms(0.99));
-  const std::string worth =
+  std::string worth =
       last.has_depth() ? fmt::format(" +- {:.3f}", last.depth().uncertainty_um() / 1000) : "";
+  if (last.depth().sharpen_steps() > 0) {
+    worth += fmt::format(" sharpened {}x", last.depth().sharpen_steps());
+  }
   const std::string force =
       last.contact().has_force_n()
           ? fmt::format("  force {:.2f} N +- {:.2f}", last.contact().force_n(),

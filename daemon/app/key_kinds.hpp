@@ -40,6 +40,10 @@ template <typename Integer>
 /// A number that goes by a name.
 [[nodiscard]] Key named(std::string path, int& field,
                         const std::vector<std::pair<std::string, int>>& names);
+/// A number of `numbers`, or one that goes by a name.
+[[nodiscard]] Key named_or(std::string path, int& field,
+                           const std::vector<std::pair<std::string, int>>& names,
+                           std::vector<std::int64_t> numbers);
 [[nodiscard]] Key path(std::string key, std::filesystem::path& field, const std::string& allowed);
 /// A path, or the name of a credential (kCredential), which stays as it is.
 [[nodiscard]] Key secret(std::string key, std::filesystem::path& field, const std::string& allowed);

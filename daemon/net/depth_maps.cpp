@@ -65,6 +65,10 @@ void DepthMaps::encode(const DepthView& view, int encoding, Map& map) {
   head.set_y(static_cast<std::uint32_t>(view.y));
   head.set_full_width(static_cast<std::uint32_t>(view.full_width));
   head.set_full_height(static_cast<std::uint32_t>(view.full_height));
+  head.set_sharpen_steps(static_cast<std::uint32_t>(frame_->sharpen_steps));
+  if (frame_->made_decimation > view.decimation) {
+    head.set_made_decimation(static_cast<std::uint32_t>(frame_->made_decimation));
+  }
   head.SerializeToString(&map.head);
   encoder_.encode(head.encoding(), view.values, static_cast<std::size_t>(view.width), map.data);
 }

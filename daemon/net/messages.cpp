@@ -232,6 +232,9 @@ void fill(const CalibrationSummary& summary, v1::CalibrationSummary& out) {
   out.set_created(summary.created);
   out.set_frame_width(static_cast<std::uint32_t>(summary.frame_width));
   out.set_frame_height(static_cast<std::uint32_t>(summary.frame_height));
+  for (const int steps : summary.sharpen_steps) {
+    out.add_sharpen_steps(static_cast<std::uint32_t>(steps));
+  }
 }
 
 void fill(const StoredCalibration& stored, v1::StoredCalibration& out) {

@@ -22,7 +22,7 @@ struct ActiveCalibration {
 };
 
 /// Throws std::invalid_argument, saying what to do, when the calibration cannot be used with frames
-/// of this camera at all (other differences are a health condition).
+/// of this camera at all (other differences are a health condition) or by these rules.
 [[nodiscard]] std::unique_ptr<ActiveCalibration> activate(
     const std::shared_ptr<const calibration::Calibration>& calibration,
     const hal::CameraInfo& camera, const ReconstructionRules& rules);

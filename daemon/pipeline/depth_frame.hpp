@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -67,15 +68,17 @@ struct DepthFrame {
   int height = 0;
   double mm_per_px = 0;
   int decimation = 1;         ///< The map has 1/decimation of the calibration's resolution.
+  int made_decimation = 1;    ///< It was made at 1/made_decimation of it, …
+  int sharpen_steps = 0;      ///< … sharpened by so many steps, and interpolated.
   double uncertainty_um = 0;  ///< Mean absolute error to expect inside the contact.
   int contact_um = 0;         ///< What is deeper belongs to the contact.
   std::vector<std::int16_t>
       depth_um;  ///< Row-major; recon::kUntrusted marks pixels not to believe.
 
   recon::DrawnTiles drawn;  ///< What depth_um holds, for the reconstruction.
-  /// Calibration (ActiveCalibration) and decimation that drew it.
+  /// Calibration (ActiveCalibration) and its rung (Resolutions) that drew it.
   std::uint64_t drawn_generation = 0;
-  int drawn_decimation = 0;
+  std::size_t drawn_rung = 0;
 
   bool has_luma = false;
   int luma_width = 0;  ///< Pixels of the camera frame.

@@ -61,7 +61,8 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
       exchange_.generation = generations_;
       calibrations_.push_back({generations_, calibration});
     } catch (const std::invalid_argument& e) {
-      unusable = true;
+      const recon::RectifyTable& table = calibration->model->rectify;
+      unusable = table.frame_width != info_.width || table.frame_height != info_.height;
       restore_failure_ = e.what();
     }
   }

@@ -53,7 +53,7 @@ void DepthRemaker::remake(const hal::LumaView& luma, v1::Frame& frame) {
 
   const int decimation =
       frame.has_depth() ? std::max(1, static_cast<int>(frame.depth().decimation())) : 1;
-  maps_.use_decimation(decimation);
+  if (const auto rung = maps_.find(decimation, 0)) maps_.use(*rung);
   pipeline::Resolution& resolution = maps_.in_use();
   const recon::Model& model = resolution.reconstructor.model();
   depth_um_.resize(model.rectify.entries.size());
@@ -87,9 +87,10 @@ void DepthRemaker::remake(const hal::LumaView& luma, v1::Frame& frame) {
 }
 
 void DepthRemaker::describe(const recon::DepthSums& sums, bool beyond, v1::Frame& frame) const {
-  frame.mutable_depth()->set_uncertainty_um(pipeline::uncertainty_at_um(
-      maps_.list_um(0.5 * summary_.deepest_mm), pipeline::bend_um(sums, frame.depth().mm_per_px()),
-      static_cast<int>(frame.depth().decimation())));
+  frame.mutable_depth()->set_uncertainty_um(
+      pipeline::uncertainty_at_um(maps_.list_um(0.5 * summary_.deepest_mm, 0),
+                                  pipeline::bend_um(sums, frame.depth().mm_per_px()),
+                                  static_cast<int>(frame.depth().decimation())));
   auto& contact = *frame.mutable_contact();
   contact.set_touching(summary_.touching);
   contact.set_area_mm2(summary_.area_mm2);

@@ -1,5 +1,6 @@
 #include "daemon/pipeline/depth/depth_maker.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -13,6 +14,7 @@ DepthMaker::DepthMaker(const PipelineConfig& config, base::Clock& clock)
 
 void DepthMaker::use(Resolutions* maps, std::uint64_t generation) noexcept {
   maps_ = maps;
+  chooser_.restart();
   generation_ = generation;
 }
 
@@ -34,53 +36,70 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   Resolution& resolution = maps_->in_use();
   recon::Reconstructor& reconstructor = resolution.reconstructor;
   const recon::Model& model = reconstructor.model();
+  const MapShape shape = maps_->shape();
   out.has_depth = true;
-  out.width = model.rectify.width;
-  out.height = model.rectify.height;
-  out.mm_per_px = model.mm_per_px;
-  out.decimation = model.rectify.decimation;
+  out.width = shape.width;
+  out.height = shape.height;
+  out.mm_per_px = shape.mm_per_px;
+  out.decimation = shape.decimation;
+  out.made_decimation = resolution.decimation();
+  out.sharpen_steps = resolution.steps();
   // Within the capacity reserved at start, so this allocates nothing.
   out.depth_um.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
-  // What another calibration or resolution drew in this buffer says nothing about this one's map.
-  const bool another =
-      out.drawn_generation != generation_ || out.drawn_decimation != out.decimation;
-  if (another) out.drawn.rest = 0;
+  // What another calibration or rung drew in this buffer says nothing about this one's map.
+  const bool another = out.drawn_generation != generation_ || out.drawn_rung != maps_->rung();
+  if (another || resolution.coarse) out.drawn.rest = 0;
   out.drawn_generation = generation_;
-  out.drawn_decimation = out.decimation;
+  out.drawn_rung = maps_->rung();
   resolution.readers.mark(untouched.active(), resolution.tiles);
   recon::SumRules rules = contact_.sum_rules();
-  if (judged || config_.reconstruction.decimation == 0) {
-    rules.bend_reach = bend_reach(out.mm_per_px);
+  if (judged || chooses()) {
+    rules.bend_reach = bend_reach(model.mm_per_px);
     rules.bend_from_um = rules.made_um;
   }
   recon::DepthSums sums(rules);
   recon::StepTimes steps;
-  reconstructor.run_active(luma.data, luma.stride, resolution.tiles, out.depth_um, out.drawn,
-                           &steps, &sums);
+  reconstructor.run_active(
+      luma.data, luma.stride, resolution.tiles,
+      resolution.coarse ? std::span(resolution.coarse->depth_um) : std::span(out.depth_um),
+      resolution.coarse ? resolution.coarse->drawn : out.drawn, &steps, &sums);
+  const std::int64_t made_ns = clock_.monotonic_ns();
+  if (resolution.coarse) {
+    resolution.coarse->upsampler.run(resolution.coarse->depth_um, out.depth_um);
+  }
+  const std::int64_t began_ns = clock_.monotonic_ns();
   out.times.rectify_ns = steps.rectify_ns;
   out.times.smooth_ns = steps.smooth_ns;
-  out.times.list_ns = steps.list_ns;
-  const std::int64_t began_ns = clock_.monotonic_ns();
+  out.times.list_ns = steps.list_ns + began_ns - made_ns;
   out.contact_um = rules.made_um;
   out.contact_absence = ContactAbsence::none;
-  out.contact = contact_.inspect(sums, out.width, out.height, out.mm_per_px);
+  out.contact = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
   contact_.weigh(model.force, out.contact);
-  beyond_ = reconstructor.beyond_pixels() * out.decimation * out.decimation > config_.beyond_pixels;
-  judge(untouched.trust(), bend_um(sums, out.mm_per_px), out);
+  beyond_ = reconstructor.beyond_pixels() * out.made_decimation * out.made_decimation >
+            config_.beyond_pixels;
+  judge(untouched.trust(), bend_um(sums, model.mm_per_px), out);
   out.times.inspect_ns = steps.sums_ns + clock_.monotonic_ns() - began_ns;
 }
 
-/// What the map is worth, and at which resolution the next is made.
+/// What the map is worth, and how the next is made.
 void DepthMaker::judge(const Trust& trust, double bend, DepthFrame& out) noexcept {
-  // Half of the deepest is about the mean over a contact.
-  double list_um = maps_->list_um(0.5 * out.contact.deepest_mm);
-  if (trust.stale) list_um = std::hypot(list_um, kStaleReferenceUm);
-  list_um = std::hypot(list_um, maps_->light_um(trust.light_left));
-  list_um = std::hypot(list_um, maps_->light_um(trust.light_unseen));
-  out.uncertainty_um = uncertainty_at_um(list_um, bend, out.decimation);
-  if (config_.reconstruction.decimation == 0) {
-    maps_->use_decimation(chooser_.next(list_um, bend));
+  const double plain_um = plain_bend_um(bend, out.sharpen_steps);
+  const auto expected_um = [&](int decimation, int steps) {
+    // Half of the deepest is about the mean over a contact.
+    double list_um = maps_->list_um(0.5 * out.contact.deepest_mm, steps);
+    if (trust.stale) list_um = std::hypot(list_um, kStaleReferenceUm);
+    list_um = std::hypot(list_um, maps_->light_um(trust.light_left));
+    list_um = std::hypot(list_um, maps_->light_um(trust.light_unseen));
+    return uncertainty_at_um(list_um, plain_um, decimation, steps);
+  };
+  out.uncertainty_um = expected_um(out.made_decimation, out.sharpen_steps);
+  if (!chooses()) return;
+  std::array<double, Resolutions::kMostRungs> expected{};
+  std::size_t rungs = 0;
+  for (const Resolution& each : maps_->rungs()) {
+    expected[rungs++] = expected_um(each.decimation(), each.steps());
   }
+  maps_->use(chooser_.next(std::span(expected).first(rungs)));
 }
 
 }  // namespace dtact::pipeline

@@ -15,7 +15,7 @@
 namespace dtact::pipeline {
 
 /// Makes a frame's depth where it differs from the untouched image, says what touches and what the
-/// map is worth, and chooses the next map's resolution. Capture thread only; does not allocate
+/// map is worth, and chooses how the next map is made. Capture thread only; does not allocate
 /// after construction.
 class DepthMaker {
  public:
@@ -42,13 +42,14 @@ class DepthMaker {
 
  private:
   void judge(const Trust& trust, double bend, DepthFrame& out) noexcept;
+  [[nodiscard]] bool chooses() const noexcept { return maps_->rungs().size() > 1; }
 
   const PipelineConfig& config_;
   base::Clock& clock_;
   Resolutions* maps_ = nullptr;
   std::uint64_t generation_ = 0;
   ContactDetector contact_;
-  ResolutionChooser chooser_;
+  RungChooser chooser_;
   bool beyond_ = false;
 };
 

@@ -4,33 +4,89 @@
 #include <cmath>
 #include <cstdlib>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "daemon/pipeline/depth/uncertainty.hpp"
 #include "daemon/recon/decimate.hpp"
 
 namespace dtact::pipeline {
+namespace {
+
+/// Resolution of sharpened levels: 1/4.
+constexpr int kSharpenedAt = 4;
+
+void require_sharpening(const recon::Model& model, int steps) {
+  const auto found = std::ranges::find(model.sharpened, steps, &recon::Model::Sharpened::steps);
+  if (found != model.sharpened.end()) return;
+  throw std::invalid_argument(
+      "reconstruction.sharpen is " + std::to_string(steps) +
+      ", but the calibration has no list for levels sharpened so often: calibrate again, or set "
+      "reconstruction.sharpen to \"auto\" or \"off\"");
+}
+
+}  // namespace
 
 Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
                          const recon::CellLattice& lattice, const ReconstructionRules& rules)
     : model_(model),
       mean_grey_(std::accumulate(model->reference_q8.begin(), model->reference_q8.end(), 0.0) /
                  256 / static_cast<double>(model->reference_q8.size())) {
-  for (const int decimation : {1, 2, 4}) {
-    if (rules.decimation != 0 && rules.decimation != decimation) continue;
-    const auto of = decimation == 1
-                        ? model
-                        : std::make_shared<const recon::Model>(recon::decimate(*model, decimation));
-    recon::Reconstructor reconstructor(of);
-    recon::TileReaders readers(lattice, of->rectify, reconstructor.radius());
-    recon::TileRows tiles(static_cast<std::size_t>(readers.grid().rows()));
-    all_.push_back({std::move(reconstructor), std::move(readers), std::move(tiles)});
+  // Where nothing else is asked for a sharpened map stays as coarse as it is made.
+  const int map = rules.decimation == 0 ? kSharpenedAt : rules.decimation;
+  if (rules.sharpen > 0) {
+    require_sharpening(*model, rules.sharpen);
+    add(lattice, kSharpenedAt, rules.sharpen, map);
+    return;
+  }
+  const bool filters = rules.sharpen == ReconstructionRules::kAutoSharpen;
+  const bool filtered = filters && !model->sharpened.empty();
+  if (rules.decimation != 0 || filtered) {
+    add(lattice, map, 0, map);
+  } else {
+    for (const int decimation : {4, 2, 1}) add(lattice, decimation, 0, decimation);
+  }
+  if (!filtered) return;
+  for (const recon::Model::Sharpened& sharpened : model->sharpened) {
+    add(lattice, kSharpenedAt, sharpened.steps, map);
   }
 }
 
-void Resolutions::use_decimation(int decimation) noexcept {
-  const auto found = std::ranges::find(all_, decimation, &Resolution::decimation);
-  if (found != all_.end()) in_use_ = static_cast<std::size_t>(found - all_.begin());
+void Resolutions::add(const recon::CellLattice& lattice, int decimation, int steps,
+                      int map_decimation) {
+  const auto of = decimation == 1
+                      ? model_
+                      : std::make_shared<const recon::Model>(recon::decimate(*model_, decimation));
+  recon::Reconstructor reconstructor(of, steps);
+  recon::TileReaders readers(lattice, of->rectify, reconstructor.radius());
+  recon::TileRows tiles(static_cast<std::size_t>(readers.grid().rows()));
+  all_.push_back({std::move(reconstructor), std::move(readers), std::move(tiles), {}});
+  if (map_decimation == decimation) return;
+  all_.back().coarse = {
+      .upsampler = recon::Upsampler(model_->rectify.width, model_->rectify.height, decimation,
+                                    map_decimation),
+      .depth_um = std::vector<std::int16_t>(static_cast<std::size_t>(of->rectify.width) *
+                                            static_cast<std::size_t>(of->rectify.height)),
+      .drawn = {}};
+}
+
+std::optional<std::size_t> Resolutions::find(int decimation, int steps) const noexcept {
+  const auto found = std::ranges::find_if(all_, [&](const Resolution& each) {
+    return each.decimation() == decimation && each.steps() == steps;
+  });
+  if (found == all_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - all_.begin());
+}
+
+MapShape Resolutions::shape() const noexcept {
+  const Resolution& now = all_[in_use_];
+  const recon::RectifyTable& table = now.reconstructor.model().rectify;
+  if (!now.coarse) {
+    return {table.width, table.height, table.decimation, now.reconstructor.model().mm_per_px};
+  }
+  const recon::Upsampler& to = now.coarse->upsampler;
+  return {to.width(), to.height(), to.decimation(), model_->mm_per_px * to.decimation()};
 }
 
 void Resolutions::set_reference(std::span<const std::uint16_t> reference_q8) noexcept {
@@ -41,8 +97,11 @@ void Resolutions::set_light(double factor) noexcept {
   for (Resolution& each : all_) each.reconstructor.set_light(factor);
 }
 
-double Resolutions::list_um(double depth_mm) const noexcept {
-  const auto& rows = model_->uncertainty;
+double Resolutions::list_um(double depth_mm, int steps) const noexcept {
+  const auto of_steps =
+      std::ranges::find(model_->sharpened, steps, &recon::Model::Sharpened::steps);
+  const auto& rows =
+      of_steps == model_->sharpened.end() ? model_->uncertainty : of_steps->uncertainty;
   if (rows.empty()) {
     // The radial gain is the published regression's alone.
     const bool published = model_->method == recon::Method::published ||

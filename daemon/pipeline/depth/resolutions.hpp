@@ -3,51 +3,85 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
+#include "daemon/recon/upsampler.hpp"
 
 namespace dtact::pipeline {
 
-/// What turns frames into depth at one resolution.
+/// One way to turn frames into depth: at a resolution, plain or sharpened. Sharpened levels are
+/// made at a quarter of the calibration's resolution, which the layer's own blur leaves enough of,
+/// and interpolated to the map that was asked for.
 struct Resolution {
   recon::Reconstructor reconstructor;
   recon::TileReaders readers;
   recon::TileRows tiles;  ///< Of the last frame.
 
+  /// Of a map that is finer than the reconstruction: what is interpolated.
+  struct Coarse {
+    recon::Upsampler upsampler;
+    std::vector<std::int16_t> depth_um;
+    recon::DrawnTiles drawn;
+  };
+  std::optional<Coarse> coarse;
+
+  /// The reconstruction's; the map's may be finer.
   [[nodiscard]] int decimation() const noexcept { return reconstructor.model().rectify.decimation; }
+  [[nodiscard]] int steps() const noexcept { return reconstructor.sharpen_steps(); }
 };
 
-/// A calibration's model at each resolution that may be asked for. Made on the network's side, used
-/// on the capture thread.
+/// What a map is and where it goes.
+struct MapShape {
+  int width = 0;
+  int height = 0;
+  int decimation = 1;
+  double mm_per_px = 0;
+};
+
+/// A calibration's model in each way that may be asked for: the rungs of a ladder, from the
+/// cheapest to the most accurate. Made on the network's side, used on the capture thread.
 class Resolutions {
  public:
+  static constexpr std::size_t kMostRungs = 3;
+
+  /// Throws std::invalid_argument, saying what to do, where the rules ask for steps of sharpening
+  /// that the model has no list for.
   Resolutions(const std::shared_ptr<const recon::Model>& model, const recon::CellLattice& lattice,
               const ReconstructionRules& rules);
 
   /// The one that works on the next frame.
   [[nodiscard]] Resolution& in_use() noexcept { return all_[in_use_]; }
-  /// From the next frame on the map has 1/`decimation` of the resolution, where there is one such.
-  void use_decimation(int decimation) noexcept;
+  [[nodiscard]] std::size_t rung() const noexcept { return in_use_; }
+  [[nodiscard]] std::span<const Resolution> rungs() const noexcept { return all_; }
+  void use(std::size_t rung) noexcept { in_use_ = rung; }
+  /// The rung of that resolution and so many steps, if there is one.
+  [[nodiscard]] std::optional<std::size_t> find(int decimation, int steps) const noexcept;
+
+  /// The map that the rung in use gives.
+  [[nodiscard]] MapShape shape() const noexcept;
 
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
   /// The light is the reference's times `factor`.
   void set_light(double factor) noexcept;
 
-  /// What the list is uncertain by at an indentation, micrometres: as the calibration says, else
-  /// kUnstatedListUm or, of a published method, kUnstatedPublishedUm.
-  [[nodiscard]] double list_um(double depth_mm) const noexcept;
+  /// What the list for so many steps is uncertain by at an indentation, micrometres: as the
+  /// calibration says, else kUnstatedListUm or, of a published method, kUnstatedPublishedUm.
+  [[nodiscard]] double list_um(double depth_mm, int steps) const noexcept;
   /// What a light that differs from the reference's by `share` adds to or takes off every
   /// indentation, micrometres.
   [[nodiscard]] double light_um(double share) const noexcept;
 
  private:
+  void add(const recon::CellLattice& lattice, int decimation, int steps, int map_decimation);
+
   std::shared_ptr<const recon::Model> model_;
   double mean_grey_;             // of the calibration's reference
-  std::vector<Resolution> all_;  // the coarser after the finer
+  std::vector<Resolution> all_;  // the cheaper before the more accurate
   std::size_t in_use_ = 0;
 };
 

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <span>
+
 #include "daemon/recon/depth_sums.hpp"
 
 namespace dtact::pipeline {
@@ -36,26 +39,33 @@ inline constexpr double kBlurPerBend = 7.0;
 
 /// The same were the map at 1/decimation (1, 2 or 4) of the calibration's resolution and then read
 /// bilinearly: coarse pixels cut edges once more. In 95 % of the same frames that cost at most
-/// 0.085 × bend at half and 0.31 × bend at quarter resolution.
-[[nodiscard]] double uncertainty_at_um(double list_um, double bend_um, int decimation) noexcept;
+/// 0.085 × bend at half and 0.31 × bend at quarter resolution. `steps` of sharpening give a part of
+/// the blur back: see plain_bend_um(). `bend_um`: that of a plain map.
+[[nodiscard]] double uncertainty_at_um(double list_um, double bend_um, int decimation,
+                                       int steps = 0) noexcept;
 
-/// Chooses the coarsest resolution whose expected error stays within a bound, from one frame for
-/// the next: finer at once, coarser only after kPatience frames that would all have been well
-/// inside (kMargin of the bound). Where even full resolution is outside, full it is.
-class ResolutionChooser {
+/// The bend of a plain map of what bends by `bend_um` in one that was sharpened so often.
+[[nodiscard]] double plain_bend_um(double bend_um, int steps) noexcept;
+
+/// Chooses the first rung of a ladder, the cheapest, whose expected error stays within a bound,
+/// from one frame for the next: a more accurate one at once, a cheaper one only after kPatience
+/// frames that would all have been well inside (kMargin of the bound). Where none is inside, the
+/// one that is expected to be least wrong, and of several such the last.
+class RungChooser {
  public:
-  explicit ResolutionChooser(double max_error_um) noexcept : max_error_um_(max_error_um) {}
+  explicit RungChooser(double max_error_um) noexcept : max_error_um_(max_error_um) {}
 
-  /// Of a frame just done. Returns the decimation for the next: 1, 2 or 4.
-  int next(double list_um, double bend_um) noexcept;
-  [[nodiscard]] int decimation() const noexcept { return decimation_; }
+  /// `expected_um`: of the frame just done, on each rung. Returns the rung for the next.
+  std::size_t next(std::span<const double> expected_um) noexcept;
+  /// Another ladder: from its first rung on.
+  void restart() noexcept;
 
   static constexpr int kPatience = 15;
   static constexpr double kMargin = 0.9;
 
  private:
   double max_error_um_;
-  int decimation_ = 4;
+  std::size_t rung_ = 0;
   int patient_ = 0;
 };
 

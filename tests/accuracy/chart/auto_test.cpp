@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <memory>
+#include <vector>
 
 #include "clients/calibrate/fit/build.hpp"
 #include "daemon/pipeline/active_calibration.hpp"
@@ -11,15 +13,24 @@
 #include "hal/sim/renderer.hpp"
 #include "tests/accuracy/chart/scenes.hpp"
 #include "tests/accuracy/chart/settings.hpp"
+#include "tests/accuracy/chart/virtual_balls.hpp"
 
 namespace dtact::chart {
 namespace {
 
-/// One frame of the scripted run, worked by every resolution and by the chosen one.
+/// What a rung of the ladder makes of a frame.
+struct Made {
+  double bend_um = 0;
+  double list_um = 0;
+  double error_um = 0;  ///< True.
+};
+
+/// One frame of the scripted run, worked by every rung.
 struct Judged {
-  int chosen = 0;            ///< Decimation.
-  double error_um = 0;       ///< Of the chosen, true.
-  double full_error_um = 0;  ///< Of full resolution, true.
+  std::size_t chosen = 0;  ///< Rung.
+  std::array<Made, pipeline::Resolutions::kMostRungs> by_rung;
+
+  [[nodiscard]] double error_um() const { return by_rung.at(chosen).error_um; }
 };
 
 calibration::Calibration from_one_press(const image::Grey16& reference) {
@@ -32,61 +43,65 @@ calibration::Calibration from_one_press(const image::Grey16& reference) {
 }
 
 /// All objects one after the other (config/scenes/all_objects.toml), as the capture loop works:
-/// each frame's resolution is chosen by the one before.
-std::vector<Judged> scripted_run(double max_error_um, const image::Grey16& reference,
+/// how each frame is made is chosen by the one before.
+std::vector<Judged> scripted_run(const pipeline::ReconstructionRules& rules,
+                                 const image::Grey16& reference,
                                  const calibration::Calibration& made) {
   const auto calibration = std::make_shared<const calibration::Calibration>(made);
   hal::CameraInfo camera;
   camera.width = kWidth;
   camera.height = kHeight;
   camera.fps = 60;
-  const auto active =
-      pipeline::activate(calibration, camera, {.decimation = 0, .max_error_um = max_error_um});
+  const auto active = pipeline::activate(calibration, camera, rules);
   pipeline::Cells& cells = active->image.cells;
   cells.set_reference(reference.pixels);
   pipeline::Resolutions& maps = active->maps;
   maps.set_reference(reference.pixels);
-  maps.use_decimation(4);
-  recon::Reconstructor full(calibration->model);
-  full.set_reference(reference.pixels);
-  pipeline::ResolutionChooser chooser(max_error_um);
+  pipeline::RungChooser chooser(rules.max_error_um);
 
   const hal::sim::Scene scene =
       hal::sim::load_scene(DTACT_SOURCE_DIR "/config/scenes/all_objects.toml");
   hal::sim::Renderer renderer(scene, 11);
   std::vector<std::uint8_t> luma(std::size_t{kWidth} * kHeight + recon::kLumaPadding);
-  std::vector<std::int16_t> depth(std::size_t{kSide} * kSide);
-  std::vector<std::int16_t> full_depth(depth);
-  std::array<recon::DrawnTiles, 5> drawn;  // by decimation
+  std::vector<std::int16_t> depth;
   std::vector<Judged> run;
   for (std::uint64_t sequence = 0; sequence < 1920; sequence += 6) {
     renderer.render(sequence, hal::sim::led_levels(hal::Light{}), luma.data(), kWidth, kHeight);
-    pipeline::Resolution& resolution = maps.in_use();
-    recon::Reconstructor& reconstructor = resolution.reconstructor;
-    const int decimation = resolution.decimation();
-    recon::DrawnTiles& marks = drawn[static_cast<std::size_t>(decimation)];
-    marks.rest = 0;  // one buffer for all resolutions
-    const recon::TileGrid& grid = reconstructor.grid();
-    depth.resize(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height));
-    const double mm_per_px = reconstructor.model().mm_per_px;
-    recon::DepthSums sums({.made_um = 100,
-                           .lost_um = 50,
-                           .bend_reach = pipeline::bend_reach(mm_per_px),
-                           .bend_from_um = 100});
     (void)cells.look({luma.data(), kWidth, kHeight, kWidth});
-    resolution.readers.mark(cells.active(), resolution.tiles);
-    reconstructor.run_active(luma.data(), kWidth, resolution.tiles, depth, marks, nullptr, &sums);
-    const double bend = pipeline::bend_um(sums, mm_per_px);
-    // As the capture loop has it: half of the deepest is about the mean over a contact.
-    const double list_um = maps.list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)));
-    Judged judged{.chosen = decimation, .error_um = 0, .full_error_um = 0};
-    maps.use_decimation(chooser.next(list_um, bend));
-
     const Shot shot = truth_of(renderer, sequence);
+    Judged judged;
+    judged.chosen = maps.rung();
+    for (std::size_t rung = 0; rung < maps.rungs().size(); ++rung) {
+      maps.use(rung);
+      pipeline::Resolution& resolution = maps.in_use();
+      recon::Reconstructor& reconstructor = resolution.reconstructor;
+      recon::DrawnTiles marks;  // one buffer for all
+      const recon::TileGrid& grid = reconstructor.grid();
+      depth.resize(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height));
+      const double mm_per_px = reconstructor.model().mm_per_px;
+      recon::DepthSums sums({.made_um = 100,
+                             .lost_um = 50,
+                             .bend_reach = pipeline::bend_reach(mm_per_px),
+                             .bend_from_um = 100});
+      resolution.readers.mark(cells.active(), resolution.tiles);
+      reconstructor.run_active(luma.data(), kWidth, resolution.tiles, depth, marks, nullptr, &sums);
+      judged.by_rung.at(rung) = {
+          .bend_um = pipeline::bend_um(sums, mm_per_px),
+          // As the capture loop has it: half of the deepest is about the mean over a contact.
+          .list_um =
+              maps.list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)), resolution.steps()),
+          .error_um = 1000 * error_of(depth, resolution.decimation(), shot).mean_absolute_mm};
+    }
+    const Made& seen = judged.by_rung.at(judged.chosen);
+    const double plain_um =
+        pipeline::plain_bend_um(seen.bend_um, maps.rungs()[judged.chosen].steps());
+    std::vector<double> expected;
+    for (const pipeline::Resolution& each : maps.rungs()) {
+      expected.push_back(pipeline::uncertainty_at_um(judged.by_rung.at(expected.size()).list_um,
+                                                     plain_um, each.decimation(), each.steps()));
+    }
+    maps.use(chooser.next(expected));
     if (std::ranges::count_if(shot.judged, [](std::uint8_t c) { return c != 0; }) < 300) continue;
-    full.run(luma.data(), kWidth, full_depth);
-    judged.error_um = 1000 * error_of(depth, decimation, shot).mean_absolute_mm;
-    judged.full_error_um = 1000 * error_of(full_depth, 1, shot).mean_absolute_mm;
     run.push_back(judged);
   }
   return run;
@@ -98,28 +113,89 @@ double share(const std::vector<Judged>& run, Predicate predicate) {
          static_cast<double>(run.size());
 }
 
+/// Shares of frames in which the chosen rung and each one alone are within the bound.
+void print_shares(const char* what, double bound_um, const std::vector<Judged>& run,
+                  std::size_t rungs) {
+  std::printf("%s, bound %3.0f um: inside %.1f %%; alone and chosen", what, bound_um,
+              100 * share(run, [&](const Judged& j) { return j.error_um() <= bound_um; }));
+  for (std::size_t rung = 0; rung < rungs; ++rung) {
+    std::printf(
+        ", rung %zu: %.1f %%, %.0f %%", rung,
+        100 * share(run, [&](const Judged& j) { return j.by_rung.at(rung).error_um <= bound_um; }),
+        100 * share(run, [&](const Judged& j) { return j.chosen == rung; }));
+  }
+  std::printf(" of frames\n");
+}
+
 TEST(Auto, KeepsTheBoundWhereverFullResolutionDoesAndSavesPixels) {
   const image::Grey16 reference = make_reference();
   const calibration::Calibration calibration = from_one_press(reference);
   for (const double bound : {60.0, 100.0, 150.0, 250.0}) {
-    const std::vector<Judged> run = scripted_run(bound, reference, calibration);
+    const std::vector<Judged> run =
+        scripted_run({.decimation = 0, .max_error_um = bound}, reference, calibration);
     ASSERT_GT(run.size(), 150U);
+    constexpr std::size_t kFull = 2;
     const double full_inside =
-        share(run, [&](const Judged& j) { return j.full_error_um <= bound; });
-    const double inside = share(run, [&](const Judged& j) { return j.error_um <= bound; });
-    double pixels = 0;
-    for (const Judged& j : run) pixels += 1.0 / (j.chosen * j.chosen);
-    std::printf(
-        "bound %3.0f um: inside %.1f %% (full resolution %.1f %%), full %.0f %%, half %.0f "
-        "%%, quarter %.0f %% of frames, pixels %.0f %%\n",
-        bound, 100 * inside, 100 * full_inside,
-        100 * share(run, [](const Judged& j) { return j.chosen == 1; }),
-        100 * share(run, [](const Judged& j) { return j.chosen == 2; }),
-        100 * share(run, [](const Judged& j) { return j.chosen == 4; }),
-        100 * pixels / static_cast<double>(run.size()));
+        share(run, [&](const Judged& j) { return j.by_rung[kFull].error_um <= bound; });
+    const double inside = share(run, [&](const Judged& j) { return j.error_um() <= bound; });
+    print_shares("resolution", bound, run, kFull + 1);
     EXPECT_GE(inside, 0.95 * full_inside);
     if (bound == 250.0) {
       EXPECT_GE(inside, 0.95);
+    }
+  }
+}
+
+/// The middle of what every frame says.
+template <typename Value>
+double median(const std::vector<Judged>& run, Value value) {
+  std::vector<double> values;
+  for (const Judged& j : run) values.push_back(value(j));
+  std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
+  return values[values.size() / 2];
+}
+
+TEST(Auto, SharpensWhereTheBoundAsksForItAndNotElsewhere) {
+  const image::Grey16 reference = make_reference();
+  calibration::Calibration calibration = from_one_press(reference);
+  calibration.model = std::make_shared<const recon::Model>(
+      with_lists_of_virtual_balls(*calibration.model, reference));
+  for (const double bound : {30.0, 60.0, 120.0}) {
+    const std::vector<Judged> run =
+        scripted_run({.decimation = 0,
+                      .sharpen = pipeline::ReconstructionRules::kAutoSharpen,
+                      .max_error_um = bound},
+                     reference, calibration);
+    ASSERT_GT(run.size(), 150U);
+    print_shares("sharpening", bound, run, 3);
+    if (bound == 30.0) {
+      // What daemon/pipeline/depth/uncertainty.cpp rests on.
+      for (int steps = 0; steps <= 2; ++steps) {
+        const auto rung = static_cast<std::size_t>(steps);
+        const double bends = median(run, [&](const Judged& j) {
+          return j.by_rung[rung].bend_um / std::max(j.by_rung[0].bend_um, 0.1);
+        });
+        const auto honesty = [&](double left) {
+          return median(run, [&](const Judged& j) {
+            const Made& made = j.by_rung[rung];
+            const double plain_um = j.by_rung[0].bend_um;
+            return made.error_um /
+                   (std::hypot(made.list_um, pipeline::kBlurPerBend * left * plain_um) +
+                    0.31 * plain_um);
+          });
+        };
+        double left = 0;
+        while (left < 2 && honesty(left) > 1) left += 0.01;
+        std::printf("%d steps: bends %.2f times as much, %.2f of the blur is left, error %.1f um\n",
+                    steps, bends, left,
+                    median(run, [&](const Judged& j) { return j.by_rung[rung].error_um; }));
+      }
+    }
+    const double two = share(run, [&](const Judged& j) { return j.by_rung[2].error_um <= bound; });
+    const double inside = share(run, [&](const Judged& j) { return j.error_um() <= bound; });
+    EXPECT_GE(inside, 0.9 * two);
+    if (bound == 120.0) {
+      EXPECT_GT(share(run, [](const Judged& j) { return j.chosen == 0; }), 0.2);
     }
   }
 }

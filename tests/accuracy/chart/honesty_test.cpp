@@ -154,7 +154,7 @@ double ratio(const pipeline::ActiveCalibration& active, const image::Grey8& fram
                            depth, drawn, nullptr, &sums);
   const double bend = pipeline::bend_um(sums, model.mm_per_px);
   // As the capture loop has it: half of the deepest is about the mean over a contact.
-  const double list_um = active.maps.list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)));
+  const double list_um = active.maps.list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)), 0);
   return 1000 * table::against_indentation(depth, truth).mean_mm() /
          pipeline::uncertainty_um(list_um, bend);
 }

@@ -84,6 +84,23 @@ TEST_F(ConfigFile, ReadsTheCamerasControls) {
   EXPECT_THAT(error("[camera.v4l2.controls]\nzoom = 1\n"), HasSubstr("zoom"));
 }
 
+TEST_F(ConfigFile, SharpensByANumberOrAName) {
+  const auto sharpen = [&](const std::string& value) {
+    return load("[reconstruction]\nsharpen = " + value + "\n").pipeline.reconstruction.sharpen;
+  };
+  EXPECT_EQ(load("").pipeline.reconstruction.sharpen, 0);
+  EXPECT_EQ(sharpen("'off'"), 0);
+  EXPECT_EQ(sharpen("1"), 1);
+  EXPECT_EQ(sharpen("2"), 2);
+  EXPECT_EQ(sharpen("'auto'"), pipeline::ReconstructionRules::kAutoSharpen);
+  for (const char* wrong : {"3", "0", "-1", "'2'", "1.0", "true"}) {
+    EXPECT_THAT(error(std::string("[reconstruction]\nsharpen = ") + wrong + "\n"),
+                AllOf(HasSubstr("reconstruction.sharpen"),
+                      HasSubstr("one of \"off\", \"auto\", or 1 or 2")))
+        << wrong;
+  }
+}
+
 TEST_F(ConfigFile, ASecretMayBeACredential) {
   const Config config = load(
       "[net]\ntoken_file = 'credential:tokens'\ntls_key = 'keys/a.key'\n"

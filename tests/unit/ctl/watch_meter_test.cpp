@@ -107,6 +107,15 @@ TEST(WatchMeter, PrintsNoLatencyBetweenMachines) {
   EXPECT_FALSE(watch_report(meter, f).has_latency_p50_ms());
 }
 
+TEST(WatchMeter, SaysThatAMapIsSharpened) {
+  WatchMeter meter;
+  auto f = frame(0);
+  f.mutable_depth()->set_uncertainty_um(18);
+  f.mutable_depth()->set_sharpen_steps(2);
+  EXPECT_NE(watch_line(meter, f).find("0.513 mm +- 0.018 sharpened 2x  latency"),
+            std::string::npos);
+}
+
 TEST(WatchMeter, ReportsWhatItCounted) {
   WatchMeter meter;
   auto f = frame(0);

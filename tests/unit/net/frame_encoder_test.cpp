@@ -243,6 +243,24 @@ TEST(FrameEncoder, MakesTheMapThatIsAskedFor) {
   EXPECT_EQ(depth.data(), std::string("\x0d\0\x11\0\x2d\0\x31\0", 8));
 }
 
+TEST(FrameEncoder, SaysHowAMapWasMade) {
+  FrameEncoder encoder("f");
+  auto frame = make_frame(1);
+  frame.sharpen_steps = 2;
+  frame.made_decimation = 4;
+  encoder.begin(frame);
+  v1::Frame message;
+  ASSERT_TRUE(message.ParseFromString(encoder.encode(kind(v1::DEPTH_INT16, 0))->body));
+  EXPECT_EQ(message.depth().sharpen_steps(), 2U);
+  EXPECT_EQ(message.depth().made_decimation(), 4U);
+  EXPECT_EQ(message.depth().decimation(), 1U);
+  FrameKind coarse = kind(v1::DEPTH_INT16, 0);
+  coarse.spec.decimation = 4;
+  ASSERT_TRUE(message.ParseFromString(encoder.encode(coarse)->body));
+  EXPECT_EQ(message.depth().sharpen_steps(), 2U);
+  EXPECT_EQ(message.depth().made_decimation(), 0U) << "no finer than it was made";
+}
+
 TEST(FrameEncoder, OfTheContactsBoxSendsNoMapWhileNothingTouches) {
   FrameEncoder encoder("f");
   auto frame = make_frame(1, 100, 80);

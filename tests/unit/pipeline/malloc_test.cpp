@@ -18,7 +18,7 @@
 #include "tests/fakes/jpeg_camera.hpp"
 #include "tests/fakes/jpeg_maker.hpp"
 #include "tests/fakes/malloc_counter.hpp"
-#include "tests/fakes/toy_sensor.hpp"
+#include "tests/fakes/scattering_toy.hpp"
 
 namespace dtact::pipeline {
 namespace {
@@ -53,7 +53,8 @@ class CaptureThread : public ::testing::Test {
   static constexpr std::uint64_t kEvery = 150;
 
   /// `on_grab`: on the capture thread, before each frame, with the number delivered so far.
-  void run(std::uint64_t frames, const std::function<void(std::uint64_t)>& on_grab) {
+  void run(std::uint64_t frames, const std::function<void(std::uint64_t)>& on_grab,
+           const ReconstructionRules& rules = {}) {
     std::atomic<std::uint64_t> grabbed{0};
     auto camera = std::make_unique<fakes::JpegCamera>(fakes::kToyWidth, fakes::kToyHeight,
                                                       payloads(60), [&](std::uint64_t delivered) {
@@ -64,9 +65,10 @@ class CaptureThread : public ::testing::Test {
     config.fifo_priority = 0;
     config.lock_memory = false;
     config.reference.frames = 16;
+    config.reconstruction = rules;
     fakes::FakeRing::Handle ring;
     Pipeline pipeline(std::move(camera), std::make_unique<fakes::FakeRing>(ring),
-                      fakes::toy_calibration(), config);
+                      fakes::scattering_toy_calibration(15), config);
     pipeline.want({.contact = true, .depth = true, .luma = true, .jpeg = true});
     pipeline.start();
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -103,7 +105,7 @@ class CaptureThread : public ::testing::Test {
       case 2:
         return {commands_, CopyReference{}};
       default:
-        return {commands_, UseCalibration{fakes::toy_calibration()}};
+        return {commands_, UseCalibration{fakes::scattering_toy_calibration(15)}};
     }
   }
 
@@ -118,6 +120,17 @@ TEST_F(CaptureThread, AllocatesNothingAfterItsFirstHundredFrames) {
   run(600, [](std::uint64_t delivered) {
     if (delivered == 100) fakes::count_allocations(true);
   });
+  EXPECT_EQ(fakes::counted_allocations(), 0U);
+}
+
+TEST_F(CaptureThread, AllocatesNothingWhileItSharpensMoreAndLess) {
+  if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer brings its own malloc";
+  // The plain list is taken for 50 um: the first frames are plain, the pressed ones sharpened.
+  run(600,
+      [](std::uint64_t delivered) {
+        if (delivered == 100) fakes::count_allocations(true);
+      },
+      {.sharpen = ReconstructionRules::kAutoSharpen, .max_error_um = 55});
   EXPECT_EQ(fakes::counted_allocations(), 0U);
 }
 

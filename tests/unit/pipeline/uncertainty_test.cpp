@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -91,7 +92,7 @@ double list_um(Change change) {
   hal::CameraInfo camera;
   camera.width = fakes::kToyWidth;
   camera.height = fakes::kToyHeight;
-  return activate(calibration, camera, {})->maps.list_um(0.5);
+  return activate(calibration, camera, {})->maps.list_um(0.5, 0);
 }
 
 TEST(ListUncertainty, IsTheCalibrationsBetweenItsRows) {
@@ -110,17 +111,33 @@ TEST(ListUncertainty, OfACalibrationThatDoesNotSayIsWhatTheTableMeasured) {
   EXPECT_EQ(list_um([](recon::Model& m) { m.gain.shape = recon::GainShape::radial; }), 118);
 }
 
-TEST(ResolutionChooser, GoesFinerAtOnceAndCoarserWithPatience) {
-  ResolutionChooser chooser(50);
+/// The ladder of plain resolutions, by what a frame's list and bend are expected to cost on each.
+class LadderChooser {
+ public:
+  int next(double list_um, double bend_um) {
+    std::array<double, 3> expected{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      expected[i] = uncertainty_at_um(list_um, bend_um, kDecimations[i]);
+    }
+    return kDecimations[chooser_.next(expected)];
+  }
+
+ private:
+  static constexpr std::array<int, 3> kDecimations{4, 2, 1};
+  RungChooser chooser_{50};
+};
+
+TEST(RungChooser, GoesFinerAtOnceAndCoarserWithPatience) {
+  LadderChooser chooser;
   EXPECT_EQ(chooser.next(20, 0), 4);
   EXPECT_EQ(chooser.next(20, 6.4), 2);  // √(20² + 44.8²) = 49.06; + 0.54 at half, + 1.98 at quarter
-  for (int i = 1; i < ResolutionChooser::kPatience; ++i) EXPECT_NE(chooser.next(20, 1), 4) << i;
+  for (int i = 1; i < RungChooser::kPatience; ++i) EXPECT_NE(chooser.next(20, 1), 4) << i;
   int frames = 0;
-  while (chooser.next(20, 1) != 4) ASSERT_LT(++frames, 3 * ResolutionChooser::kPatience);
+  while (chooser.next(20, 1) != 4) ASSERT_LT(++frames, 3 * RungChooser::kPatience);
 }
 
-TEST(ResolutionChooser, PatienceBeginsAnewAfterEveryFrameThatIsNotWellInside) {
-  ResolutionChooser chooser(50);
+TEST(RungChooser, PatienceBeginsAnewAfterEveryFrameThatIsNotWellInside) {
+  LadderChooser chooser;
   ASSERT_EQ(chooser.next(20, 6.4), 2);
   for (int round = 0; round < 3; ++round) {
     for (int i = 1; i < 15; ++i) ASSERT_EQ(chooser.next(20, 1), 2) << round << ", frame " << i;
@@ -133,8 +150,8 @@ TEST(ResolutionChooser, PatienceBeginsAnewAfterEveryFrameThatIsNotWellInside) {
   EXPECT_EQ(chooser.next(20, 1), 4);
 }
 
-TEST(ResolutionChooser, GoesOneStepCoarserAfterFifteenFramesEach) {
-  ResolutionChooser chooser(50);
+TEST(RungChooser, GoesOneStepCoarserAfterFifteenFramesEach) {
+  LadderChooser chooser;
   ASSERT_EQ(chooser.next(60, 0), 1);
   std::vector<int> chosen;
   for (int i = 0; i < 31; ++i) chosen.push_back(chooser.next(20, 1));
@@ -144,18 +161,34 @@ TEST(ResolutionChooser, GoesOneStepCoarserAfterFifteenFramesEach) {
   EXPECT_EQ(chosen, expected);
 }
 
-TEST(ResolutionChooser, TakesFullResolutionWhereNothingIsInside) {
-  ResolutionChooser chooser(50);
+TEST(RungChooser, TakesFullResolutionWhereNothingIsInside) {
+  LadderChooser chooser;
   EXPECT_EQ(chooser.next(60, 0), 1);
   for (int i = 0; i < 100; ++i) EXPECT_EQ(chooser.next(60, 0), 1);
 }
 
-TEST(ResolutionChooser, DoesNotSwingAtTheBound) {
+TEST(RungChooser, DoesNotSwingAtTheBound) {
   // At quarter resolution just outside, at half just inside: never inside by the margin.
-  ResolutionChooser chooser(50);
-  (void)chooser.next(20, 6.3);
-  const int first = chooser.decimation();
+  LadderChooser chooser;
+  const int first = chooser.next(20, 6.3);
   for (int i = 0; i < 200; ++i) EXPECT_EQ(chooser.next(20, 6.3), first);
+}
+
+TEST(RungChooser, TakesTheLeastWrongWhereNothingIsInside) {
+  RungChooser chooser(50);
+  EXPECT_EQ(chooser.next(std::array{80.0, 60.0, 70.0}), 1U);
+  EXPECT_EQ(chooser.next(std::array{80.0, 70.0, 60.0}), 2U);
+  EXPECT_EQ(chooser.next(std::array{60.0, 70.0, 80.0}), 0U);
+  EXPECT_EQ(chooser.next(std::array{60.0, 40.0, 30.0}), 1U) << "the first that is inside";
+}
+
+TEST(Uncertainty, SharpeningLeavesLessOfTheBlurAndBendsMore) {
+  EXPECT_EQ(plain_bend_um(5, 0), 5);
+  EXPECT_EQ(uncertainty_at_um(28, 3, 4, 0), uncertainty_at_um(28, 3, 4));
+  for (const int steps : {1, 2}) {
+    EXPECT_LT(plain_bend_um(5, steps), plain_bend_um(5, steps - 1));
+    EXPECT_LT(uncertainty_at_um(28, 3, 4, steps), uncertainty_at_um(28, 3, 4, steps - 1));
+  }
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -229,6 +230,18 @@ TEST(LightDiffers, ComparesAfterBrightness) {
   EXPECT_TRUE(light_differs(*calibration, light));
   calibration->origin.leds.clear();  // not recorded
   EXPECT_FALSE(light_differs(*calibration, light));
+}
+
+TEST(Activate, NamesTheListThatSharpeningNeeds) {
+  hal::CameraInfo camera;
+  camera.width = fakes::kToyWidth;
+  camera.height = fakes::kToyHeight;
+  EXPECT_THAT(
+      [&] { (void)activate(fakes::toy_calibration(), camera, {.sharpen = 2}); },
+      testing::ThrowsMessage<std::invalid_argument>(testing::AllOf(
+          testing::HasSubstr("reconstruction.sharpen is 2"), testing::HasSubstr("\"auto\""))));
+  EXPECT_NO_THROW((void)activate(fakes::toy_calibration(), camera,
+                                 {.sharpen = ReconstructionRules::kAutoSharpen}));
 }
 
 TEST(Activate, NamesAFrameSizeThatDoesNotFit) {

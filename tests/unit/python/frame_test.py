@@ -34,8 +34,10 @@ class Depth(unittest.TestCase):
         message.depth.x, message.depth.y = 10, 20
         message.depth.full_width, message.depth.full_height = 145, 144
         message.depth.decimation = 4
+        message.depth.sharpen_steps = 2
         f = dtact.Frame(message)
         self.assertEqual((f.origin_px, f.full_shape, f.decimation), ((10, 20), (144, 145), 4))
+        self.assertEqual(f.sharpen_steps, 2)
 
     def test_none(self):
         message = ServerMessage().frame

@@ -79,6 +79,11 @@ class Frame:
         return int(self._depth.decimation) or 1
 
     @property
+    def sharpen_steps(self) -> int:
+        """Steps of the filter that undid the layer's scattering before the list; 0: none."""
+        return int(self._depth.sharpen_steps)
+
+    @property
     def origin_px(self) -> tuple[int, int]:
         """Column and row of the map's first pixel in the whole map, in the map's pixels: (0, 0)
         unless a region was subscribed."""
