@@ -31,7 +31,8 @@ struct PressReport {
   };
   std::vector<Depth> presses;         ///< Those that were used.
   std::vector<std::string> left_out;  ///< The others: name and reason.
-  std::string note;                   ///< Why the method that was to be taken was not; else empty.
+  /// Why the method that was to be taken was not, and what one press chose; lines without an end.
+  std::string note;
   /// A gain that was tried: how far each press is from the known sphere under the list of all
   /// others (meet()), the mean over the presses.
   struct Gain {

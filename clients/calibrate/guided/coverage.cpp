@@ -39,8 +39,8 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty,
     coverage.missing = "at least two presses of different depths are needed";
   } else {
     try {
-      coverage.made =
-          std::make_shared<const calibration::Calibration>(build_list(images, &coverage.report));
+      coverage.made = std::make_shared<const calibration::Calibration>(
+          build_list(images, ListMethod::free, &coverage.report));
       coverage.doubts = calibration::doubts_about(*coverage.made, images.set);
       if (!coverage.doubts.empty() && !force) {
         coverage.made = nullptr;

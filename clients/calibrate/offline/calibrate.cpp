@@ -18,7 +18,7 @@ struct Options {
   std::vector<std::string> presses;
   double radius_mm = 0;
   MapOptions map;
-  std::string method = "list";
+  std::string method = "best";
   std::vector<double> gain_centre{0, 0};  ///< x, y in millimetres from the map's centre.
   std::string output;
   bool force = false;
@@ -30,26 +30,21 @@ struct Made {
   std::vector<std::string> doubts;
 };
 
-/// From one press.
-Made make_from_one(const Options& options) {
+/// By the paper's list of one press.
+Made make_published(const Options& options) {
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet ball = load_images(options.ball, "--ball");
   require_same_size(reference, "--reference", ball, "--ball");
   const MapChoice map = choose_map(options.map, reference.width(), reference.height());
-  const calibration::BallPress press{
-      .reference_q8 = reference.mean_q8(),
-      .frames = ball.frames(),
-      .ball_radius_mm = options.radius_mm,
-      .mm_per_px = map.mm_per_px,
-      .lens = map.lens,
-      .crop = map.crop,
-      .gain = map.gain,
-      .method = options.method == "published" ? recon::Method::published : recon::Method::list,
-      // A lens file says what its board's pins ask for.
-      .may_share_light = options.map.lens.empty()};
-  calibration::PressChoices choices;
-  calibration::Calibration made = calibration::build(press, &choices);
-  if (press.method == recon::Method::list) fmt::print("{}\n", choices.describe());
+  const calibration::BallPress press{.reference_q8 = reference.mean_q8(),
+                                     .frames = ball.frames(),
+                                     .ball_radius_mm = options.radius_mm,
+                                     .mm_per_px = map.mm_per_px,
+                                     .lens = map.lens,
+                                     .crop = map.crop,
+                                     .gain = map.gain,
+                                     .method = recon::Method::published};
+  calibration::Calibration made = calibration::build(press);
   made.origin = recorded_origin(options.reference);
   made.origin.created = utc_now();
   made.origin.sources = reference.sources;
@@ -58,9 +53,10 @@ Made make_from_one(const Options& options) {
   return {std::move(made), std::move(doubts)};
 }
 
-/// From several.
-Made make_from_many(const Options& options) {
+/// From one press or several.
+Made make_list(const Options& options) {
   PressImages images = begin_presses(options.reference, options.radius_mm, options.map);
+  if (!options.ball.empty()) add_press(images, options.ball, "--ball");
   for (const std::string& press : options.presses) add_press(images, press);
   if (options.method == "regression") {
     calibration::Calibration made =
@@ -70,8 +66,11 @@ Made make_from_many(const Options& options) {
     std::vector<std::string> doubts = calibration::doubts_about(made, images.set);
     return {std::move(made), std::move(doubts)};
   }
+  const ListMethod method = options.method == "model"  ? ListMethod::model
+                            : options.method == "list" ? ListMethod::free
+                                                       : ListMethod::best;
   calibration::PressReport report;
-  calibration::Calibration made = build_list(images, &report);
+  calibration::Calibration made = build_list(images, method, &report);
   fmt::print("{}", report_text(report));
   std::vector<std::string> doubts = calibration::doubts_about(made, images.set);
   return {std::move(made), std::move(doubts)};
@@ -91,7 +90,7 @@ void check(const Options& options) {
 void run(const Options& options) {
   check(options);
   const auto [made, doubts] =
-      options.presses.empty() ? make_from_one(options) : make_from_many(options);
+      options.method == "published" ? make_published(options) : make_list(options);
   if (!doubts.empty() && !options.force) {
     throw std::runtime_error(fmt::format("{}; nothing was written (--force writes it as it is)",
                                          fmt::join(doubts, "; ")));
@@ -99,8 +98,13 @@ void run(const Options& options) {
   for (const std::string& doubt : doubts) fmt::print("doubtful: {}\n", doubt);
   calibration::save(made, options.output);
   const recon::RectifyTable& map = made.model->rectify;
-  fmt::print("{}: method {}, {}x{} at column {}, row {}\n{}", options.output, options.method,
-             map.width, map.height, made.crop_col, made.crop_row, list_text(*made.model));
+  const std::string method = made.layer                 ? "model"
+                             : options.method == "best" ? "list"
+                                                        : options.method;
+  fmt::print("{}: method {}, {}x{} at column {}, row {}\n", options.output, method, map.width,
+             map.height, made.crop_col, made.crop_row);
+  if (made.layer) fmt::print("{}", layer_text(*made.layer));
+  fmt::print("{}", list_text(*made.model));
 }
 
 }  // namespace
@@ -128,9 +132,12 @@ void add_calibrate(CLI::App& app) {
   depth->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")->required();
   add_map_options(*depth, options->map);
   depth
-      ->add_option("--method", options->method,
-                   "list (default); to compare with: published (one press), regression (several)")
-      ->check(CLI::IsMember({"list", "published", "regression"}));
+      ->add_option(
+          "--method", options->method,
+          "best (default): model, and list where no layer fits; model: the list of a layer "
+          "that is fitted to the whole image of the presses; list: from the known sphere "
+          "alone; to compare with: published (one press), regression (several)")
+      ->check(CLI::IsMember({"best", "model", "list", "published", "regression"}));
   depth
       ->add_option("--gain-centre", options->gain_centre,
                    "Where the regression's distance is taken from, mm right and down of the middle")

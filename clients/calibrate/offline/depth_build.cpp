@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "clients/calibrate/fit/model/model_build.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/sensor_file.hpp"
 
@@ -54,6 +55,24 @@ std::pair<std::string, std::optional<double>> split_press(const std::string& tex
   return {text.substr(0, at), depth_mm};
 }
 
+calibration::Calibration free_list(const PressImages& images, calibration::PressReport& report) {
+  const calibration::BallPresses& set = images.set;
+  if (set.presses.size() != 1) return calibration::build(set, &report);
+  calibration::PressChoices choices;
+  calibration::Calibration made = calibration::build({.reference_q8 = set.reference_q8,
+                                                      .frames = set.presses.front().frames,
+                                                      .ball_radius_mm = set.ball_radius_mm,
+                                                      .mm_per_px = set.mm_per_px,
+                                                      .lens = set.lens,
+                                                      .crop = set.crop,
+                                                      .gain = images.gain,
+                                                      // A lens file says what its pins ask for.
+                                                      .may_share_light = !set.lens},
+                                                     &choices);
+  report.note = choices.describe();
+  return made;
+}
+
 }  // namespace
 
 void add_map_options(CLI::App& command, MapOptions& options) {
@@ -99,29 +118,59 @@ PressImages begin_presses(const std::vector<std::string>& reference, double ball
                              .mm_per_px = choice.mm_per_px,
                              .crop = choice.crop,
                              .lens = choice.lens},
+                     .gain = choice.gain,
                      .origin = recorded_origin(reference)};
   images.origin.sources = untouched.sources;
   return images;
 }
 
-void add_press(PressImages& images, const std::string& press) {
-  const auto [path, depth_mm] = split_press(press);
-  ImageSet pressed = load_images({path}, "--press");
+void add_press(PressImages& images, const std::vector<std::string>& paths, const char* option) {
+  ImageSet pressed = load_images(paths, option);
   const image::Grey16& reference = images.set.reference_q8;
   if (pressed.width() != reference.width || pressed.height() != reference.height) {
     throw std::runtime_error(fmt::format(
-        "--press {} is {}x{} but --reference is {}x{}; both must come from one camera mode", press,
-        pressed.width(), pressed.height(), reference.width, reference.height));
+        "{} {} is {}x{} but --reference is {}x{}; both must come from one camera mode", option,
+        paths.front(), pressed.width(), pressed.height(), reference.width, reference.height));
   }
-  images.set.presses.push_back({.name = press, .frames = pressed.frames(), .depth_mm = depth_mm});
+  images.set.presses.push_back(
+      {.name = paths.front(), .frames = pressed.frames(), .depth_mm = std::nullopt});
   images.origin.sources.insert(images.origin.sources.end(), pressed.sources.begin(),
                                pressed.sources.end());
 }
 
-calibration::Calibration build_list(const PressImages& images, calibration::PressReport* report) {
-  calibration::Calibration made = calibration::build(images.set, report);
+void add_press(PressImages& images, const std::string& press) {
+  const auto [path, depth_mm] = split_press(press);
+  add_press(images, {path}, "--press");
+  images.set.presses.back().name = press;
+  images.set.presses.back().depth_mm = depth_mm;
+}
+
+calibration::Calibration build_list(const PressImages& images, ListMethod method,
+                                    calibration::PressReport* report) {
+  calibration::PressReport found;
+  calibration::Calibration made;
+  const auto by_model = [&] {
+    calibration::FittedCalibration fitted = calibration::build_model(images.set, images.gain);
+    found.left_out = std::move(fitted.left_out);
+    for (const auto& press : fitted.presses) found.presses.push_back({press.name, press.depth_mm});
+    return std::move(fitted.calibration);
+  };
+  if (method == ListMethod::free) {
+    made = free_list(images, found);
+  } else if (method == ListMethod::model) {
+    made = by_model();
+  } else {
+    try {
+      made = by_model();
+    } catch (const calibration::ModelRefused& refused) {
+      made = free_list(images, found);
+      found.note = fmt::format("the list is made without a model of the layer: {}{}{}",
+                               refused.what(), found.note.empty() ? "" : "\n", found.note);
+    }
+  }
   made.origin = images.origin;
   made.origin.created = utc_now();
+  if (report != nullptr) *report = std::move(found);
   return made;
 }
 
@@ -139,6 +188,7 @@ std::string utc_now() {
 
 std::string report_text(const calibration::PressReport& report) {
   std::string text;
+  if (!report.note.empty()) text += report.note + "\n";
   for (const std::string& press : report.left_out) text += fmt::format("left out: {}\n", press);
   for (const auto& press : report.presses) {
     text += fmt::format("{}: {:.3f} mm deep\n", press.name, press.depth_mm);
@@ -164,6 +214,29 @@ std::string list_text(const recon::Model& model) {
     text += fmt::format("uncertain at {:.2f} mm by {:.1f} um\n", row.depth_mm, row.error_um);
   }
   return text;
+}
+
+std::string layer_text(const calibration::Layer& layer) {
+  const auto with_error = [](const calibration::Layer::Estimate& estimate) {
+    return fmt::format("{:.2f} ± {:.2f}", estimate.value, estimate.error);
+  };
+  std::string text = fmt::format(
+      "layer: {} mm thick; light spreads sideways by {} mm ({:.0f} ± {:.0f} % of it) and {} mm; "
+      "the fit leaves {:.2f} grey levels\n",
+      with_error(layer.thickness_mm), with_error(layer.narrow_mm), 100 * layer.narrow_weight.value,
+      100 * layer.narrow_weight.error, with_error(layer.wide_mm), layer.residual_levels);
+  text += "response: of the light is lost a tenth of a millimetre";
+  for (std::size_t i = 0; i < layer.slope.size(); ++i) {
+    const double depth_mm = layer.indentation[i] * layer.thickness_mm.value;
+    const double percent =
+        10 / layer.thickness_mm.value * (layer.indentation[i] < 0 ? layer.bulge_factor : 1);
+    text += fmt::format("{} {:.1f} ± {:.1f} % {}", i == 0 ? "" : ",",
+                        percent * layer.slope[i].value, percent * layer.slope[i].error,
+                        depth_mm == 0  ? "at the surface"
+                        : depth_mm < 0 ? fmt::format("on a bulge of {:.2f} mm", -depth_mm)
+                                       : fmt::format("at {:.2f} mm", depth_mm));
+  }
+  return text + "\n";
 }
 
 }  // namespace dtact::ctl

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -36,6 +37,7 @@ struct MapChoice {
 /// Several presses of one ball, and what is recorded of where they come from.
 struct PressImages {
   calibration::BallPresses set;
+  recon::SpatialGain gain;  ///< Of the lens file.
   calibration::Origin origin;
 };
 
@@ -48,8 +50,20 @@ struct PressImages {
 /// Throws std::runtime_error naming --press.
 void add_press(PressImages& images, const std::string& press);
 
-/// The calibration of several presses, its origin filled in. Throws as calibration::build().
-[[nodiscard]] calibration::Calibration build_list(const PressImages& images,
+/// What the darkening of a ball's presses is turned into a list by.
+enum class ListMethod : std::uint8_t {
+  best,   ///< The layer's model where it fits, else the free list.
+  model,  ///< A layer fitted to the presses (calibration::build_model()).
+  free    ///< The known sphere alone: calibration::build().
+};
+
+/// Adds one press: PNG files or folders. Throws as load_images(), and std::runtime_error naming the
+/// option when they have not the reference's size.
+void add_press(PressImages& images, const std::vector<std::string>& paths, const char* option);
+
+/// The calibration of one press or several, its origin filled in. `report` also says why `best`
+/// took the free list. Throws as calibration::build() and build_model().
+[[nodiscard]] calibration::Calibration build_list(const PressImages& images, ListMethod method,
                                                   calibration::PressReport* report);
 
 /// Camera and light of the images in these folders, where a sensor.toml says so.
@@ -62,5 +76,7 @@ void add_press(PressImages& images, const std::string& press);
 [[nodiscard]] std::string report_text(const calibration::PressReport& report);
 /// What the list covers and what it is uncertain by; lines.
 [[nodiscard]] std::string list_text(const recon::Model& model);
+/// The layer in words; lines.
+[[nodiscard]] std::string layer_text(const calibration::Layer& layer);
 
 }  // namespace dtact::ctl
