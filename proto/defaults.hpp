@@ -13,6 +13,9 @@ inline constexpr std::uint32_t kMinor = 1;
 /// and port number registry leaves unassigned.
 inline constexpr std::uint16_t kDefaultPort = 7377;
 
+/// dtact-perceive's own, from the same range.
+inline constexpr std::uint16_t kPerceivePort = 7378;
+
 /// Where the daemon listens, and clients connect to, unless told otherwise: this machine only.
 inline constexpr const char* kDefaultAddress = "127.0.0.1";
 

@@ -11,4 +11,9 @@ inline constexpr std::array kFeatures = {
     "rates",           "reference",  "region", "rvl",   "stamps", "units",
 };
 
+/// The same of dtact-perceive.
+inline constexpr std::array kPerceiveFeatures = {
+    "cloud", "decimation", "events", "ping", "pose", "rates", "region",
+};
+
 }  // namespace dtact::wire

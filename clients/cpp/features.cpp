@@ -22,15 +22,18 @@ void require_feature(const v1::HelloReply& daemon, const std::string& feature) {
 }
 
 void require_features(const v1::HelloReply& daemon, const v1::Subscribe& s) {
-  const std::array<std::pair<const char*, bool>, 8> needs{{
+  const std::array<std::pair<const char*, bool>, 10> needs{{
       {"rvl", s.depth() == v1::DEPTH_RVL},
       {"predict_zstd", s.depth() == v1::DEPTH_PREDICT_ZSTD},
       {"jpeg", s.jpeg()},
-      {"rates", s.depth_hz() != 0 || s.luma_hz() != 0 || s.jpeg_hz() != 0 || s.summary_hz() != 0},
+      {"rates", s.depth_hz() != 0 || s.luma_hz() != 0 || s.jpeg_hz() != 0 || s.summary_hz() != 0 ||
+                    s.cloud_hz() != 0 || s.pose_hz() != 0},
       {"decimation", s.decimation() > 1},
       {"units", s.um_per_unit() > 1},
       {"region", s.region_case() != v1::Subscribe::REGION_NOT_SET},
       {"events", s.has_events() && !s.events()},
+      {"cloud", s.cloud() != v1::CLOUD_NONE},
+      {"pose", s.pose()},
   }};
   for (const auto& [feature, needed] : needs) {
     if (needed) require_feature(daemon, feature);

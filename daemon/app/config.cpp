@@ -12,7 +12,7 @@
 #include <string_view>
 
 #include "daemon/app/config_keys.hpp"
-#include "daemon/net/security.hpp"
+#include "daemon/serve/security.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::app {

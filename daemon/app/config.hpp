@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/metrics/endpoint.hpp"
-#include "daemon/net/net_config.hpp"
+#include "daemon/serve/net_config.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "hal/config.hpp"
 

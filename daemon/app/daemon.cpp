@@ -30,7 +30,7 @@
 #include "daemon/metrics/text.hpp"
 #include "daemon/net/calibration_store.hpp"
 #include "daemon/net/light_schemes.hpp"
-#include "daemon/net/security.hpp"
+#include "daemon/serve/security.hpp"
 #include "daemon/net/server.hpp"
 #include "daemon/pipeline/pipeline.hpp"
 #include "hal/base/clock.hpp"

@@ -13,6 +13,7 @@
 #include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/sensor_file.hpp"
 #include "daemon/calibration/sha256.hpp"
+#include "daemon/calibration/surface_table.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
 #include "hal/toml/key_reader.hpp"
@@ -89,7 +90,8 @@ Files format(const Calibration& calibration) {
   t += fmt::format(
       "[lens]  # where the surface appears in the frame; empty: the frame as it is\n{}\n",
       calibration.lens ? format_lens(*calibration.lens) : "");
-  t += "# Reserved for a curved surface. Empty: none.\n[surface]\n\n";
+  t += fmt::format("[surface]  # of the untouched gel; empty: a plane\n{}\n",
+                   format_surface(model.surface));
   t += format_gain(model.gain);
   if (calibration.layer) t += format_layer(*calibration.layer);
   t += format_lists(model);

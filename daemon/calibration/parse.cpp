@@ -12,6 +12,7 @@
 #include "daemon/calibration/map_table.hpp"
 #include "daemon/calibration/sensor_file.hpp"
 #include "daemon/calibration/sha256.hpp"
+#include "daemon/calibration/surface_table.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
 #include "hal/toml/key_reader.hpp"
@@ -84,17 +85,6 @@ void read_reference(tomlfile::KeyReader reader, const std::string& png, const st
   model.reference_q8 = std::move(image.pixels);
 }
 
-/// Tables that later versions fill. What this program cannot apply it must not pass over.
-void refuse_reserved(tomlfile::KeyReader& top) {
-  for (const char* name : {"surface"}) {
-    if (top.has(name) && !top.table(name).keys().empty()) {
-      top.fail(name,
-               "is reserved and must be empty: this program applies none of it; use the "
-               "version that wrote the file");
-    }
-  }
-}
-
 }  // namespace
 
 Calibration parse(const std::string& toml, const std::string& reference_png,
@@ -153,7 +143,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   }
   if (top.has("force")) model->force = read_force(top.table("force"));
   add_untrusted(*model, outside);
-  refuse_reserved(top);
+  if (top.has("surface")) model->surface = read_surface(top.table("surface"));
   read_reference(top.table("reference"), reference_png, where, *model);
   top.finish();
   calibration.model = std::move(model);

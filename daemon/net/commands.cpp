@@ -8,6 +8,7 @@
 #include "daemon/net/hub.hpp"
 #include "daemon/net/light_schemes.hpp"
 #include "daemon/net/messages.hpp"
+#include "daemon/serve/who.hpp"
 #include "hal/base/clock.hpp"
 #include "proto/dtact.pb.h"
 
@@ -216,25 +217,9 @@ Overview Commands::overview() const {
   }
   status.set_encoded(hub_.encoded());
   for (const auto& session : hub_.sessions()) {
-    if (!session->greeted()) continue;
-    auto& client = *status.add_clients();
-    client.set_address(session->peer().address);
-    client.set_program(session->program());
-    client.set_sent(session->outbox().sent());
-    client.set_dropped(session->outbox().dropped());
-    client.set_rights(static_cast<v1::Rights>(session->rights()));
-    client.set_endpoint(session->peer().endpoint);
-    client.set_sent_bytes(session->outbox().sent_bytes());
-    client.set_waiting_bytes(session->outbox().waiting_bytes());
+    if (session->greeted()) fill(*session, *status.add_clients());
   }
-  for (const auto& endpoint : hub_.endpoints()) {
-    auto& out = *status.add_endpoints();
-    out.set_address(endpoint.address);
-    out.set_tls(endpoint.tls);
-    out.set_token(endpoint.token);
-    out.set_insecure(endpoint.insecure);
-    out.set_fingerprint(endpoint.fingerprint);
-  }
+  for (const auto& endpoint : hub_.endpoints()) fill(endpoint, *status.add_endpoints());
   status.set_version(config_.version);
   status.set_name(config_.name);
   status.set_serial(hub_.serial());

@@ -11,10 +11,10 @@
 #include <variant>
 
 #include "daemon/net/calibration_store.hpp"
-#include "daemon/net/net_config.hpp"
 #include "daemon/net/overview.hpp"
-#include "daemon/net/session.hpp"
 #include "daemon/pipeline/port.hpp"
+#include "daemon/serve/net_config.hpp"
+#include "daemon/serve/session.hpp"
 
 namespace dtact::v1 {
 class ActivateCalibration;

@@ -7,25 +7,9 @@
 #include <vector>
 
 #include "daemon/pipeline/depth_frame.hpp"
+#include "daemon/serve/frame_kind.hpp"
 
 namespace dtact::net {
-
-/// dtact.v1.Region: pixels of the depth map at the calibration's full resolution.
-struct DepthRegion {
-  std::uint32_t x = 0;
-  std::uint32_t y = 0;
-  std::uint32_t width = 1;
-  std::uint32_t height = 1;
-  bool operator==(const DepthRegion&) const = default;
-};
-
-/// Which depth map a client asked for.
-struct DepthSpec {
-  int decimation = 1;                      ///< 1, 2 or 4: of the calibration's resolution.
-  int um_per_unit = 1;                     ///< 1, 2, 5 or 10.
-  std::optional<DepthRegion> region = {};  ///< All of the map when unset.
-  bool operator==(const DepthSpec&) const = default;
-};
 
 /// The map as dtact.v1.DepthMap says it.
 struct DepthView {

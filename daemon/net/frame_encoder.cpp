@@ -18,7 +18,6 @@ namespace {
 
 using google::protobuf::io::CodedOutputStream;
 
-constexpr std::uint32_t kVarint = 0;
 constexpr std::uint32_t kBytes = 2;  // length-delimited
 
 /// A tag of the protobuf encoding.
@@ -59,23 +58,6 @@ std::string_view text_of(const std::vector<std::uint8_t>& bytes) {
 }
 
 }  // namespace
-
-FrameEnvelope::FrameEnvelope(std::size_t body_size, std::uint64_t dropped) noexcept {
-  constexpr auto kDropped = tag(v1::Frame::kDroppedFieldNumber, kVarint);
-  constexpr auto kFrame = tag(v1::ServerMessage::kFrameFieldNumber, kBytes);
-  static_assert(kDropped < 128 && kFrame < 128, "the tags are one byte each");
-  if (dropped != 0) {
-    tail[0] = kDropped;
-    const auto* end = CodedOutputStream::WriteVarint64ToArray(dropped, tail.data() + 1);
-    tail_size = static_cast<std::size_t>(end - tail.data());
-  }
-  std::uint8_t* const message = head.data() + wire::kLengthSize;
-  message[0] = kFrame;
-  const auto* end = CodedOutputStream::WriteVarint64ToArray(body_size + tail_size, message + 1);
-  head_size = static_cast<std::size_t>(end - head.data());
-  const auto length = wire::encode_length(head_size - wire::kLengthSize + body_size + tail_size);
-  std::copy(length.begin(), length.end(), head.begin());
-}
 
 struct FrameEncoder::Impl {
   std::string frame_id;

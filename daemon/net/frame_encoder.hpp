@@ -1,44 +1,16 @@
 #pragma once
 
-#include <array>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "daemon/net/depth_view.hpp"
 #include "daemon/pipeline/depth_frame.hpp"
 #include "daemon/pipeline/histogram.hpp"
+#include "daemon/serve/encoded_frame.hpp"
+#include "daemon/serve/frame_kind.hpp"
 
 namespace dtact::net {
-
-/// What a frame message is to hold. Nothing at all: a summary.
-struct FrameKind {
-  int depth = 0;  ///< dtact.v1.DepthEncoding; 0: none, and the next two say nothing.
-  DepthSpec spec = {};
-  bool contact_box = false;  ///< The region is where the contact is.
-  int luma = 0;              ///< dtact.v1.LumaEncoding
-  bool jpeg = false;
-  bool operator==(const FrameKind&) const = default;
-};
-
-/// One frame message as every client gets it, but for the client's own drop count.
-struct EncodedFrame {
-  std::string body;  ///< dtact.v1.Frame without `dropped`.
-};
-
-/// What stands around a shared body for one client: before it the length and ServerMessage's
-/// frame tag, after it the field `dropped`. Fields of one message may come in any order, so a body
-/// can be continued without being parsed or copied.
-struct FrameEnvelope {
-  FrameEnvelope(std::size_t body_size, std::uint64_t dropped) noexcept;
-
-  std::array<std::uint8_t, 16> head{};
-  std::size_t head_size = 0;
-  std::array<std::uint8_t, 12> tail{};
-  std::size_t tail_size = 0;
-};
 
 /// Encodes a frame once for each kind that is asked for, and its maps once for each choice among
 /// them, whatever else is in the message. `times.encode_ns` is this very encoding's own time:

@@ -3,12 +3,9 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/post.hpp>
 #include <cerrno>
-#include <map>
-#include <string_view>
 #include <system_error>
 
 #include "daemon/net/messages.hpp"
@@ -21,23 +18,6 @@ namespace {
 
 namespace asio = boost::asio;
 using boost::system::error_code;
-
-/// The oldest stranger from where most of them are; null unless there are too many.
-std::shared_ptr<Session> one_too_many(const std::vector<std::shared_ptr<Session>>& sessions) {
-  std::map<std::string_view, std::size_t> hosts;
-  std::size_t strangers = 0;
-  for (const auto& session : sessions) {
-    if (!session->stranger()) continue;
-    ++strangers;
-    ++hosts[session->peer().host];
-  }
-  if (strangers <= Hub::kMaxStrangers) return nullptr;
-  const auto most = std::max_element(
-      hosts.begin(), hosts.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  return *std::find_if(sessions.begin(), sessions.end(), [&](const auto& session) {
-    return session->stranger() && hosts[session->peer().host] == most->second;
-  });
-}
 
 /// The hub's own descriptor of the pipeline's eventfd: Asio closes what it watches.
 int duplicate(int fd) {
@@ -74,8 +54,7 @@ void Hub::start(Handlers handlers) {
 void Hub::stop() {
   error_code ignored;
   events_.close(ignored);
-  const auto sessions = std::exchange(sessions_, {});
-  for (const auto& session : sessions) session->close("the daemon ends");
+  guests_.dismiss("the daemon ends");
   port_.want({});
 }
 
@@ -116,7 +95,7 @@ void Hub::on_event(const pipeline::Event& event) {
     if (!reference->restored) reference_taken_ns_ = reference->at.monotonic_ns;
   }
   v1::ServerMessage message;
-  if (fill(event, *message.mutable_event())) broadcast(message);
+  if (fill(event, *message.mutable_event())) guests_.broadcast(message);
 }
 
 void Hub::on_frame(const pipeline::DepthFrame& frame) {
@@ -127,7 +106,7 @@ void Hub::on_frame(const pipeline::DepthFrame& frame) {
   encoder_.begin(frame, calibration_number(frame.calibration));
   // Calibrations come into use in the order of their keys.
   if (frame.calibration) numbers_.erase(numbers_.begin(), numbers_.lower_bound(*frame.calibration));
-  for (const auto& session : sessions_) {
+  for (const auto& session : guests_.all()) {
     const auto kind = session->due(frame.camera.timestamp_ns, missed);
     if (!kind) continue;
     auto encoded = encoder_.encode(*kind);
@@ -143,17 +122,7 @@ void Hub::on_frame(const pipeline::DepthFrame& frame) {
 
 void Hub::admit(const std::shared_ptr<Session>& session) {
   ++gone_.connections;
-  sessions_.push_back(session);
-  if (const auto other = one_too_many(sessions_)) {
-    other->close("too many connections wait for Hello", LogLevel::warning);
-  }
-  session->start();
-}
-
-void Hub::broadcast(const v1::ServerMessage& event) {
-  for (const auto& session : sessions_) {
-    if (session->greeted() && session->subscription().events()) session->send(event);
-  }
+  guests_.admit(session);
 }
 
 std::optional<std::uint64_t> Hub::calibration_number(std::optional<std::uint64_t> key) const {
@@ -165,7 +134,7 @@ std::optional<std::uint64_t> Hub::calibration_number(std::optional<std::uint64_t
 
 void Hub::update_want() {
   pipeline::Wanted wanted;
-  for (const auto& session : sessions_) {
+  for (const auto& session : guests_.all()) {
     if (!session->greeted()) continue;
     wanted.contact = true;
     const auto parts = session->subscription().parts();
@@ -180,7 +149,7 @@ void Hub::update_want() {
 
 Traffic Hub::traffic() const {
   Traffic all = gone_;
-  for (const auto& session : sessions_) add(*session, all);
+  for (const auto& session : guests_.all()) add(*session, all);
   return all;
 }
 
@@ -203,12 +172,10 @@ void Hub::on_closed(const Session& session) {
   asio::post(io_, [weak = weak_from_this(), gone = &session] {
     const auto self = weak.lock();
     if (self == nullptr) return;
-    const auto is_gone = [gone](const auto& other) { return other.get() == gone; };
-    const auto left = std::ranges::find_if(self->sessions_, is_gone);
-    if (left == self->sessions_.end()) return;
-    add(**left, self->gone_);
-    if (!(*left)->let_in()) ++self->gone_.refused;
-    self->sessions_.erase(left);
+    const auto left = self->guests_.release(gone);
+    if (left == nullptr) return;
+    add(*left, self->gone_);
+    if (!left->let_in()) ++self->gone_.refused;
     self->update_want();
   });
 }

@@ -10,11 +10,12 @@
 #include <vector>
 
 #include "daemon/net/frame_encoder.hpp"
-#include "daemon/net/net_config.hpp"
 #include "daemon/net/overview.hpp"
-#include "daemon/net/security.hpp"
-#include "daemon/net/session.hpp"
 #include "daemon/pipeline/port.hpp"
+#include "daemon/serve/guests.hpp"
+#include "daemon/serve/net_config.hpp"
+#include "daemon/serve/security.hpp"
+#include "daemon/serve/session.hpp"
 
 namespace dtact::net {
 
@@ -37,15 +38,10 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   /// Ends every connection and stops watching the pipeline.
   void stop();
 
-  /// Connections that have not said Hello at one time. They are strangers: whoever comes after
-  /// that takes the place of the oldest from where most of them are, so that a flood from one
-  /// address leaves room for those from others.
-  static constexpr std::size_t kMaxStrangers = 64;
-
   /// A new connection.
   void admit(const std::shared_ptr<Session>& session);
   /// To every client that has been greeted and wants events.
-  void broadcast(const v1::ServerMessage& event);
+  void broadcast(const v1::ServerMessage& event) { guests_.broadcast(event); }
   /// What the calibration is called on the wire that the pipeline knows by this key.
   void number_calibration(std::uint64_t key, std::uint64_t number) { numbers_[key] = number; }
   [[nodiscard]] std::optional<std::uint64_t> calibration_number(
@@ -54,7 +50,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   /// lets go of what nobody wants any more.
   void update_want();
   [[nodiscard]] const std::vector<std::shared_ptr<Session>>& sessions() const noexcept {
-    return sessions_;
+    return guests_.all();
   }
 
   /// Where the daemon listens, for status.
@@ -92,7 +88,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   FrameEncoder encoder_;
   pipeline::Histogram handover_;  ///< From published until fetched here.
   Handlers handlers_;
-  std::vector<std::shared_ptr<Session>> sessions_;  ///< Oldest first.
+  Guests guests_;
   std::vector<EndpointInfo> endpoints_;
   std::map<std::uint64_t, std::uint64_t> numbers_;  ///< By key, of those still in use.
   bool seen_frame_ = false;

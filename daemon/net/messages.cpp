@@ -183,6 +183,16 @@ void fill(const pipeline::DepthFrame& frame, v1::Frame& out) {
   if (frame.contact_absence == pipeline::ContactAbsence::none) {
     fill(frame.contact, *out.mutable_contact());
   }
+  if (frame.has_depth && frame.surface.kind != recon::Surface::Kind::plane) {
+    auto& surface = *out.mutable_surface();
+    surface.set_shape(frame.surface.kind == recon::Surface::Kind::sphere ? v1::Surface::SPHERE
+                                                                         : v1::Surface::CYLINDER);
+    surface.set_radius_mm(frame.surface.radius_mm);
+    surface.set_axis_deg(frame.surface.axis_deg);
+    surface.set_air_mm(frame.surface.air_mm);
+    surface.set_gel_mm(frame.surface.gel_mm);
+    surface.set_refraction(frame.surface.refraction);
+  }
 }
 
 void fill(const pipeline::StageTimes& times, std::int64_t encode_ns, v1::StageTimes& out) {

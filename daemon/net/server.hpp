@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/net/net_config.hpp"
 #include "daemon/net/overview.hpp"
+#include "daemon/serve/net_config.hpp"
 
 namespace boost::asio {
 class io_context;

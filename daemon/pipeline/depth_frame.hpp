@@ -70,6 +70,7 @@ struct DepthFrame {
   int decimation = 1;         ///< The map has 1/decimation of the calibration's resolution.
   int made_decimation = 1;    ///< It was made at 1/made_decimation of it, …
   int sharpen_steps = 0;      ///< … sharpened by so many steps, and interpolated.
+  recon::Surface surface;     ///< That depth_um is measured from.
   double uncertainty_um = 0;  ///< Mean absolute error to expect inside the contact.
   int contact_um = 0;         ///< What is deeper belongs to the contact.
   std::vector<std::int16_t>

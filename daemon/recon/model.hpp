@@ -10,6 +10,7 @@
 #include "daemon/recon/rectify.hpp"
 #include "daemon/recon/scattering.hpp"
 #include "daemon/recon/spatial_gain.hpp"
+#include "daemon/recon/surface.hpp"
 
 namespace dtact::recon {
 
@@ -58,6 +59,7 @@ struct Model {
   /// Depth-map sized; non-zero marks pixels that are never trusted. Empty: none.
   std::vector<std::uint8_t> untrusted;
   std::optional<ForceModel> force;  ///< None: not calibrated.
+  Surface surface;  ///< That the indentation is measured from; says where in space a pixel lies.
 };
 
 /// Throws std::invalid_argument, naming the part, where the parts do not fit each other.

@@ -1,6 +1,6 @@
 // A token file: what is accepted grants the rights that its own lines name and nothing else, what
 // is not is refused with a sentence that tells no token.
-#include "daemon/net/tokens.hpp"
+#include "daemon/serve/tokens.hpp"
 
 #include <sstream>
 #include <stdexcept>

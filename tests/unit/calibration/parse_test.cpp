@@ -147,10 +147,34 @@ TEST(ParseCalibration, WhatTheLensDoesNotSeeIsUntrustedBesideTheMask) {
   EXPECT_EQ(parse(files.toml, files.reference_png, "upload").model->untrusted, expected);
 }
 
-TEST(ParseCalibration, ReservedTablesMayBeEmptyOrAbsentButNotFilled) {
-  const std::string png = format(sample()).reference_png;
-  EXPECT_NO_THROW((void)parse(with("[surface]\n", ""), png, "upload"));
-  expect_refused(with("[surface]\n", "[surface]\nr = 1\n"), "surface", "reserved");
+TEST(ParseCalibration, ASurfaceIsCheckedAndMayBeAbsent) {
+  const Calibration plain = sample();
+  const std::string png = format(plain).reference_png;
+  const std::string finger =
+      "[surface]\nshape = \"cylinder\"\nradius_mm = 12.5\naxis_deg = 90\nair_mm = 20\n"
+      "gel_mm = 8\nrefraction = 1.41\n";
+  using Kind = recon::Surface::Kind;
+  const auto surface_in = [&](const std::string& table) {
+    std::string toml = format(plain).toml;
+    const auto begin = toml.find("[surface]");
+    toml.replace(begin, toml.find('\n', begin) + 1 - begin, table);
+    return parse(toml, png, "upload").model->surface;
+  };
+  EXPECT_EQ(surface_in(""), recon::Surface{});
+  const recon::Surface expected{Kind::cylinder, 12.5, 90, 20, 8, 1.41};
+  EXPECT_EQ(surface_in(finger), expected);
+  Calibration curved = plain;
+  auto model = std::make_shared<recon::Model>(*plain.model);
+  model->surface = {Kind::sphere, 15, 0, 20, 8, 1.41};
+  curved.model = model;
+  const Files files = format(curved);
+  EXPECT_EQ(parse(files.toml, files.reference_png, "upload").model->surface, model->surface);
+  const auto refused = [&](const std::string& table, const char* key) {
+    EXPECT_THAT([&] { (void)surface_in(table); },
+                ThrowsMessage<std::runtime_error>(HasSubstr(key)));
+  };
+  refused("[surface]\nshape = \"cube\"\n", "surface.shape");
+  refused("[surface]\nshape = \"sphere\"\nradius_mm = 0\n", "surface.radius_mm");
 }
 
 TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {

@@ -11,8 +11,8 @@
 #include <string>
 
 #include "clients/ctl/certificate.hpp"
-#include "daemon/net/tls.hpp"
-#include "daemon/net/tokens.hpp"
+#include "daemon/serve/tls.hpp"
+#include "daemon/serve/tokens.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/calibration/sample.hpp"
 #include "tests/unit/ctl/run_ctl.hpp"

@@ -11,7 +11,7 @@
 #include <memory>
 #include <thread>
 
-#include "daemon/net/tcp_watch.hpp"
+#include "daemon/serve/tcp_watch.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/rig.hpp"
 

@@ -109,6 +109,24 @@ TEST(FrameEncoder, CarriesTimesLightAndHealth) {
   EXPECT_FALSE(message.has_depth());
 }
 
+TEST(FrameEncoder, SaysTheSurfaceOfASensorThatIsNotFlat) {
+  FrameEncoder encoder("f");
+  auto frame = make_frame(3);
+  v1::Frame message;
+  encoder.begin(frame);
+  ASSERT_TRUE(message.ParseFromString(encoder.encode(kind(0, 0))->body));
+  EXPECT_FALSE(message.has_surface());
+  frame.surface = {recon::Surface::Kind::cylinder, 12.5, 90, 20, 8, 1.41};
+  encoder.begin(frame);
+  ASSERT_TRUE(message.ParseFromString(encoder.encode(kind(0, 0))->body));
+  EXPECT_EQ(message.surface().shape(), v1::Surface::CYLINDER);
+  EXPECT_EQ(message.surface().radius_mm(), 12.5);
+  EXPECT_EQ(message.surface().axis_deg(), 90);
+  EXPECT_EQ(message.surface().air_mm(), 20);
+  EXPECT_EQ(message.surface().gel_mm(), 8);
+  EXPECT_EQ(message.surface().refraction(), 1.41);
+}
+
 TEST(FrameEncoder, RefusesWhatExceedsTheWire) {
   FrameEncoder encoder("f");
   const auto frame = make_frame(1, 4096, 4096);  // 32 MiB of depth, 16 MiB of luma

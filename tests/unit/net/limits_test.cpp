@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "daemon/net/admission.hpp"
-#include "daemon/net/hub.hpp"
-#include "daemon/net/limited_log.hpp"
-#include "daemon/net/token_bucket.hpp"
+#include "daemon/serve/admission.hpp"
+#include "daemon/serve/guests.hpp"
+#include "daemon/serve/limited_log.hpp"
+#include "daemon/serve/token_bucket.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/requests.hpp"
 #include "tests/unit/net/rig.hpp"
@@ -78,7 +78,7 @@ TEST(BeforeHello, AFloodLeavesRoomForOthers) {
   const Rig rig;
   std::vector<std::unique_ptr<RawClient>> flood;
   RawClient early{connected_from("127.0.0.2", rig.tcp_port())};
-  for (std::size_t i = 0; i < 3 * Hub::kMaxStrangers; ++i) {
+  for (std::size_t i = 0; i < 3 * Guests::kMaxStrangers; ++i) {
     flood.push_back(std::make_unique<RawClient>(rig.tcp_port()));
   }
   // One who came before, from elsewhere, has kept its place.
@@ -93,7 +93,7 @@ TEST(BeforeHello, AFloodFromEverywhereTakesTheOldestOnesPlace) {
   const Rig rig;
   RawClient oldest{connected_from("127.0.9.9", rig.tcp_port())};
   std::vector<std::unique_ptr<RawClient>> flood;
-  for (std::size_t i = 0; i < Hub::kMaxStrangers; ++i) {
+  for (std::size_t i = 0; i < Guests::kMaxStrangers; ++i) {
     const std::string from = "127.0.0." + std::to_string(i + 2);
     flood.push_back(std::make_unique<RawClient>(connected_from(from.c_str(), rig.tcp_port())));
   }

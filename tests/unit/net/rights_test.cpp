@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "daemon/net/security.hpp"
+#include "daemon/serve/security.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/calibration/sample.hpp"
 #include "tests/unit/net/raw_client.hpp"

@@ -1,4 +1,4 @@
-#include "daemon/net/subscription.hpp"
+#include "daemon/serve/subscription.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -229,6 +229,38 @@ TEST(Subscription, DoesNotSupportUnknownEncodings) {
   request.set_depth(v1::DEPTH_NONE);
   request.set_luma(static_cast<v1::LumaEncoding>(9));
   expect_refused(request, v1::ERROR_UNSUPPORTED, "subscribe.luma");
+}
+
+TEST(Subscription, EachProgramServesItsOwnParts) {
+  v1::Subscribe points;
+  points.set_cloud(v1::CLOUD_INT16);
+  points.set_cloud_hz(30);
+  points.set_pose(true);
+  points.set_contact_box(true);
+  points.set_decimation(2);
+  const auto of_perceive = Subscription::from(points, 1, {}, Serves::geometry);
+  ASSERT_TRUE(std::holds_alternative<Subscription>(of_perceive));
+  const auto& made = std::get<Subscription>(of_perceive);
+  EXPECT_EQ(made.parts(), Subscription::kCloud | Subscription::kPose);
+  const FrameKind cloud = made.kind(Subscription::kCloud);
+  EXPECT_EQ(cloud.cloud, v1::CLOUD_INT16);
+  EXPECT_TRUE(cloud.contact_box);
+  EXPECT_EQ(cloud.spec.decimation, 2);
+  EXPECT_FALSE(cloud.pose);
+  EXPECT_TRUE(made.kind(Subscription::kPose).pose);
+  EXPECT_EQ(made.kind(Subscription::kPose).cloud, 0);
+  const auto code_of = [](const v1::Subscribe& request, Serves serves) {
+    const auto from = Subscription::from(request, 1, {}, serves);
+    const auto* refusal = std::get_if<Refusal>(&from);
+    return refusal == nullptr ? 0 : refusal->code;
+  };
+  EXPECT_EQ(code_of(points, Serves::images), v1::ERROR_UNSUPPORTED);
+  v1::Subscribe depth;
+  depth.set_depth(v1::DEPTH_INT16);
+  EXPECT_EQ(code_of(depth, Serves::images), 0);
+  EXPECT_EQ(code_of(depth, Serves::geometry), v1::ERROR_UNSUPPORTED);
+  points.set_cloud_hz(2000);
+  EXPECT_EQ(code_of(points, Serves::geometry), v1::ERROR_INVALID);
 }
 
 }  // namespace

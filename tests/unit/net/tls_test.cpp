@@ -1,4 +1,4 @@
-#include "daemon/net/tls.hpp"
+#include "daemon/serve/tls.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

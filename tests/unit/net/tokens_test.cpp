@@ -1,4 +1,4 @@
-#include "daemon/net/tokens.hpp"
+#include "daemon/serve/tokens.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "daemon/net/private_file.hpp"
+#include "daemon/serve/private_file.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/calibration/sample.hpp"
 

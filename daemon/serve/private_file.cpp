@@ -1,4 +1,4 @@
-#include "daemon/net/private_file.hpp"
+#include "daemon/serve/private_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-#include "daemon/net/tcp_watch.hpp"
+#include "daemon/serve/tcp_watch.hpp"
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>

@@ -7,8 +7,8 @@
 #include <memory>
 #include <string>
 
-#include "daemon/net/net_config.hpp"
-#include "daemon/net/transport.hpp"
+#include "daemon/serve/net_config.hpp"
+#include "daemon/serve/transport.hpp"
 
 namespace dtact::net {
 

@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <span>
 #include <string>
 
 #include "proto/defaults.hpp"
+#include "proto/features.hpp"
 
 namespace dtact::net {
 
@@ -44,6 +46,8 @@ struct NetConfig {
   std::string name;                        ///< The daemon's own, in the handshake and status.
   std::string program = "dtactd";          ///< "dtactd 0.1.0": in the handshake.
   std::string version;                     ///< "0.1.0": in status.
+  /// HelloReply.features: of what lives as long as the program.
+  std::span<const char* const> features = wire::kFeatures;
   std::chrono::milliseconds hello_timeout{5000};  ///< A client silent for so long is let go.
   /// A peer whose machine has not answered for so long is dead: a pulled cable. One that answers
   /// and only does not read is not.

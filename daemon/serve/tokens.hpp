@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/net/rights.hpp"
+#include "daemon/serve/rights.hpp"
 
 namespace dtact::net {
 

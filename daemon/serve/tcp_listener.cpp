@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "daemon/net/accept_loop.hpp"
-#include "daemon/net/listener.hpp"
+#include "daemon/serve/accept_loop.hpp"
+#include "daemon/serve/listener.hpp"
 
 namespace dtact::net {
 namespace {

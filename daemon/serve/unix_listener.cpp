@@ -11,8 +11,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "daemon/net/accept_loop.hpp"
-#include "daemon/net/listener.hpp"
+#include "daemon/serve/accept_loop.hpp"
+#include "daemon/serve/listener.hpp"
 #include "hal/base/unique_fd.hpp"
 
 namespace dtact::net {

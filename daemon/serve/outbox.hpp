@@ -6,8 +6,8 @@
 #include <memory>
 #include <string>
 
-#include "daemon/net/frame_encoder.hpp"
-#include "daemon/net/transport.hpp"
+#include "daemon/serve/encoded_frame.hpp"
+#include "daemon/serve/transport.hpp"
 
 namespace dtact::v1 {
 class ServerMessage;

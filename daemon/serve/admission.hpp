@@ -6,10 +6,10 @@
 #include <string>
 #include <utility>
 
-#include "daemon/net/net_config.hpp"
-#include "daemon/net/rights.hpp"
-#include "daemon/net/tokens.hpp"
-#include "daemon/net/transport.hpp"
+#include "daemon/serve/net_config.hpp"
+#include "daemon/serve/rights.hpp"
+#include "daemon/serve/tokens.hpp"
+#include "daemon/serve/transport.hpp"
 
 namespace dtact::net {
 

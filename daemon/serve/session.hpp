@@ -7,13 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "daemon/net/admission.hpp"
-#include "daemon/net/frame_encoder.hpp"
-#include "daemon/net/net_config.hpp"
-#include "daemon/net/outbox.hpp"
-#include "daemon/net/subscription.hpp"
-#include "daemon/net/token_bucket.hpp"
-#include "daemon/net/transport.hpp"
+#include "daemon/serve/admission.hpp"
+#include "daemon/serve/encoded_frame.hpp"
+#include "daemon/serve/frame_kind.hpp"
+#include "daemon/serve/net_config.hpp"
+#include "daemon/serve/outbox.hpp"
+#include "daemon/serve/subscription.hpp"
+#include "daemon/serve/token_bucket.hpp"
+#include "daemon/serve/transport.hpp"
 #include "proto/framing.hpp"
 
 namespace dtact::v1 {

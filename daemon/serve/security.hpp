@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "daemon/net/net_config.hpp"
+#include "daemon/serve/net_config.hpp"
 
 namespace dtact::net {
 

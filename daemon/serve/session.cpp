@@ -1,4 +1,4 @@
-#include "daemon/net/session.hpp"
+#include "daemon/serve/session.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "proto/dtact.pb.h"
-#include "proto/features.hpp"
 
 namespace dtact::net {
 namespace {
@@ -206,7 +205,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   reply.set_major(wire::kMajor);
   reply.set_minor(wire::kMinor);
   reply.set_program(config_.program);
-  for (const char* feature : wire::kFeatures) reply.add_features(feature);
+  for (const char* feature : config_.features) reply.add_features(feature);
   reply.set_rights(static_cast<v1::Rights>(*rights_));
   reply.set_name(config_.name);
   auto& frame = *reply.mutable_surface_frame();

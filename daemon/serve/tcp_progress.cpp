@@ -1,4 +1,4 @@
-#include "daemon/net/tcp_progress.hpp"
+#include "daemon/serve/tcp_progress.hpp"
 
 // The kernel's header, whose tcp_info tells more than the C library's. The two cannot be included
 // together, and Asio includes the other.

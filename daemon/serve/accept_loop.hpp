@@ -10,7 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "daemon/net/net_config.hpp"
+#include "daemon/serve/net_config.hpp"
 
 namespace dtact::net {
 

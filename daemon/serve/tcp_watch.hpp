@@ -7,7 +7,7 @@
 #include <functional>
 #include <memory>
 
-#include "daemon/net/tcp_progress.hpp"
+#include "daemon/serve/tcp_progress.hpp"
 
 namespace dtact::net {
 

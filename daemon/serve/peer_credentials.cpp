@@ -1,4 +1,4 @@
-#include "daemon/net/peer_credentials.hpp"
+#include "daemon/serve/peer_credentials.hpp"
 
 #include <fmt/format.h>
 #include <sys/socket.h>

@@ -1,4 +1,4 @@
-#include "daemon/net/transport.hpp"
+#include "daemon/serve/transport.hpp"
 
 #include <fmt/format.h>
 #include <netinet/in.h>
@@ -10,8 +10,8 @@
 #include <boost/asio/write.hpp>
 #include <utility>
 
-#include "daemon/net/peer_credentials.hpp"
-#include "daemon/net/tcp_watch.hpp"
+#include "daemon/serve/peer_credentials.hpp"
+#include "daemon/serve/tcp_watch.hpp"
 
 namespace dtact::net {
 namespace {

@@ -1,8 +1,8 @@
-#include "daemon/net/admission.hpp"
+#include "daemon/serve/admission.hpp"
 
 #include <fmt/format.h>
 
-#include "daemon/net/private_file.hpp"
+#include "daemon/serve/private_file.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {

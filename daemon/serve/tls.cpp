@@ -1,4 +1,4 @@
-#include "daemon/net/tls.hpp"
+#include "daemon/serve/tls.hpp"
 
 #include <fmt/format.h>
 #include <openssl/err.h>
@@ -10,7 +10,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "daemon/net/private_file.hpp"
+#include "daemon/serve/private_file.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "proto/fingerprint.hpp"
 

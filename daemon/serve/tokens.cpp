@@ -1,4 +1,4 @@
-#include "daemon/net/tokens.hpp"
+#include "daemon/serve/tokens.hpp"
 
 #include <fmt/format.h>
 #include <openssl/crypto.h>

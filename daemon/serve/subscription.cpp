@@ -1,4 +1,4 @@
-#include "daemon/net/subscription.hpp"
+#include "daemon/serve/subscription.hpp"
 
 #include <fmt/format.h>
 
@@ -33,11 +33,35 @@ std::optional<Refusal> check_encodings(const v1::Subscribe& request) {
   return std::nullopt;
 }
 
+std::optional<Refusal> check_parts(const v1::Subscribe& request, Serves serves) {
+  const bool images =
+      request.depth() != v1::DEPTH_NONE || request.luma() != v1::LUMA_NONE || request.jpeg();
+  const bool geometry = request.cloud() != v1::CLOUD_NONE || request.pose();
+  if (serves == Serves::images && geometry) {
+    return Refusal{v1::ERROR_UNSUPPORTED,
+                   "subscribe.cloud and subscribe.pose: dtactd makes neither; connect to the "
+                   "dtact-perceive that runs beside it, port 7378 unless configured"};
+  }
+  if (serves == Serves::geometry && images) {
+    return Refusal{v1::ERROR_UNSUPPORTED,
+                   "subscribe.depth, luma and jpeg: dtact-perceive passes none on; subscribe to "
+                   "them at dtactd itself"};
+  }
+  if (!v1::CloudEncoding_IsValid(request.cloud())) {
+    return Refusal{v1::ERROR_UNSUPPORTED,
+                   fmt::format("subscribe.cloud: encoding {} is not known: update dtact-perceive",
+                               static_cast<int>(request.cloud()))};
+  }
+  return std::nullopt;
+}
+
 std::optional<Refusal> check_rates(const v1::Subscribe& request) {
-  const std::array<std::pair<const char*, double>, 4> rates{{{"depth_hz", request.depth_hz()},
+  const std::array<std::pair<const char*, double>, 6> rates{{{"depth_hz", request.depth_hz()},
                                                              {"luma_hz", request.luma_hz()},
                                                              {"jpeg_hz", request.jpeg_hz()},
-                                                             {"summary_hz", request.summary_hz()}}};
+                                                             {"summary_hz", request.summary_hz()},
+                                                             {"cloud_hz", request.cloud_hz()},
+                                                             {"pose_hz", request.pose_hz()}}};
   for (const auto& [name, hz] : rates) {
     // Not by what is outside, since that is false of NaN.
     if (hz == 0 || (hz >= 0.01 && hz <= 1000)) continue;
@@ -93,9 +117,10 @@ bool RateLimit::admits(std::int64_t timestamp_ns, std::int64_t spacing_ns) noexc
 }
 
 std::variant<Subscription, Refusal> Subscription::from(const v1::Subscribe& request,
-                                                       std::uint32_t minor, Map map) {
-  for (const auto& refusal :
-       {check_encodings(request), check_rates(request), check_map(request, map)}) {
+                                                       std::uint32_t minor, Map map,
+                                                       Serves serves) {
+  for (const auto& refusal : {check_parts(request, serves), check_encodings(request),
+                              check_rates(request), check_map(request, map)}) {
     if (refusal) return *refusal;
   }
   Subscription made;
@@ -104,7 +129,9 @@ std::variant<Subscription, Refusal> Subscription::from(const v1::Subscribe& requ
                          .um_per_unit = std::max(1, static_cast<int>(request.um_per_unit()))},
                 .contact_box = request.contact_box(),
                 .luma = request.luma(),
-                .jpeg = request.jpeg()};
+                .jpeg = request.jpeg(),
+                .cloud = request.cloud(),
+                .pose = request.pose()};
   if (request.has_box()) {
     const auto& box = request.box();
     made.kind_.spec.region = DepthRegion{box.x(), box.y(), box.width(), box.height()};
@@ -120,6 +147,8 @@ std::variant<Subscription, Refusal> Subscription::from(const v1::Subscribe& requ
   ask(maps && request.depth() != v1::DEPTH_NONE, kDepth, made.depth_, request.depth_hz());
   ask(maps && request.luma() != v1::LUMA_NONE, kLuma, made.luma_, request.luma_hz());
   ask(request.jpeg(), kJpeg, made.jpeg_, request.jpeg_hz());
+  ask(request.cloud() != v1::CLOUD_NONE, kCloud, made.cloud_, request.cloud_hz());
+  ask(request.pose(), kPose, made.pose_, request.pose_hz());
   ask(request.summary(), kSummary, made.summary_, request.summary_hz());
   made.every_ = std::max(1U, request.every());
   made.events_ = !request.has_events() || request.events();
@@ -146,18 +175,22 @@ Subscription::Due Subscription::next(std::int64_t timestamp_ns, std::uint64_t mi
   ask(kDepth, depth_);
   ask(kLuma, luma_);
   ask(kJpeg, jpeg_);
+  ask(kCloud, cloud_);
+  ask(kPose, pose_);
   return due;
 }
 
 FrameKind Subscription::kind(Parts parts) const {
   FrameKind kind;
-  if ((parts & kDepth) != 0) {
-    kind.depth = kind_.depth;
+  if ((parts & (kDepth | kCloud)) != 0) {
+    if ((parts & kDepth) != 0) kind.depth = kind_.depth;
+    if ((parts & kCloud) != 0) kind.cloud = kind_.cloud;
     kind.spec = kind_.spec;
     kind.contact_box = kind_.contact_box;
   }
   if ((parts & kLuma) != 0) kind.luma = kind_.luma;
   kind.jpeg = (parts & kJpeg) != 0;
+  kind.pose = (parts & kPose) != 0;
   return kind;
 }
 

@@ -1,4 +1,4 @@
-#include "daemon/net/security.hpp"
+#include "daemon/serve/security.hpp"
 
 #include <fmt/format.h>
 

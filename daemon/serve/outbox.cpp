@@ -1,4 +1,4 @@
-#include "daemon/net/outbox.hpp"
+#include "daemon/serve/outbox.hpp"
 
 #include <fmt/format.h>
 

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <variant>
 
-#include "daemon/net/frame_encoder.hpp"
-#include "daemon/net/refusal.hpp"
+#include "daemon/serve/frame_kind.hpp"
+#include "daemon/serve/refusal.hpp"
 
 namespace dtact::v1 {
 class Subscribe;
@@ -30,6 +30,12 @@ class RateLimit {
   std::int64_t next_ns_ = INT64_MIN;
 };
 
+/// Which parts a program has besides the summary; the other ones are refused.
+enum class Serves : std::uint8_t {
+  images,   ///< Depth, luma and JPEG: dtactd.
+  geometry  ///< Point clouds and poses: dtact-perceive.
+};
+
 /// What a client wants and when it is due, see dtact.v1.Subscribe.
 class Subscription {
  public:
@@ -42,7 +48,8 @@ class Subscription {
     std::uint32_t height = 0;
   };
   [[nodiscard]] static std::variant<Subscription, Refusal> from(const v1::Subscribe& request,
-                                                                std::uint32_t minor, Map map);
+                                                                std::uint32_t minor, Map map,
+                                                                Serves serves = Serves::images);
 
   /// Parts of a frame message. A set of bits.
   using Parts = std::uint8_t;
@@ -50,6 +57,8 @@ class Subscription {
   static constexpr Parts kDepth = 2;
   static constexpr Parts kLuma = 4;
   static constexpr Parts kJpeg = 8;
+  static constexpr Parts kCloud = 16;
+  static constexpr Parts kPose = 32;
 
   struct Due {
     Parts parts = 0;           ///< 0: no message.
@@ -72,6 +81,8 @@ class Subscription {
   RateLimit depth_;
   RateLimit luma_;
   RateLimit jpeg_;
+  RateLimit cloud_;
+  RateLimit pose_;
   bool events_ = true;
   bool unlimited_ = false;     ///< One part at least comes with every frame that `every_` leaves.
   std::uint64_t offered_ = 0;  ///< Frames of the pipeline, for `every_`.

@@ -5,8 +5,8 @@
 #include <memory>
 #include <utility>
 
-#include "daemon/net/net_config.hpp"
-#include "daemon/net/token_bucket.hpp"
+#include "daemon/serve/net_config.hpp"
+#include "daemon/serve/token_bucket.hpp"
 
 namespace dtact::net {
 

@@ -1,0 +1,90 @@
+#include "daemon/serve/entrance.hpp"
+
+#include <fmt/format.h>
+
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "daemon/serve/limited_log.hpp"
+
+namespace dtact::net {
+namespace {
+
+std::unique_ptr<Tls> make_tls(const NetConfig& config) {
+  if (config.tls_certificate.empty()) return nullptr;
+  return std::make_unique<Tls>(config.tls_certificate, config.tls_key);
+}
+
+NetConfig checked(NetConfig config) {
+  check_security(config);
+  if (is_insecure(config)) {
+    config.log(
+        {LogLevel::warning,
+         fmt::format("net.insecure: whoever can reach {} may {} the sensor, since there is no "
+                     "{}",
+                     config.address, config.token_file.empty() ? "watch and command" : "watch",
+                     config.token_file.empty() ? "token" : "TLS to keep a token secret")});
+  }
+  config.log = limited(std::move(config.log));
+  return config;
+}
+
+}  // namespace
+
+Entrance::Entrance(boost::asio::io_context& io, NetConfig settings)
+    : config_(checked(std::move(settings))), tls_(make_tls(config_)), admission_(config_) {
+  const auto admit = [this](std::unique_ptr<Transport> transport) {
+    admit_(std::make_shared<Session>(std::move(transport), config_, admission_, host_));
+  };
+  const bool token = !config_.token_file.empty();
+  if (!config_.unix_socket.empty()) {
+    listeners_.push_back(listen_unix(io, config_, admit));
+    endpoints_.push_back({listeners_.back()->address(), false, token, false, ""});
+  }
+  if (!config_.address.empty()) {
+    listeners_.push_back(listen_tcp(io, config_, tls_ ? &tls_->context : nullptr, admit));
+    endpoints_.push_back({listeners_.back()->address(), tls_ != nullptr, token,
+                          is_insecure(config_), tls_ ? tls_->fingerprint : ""});
+  }
+  if (listeners_.empty()) {
+    throw std::runtime_error(
+        "net.address and net.unix_socket are empty, so that nobody could connect: set one");
+  }
+}
+
+void Entrance::open(std::weak_ptr<SessionHost> host,
+                    std::function<void(const std::shared_ptr<Session>&)> admit) {
+  host_ = std::move(host);
+  admit_ = std::move(admit);
+  for (const auto& listener : listeners_) listener->start();
+}
+
+void Entrance::close() {
+  for (const auto& listener : listeners_) listener->stop();
+}
+
+void Entrance::reload(const NetConfig& fresh) {
+  std::unique_ptr<Tls> new_tls = make_tls(fresh);
+  std::optional<Tokens> new_tokens = read_tokens(fresh);
+  // From here on nothing fails.
+  if (tls_ && new_tls) {
+    *tls_ = std::move(*new_tls);  // where it is, since the listener knows its place
+    endpoints_.back().fingerprint = tls_->fingerprint;  // TCP is the last
+  }
+  admission_.set_tokens(std::move(new_tokens));
+  config_.max_clients = fresh.max_clients;
+  config_.max_clients_per_address = fresh.max_clients_per_address;
+  config_.max_requests_per_s = fresh.max_requests_per_s;
+  config_.hello_timeout = fresh.hello_timeout;
+}
+
+std::vector<std::string> Entrance::addresses() const {
+  std::vector<std::string> all;
+  for (const auto& listener : listeners_) all.push_back(listener->address());
+  return all;
+}
+
+std::uint16_t Entrance::port() const { return listeners_.back()->port(); }
+
+}  // namespace dtact::net
