@@ -35,10 +35,12 @@ FILES = {
         /usr/share/zsh/vendor-completions/_dtactd""",
     "dtact-tools": """
         /usr/bin/dtact-calibrate
+        /usr/bin/dtact-perceive
         /usr/bin/dtactctl
         /usr/share/bash-completion/completions/dtact-calibrate
         /usr/share/bash-completion/completions/dtactctl
         /usr/share/man/man1/dtact-calibrate.1.gz
+        /usr/share/man/man1/dtact-perceive.1.gz
         /usr/share/man/man1/dtactctl.1.gz
         /usr/share/zsh/vendor-completions/_dtact-calibrate
         /usr/share/zsh/vendor-completions/_dtactctl

@@ -2,6 +2,7 @@
 
 #include "clients/calibrate/calibrate.hpp"
 #include "clients/ctl/ctl.hpp"
+#include "clients/perceive/perceive.hpp"
 #include "daemon/app/options.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/manual/pages.hpp"
@@ -15,6 +16,7 @@ const PageName kDtactd{"dtactd", 8};
 const PageName kConfig{"dtactd.toml", 5};
 const PageName kCtl{"dtactctl", 1};
 const PageName kCalibrate{"dtact-calibrate", 1};
+const PageName kPerceive{"dtact-perceive", 1};
 
 }  // namespace
 
@@ -40,10 +42,18 @@ Command dtact_calibrate() {
   return describe(app);
 }
 
+Command dtact_perceive() {
+  cli::Context context{{}, false, std::cout};
+  CLI::App app;
+  perceive::set_up(app, context);
+  return describe(app);
+}
+
 std::vector<File> all_files(const std::filesystem::path& root) {
   const Command daemon = dtactd();
   const Command ctl = dtactctl();
   const Command calibrate = dtact_calibrate();
+  const Command perceive = dtact_perceive();
   const PageNotes of_daemon{
       8,
       "System Administration",
@@ -59,6 +69,7 @@ std::vector<File> all_files(const std::filesystem::path& root) {
       {kConfig, kCtl, kCalibrate, {"systemctl", 1}, {"journalctl", 1}}};
   const PageNotes of_ctl{1, kUserCommands, {}, {kCalibrate, kDtactd, kConfig}};
   const PageNotes of_calibrate{1, kUserCommands, {}, {kCtl, kDtactd, kConfig}};
+  const PageNotes of_perceive{1, kUserCommands, {}, {kDtactd, kCtl}};
 
   // As clients/ctl/hand_over.cpp has it.
   const std::string as_is = "words=(dtact-calibrate $words); (( CURRENT++ )); _dtact-calibrate";
@@ -74,6 +85,7 @@ std::vector<File> all_files(const std::filesystem::path& root) {
       {"daemon/dtactd.8", program_page(daemon, of_daemon)},
       {"clients/ctl/dtactctl.1", program_page(ctl, of_ctl)},
       {"clients/calibrate/dtact-calibrate.1", program_page(calibrate, of_calibrate)},
+      {"clients/perceive/dtact-perceive.1", program_page(perceive, of_perceive)},
       {"config/dtactd.toml.5", config_page(base::read_file(root / "config/dtactd.toml"))},
       {"daemon/dtactd.zsh-completion", zsh_completion(daemon, {})},
       {"clients/ctl/dtactctl.zsh-completion", zsh_completion(ctl, {{"calibrate", guided},

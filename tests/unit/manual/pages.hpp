@@ -37,6 +37,7 @@ struct PageNotes {
 [[nodiscard]] Command dtactd();
 [[nodiscard]] Command dtactctl();
 [[nodiscard]] Command dtact_calibrate();
+[[nodiscard]] Command dtact_perceive();
 
 /// A file that is made, by its path in the tree.
 struct File {

@@ -57,6 +57,8 @@ ROOMS = {
     # Contacts of pictures and of recordings.
     "clients/calibrate/force": ["hal/base", "hal/image", "hal/mcap", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/offline", "clients/recording"],
     "clients/calibrate": ["clients/common", "clients/cpp", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
+    # A client and a server: what serves the wire is the daemon's own.
+    "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/perceive/geometry", "clients/perceive/pose"],
     # A daemon's administration: neither a fit nor OpenCV.
     "clients/ctl": ["hal/base", "hal/image", "hal/mcap", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
 }

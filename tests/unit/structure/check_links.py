@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks what the programs link: check_links.py DTACTD DTACTCTL DTACT_CALIBRATE
+"""Checks what the programs link: check_links.py DTACTD DTACTCTL DTACT_CALIBRATE DTACT_PERCEIVE
 
 The libraries named by the program itself count (DT_NEEDED), not what those bring along.
 """
@@ -19,6 +19,9 @@ RULES = {
                  FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
     "dtact-calibrate": (["core", "imgproc", "calib3d"],
                         ["systemd", "gpiod", "camera", "spdlog"], []),
+    # Depth it is given.
+    "dtact-perceive": ([], ["tomlplusplus", "systemd", "gpiod", "camera", "spdlog"],
+                       FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
 }
 
 

@@ -38,6 +38,7 @@ from .event import (
     StateEvent,
 )
 from .frame import Frame
+from .geometry import ObjectPose, PointCloud
 from .mcap import read
 from .recording import Recording
 from .subscription import Subscription
@@ -60,7 +61,7 @@ __all__ = [
     "Busy", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Camera", "Client",
     "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "EndedByDaemon",
     "Error", "Event", "Frame", "IdentityError", "Invalid", "Light", "LightEvent", "NoFrame",
-    "NotInFrame", "Pong", "ProtocolError", "Reconnected", "Recording", "ReferenceEvent",
+    "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Reconnected", "Recording", "ReferenceEvent",
     "ReferenceImage", "Refused", "Server", "StateEvent", "Status", "StorageFailed",
     "StoredCalibration", "Subscription", "TimeoutError", "Touched", "Uncalibrated", "Unsupported",
     "aio", "connect", "read",

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .encodings import depth_values
 from .errors import NotInFrame, ProtocolError
+from .geometry import ObjectPose, PointCloud
 from .messages import Message, name_of
 from .values import Contact, Light, condition_names, wall_time
 
@@ -137,6 +138,26 @@ class Frame:
             raise NotInFrame(f"frame {self.sequence} has no JPEG: either Subscription(jpeg=True) was "
                              "not asked for, or the camera delivers another format")
         return bytes(self.message.jpeg.data)
+
+    # ------------------------------------------------------------ of dtact-perceive
+
+    @property
+    def has_cloud(self) -> bool:
+        """Whether it holds points: not when none were subscribed or nothing touches."""
+        return bool(self.message.HasField("cloud"))
+
+    @cached_property
+    def cloud(self) -> PointCloud:
+        """The deformed surface as points. NotInFrame without them."""
+        if not self.has_cloud:
+            raise NotInFrame(f"frame {self.sequence} has no point cloud: either nothing touches, or "
+                             "Subscription(cloud=...) was not asked for; dtact-perceive makes them")
+        return PointCloud.of(self.message.cloud)
+
+    @cached_property
+    def pose(self) -> ObjectPose | None:
+        """How the touched object has moved; None when it was not subscribed or nothing touches."""
+        return ObjectPose.of(self.message.pose) if self.message.HasField("pose") else None
 
     # ------------------------------------------------------------ what was measured
 

@@ -38,12 +38,21 @@ class Subscription:
     #: "contact": the box around what is pressed, and no map while nothing is.
     region: tuple[int, int, int, int] | Literal["contact"] | None = None
     events: bool = True
+    #: Points of the surface while something touches, of dtact-perceive, which has no depth: "float32",
+    #: or half as large "int16". `decimation` and `region` say which.
+    cloud: Literal["float32", "int16"] | None = None
+    cloud_hz: float = 0.0
+    pose: bool = False  #: how the touched object moves, of dtact-perceive
+    pose_hz: float = 0.0
 
     def needs(self) -> frozenset[str]:
         """The features that a daemon has to have for it."""
         asked = {
             "jpeg": self.jpeg,
-            "rates": any((self.depth_hz, self.luma_hz, self.jpeg_hz, self.summary_hz)),
+            "rates": any((self.depth_hz, self.luma_hz, self.jpeg_hz, self.summary_hz,
+                          self.cloud_hz, self.pose_hz)),
+            "cloud": self.cloud is not None,
+            "pose": self.pose,
             "decimation": self.decimation not in (0, 1),
             "units": self.um_per_unit not in (0, 1),
             "region": self.region is not None,
@@ -78,6 +87,13 @@ class Subscription:
             box.x, box.y, box.width, box.height = self.region
         if not self.events:
             request.events = False
+        if self.cloud is not None:
+            if self.cloud not in ("float32", "int16"):
+                raise ValueError(f'"{self.cloud}" is no encoding of points: "float32" or "int16"')
+            request.cloud = value_of(f"CLOUD_{self.cloud.upper()}")
+        request.cloud_hz = self.cloud_hz
+        request.pose = self.pose
+        request.pose_hz = self.pose_hz
         return request
 
     def _constant(self, features: AbstractSet[str], same_machine: bool) -> str:

@@ -1,0 +1,91 @@
+#include "clients/perceive/depth_part.hpp"
+
+#include <algorithm>
+
+#include "clients/cpp/maps.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::perceive {
+
+recon::Surface surface_of(const v1::Surface& surface) {
+  using Kind = recon::Surface::Kind;
+  recon::Surface made;
+  if (surface.shape() == v1::Surface::PLANE) return made;
+  made.kind = surface.shape() == v1::Surface::SPHERE ? Kind::sphere : Kind::cylinder;
+  made.radius_mm = surface.radius_mm();
+  made.axis_deg = surface.axis_deg();
+  made.air_mm = surface.air_mm();
+  made.gel_mm = surface.gel_mm();
+  made.refraction = surface.refraction();
+  return made;
+}
+
+DepthPart::DepthPart(const v1::DepthMap& map)
+    : values_(client::values_of(map)),
+      whole_{.x = static_cast<int>(map.x()),
+             .y = static_cast<int>(map.y()),
+             .width = static_cast<int>(map.width()),
+             .height = static_cast<int>(map.height()),
+             // A daemon of 1.0 says neither.
+             .full_width = static_cast<int>(std::max(map.full_width(), map.width())),
+             .full_height = static_cast<int>(std::max(map.full_height(), map.height())),
+             .mm_per_px = map.mm_per_px(),
+             .um_per_unit = map.um_per_unit(),
+             .untrusted = map.untrusted_value(),
+             .values = values_},
+      decimation_(std::max(1, static_cast<int>(map.decimation()))) {}
+
+std::optional<DepthGrid> DepthPart::crop(int left, int top, int right, int bottom) {
+  left = std::max(left, whole_.x);
+  top = std::max(top, whole_.y);
+  right = std::min(right, whole_.x + whole_.width);
+  bottom = std::min(bottom, whole_.y + whole_.height);
+  if (left >= right || top >= bottom) return std::nullopt;
+  DepthGrid part = whole_;
+  part.x = left;
+  part.y = top;
+  part.width = right - left;
+  part.height = bottom - top;
+  cut_.clear();
+  for (int row = top; row < bottom; ++row) {
+    const auto* from =
+        values_.data() + std::ptrdiff_t{row - whole_.y} * whole_.width + (left - whole_.x);
+    cut_.insert(cut_.end(), from, from + part.width);
+  }
+  part.values = cut_;
+  return part;
+}
+
+std::optional<DepthGrid> DepthPart::cut(const net::DepthRegion& region) {
+  const auto begin = [this](std::uint32_t pixel) { return static_cast<int>(pixel) / decimation_; };
+  const auto end = [this](std::uint32_t pixel, std::uint32_t size) {
+    return static_cast<int>((std::uint64_t{pixel} + size + static_cast<unsigned>(decimation_) - 1) /
+                            static_cast<unsigned>(decimation_));
+  };
+  return crop(begin(region.x), begin(region.y), end(region.x, region.width),
+              end(region.y, region.height));
+}
+
+std::optional<DepthGrid> DepthPart::contact() {
+  const auto threshold = static_cast<int>(kContactUm / whole_.um_per_unit);
+  int left = whole_.width;
+  int right = -1;
+  int top = whole_.height;
+  int bottom = -1;
+  for (int row = 0; row < whole_.height; ++row) {
+    const auto* begin = values_.data() + std::ptrdiff_t{row} * whole_.width;
+    for (int column = 0; column < whole_.width; ++column) {
+      if (begin[column] <= threshold) continue;
+      left = std::min(left, column);
+      right = std::max(right, column);
+      top = std::min(top, row);
+      bottom = row;
+    }
+  }
+  if (bottom < 0) return std::nullopt;
+  const int margin = kMarginPx / decimation_;
+  return crop(whole_.x + left - margin, whole_.y + top - margin, whole_.x + right + 1 + margin,
+              whole_.y + bottom + 1 + margin);
+}
+
+}  // namespace dtact::perceive

@@ -1,0 +1,88 @@
+#include "clients/perceive/frame_maker.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+#include "clients/perceive/cloud_message.hpp"
+#include "clients/perceive/pose_message.hpp"
+#include "proto/framing.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+// Room for an envelope.
+constexpr std::size_t kMaxBody = wire::kMaxMessage - 256;
+
+/// Runs `work` and returns how long it took, nanoseconds.
+template <typename Work>
+std::uint32_t timed(Work work) {
+  const auto began = std::chrono::steady_clock::now();
+  work();
+  return static_cast<std::uint32_t>(
+      std::chrono::nanoseconds(std::chrono::steady_clock::now() - began).count());
+}
+
+}  // namespace
+
+void FrameMaker::begin(v1::Frame frame, bool pose) {
+  done_.clear();
+  depth_.reset();
+  pose_.reset();
+  frame_ = std::move(frame);
+  // Each client has its own count.
+  frame_.clear_dropped();
+  if (frame_.has_depth()) {
+    if (frame_.contact().touching()) depth_.emplace(frame_.depth());
+    const recon::Surface surface = surface_of(frame_.surface());
+    if (surface != clouds_.surface()) clouds_ = CloudMaker(surface);
+  }
+  // Motion on a curved surface is not followed: which pixel a point lies above is not known there.
+  const bool flat = clouds_.surface().kind == recon::Surface::Kind::plane;
+  const bool gone = frame_.has_contact() && !frame_.contact().touching();
+  if (!pose || !flat || gone) tracker_.release();
+  if (pose && flat && depth_) follow(frame_.depth().uncertainty_um());
+  frame_.clear_depth();
+}
+
+void FrameMaker::follow(double uncertainty_um) {
+  const std::optional<DepthGrid> grid = depth_->contact();
+  if (!grid) return;
+  const std::uint32_t took = timed([&] {
+    clouds_.make(*grid, 1, cloud_);
+    (void)tracker_.follow(ContactView(*grid, cloud_, uncertainty_um), frame_.sequence());
+  });
+  if (tracker_.pose().state == Tracker::State::idle) return;
+  fill(tracker_.pose(), pose_.emplace());
+  pose_->set_track_ns(took);
+}
+
+void FrameMaker::add_cloud(const net::FrameKind& kind, v1::PointCloud& out) {
+  std::optional<DepthGrid> grid = depth_->whole();
+  if (kind.contact_box) grid = depth_->contact();
+  if (kind.spec.region) grid = depth_->cut(*kind.spec.region);
+  if (!grid) return;
+  const int stride = std::max(1, kind.spec.decimation / depth_->decimation());
+  const std::uint32_t took = timed([&] { clouds_.make(*grid, stride, cloud_); });
+  fill(cloud_, kind.cloud, out);
+  out.set_decimation(static_cast<std::uint32_t>(stride * depth_->decimation()));
+  out.set_make_ns(took);
+}
+
+std::shared_ptr<const net::EncodedFrame> FrameMaker::make(const net::FrameKind& kind) {
+  const auto found = std::ranges::find(done_, kind, [](const auto& one) { return one.first; });
+  if (found != done_.end()) return found->second;
+  v1::Frame message = frame_;
+  if (kind.cloud != v1::CLOUD_NONE && depth_) add_cloud(kind, *message.mutable_cloud());
+  if (message.cloud().points() == 0) message.clear_cloud();
+  if (kind.pose && pose_) *message.mutable_pose() = *pose_;
+  auto encoded = std::make_shared<net::EncodedFrame>();
+  if (message.ByteSizeLong() > kMaxBody) {
+    encoded.reset();
+  } else {
+    message.SerializeToString(&encoded->body);
+  }
+  done_.emplace_back(kind, encoded);
+  return encoded;
+}
+
+}  // namespace dtact::perceive

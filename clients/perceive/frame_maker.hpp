@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "clients/perceive/depth_part.hpp"
+#include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/perceive/pose/tracker.hpp"
+#include "daemon/serve/encoded_frame.hpp"
+#include "daemon/serve/frame_kind.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::perceive {
+
+/// Makes of a frame of the daemon what each kind of subscription is sent: once for each kind, and
+/// nothing that nobody is due.
+class FrameMaker {
+ public:
+  /// Begins another frame; with `pose` the object's motion is followed. Throws
+  /// client::ProtocolError for a damaged map.
+  void begin(v1::Frame frame, bool pose);
+  /// The frame as `kind`; the same buffer when asked again. Null when it would exceed the wire's
+  /// cap.
+  [[nodiscard]] std::shared_ptr<const net::EncodedFrame> make(const net::FrameKind& kind);
+
+  [[nodiscard]] const v1::Frame& frame() const noexcept { return frame_; }
+
+ private:
+  void add_cloud(const net::FrameKind& kind, v1::PointCloud& out);
+  void follow(double uncertainty_um);
+
+  v1::Frame frame_;  ///< Without what is made here, and without the depth map.
+  std::optional<DepthPart> depth_;
+  CloudMaker clouds_;
+  PointCloud cloud_;
+  Tracker tracker_;
+  std::optional<v1::ObjectPose> pose_;
+  std::vector<std::pair<net::FrameKind, std::shared_ptr<const net::EncodedFrame>>> done_;
+};
+
+}  // namespace dtact::perceive

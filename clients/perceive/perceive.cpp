@@ -1,0 +1,87 @@
+#include "clients/perceive/perceive.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <memory>
+#include <ostream>
+#include <string>
+
+#include "clients/perceive/server.hpp"
+#include "clients/perceive/watch.hpp"
+#include "daemon/serve/net_config.hpp"
+#include "version.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+void serve(const cli::Context& context, net::NetConfig config) {
+  config.program = "dtact-perceive " DTACT_VERSION;
+  config.version = DTACT_VERSION;
+  config.features = wire::kPerceiveFeatures;
+  // A line each, for a terminal and for the journal alike.
+  config.log = [&out = context.out](const net::LogLine& line) { out << line.text << std::endl; };
+  boost::asio::io_context io;
+  const auto server = std::make_shared<Server>(io, config, context.target);
+  for (const std::string& address : server->addresses()) {
+    config.log({net::LogLevel::info, "listening on " + address});
+  }
+  boost::asio::signal_set signals(io, SIGINT, SIGTERM);
+  signals.async_wait([&](const auto& error, int) {
+    if (!error) server->stop();
+  });
+  server->start();
+  io.run();
+}
+
+void add_serve(CLI::App& app, cli::Context& context) {
+  auto* command = app.add_subcommand(
+      "serve", "Serve point clouds and poses of the daemon's frames, until Ctrl-C or SIGTERM");
+  const auto settings = std::make_shared<net::NetConfig>();
+  settings->port = wire::kPerceivePort;
+  command
+      ->add_option("--listen", settings->address,
+                   "Address to listen on; beyond this machine it needs TLS and tokens")
+      ->type_name("ADDRESS")
+      ->capture_default_str();
+  command->add_option("--listen-port", settings->port, "TCP port to listen on; 0: any free one")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 65535));
+  command
+      ->add_option("--unix-socket", settings->unix_socket,
+                   "A socket for clients on this machine, too")
+      ->type_name("FILE");
+  command
+      ->add_option(
+          "--tokens", settings->token_file,
+          "Every client needs one of these tokens: a file like the daemon's net.token_file")
+      ->type_name("FILE");
+  command
+      ->add_option("--tls-certificate", settings->tls_certificate,
+                   "Speak TLS only, with this certificate (PEM)")
+      ->type_name("FILE");
+  command->add_option("--tls-key", settings->tls_key, "The certificate's key (PEM)")
+      ->type_name("FILE");
+  command->callback([&context, settings] { serve(context, *settings); });
+}
+
+}  // namespace
+
+void set_up(CLI::App& app, cli::Context& context) {
+  app.name("dtact-perceive")
+      ->description(
+          "Makes point clouds of what a DTact tactile sensor touches, and follows how it moves: "
+          "from "
+          "the frames of dtactd, on the same wire, only while something touches.");
+  cli::add_global_options(app, context);
+  add_serve(app, context);
+  add_watch(app, context);
+}
+
+int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& error) {
+  CLI::App app;
+  cli::Context context{{}, false, out};
+  set_up(app, context);
+  return cli::run(app, arguments, out, error);
+}
+
+}  // namespace dtact::perceive

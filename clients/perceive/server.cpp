@@ -1,0 +1,159 @@
+#include "clients/perceive/server.hpp"
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <utility>
+
+#include "daemon/serve/who.hpp"
+#include "hal/base/clock.hpp"
+
+namespace dtact::perceive {
+
+namespace asio = boost::asio;
+using net::Subscription;
+
+Server::Server(asio::io_context& io, net::NetConfig config, client::Options daemon)
+    : io_(io), entrance_(io, std::move(config)), daemon_(std::move(daemon)) {}
+
+void Server::start() {
+  const auto weak = weak_from_this();
+  entrance_.open(weak, [this](const auto& session) { guests_.admit(session); });
+  const auto frame = [weak, &io = io_] {
+    asio::post(io, [weak] {
+      if (const auto self = weak.lock()) self->on_frame();
+    });
+  };
+  const auto notice = [weak, &io = io_](const std::string& sentence) {
+    asio::post(io, [weak, sentence] {
+      if (const auto self = weak.lock()) {
+        self->entrance_.config().log({net::LogLevel::info, sentence});
+      }
+    });
+  };
+  upstream_ = std::make_unique<Upstream>(daemon_, Upstream::Handlers{frame, notice});
+  update_want();
+}
+
+void Server::stop() {
+  entrance_.close();
+  guests_.dismiss("dtact-perceive ends");
+  upstream_.reset();
+}
+
+std::string Server::serial() const { return upstream_ ? upstream_->serial() : ""; }
+
+void Server::on_frame() {
+  if (!upstream_) return;
+  auto taken = upstream_->take();
+  if (!taken) return;
+  ++frames_;
+  skipped_ += taken->missed;
+  const std::int64_t timestamp_ns = taken->frame.monotonic_ns();
+  try {
+    maker_.begin(std::move(taken->frame), pose_wanted_);
+  } catch (const client::ProtocolError& e) {
+    return entrance_.config().log({net::LogLevel::warning, e.what()});
+  }
+  for (const auto& session : guests_.all()) {
+    const auto kind = session->due(timestamp_ns, taken->missed);
+    if (!kind) continue;
+    if (auto encoded = maker_.make(*kind)) session->send_frame(std::move(encoded));
+  }
+}
+
+/// What all clients together need of the daemon.
+void Server::update_want() {
+  v1::Subscribe wanted;
+  wanted.set_events(false);
+  bool contact = true;
+  int decimation = 4;
+  pose_wanted_ = false;
+  for (const auto& session : guests_.all()) {
+    if (!session->greeted()) continue;
+    const auto parts = session->subscription().parts();
+    if (parts != 0) wanted.set_summary(true);
+    if ((parts & Subscription::kPose) != 0) {
+      pose_wanted_ = true;
+      wanted.set_depth(v1::DEPTH_INT16);
+      decimation = 1;
+    }
+    if ((parts & Subscription::kCloud) == 0) continue;
+    const net::FrameKind kind = session->subscription().kind(Subscription::kCloud);
+    wanted.set_depth(v1::DEPTH_INT16);
+    contact = contact && kind.contact_box;
+    decimation = std::min(decimation, kind.spec.decimation);
+  }
+  if (wanted.depth() != v1::DEPTH_NONE) {
+    if (contact) wanted.set_contact_box(true);
+    if (decimation > 1) wanted.set_decimation(static_cast<std::uint32_t>(decimation));
+  }
+  if (upstream_ == nullptr || wanted.SerializeAsString() == wanted_.SerializeAsString()) return;
+  wanted_ = wanted;
+  upstream_->want(wanted);
+}
+
+void Server::subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
+                       const v1::Subscribe& request) {
+  const auto made =
+      Subscription::from(request, session->minor_version(), {}, net::Serves::geometry);
+  if (const auto* refusal = std::get_if<net::Refusal>(&made)) {
+    return session->reply_error(id, refusal->code, refusal->sentence);
+  }
+  session->subscribe(std::get<Subscription>(made));
+  update_want();
+  v1::ServerMessage message;
+  message.mutable_reply()->set_id(id);
+  message.mutable_reply()->mutable_done();
+  session->send(message);
+}
+
+void Server::on_request(const std::shared_ptr<net::Session>& session,
+                        const v1::ClientMessage& message) {
+  v1::ServerMessage answer;
+  answer.mutable_reply()->set_id(message.id());
+  switch (message.request_case()) {
+    case v1::ClientMessage::kSubscribe:
+      return subscribe(session, message.id(), message.subscribe());
+    case v1::ClientMessage::kGetStatus:
+      fill(*answer.mutable_reply()->mutable_status());
+      return session->send(answer);
+    case v1::ClientMessage::kPing: {
+      auto& pong = *answer.mutable_reply()->mutable_pong();
+      pong.set_monotonic_ns(base::system_clock().monotonic_ns());
+      pong.set_wall_ns(base::system_clock().wall_ns());
+      return session->send(answer, true);
+    }
+    default:
+      return session->reply_error(message.id(), v1::ERROR_UNSUPPORTED,
+                                  "dtact-perceive answers Subscribe, GetStatus and Ping alone: ask "
+                                  "dtactd itself for everything else");
+  }
+}
+
+void Server::fill(v1::Status& status) const {
+  const net::NetConfig& config = entrance_.config();
+  status.set_state(v1::STATE_SERVING);
+  status.set_version(config.version);
+  status.set_name(config.name);
+  status.set_serial(serial());
+  status.set_frames(frames_);
+  status.set_skipped(skipped_);
+  const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - start_;
+  status.set_uptime_s(uptime.count());
+  for (const auto& endpoint : entrance_.endpoints()) net::fill(endpoint, *status.add_endpoints());
+  for (const auto& session : guests_.all()) {
+    if (session->greeted()) net::fill(*session, *status.add_clients());
+  }
+}
+
+void Server::on_closed(const net::Session& session) {
+  // Later, since a session may end while the list is being walked through.
+  asio::post(io_, [weak = weak_from_this(), gone = &session] {
+    const auto self = weak.lock();
+    if (self == nullptr) return;
+    (void)self->guests_.release(gone);
+    self->update_want();
+  });
+}
+
+}  // namespace dtact::perceive

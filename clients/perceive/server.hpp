@@ -1,0 +1,57 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "clients/perceive/frame_maker.hpp"
+#include "clients/perceive/upstream.hpp"
+#include "daemon/serve/entrance.hpp"
+#include "daemon/serve/guests.hpp"
+
+namespace dtact::perceive {
+
+/// dtact-perceive as a whole: a client of the daemon, and a server of its own. All but the
+/// connection to the daemon is on the thread that runs `io`.
+class Server : public net::SessionHost, public std::enable_shared_from_this<Server> {
+ public:
+  /// Listens from here on. Throws std::runtime_error naming the setting, address or port and the
+  /// remedy.
+  Server(boost::asio::io_context& io, net::NetConfig config, client::Options daemon);
+
+  void start();
+  void stop();
+  [[nodiscard]] std::vector<std::string> addresses() const { return entrance_.addresses(); }
+  /// The TCP port it listens on; 0 without TCP.
+  [[nodiscard]] std::uint16_t port() const { return entrance_.port(); }
+
+  [[nodiscard]] std::string serial() const override;
+  void on_greeted() override { update_want(); }
+  void on_request(const std::shared_ptr<net::Session>& session,
+                  const v1::ClientMessage& message) override;
+  void on_closed(const net::Session& session) override;
+
+ private:
+  void on_frame();
+  void update_want();
+  void subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
+                 const v1::Subscribe& request);
+  void fill(v1::Status& status) const;
+
+  boost::asio::io_context& io_;
+  net::Entrance entrance_;
+  net::Guests guests_;
+  FrameMaker maker_;
+  std::unique_ptr<Upstream> upstream_;
+  client::Options daemon_;
+  v1::Subscribe wanted_;
+  bool pose_wanted_ = false;
+  std::uint64_t frames_ = 0;
+  std::uint64_t skipped_ = 0;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace dtact::perceive

@@ -1,0 +1,109 @@
+#include "clients/perceive/watch.hpp"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <memory>
+#include <ostream>
+#include <string>
+
+#include "clients/common/interruptible.hpp"
+#include "clients/common/json.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+v1::Subscribe wanted() {
+  v1::Subscribe subscription;
+  subscription.set_summary(true);
+  subscription.set_cloud(v1::CLOUD_INT16);
+  subscription.set_contact_box(true);
+  subscription.set_pose(true);
+  subscription.set_events(false);
+  return subscription;
+}
+
+const char* name_of(v1::ObjectPose::Tracking tracking) {
+  switch (tracking) {
+    case v1::ObjectPose::STARTED:
+      return "started";
+    case v1::ObjectPose::TRACKED:
+      return "tracked";
+    case v1::ObjectPose::LOST:
+      return "lost";
+    case v1::ObjectPose::RECOVERED:
+      return "recovered";
+    default:
+      return "unknown";
+  }
+}
+
+/// "58.1 fps  12,340 points in 0.21 ms  tracked: moved (1.02, 0.00, -0.10) mm, ...".
+std::string line_of(const v1::Frame& frame, double fps) {
+  std::string line = fmt::format("{:.1f} fps", fps);
+  if (!frame.contact().touching()) return line + "  nothing touches\n";
+  if (frame.has_cloud()) {
+    line += fmt::format("  {} points in {:.2f} ms", frame.cloud().points(),
+                        frame.cloud().make_ns() * 1e-6);
+  }
+  if (frame.has_pose()) {
+    const v1::ObjectPose& pose = frame.pose();
+    const auto& moved = pose.translation_mm();
+    const auto& turned = pose.rotation_deg();
+    line += fmt::format(
+        "  {}: moved ({:.2f}, {:.2f}, {:.2f}) mm, turned ({:.1f}, {:.1f}, {:.1f}) deg, {} of 6 "
+        "directions seen, {:.0f} um off, in {:.2f} ms",
+        name_of(pose.tracking()), moved.x(), moved.y(), moved.z(), turned.x(), turned.y(),
+        turned.z(), 6 - pose.unobservable_size(), pose.residual_um(), pose.track_ns() * 1e-6);
+  }
+  return line + "\n";
+}
+
+void watch(const cli::Context& context, double seconds) {
+  const cli::Interruptible interruptible;
+  client::Client client(context.target);
+  client.subscribe(wanted());
+  const auto start = Clock::now();
+  auto told = start;
+  int frames = 0;
+  while (!cli::Interruptible::happened()) {
+    const auto item = client.next(std::chrono::milliseconds(100));
+    const auto now = Clock::now();
+    if (seconds > 0 && now - start > std::chrono::duration<double>(seconds)) break;
+    const auto* frame = item ? std::get_if<v1::Frame>(&*item) : nullptr;
+    if (frame == nullptr) continue;
+    ++frames;
+    const std::chrono::duration<double> passed = now - told;
+    if (passed.count() < 1) continue;
+    if (context.json) {
+      v1::Frame shown = *frame;
+      if (shown.has_cloud()) shown.mutable_cloud()->clear_data();
+      context.out << cli::json_line(shown);
+    } else {
+      context.out << line_of(*frame, frames / passed.count());
+    }
+    context.out << std::flush;
+    told = now;
+    frames = 0;
+  }
+}
+
+}  // namespace
+
+void add_watch(CLI::App& app, cli::Context& context) {
+  auto* command = app.add_subcommand(
+      "watch",
+      "Show a running dtact-perceive's rate, points and pose, a line a second, until "
+      "Ctrl-C");
+  const auto seconds = std::make_shared<double>(0);
+  command->add_option("--seconds", *seconds, "End by itself after so long")
+      ->check(CLI::PositiveNumber);
+  command->callback([&app, &context, seconds] {
+    if (app.count("--port") == 0) context.target.port = wire::kPerceivePort;
+    watch(context, *seconds);
+  });
+}
+
+}  // namespace dtact::perceive

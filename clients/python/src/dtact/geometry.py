@@ -1,0 +1,94 @@
+"""What dtact-perceive adds to a frame: points, and how the touched object has moved."""
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ProtocolError
+from .messages import Message, name_of
+
+_PARTS = 6  # x, y, z and the normal's
+_HOLE = -32768
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """The deformed surface as points with outward normals, on the depth map's grid."""
+
+    points: NDArray[np.float32]  #: (H, W, 3) metres in the surface frame; NaN where there is none
+    normals: NDArray[np.float32]  #: (H, W, 3) of length 1; NaN where there is no point
+    decimation: int  #: one point of so many pixels of the calibration's resolution
+
+    @classmethod
+    def of(cls, m: Message) -> PointCloud:
+        """ProtocolError where the data do not fit the sizes."""
+        size = _PARTS * m.width * m.height
+        kind = {1: np.dtype("<f4"), 2: np.dtype("<i2")}.get(m.encoding)
+        if kind is None or len(m.data) != size * kind.itemsize:
+            raise ProtocolError("a point cloud of dtact-perceive is damaged or in an unknown encoding: "
+                                "install the same release on both sides")
+        parts = np.frombuffer(m.data, kind).reshape(_PARTS, m.height, m.width)
+        values = np.moveaxis(parts, 0, -1).astype(np.float32)
+        if m.encoding == 2:
+            values[values == _HOLE] = np.nan
+            values *= np.array([m.metres_per_unit] * 3 + [1 / 32767] * 3, np.float32)
+        return cls(values[..., :3], values[..., 3:], int(m.decimation) or 1)
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """(H, W): where there is a point."""
+        return np.asarray(~np.isnan(self.points[..., 2]))
+
+    def triangles(self) -> NDArray[np.int64]:
+        """The mesh: (N, 3) indices into `points.reshape(-1, 3)`, counter-clockwise as seen from
+        outside; two for each square of neighbours, as far as their points are there."""
+        height, width = self.points.shape[:2]
+        index = np.arange(height * width).reshape(height, width)
+        corner, right = index[:-1, :-1].ravel(), index[:-1, 1:].ravel()
+        below, across = index[1:, :-1].ravel(), index[1:, 1:].ravel()
+        all_of_them = np.concatenate([np.stack([corner, right, below], 1),
+                                      np.stack([right, across, below], 1)])
+        return np.asarray(all_of_them[self.valid.ravel()[all_of_them].all(1)])
+
+
+@dataclass(frozen=True)
+class ObjectPose:
+    """How the touched object has moved since the contact was made, in the surface frame: a point p
+    of it now lies at `matrix() @ (p, 1)`, in millimetres."""
+
+    tracking: str  #: "started", "tracked", "lost" (the last one is repeated) or "recovered"
+    since_sequence: int  #: the frame that it is measured from
+    translation_mm: NDArray[np.float64]
+    rotation_deg: NDArray[np.float64]  #: axis times angle
+    #: (N, 6) unit twists about `centre_mm` that the shape does not show: rotation times `arm_mm`,
+    #: then translation. Along them the motion is not known.
+    unobservable: NDArray[np.float64]
+    centre_mm: NDArray[np.float64]
+    arm_mm: float
+    residual_um: float  #: root mean square along the normals
+    points: int  #: that count
+
+    @classmethod
+    def of(cls, m: Message) -> ObjectPose:
+        def vector(v: Message) -> list[float]:
+            return [v.x, v.y, v.z]
+
+        hidden = [vector(t.rotation) + vector(t.translation) for t in m.unobservable]
+        return cls(name_of("ObjectPose.Tracking", m.tracking, ""), int(m.since_sequence),
+                   np.array(vector(m.translation_mm)), np.array(vector(m.rotation_deg)),
+                   np.array(hidden).reshape(-1, 6), np.array(vector(m.centre_mm)),
+                   float(m.arm_mm), float(m.residual_um), int(m.points))
+
+    def matrix(self) -> NDArray[np.float64]:
+        """4 × 4, millimetres."""
+        angle = np.radians(np.linalg.norm(self.rotation_deg))
+        made = np.eye(4)
+        if angle > 0:
+            x, y, z = np.radians(self.rotation_deg) / angle
+            cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            # Rodrigues' formula.
+            made[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+        made[:3, 3] = self.translation_mm
+        return made

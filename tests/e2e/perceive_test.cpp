@@ -1,0 +1,203 @@
+// dtact-perceive beside a daemon on the simulated sensor, against what was pressed in.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+
+#include "clients/perceive/server.hpp"
+#include "hal/base/atomic_file.hpp"
+#include "hal/sim/scene.hpp"
+#include "tests/e2e/sensor.hpp"
+
+namespace dtact::e2e {
+namespace {
+
+/// A server of the test's own, on a thread.
+class Perceive {
+ public:
+  explicit Perceive(const Sensor& sensor) {
+    client::Options daemon;
+    daemon.port = sensor.daemon->port();
+    net::NetConfig config;
+    config.port = 0;
+    config.features = wire::kPerceiveFeatures;
+    server_ = std::make_shared<perceive::Server>(io_, config, daemon);
+    server_->start();
+    thread_ = std::thread([this] { io_.run(); });
+  }
+  ~Perceive() {
+    boost::asio::post(io_, [this] { server_->stop(); });
+    thread_.join();
+  }
+  Perceive(const Perceive&) = delete;
+  Perceive& operator=(const Perceive&) = delete;
+
+  [[nodiscard]] client::Client connect() const {
+    client::Options options;
+    options.port = server_->port();
+    return client::Client(options);
+  }
+
+ private:
+  boost::asio::io_context io_;
+  std::shared_ptr<perceive::Server> server_;
+  std::thread thread_;
+};
+
+constexpr double kRadiusMm = 4;
+
+// A ball goes in over a second, is held for five, and then slides by a millimetre, again and again.
+constexpr const char* kScene = R"([loop]
+from_s = 2.0
+to_s = 14.0
+
+[[press]]
+object = "ball"
+radius_mm = 4.0
+keys = [
+  { t = 3.0, x = 0.5, y = -0.5, depth = -0.3 },
+  { t = 4.0, depth = 1.0 },
+  { t = 8.0 },
+  { t = 10.0, x = 1.5 },
+  { t = 12.0 },
+  { t = 13.0, depth = -0.3 },
+]
+)";
+
+struct Press {
+  explicit Press(const TempFolder& folder) : file(folder.path() / "ball.toml") {
+    base::write_file_atomically(file, kScene);
+    scene = hal::sim::load_scene(file);
+  }
+  /// The ball's middle at a frame, millimetres.
+  [[nodiscard]] std::array<double, 3> middle(std::uint64_t sequence) const {
+    const double t = scene.time_s(sequence);
+    const auto& keys = scene.presses.at(0).keys;
+    const auto next =
+        std::find_if(keys.begin(), keys.end(), [t](const auto& key) { return key.time_s > t; });
+    const auto& a = next == keys.begin() ? keys.front() : *(next - 1);
+    const auto& b = next == keys.end() ? a : *next;
+    const double part = b.time_s > a.time_s ? (t - a.time_s) / (b.time_s - a.time_s) : 0;
+    return {a.x_mm + part * (b.x_mm - a.x_mm), a.y_mm + part * (b.y_mm - a.y_mm),
+            kRadiusMm - a.depth_mm - part * (b.depth_mm - a.depth_mm)};
+  }
+
+  std::filesystem::path file;
+  hal::sim::Scene scene;
+};
+
+TEST(Perceive, FollowsASlidingBallWithoutItsRotation) {
+  const TempFolder folder;
+  const Press press(folder);
+  const Sensor sensor(press.file);
+  const Perceive perceive(sensor);
+  client::Client client = perceive.connect();
+  v1::Subscribe subscription;
+  subscription.set_pose(true);
+  client.subscribe(subscription);
+  std::uint64_t since = 0;
+  std::vector<double> slide_um;
+  int tracked = 0;
+  int others = 0;
+  ASSERT_TRUE(read_until(
+      client,
+      [&](const Item& item) {
+        const auto* frame = std::get_if<v1::Frame>(&item);
+        if (frame == nullptr || !frame->has_pose()) return false;
+        const v1::ObjectPose& pose = frame->pose();
+        if (pose.tracking() == v1::ObjectPose::STARTED) since = frame->sequence();
+        if (since == 0 || pose.since_sequence() != since) return false;
+        // The slide, from where it was held on.
+        const double t = press.scene.time_s(frame->sequence());
+        if (t < 4.2 || t > 11.9) return false;
+        ++(pose.tracking() == v1::ObjectPose::TRACKED ? tracked : others);
+        const auto now = press.middle(frame->sequence());
+        const auto then = press.middle(since);
+        const double error = std::hypot(pose.translation_mm().x() - (now[0] - then[0]),
+                                        pose.translation_mm().y() - (now[1] - then[1]));
+        EXPECT_FALSE(frame->has_depth());
+        if (t > 10.2) {
+          slide_um.push_back(1000 * error);
+          EXPECT_EQ(pose.unobservable_size(), 3);
+        }
+        return t > 11.5 && slide_um.size() > 10;
+      },
+      std::chrono::seconds(60)));
+  std::nth_element(slide_um.begin(), slide_um.begin() + 5, slide_um.end());
+  std::printf("a ball slid by 1 mm: %.0f um off; %d frames tracked, %d not\n", slide_um[5], tracked,
+              others);
+  EXPECT_LT(slide_um[5], 60);
+  EXPECT_LT(others, tracked / 20 + 1);
+}
+
+TEST(Perceive, PointsOfTheContactWhileSomethingTouches) {
+  const TempFolder folder;
+  const Press press(folder);
+  const Sensor sensor(press.file);
+  const Perceive perceive(sensor);
+  client::Client client = perceive.connect();
+  v1::Subscribe subscription;
+  subscription.set_cloud(v1::CLOUD_INT16);
+  subscription.set_contact_box(true);
+  client.subscribe(subscription);
+  int with = 0;
+  ASSERT_TRUE(read_until(
+      client,
+      [&](const Item& item) {
+        const auto* frame = std::get_if<v1::Frame>(&item);
+        if (frame == nullptr) return false;
+        EXPECT_FALSE(frame->has_depth());
+        EXPECT_TRUE(frame->contact().touching() || !frame->has_cloud());
+        if (!frame->has_cloud()) return false;
+        const v1::PointCloud& cloud = frame->cloud();
+        EXPECT_EQ(cloud.data().size(), 12 * std::size_t{cloud.width()} * cloud.height());
+        EXPECT_EQ(cloud.points(), cloud.width() * cloud.height());
+        EXPECT_LT(cloud.width(), 300U) << "the contact alone";
+        return ++with == 10;
+      },
+      std::chrono::seconds(60)));
+}
+
+TEST(Perceive, RefusesWhatTheDaemonServesAndIsRefusedItsOwnThere) {
+  const Sensor sensor;
+  const Perceive perceive(sensor);
+  client::Client client = perceive.connect();
+  EXPECT_TRUE(client.has_feature("cloud"));
+  EXPECT_THROW(client.subscribe(), client::Refused);
+  EXPECT_THROW((void)client.calibration(), client::Refused);
+  EXPECT_GT(client.ping().monotonic_ns(), 0);
+  EXPECT_EQ(client.status().clients_size(), 1);
+  v1::Subscribe points;
+  points.set_cloud(v1::CLOUD_INT16);
+  client::Client daemon = sensor.connect();
+  EXPECT_THROW(daemon.subscribe(points), client::Refused);
+}
+
+TEST(Perceive, AsksTheDaemonForNothingThatNobodyWants) {
+  const Sensor sensor;
+  const Perceive perceive(sensor);
+  client::Client client = perceive.connect();
+  client::Client daemon = sensor.connect();
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  const auto sent = [&] {
+    std::uint64_t all = 0;
+    const v1::Status status = daemon.status();
+    for (const auto& one : status.clients()) all += one.sent();
+    return all;
+  };
+  EXPECT_EQ(sent(), 0U);
+  v1::Subscribe summary;
+  summary.set_summary(true);
+  client.subscribe(summary);
+  ASSERT_TRUE(
+      read_until(client, [](const Item& item) { return std::holds_alternative<v1::Frame>(item); }));
+  EXPECT_GT(sent(), 0U);
+}
+
+}  // namespace
+}  // namespace dtact::e2e

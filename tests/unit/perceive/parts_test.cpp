@@ -1,0 +1,182 @@
+// What dtact-perceive makes messages of, and messages into.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "clients/cpp/errors.hpp"
+#include "clients/perceive/cloud_message.hpp"
+#include "clients/perceive/depth_part.hpp"
+#include "clients/perceive/frame_maker.hpp"
+#include "clients/perceive/pose_message.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::perceive {
+namespace {
+
+using testing::ElementsAre;
+
+/// Columns 10 … 13 and rows 20 … 22 of a map at half resolution.
+v1::DepthMap map_of(const std::vector<std::int16_t>& values) {
+  v1::DepthMap map;
+  map.set_encoding(v1::DEPTH_INT16);
+  map.set_width(4);
+  map.set_height(3);
+  map.set_x(10);
+  map.set_y(20);
+  map.set_full_width(100);
+  map.set_full_height(80);
+  map.set_mm_per_px(0.1);
+  map.set_um_per_unit(1);
+  map.set_untrusted_value(-32768);
+  map.set_decimation(2);
+  map.set_data(values.data(), 2 * values.size());
+  return map;
+}
+
+TEST(DepthPart, CutsRegionsOfTheCalibrationsResolution) {
+  DepthPart part(map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23}));
+  EXPECT_EQ(part.whole().full_width, 100);
+  // 23 … 26: grown to the map's columns 11 … 13.
+  const auto cut = part.cut({23, 42, 4, 1});
+  ASSERT_TRUE(cut.has_value());
+  EXPECT_EQ(cut->x, 11);
+  EXPECT_EQ(cut->y, 21);
+  EXPECT_THAT(cut->values, ElementsAre(11, 12, 13));
+  EXPECT_FALSE(part.cut({0, 0, 10, 10}).has_value());
+}
+
+TEST(DepthPart, TheContactHasAMargin) {
+  std::vector<std::int16_t> values(12, 100);
+  DepthPart none(map_of(values));
+  EXPECT_FALSE(none.contact().has_value()) << "not deeper than the threshold";
+  values[5] = 101;
+  DepthPart part(map_of(values));
+  const auto contact = part.contact();
+  ASSERT_TRUE(contact.has_value());
+  EXPECT_EQ(contact->width, 4) << "cut at the map's border";
+  EXPECT_EQ(contact->height, 3);
+}
+
+TEST(DepthPart, RefusesADamagedMap) {
+  EXPECT_THROW(DepthPart(map_of({1, 2, 3})), client::ProtocolError);
+}
+
+TEST(CloudMessage, Float32AndInt16) {
+  PointCloud cloud;
+  cloud.width = 2;
+  cloud.height = 1;
+  const float hole = NAN;
+  cloud.values = {0.001F, hole, -0.002F, hole, 0.0000034F, hole, 0, hole, 0.6F, hole, -0.8F, hole};
+  v1::PointCloud message;
+  fill(cloud, v1::CLOUD_FLOAT32, message);
+  EXPECT_EQ(message.points(), 1U);
+  EXPECT_EQ(message.metres_per_unit(), 1);
+  ASSERT_EQ(message.data().size(), 48U);
+  EXPECT_EQ(message.data().substr(8, 4), std::string("\x6F\x12\x03\xBB", 4)) << "-0.002";
+  v1::PointCloud small;
+  fill(cloud, v1::CLOUD_INT16, small);
+  EXPECT_EQ(small.metres_per_unit(), 1e-6);
+  ASSERT_EQ(small.data().size(), 24U);
+  std::array<std::int16_t, 12> units{};
+  std::memcpy(units.data(), small.data().data(), 24);
+  EXPECT_THAT(units, ElementsAre(1000, -32768, -2000, -32768, 3, -32768, 0, -32768, 19660, -32768,
+                                 -26214, -32768));
+  // 65.534 mm: beyond 32767 micrometres.
+  cloud.values[0] = 0.065534F;
+  v1::PointCloud large;
+  fill(cloud, v1::CLOUD_INT16, large);
+  EXPECT_NEAR(large.metres_per_unit(), 2e-6, 1e-12);
+}
+
+TEST(PoseMessage, MillimetresAndDegrees) {
+  Tracker::Pose pose;
+  pose.state = Tracker::State::tracked;
+  pose.since = 7;
+  pose.alignment.motion.translation = {0.001, 0, -0.0005};
+  pose.alignment.motion.rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  pose.alignment.rms = 4e-6;
+  pose.alignment.arm = 2e-3;
+  Twist hidden = Twist::Zero();
+  hidden[4] = 1;
+  pose.alignment.unobservable.push_back(hidden);
+  v1::ObjectPose message;
+  fill(pose, message);
+  EXPECT_EQ(message.tracking(), v1::ObjectPose::TRACKED);
+  EXPECT_EQ(message.since_sequence(), 7U);
+  EXPECT_DOUBLE_EQ(message.translation_mm().x(), 1);
+  EXPECT_DOUBLE_EQ(message.translation_mm().z(), -0.5);
+  EXPECT_NEAR(message.rotation_deg().z(), 90, 1e-9);
+  EXPECT_NEAR(message.residual_um(), 4, 1e-9);
+  EXPECT_DOUBLE_EQ(message.arm_mm(), 2);
+  ASSERT_EQ(message.unobservable_size(), 1);
+  EXPECT_EQ(message.unobservable(0).translation().y(), 1);
+}
+
+v1::Frame frame_of(bool touching) {
+  v1::Frame frame;
+  frame.set_sequence(5);
+  frame.set_dropped(3);
+  frame.mutable_contact()->set_touching(touching);
+  *frame.mutable_depth() = map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23});
+  return frame;
+}
+
+v1::Frame made(FrameMaker& maker, const net::FrameKind& kind) {
+  v1::Frame frame;
+  EXPECT_TRUE(frame.ParseFromString(maker.make(kind)->body));
+  return frame;
+}
+
+TEST(FrameMaker, SendsWhatIsDueAndTheSameBufferToEveryone) {
+  FrameMaker maker;
+  maker.begin(frame_of(true), false);
+  net::FrameKind points;
+  points.cloud = v1::CLOUD_FLOAT32;
+  const v1::Frame frame = made(maker, points);
+  EXPECT_EQ(frame.sequence(), 5U);
+  EXPECT_EQ(frame.dropped(), 0U);
+  EXPECT_FALSE(frame.has_depth());
+  EXPECT_EQ(frame.cloud().width(), 4U);
+  EXPECT_EQ(frame.cloud().decimation(), 2U);
+  EXPECT_EQ(maker.make(points), maker.make(points));
+  EXPECT_FALSE(made(maker, {}).has_cloud());
+  points.spec.decimation = 4;
+  EXPECT_EQ(made(maker, points).cloud().width(), 2U);
+}
+
+TEST(FrameMaker, NothingTouchingNoPoints) {
+  FrameMaker maker;
+  maker.begin(frame_of(false), true);
+  net::FrameKind all;
+  all.cloud = v1::CLOUD_FLOAT32;
+  all.pose = true;
+  const v1::Frame frame = made(maker, all);
+  EXPECT_FALSE(frame.has_cloud());
+  EXPECT_FALSE(frame.has_pose());
+}
+
+TEST(FrameMaker, KnowsACurvedSurface) {
+  FrameMaker maker;
+  v1::Frame bent = frame_of(true);
+  auto& surface = *bent.mutable_surface();
+  surface.set_shape(v1::Surface::SPHERE);
+  surface.set_radius_mm(10);
+  surface.set_air_mm(20);
+  surface.set_gel_mm(5);
+  surface.set_refraction(1.41);
+  maker.begin(bent, true);
+  net::FrameKind all;
+  all.cloud = v1::CLOUD_FLOAT32;
+  all.pose = true;
+  const v1::Frame frame = made(maker, all);
+  ASSERT_TRUE(frame.has_cloud());
+  EXPECT_FALSE(frame.has_pose()) << "not followed there";
+  float z = 0;
+  std::memcpy(&z, frame.cloud().data().data() + 2 * 12 * sizeof z, sizeof z);
+  EXPECT_LT(z, -5e-4F) << "4 mm from the middle of a sphere of 10 mm";
+}
+
+}  // namespace
+}  // namespace dtact::perceive

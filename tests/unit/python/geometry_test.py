@@ -1,0 +1,82 @@
+"""Points and motion of an object, as dtact-perceive sends them."""
+import struct
+import unittest
+
+import numpy as np
+
+import dtact
+from dtact.messages import ServerMessage
+
+
+def message():
+    m = ServerMessage().frame
+    m.sequence = 9
+    return m
+
+
+class Cloud(unittest.TestCase):
+    def test_float32(self):
+        m = message()
+        hole = float("nan")
+        m.cloud.encoding, m.cloud.width, m.cloud.height, m.cloud.decimation = 1, 2, 1, 4
+        m.cloud.data = struct.pack("<12f", 0.5, hole, 0.25, hole, -1, hole, 0, hole, 0, hole, 1, hole)
+        cloud = dtact.Frame(m).cloud
+        np.testing.assert_array_equal(cloud.points, np.array([[[0.5, 0.25, -1], [hole] * 3]], np.float32))
+        np.testing.assert_array_equal(cloud.normals[0, 0], [0, 0, 1])
+        self.assertEqual(cloud.valid.tolist(), [[True, False]])
+        self.assertEqual(cloud.decimation, 4)
+
+    def test_int16(self):
+        m = message()
+        m.cloud.encoding, m.cloud.width, m.cloud.height, m.cloud.metres_per_unit = 2, 1, 2, 1e-6
+        m.cloud.data = struct.pack("<12h", 1000, -32768, -2000, -32768, 3, -32768, 0, -32768, 0, -32768,
+                                   32767, -32768)
+        cloud = dtact.Frame(m).cloud
+        np.testing.assert_allclose(cloud.points[0, 0], [1e-3, -2e-3, 3e-6], rtol=1e-6)
+        np.testing.assert_allclose(cloud.normals[0, 0], [0, 0, 1], rtol=1e-6)
+        self.assertTrue(np.isnan(cloud.points[1, 0]).all() and np.isnan(cloud.normals[1, 0]).all())
+
+    def test_mesh_leaves_holes_open(self):
+        points = np.zeros((3, 3, 3), np.float32)
+        cloud = dtact.PointCloud(points, points, 1)
+        self.assertEqual(cloud.triangles().tolist()[0], [0, 1, 3])
+        self.assertEqual(len(cloud.triangles()), 8)
+        points[0, 0] = np.nan
+        self.assertEqual(len(cloud.triangles()), 7)
+
+    def test_damaged_and_missing(self):
+        m = message()
+        with self.assertRaises(dtact.NotInFrame):
+            _ = dtact.Frame(m).cloud
+        m.cloud.encoding, m.cloud.width, m.cloud.height, m.cloud.data = 1, 2, 1, b"x"
+        with self.assertRaises(dtact.ProtocolError):
+            _ = dtact.Frame(m).cloud
+
+
+class Pose(unittest.TestCase):
+    def test_matrix_and_names(self):
+        m = message()
+        self.assertIsNone(dtact.Frame(m).pose)
+        m.pose.tracking, m.pose.since_sequence = 2, 7
+        m.pose.rotation_deg.z = 90
+        m.pose.translation_mm.x = 2
+        hidden = m.pose.unobservable.add()
+        hidden.translation.y = 1
+        pose = dtact.Frame(m).pose
+        self.assertEqual((pose.tracking, pose.since_sequence), ("tracked", 7))
+        np.testing.assert_allclose(pose.matrix() @ [1, 0, 0, 1], [2, 1, 0, 1], atol=1e-12)
+        self.assertEqual(pose.unobservable.tolist(), [[0, 0, 0, 0, 1, 0]])
+
+
+class Asking(unittest.TestCase):
+    def test_needs_perceive(self):
+        wanted = dtact.Subscription(depth=None, cloud="int16", pose=True, cloud_hz=10)
+        self.assertEqual(wanted.needs(), {"cloud", "pose", "rates"})
+        request = wanted.message(frozenset(), True)
+        self.assertEqual((request.depth, request.cloud, request.pose, request.cloud_hz), (0, 2, True, 10))
+        with self.assertRaises(ValueError):
+            dtact.Subscription(cloud="int8").message(frozenset(), True)  # type: ignore[arg-type]
+
+
+if __name__ == "__main__":
+    unittest.main()
