@@ -45,7 +45,7 @@ class FakeStore : public CalibrationStore {
       if (files.toml == "bad") {
         stored.damage = "calibration.toml:3: scale missing";
       } else {
-        stored.summary = {files.name, "list", 0.0414, 580, 580, -0.02, 1.4, "", 800, 600};
+        stored.summary = {files.name, "list", 0.0414, 580, 580, -0.02, 1.4, "", 800, 600, {}};
       }
     }
     return all;
