@@ -31,8 +31,7 @@ struct PressReport {
   };
   std::vector<Depth> presses;         ///< Those that were used.
   std::vector<std::string> left_out;  ///< The others: name and reason.
-  /// Why the method that was to be taken was not, and what one press chose; lines without an end.
-  std::string note;
+  std::string note;  ///< What the list of one press chose (PressChoices); else empty.
   /// A gain that was tried: how far each press is from the known sphere under the list of all
   /// others (meet()), the mean over the presses.
   struct Gain {

@@ -5,11 +5,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <memory>
 #include <optional>
 #include <utility>
 
-#include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/guided/fitness.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -196,20 +194,10 @@ void Session::reference_step() {
   }
 }
 
-void Session::take_model() {
-  calibration::PressReport report;
-  calibration::Calibration made = build_list(images_, ListMethod::best, &report);
-  if (made.layer && !calibration::doubts_about(made, images_.set).empty()) return;
-  coverage_.made = std::make_shared<const calibration::Calibration>(std::move(made));
-  coverage_.report = std::move(report);
-}
-
 Outcome Session::finish() {
-  take_model();
   calibration::save(*coverage_.made, folder_.path() / kCalibration);
-  console_.say(report_text(coverage_.report) +
-               (coverage_.made->layer ? layer_text(*coverage_.made->layer) : std::string()) +
-               list_text(*coverage_.made->model) + "saved in " + folder_.at(kCalibration));
+  console_.say(report_text(coverage_.report) + list_text(*coverage_.made->model) + "saved in " +
+               folder_.at(kCalibration));
   const std::string line = ask(fmt::format(
       "Upload it to the daemon as {}?   [Enter] yes   [n] not now", folder_.calibration_name()));
   if (line.empty() || line == "y") {

@@ -62,9 +62,6 @@ class Session {
   [[nodiscard]] std::string press_prompt() const;
   void take_press(const std::string& name);
   void judge();
-  /// Takes the list of the layer's model for that of the presses alone, where one fits: it takes
-  /// seconds, so not after each press.
-  void take_model();
   [[nodiscard]] Outcome finish();
   void upload();
 

@@ -18,7 +18,7 @@ struct Options {
   std::vector<std::string> presses;
   double radius_mm = 0;
   MapOptions map;
-  std::string method = "best";
+  std::string method = "list";
   std::vector<double> gain_centre{0, 0};  ///< x, y in millimetres from the map's centre.
   std::string output;
   bool force = false;
@@ -66,9 +66,7 @@ Made make_list(const Options& options) {
     std::vector<std::string> doubts = calibration::doubts_about(made, images.set);
     return {std::move(made), std::move(doubts)};
   }
-  const ListMethod method = options.method == "model"  ? ListMethod::model
-                            : options.method == "list" ? ListMethod::free
-                                                       : ListMethod::best;
+  const ListMethod method = options.method == "model" ? ListMethod::model : ListMethod::free;
   calibration::PressReport report;
   calibration::Calibration made = build_list(images, method, &report);
   fmt::print("{}", report_text(report));
@@ -98,11 +96,8 @@ void run(const Options& options) {
   for (const std::string& doubt : doubts) fmt::print("doubtful: {}\n", doubt);
   calibration::save(made, options.output);
   const recon::RectifyTable& map = made.model->rectify;
-  const std::string method = made.layer                 ? "model"
-                             : options.method == "best" ? "list"
-                                                        : options.method;
-  fmt::print("{}: method {}, {}x{} at column {}, row {}\n", options.output, method, map.width,
-             map.height, made.crop_col, made.crop_row);
+  fmt::print("{}: method {}, {}x{} at column {}, row {}\n", options.output, options.method,
+             map.width, map.height, made.crop_col, made.crop_row);
   if (made.layer) fmt::print("{}", layer_text(*made.layer));
   fmt::print("{}", list_text(*made.model));
 }
@@ -134,10 +129,10 @@ void add_calibrate(CLI::App& app) {
   depth
       ->add_option(
           "--method", options->method,
-          "best (default): model, and list where no layer fits; model: the list of a layer "
-          "that is fitted to the whole image of the presses; list: from the known sphere "
-          "alone; to compare with: published (one press), regression (several)")
-      ->check(CLI::IsMember({"best", "model", "list", "published", "regression"}));
+          "list (default): from the known sphere alone; model: the list of a layer that is fitted "
+          "to the whole image of the presses; to compare with: published (one press), "
+          "regression (several)")
+      ->check(CLI::IsMember({"list", "model", "published", "regression"}));
   depth
       ->add_option("--gain-centre", options->gain_centre,
                    "Where the regression's distance is taken from, mm right and down of the middle")

@@ -149,24 +149,13 @@ calibration::Calibration build_list(const PressImages& images, ListMethod method
                                     calibration::PressReport* report) {
   calibration::PressReport found;
   calibration::Calibration made;
-  const auto by_model = [&] {
+  if (method == ListMethod::free) {
+    made = free_list(images, found);
+  } else {
     calibration::FittedCalibration fitted = calibration::build_model(images.set, images.gain);
     found.left_out = std::move(fitted.left_out);
     for (const auto& press : fitted.presses) found.presses.push_back({press.name, press.depth_mm});
-    return std::move(fitted.calibration);
-  };
-  if (method == ListMethod::free) {
-    made = free_list(images, found);
-  } else if (method == ListMethod::model) {
-    made = by_model();
-  } else {
-    try {
-      made = by_model();
-    } catch (const calibration::ModelRefused& refused) {
-      made = free_list(images, found);
-      found.note = fmt::format("the list is made without a model of the layer: {}{}{}",
-                               refused.what(), found.note.empty() ? "" : "\n", found.note);
-    }
+    made = std::move(fitted.calibration);
   }
   made.origin = images.origin;
   made.origin.created = utc_now();

@@ -52,7 +52,6 @@ void add_press(PressImages& images, const std::string& press);
 
 /// What the darkening of a ball's presses is turned into a list by.
 enum class ListMethod : std::uint8_t {
-  best,   ///< The layer's model where it fits, else the free list.
   model,  ///< A layer fitted to the presses (calibration::build_model()).
   free    ///< The known sphere alone: calibration::build().
 };
@@ -61,8 +60,8 @@ enum class ListMethod : std::uint8_t {
 /// option when they have not the reference's size.
 void add_press(PressImages& images, const std::vector<std::string>& paths, const char* option);
 
-/// The calibration of one press or several, its origin filled in. `report` also says why `best`
-/// took the free list. Throws as calibration::build() and build_model().
+/// The calibration of one press or several, its origin filled in. Throws as calibration::build()
+/// and build_model().
 [[nodiscard]] calibration::Calibration build_list(const PressImages& images, ListMethod method,
                                                   calibration::PressReport* report);
 
