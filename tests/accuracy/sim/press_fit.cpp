@@ -120,7 +120,15 @@ class PressedProfile {
 };
 
 sim::OpticsModel to_model(const std::vector<double>& p) {
-  return {p[0], p[1], p[2], p[3], p[4], p[5], p[6]};
+  sim::OpticsModel optics;
+  optics.pressed_slope = p[0];
+  optics.pressed_curve = p[1];
+  optics.bulged_slope = p[2];
+  optics.bulged_curve = p[3];
+  optics.narrow_mm = p[4];
+  optics.wide_mm = p[5];
+  optics.narrow_weight = p[6];
+  return optics;
 }
 
 // How far the optics lie outside what is physical; 0 inside. In shared/physics.md's terms: a mild
