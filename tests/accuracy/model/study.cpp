@@ -138,10 +138,46 @@ std::vector<Specimen> specimens() {
   }
   // Chosen before anything was measured on them: curved and steep, flat and wide, a kink at zero,
   // hardly any narrow light.
-  all.push_back(with_optics("curved", 2.0, {0.26, -0.05, 0.26, -0.6, 0.25, 1.0, 0.8}));
-  all.push_back(with_optics("wide", 2.3, {0.15, 0.01, 0.2, -0.9, 0.4, 1.9, 0.65}));
-  all.push_back(with_optics("kinked", 1.8, {0.19, 0.0, 0.4, -1.0, 0.3, 1.4, 0.7}));
-  all.push_back(with_optics("blurred", 2.4, {0.17, 0.0, 0.3, -1.2, 0.55, 1.3, 0.55}));
+  all.push_back(with_optics("curved", 2.0,
+                            {.pressed_slope = 0.26,
+                             .pressed_curve = -0.05,
+                             .bulged_slope = 0.26,
+                             .bulged_curve = -0.6,
+                             .narrow_mm = 0.25,
+                             .wide_mm = 1.0,
+                             .narrow_weight = 0.8,
+                             .knots = {},
+                             .slopes = {}}));
+  all.push_back(with_optics("wide", 2.3,
+                            {.pressed_slope = 0.15,
+                             .pressed_curve = 0.01,
+                             .bulged_slope = 0.2,
+                             .bulged_curve = -0.9,
+                             .narrow_mm = 0.4,
+                             .wide_mm = 1.9,
+                             .narrow_weight = 0.65,
+                             .knots = {},
+                             .slopes = {}}));
+  all.push_back(with_optics("kinked", 1.8,
+                            {.pressed_slope = 0.19,
+                             .pressed_curve = 0.0,
+                             .bulged_slope = 0.4,
+                             .bulged_curve = -1.0,
+                             .narrow_mm = 0.3,
+                             .wide_mm = 1.4,
+                             .narrow_weight = 0.7,
+                             .knots = {},
+                             .slopes = {}}));
+  all.push_back(with_optics("blurred", 2.4,
+                            {.pressed_slope = 0.17,
+                             .pressed_curve = 0.0,
+                             .bulged_slope = 0.3,
+                             .bulged_curve = -1.2,
+                             .narrow_mm = 0.55,
+                             .wide_mm = 1.3,
+                             .narrow_weight = 0.55,
+                             .knots = {},
+                             .slopes = {}}));
   return all;
 }
 
