@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ class PointCloud:
     def of(cls, m: Message) -> PointCloud:
         """ProtocolError where the data do not fit the sizes."""
         size = _PARTS * m.width * m.height
-        kind = {1: np.dtype("<f4"), 2: np.dtype("<i2")}.get(m.encoding)
+        kinds: dict[int, np.dtype[Any]] = {1: np.dtype("<f4"), 2: np.dtype("<i2")}
+        kind = kinds.get(m.encoding)
         if kind is None or len(m.data) != size * kind.itemsize:
             raise ProtocolError("a point cloud of dtact-perceive is damaged or in an unknown encoding: "
                                 "install the same release on both sides")
