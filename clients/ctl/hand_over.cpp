@@ -55,7 +55,7 @@ std::vector<std::string> for_calibrate(std::vector<std::string> arguments) {
   const auto command = word_from(arguments, arguments.begin());
   if (command == arguments.end() || *command != "calibrate") return arguments;
   const auto verb = word_from(arguments, command + 1);
-  if (verb != arguments.end() && (*verb == "depth" || *verb == "lens")) {
+  if (verb != arguments.end() && (*verb == "depth" || *verb == "lens" || *verb == "force")) {
     arguments.erase(command);
   } else {
     *command = "guided";
@@ -70,7 +70,8 @@ void add_handed_over(CLI::App& app, const std::vector<std::string>& arguments) {
     command->allow_extras()->fallthrough(false)->set_help_flag();
     command->callback([&arguments] { start_calibrate(for_calibrate(arguments)); });
   };
-  add("calibrate", "Make a calibration: guided, or depth or lens from images (dtact-calibrate)");
+  add("calibrate",
+      "Make a calibration: guided, or depth, lens or force from images (dtact-calibrate)");
   add("reprocess", "Make the depth of a recording anew with another calibration (dtact-calibrate)");
   add("reconstruct", "Reconstruct the depth of an image (dtact-calibrate)");
   add("evaluate", "Compare a calibration with the press of a ball (dtact-calibrate)");

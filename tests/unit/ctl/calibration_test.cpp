@@ -110,7 +110,7 @@ TEST(Calibration, IsListed) {
       StartsWith(R"({"number":"0","name":"factory","uploaded":"","current":false,"summary":{)"
                  R"("name":"factory","method":"list","mm_per_px":0.0414,"width":580,"height":580,)"
                  R"("covered_from_mm":-0.02,"covered_to_mm":1.4,"created":"","frame_width":800,)"
-                 R"("frame_height":600},"in_use":false})"
+                 R"("frame_height":600,"sharpen_steps":[]},"in_use":false})"
                  "\n"));
   EXPECT_THAT(json, HasSubstr(R"("name":"broken","uploaded":"2026-01-31T12:00:00Z",)"
                               R"("current":false,"damage":"calibration.toml:3: scale missing",)"));

@@ -76,7 +76,8 @@ TEST(Completion, OffersValues) {
   EXPECT_THAT(complete("dtactctl calibrate depth --method p"), UnorderedElementsAre("published"));
   EXPECT_THAT(complete("dtact-calibrate depth --method p"), UnorderedElementsAre("published"));
   EXPECT_THAT(complete("dtactctl led --brightness \"\""), UnorderedElementsAre());
-  EXPECT_THAT(complete("dtactctl export press.mcap --to p"), UnorderedElementsAre("png", "ply"));
+  EXPECT_THAT(complete("dtactctl export press.mcap --to p"),
+              UnorderedElementsAre("pcd", "ply", "png"));
 }
 
 void expect_options(const std::string& program, Run run,

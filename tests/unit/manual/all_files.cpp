@@ -74,10 +74,10 @@ std::vector<File> all_files(const std::filesystem::path& root) {
   // As clients/ctl/hand_over.cpp has it.
   const std::string as_is = "words=(dtact-calibrate $words); (( CURRENT++ )); _dtact-calibrate";
   const std::string guided = R"(
-          if (( CURRENT > 2 )) && [[ $words[2] == (depth|lens) ]]; then
+          if (( CURRENT > 2 )) && [[ $words[2] == (depth|lens|force) ]]; then
             words[1]=dtact-calibrate
           else
-            (( CURRENT == 2 )) && compadd depth lens
+            (( CURRENT == 2 )) && compadd depth lens force
             words=(dtact-calibrate guided $words[2,-1]); (( CURRENT++ ))
           fi
           _dtact-calibrate)";
