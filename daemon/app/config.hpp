@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "daemon/metrics/endpoint.hpp"
-#include "daemon/serve/net_config.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/serve/net_config.hpp"
 #include "hal/config.hpp"
 
 namespace dtact::app {

@@ -43,7 +43,7 @@ struct Calibration {
   int crop_col = 0;
   int crop_row = 0;
   std::optional<recon::Lens> lens;  ///< None: the depth map is a part of the frame as it is.
-  std::optional<Layer> layer;  ///< Where a layer was fitted to the presses.
+  std::optional<Layer> layer;       ///< Where a layer was fitted to the presses.
   Origin origin;
 };
 

@@ -67,8 +67,7 @@ TEST(Table, AnotherLawHasARowOfItsOwn) {
   both.insert(both.end(), other.begin(), other.end());
   EXPECT_NE(to_csv(both).find(",another\n"), std::string::npos);
   const std::string table = to_markdown(both);
-  EXPECT_NE(table.find("| ours, one press, true indentation, another law | 0."),
-            std::string::npos);
+  EXPECT_NE(table.find("| ours, one press, true indentation, another law | 0."), std::string::npos);
   EXPECT_EQ(to_markdown(cells()).find("another law | 0"), std::string::npos);
 }
 
