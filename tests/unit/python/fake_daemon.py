@@ -121,9 +121,9 @@ class FakeDaemon:
                 reply.pong.wall_ns = 1_000_000_000
             else:
                 reply.done.SetInParent()
-            connection.sendall(packed(message))
-            if kind == "subscribe":
-                connection.sendall(b"".join(packed(m) for m in self.pushed))
+            # In one piece, so that drop() comes after all of it.
+            behind = self.pushed if kind == "subscribe" else []
+            connection.sendall(b"".join(packed(m) for m in [message, *behind]))
 
 
 def packed(message):
