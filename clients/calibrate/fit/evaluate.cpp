@@ -8,6 +8,7 @@
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/difference.hpp"
 #include "clients/calibrate/fit/list_fit.hpp"
+#include "clients/calibrate/fit/list_shape.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -41,12 +42,6 @@ void for_contact(const DifferenceMap& map, const Contact& contact, const Visit& 
       if (r < contact.radius_mm) visit(x, y, std::sqrt(r2 - r * r) - edge);
     }
   }
-}
-
-double look_up_mm(const recon::DepthList& list, double level) {
-  const long entry = std::lround(level * recon::kEntriesPerLevel) - list.first_q6;
-  const long last = static_cast<long>(list.um.size()) - 1;
-  return 0.001 * list.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))];
 }
 
 /// Of a list from the pixels `fitted` on the others.

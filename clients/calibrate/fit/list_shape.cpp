@@ -77,4 +77,10 @@ recon::DepthList make_list(const std::vector<Knot>& knots, double slope_at_zero,
   return list;
 }
 
+double look_up_mm(const recon::DepthList& list, double level) {
+  const long entry = std::lround(level * recon::kEntriesPerLevel) - list.first_q6;
+  const long last = static_cast<long>(list.um.size()) - 1;
+  return 0.001 * list.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))];
+}
+
 }  // namespace dtact::calibration

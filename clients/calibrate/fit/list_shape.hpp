@@ -28,6 +28,9 @@ struct Knot {
 [[nodiscard]] recon::DepthList make_list(const std::vector<Knot>& knots, double slope_at_zero,
                                          double slope_beyond, const RadialProfile& profile);
 
+/// What a list says of a darkening, grey levels: millimetres; its ends' beyond them.
+[[nodiscard]] double look_up_mm(const recon::DepthList& list, double level);
+
 /// What lists span: the design's −40 to +110 grey levels.
 inline constexpr int kListFirstLevel = -40;
 inline constexpr int kListLastLevel = 110;

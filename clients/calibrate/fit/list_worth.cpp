@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/list_fit.hpp"
+#include "clients/calibrate/fit/list_shape.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -13,12 +14,6 @@ namespace {
 constexpr double kDepthBinMm = 0.2;
 constexpr double kZeroLevels = 1;    // grey levels
 constexpr double kRingShare = 0.15;  // of the ring's level, scattered into the contact
-
-double look_up_mm(const recon::DepthList& list, double level) {
-  const long entry = std::lround(level * recon::kEntriesPerLevel) - list.first_q6;
-  const long last = static_cast<long>(list.um.size()) - 1;
-  return 0.001 * list.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))];
-}
 
 /// None where the press doesn't darken steadily.
 std::optional<SagLine> line_of(const SettledPress& press) {

@@ -15,7 +15,7 @@ using Corners = std::vector<cv::Point2f>;
 
 constexpr int kFixed =
     cv::CALIB_FIX_ASPECT_RATIO | cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_K3 | cv::CALIB_FIX_K2;
-constexpr LensModel kModels[] = {LensModel::radial1, LensModel::radial2, LensModel::radial3};
+constexpr LensModel kBoardModels[] = {LensModel::radial1, LensModel::radial2, LensModel::radial3};
 
 cv::Size inner(const Chessboard& board) { return {board.cols - 1, board.rows - 1}; }
 
@@ -114,14 +114,15 @@ std::vector<Mark> marks_of(const Corners& corners, const std::vector<cv::Point3f
 
 /// Mean squared residual of each image with the camera of all others, and the first one's
 /// residuals.
-struct LeftOut {
+struct LeftOutImages {
   std::vector<double> squares;
   std::vector<recon::Point> first;
 };
 
-LeftOut leave_images_out(const std::vector<Corners>& images, const std::vector<cv::Point3f>& points,
-                         cv::Size frame, LensModel model) {
-  LeftOut result;
+LeftOutImages leave_images_out(const std::vector<Corners>& images,
+                               const std::vector<cv::Point3f>& points, cv::Size frame,
+                               LensModel model) {
+  LeftOutImages result;
   for (std::size_t out = 0; out < images.size(); ++out) {
     std::vector<Corners> others = images;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(out));
@@ -139,9 +140,9 @@ LeftOut leave_images_out(const std::vector<Corners>& images, const std::vector<c
 ChosenLens choose_camera(const std::vector<Corners>& images, const std::vector<cv::Point3f>& points,
                          cv::Size frame) {
   ChosenLens chosen;
-  LeftOut best;
-  for (const LensModel model : kModels) {
-    LeftOut left_out = leave_images_out(images, points, frame, model);
+  LeftOutImages best;
+  for (const LensModel model : kBoardModels) {
+    LeftOutImages left_out = leave_images_out(images, points, frame, model);
     chosen.left_out_rms_of_each.push_back(rms(left_out.first));
     if (best.squares.empty() || clearly_lower(left_out.squares, best.squares)) {
       chosen.model = model;

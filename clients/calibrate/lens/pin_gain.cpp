@@ -55,13 +55,13 @@ Surface fit(const std::vector<Pin>& pins, bool quadratic, std::size_t out) {
   return surface;
 }
 
-struct LeftOut {
+struct LeftOutPins {
   std::vector<double> squares;
   std::vector<double> gain;  ///< At each pin, of the surface through the others.
 };
 
-LeftOut leave_pins_out(const std::vector<Pin>& pins, bool quadratic) {
-  LeftOut result;
+LeftOutPins leave_pins_out(const std::vector<Pin>& pins, bool quadratic) {
+  LeftOutPins result;
   for (std::size_t out = 0; out < pins.size(); ++out) {
     const Surface surface = fit(pins, quadratic, out);
     const double error = surface.error(pins[out]);
@@ -115,10 +115,11 @@ PinGain choose_gain(const cv::Mat1f& reference, const cv::Mat1f& frame, std::spa
     share.push_back({pin.x, pin.y, levels[i] / std::max(light[i], 1.0F)});
   }
   PinGain chosen;
-  LeftOut best = leave_pins_out(plain, false);
-  const LeftOut lit = leave_pins_out(share, false);
-  const LeftOut quadratic = leave_pins_out(plain, true);
-  for (const LeftOut* one : std::initializer_list<const LeftOut*>{&best, &lit, &quadratic}) {
+  LeftOutPins best = leave_pins_out(plain, false);
+  const LeftOutPins lit = leave_pins_out(share, false);
+  const LeftOutPins quadratic = leave_pins_out(plain, true);
+  for (const LeftOutPins* one :
+       std::initializer_list<const LeftOutPins*>{&best, &lit, &quadratic}) {
     chosen.left_out_of_each.push_back(root_mean(one->squares));
   }
   chosen.left_out_ratio.assign(marks.size(), 1.0);
