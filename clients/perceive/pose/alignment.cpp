@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
@@ -115,11 +114,18 @@ Twist least_turn(const Twist& step, const std::vector<Twist>& unobservable) {
     free.col(static_cast<Eigen::Index>(i)) = unobservable[i];
   }
   const Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> turns = free.topRows<3>();
-  Eigen::JacobiSVD<Eigen::MatrixXd> parts(turns, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  // What turns less than this is a slide, but for noise.
-  constexpr double kTurns = 0.05;
-  parts.setThreshold(kTurns / std::max(kTurns, parts.singularValues()[0]));
-  return step - free * parts.solve(step.head<3>());
+  // The pseudoinverse of `turns` by its left singular vectors.
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> parts(turns * turns.transpose());
+  Eigen::Vector3d undone = Eigen::Vector3d::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    // What turns less than this is a slide, but for noise.
+    constexpr double kTurns = 0.05;
+    const double squared = parts.eigenvalues()[axis];
+    if (squared <= kTurns * kTurns) continue;
+    const Eigen::Vector3d direction = parts.eigenvectors().col(axis);
+    undone += direction * (direction.dot(step.head<3>()) / squared);
+  }
+  return step - free * (turns.transpose() * undone);
 }
 
 void apply(const Twist& step, const Eigen::Vector3d& centre, double arm, Motion& motion) {
