@@ -68,7 +68,7 @@ PLACES = {
     "dtactd": r"/etc/dtactd/|/usr/bin/dtactd$|(/usr)?/lib/systemd/system/dtactd|/usr/lib/\w+\.d/dtactd|"
     r"/usr/lib/udev/rules\.d/60-dtactd|/usr/share/dtactd/scenes/|/usr/share/man/man[58]/dtactd|"
     r"/usr/share/(bash|zsh)",
-    "dtact-tools": r"/usr/bin/dtact(ctl|-calibrate)$|/usr/share/(bash|zsh)|/usr/share/dtact/foxglove|"
+    "dtact-tools": r"/usr/bin/dtact(ctl|-calibrate|-perceive)$|/usr/share/(bash|zsh)|/usr/share/dtact/foxglove|"
     r"/usr/share/man/man1/dtact",
     "libdtact1": r"LIB/libdtact\.so\.1$",
     "libdtact-dev": r"/usr/include/dtact/|LIB/(cmake/dtact/|libdtact\.so$|pkgconfig/dtact\.pc$)|"
