@@ -93,6 +93,7 @@ std::vector<File> all_files(const std::filesystem::path& root) {
                                                                    {"reconstruct", as_is},
                                                                    {"evaluate", as_is}})},
       {"clients/calibrate/dtact-calibrate.zsh-completion", zsh_completion(calibrate, {})},
+      {"clients/perceive/dtact-perceive.zsh-completion", zsh_completion(perceive, {})},
   };
 }
 

@@ -1,4 +1,4 @@
-// dtactd's completion file in a real bash; that of the clients is tested with dtactctl.
+// Completion files in a real bash; that of dtactctl and dtact-calibrate is tested with dtactctl.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,13 +13,19 @@
 namespace dtact::manual {
 namespace {
 
+struct Completion {
+  std::string file;      ///< In the tree.
+  std::string function;  ///< In the file.
+};
+const Completion kDtactd{"daemon/dtactd.bash-completion", "_dtactd"};
+const Completion kPerceive{"clients/perceive/dtact-perceive.bash-completion", "_dtact_perceive"};
+
 /// What bash offers for the last of `words`, which are separated by blanks.
-std::set<std::string> offered(const std::string& words) {
-  const std::string command =
-      "bash --norc -c 'source \"" DTACT_SOURCE_DIR
-      "/daemon/dtactd.bash-completion\"; COMP_WORDS=(" +
-      words +
-      "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _dtactd; printf \"%s\\n\" \"${COMPREPLY[@]}\"'";
+std::set<std::string> offered(const Completion& completion, const std::string& words) {
+  const std::string command = "bash --norc -c 'source \"" DTACT_SOURCE_DIR "/" + completion.file +
+                              "\"; COMP_WORDS=(" + words +
+                              "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); " + completion.function +
+                              "; printf \"%s\\n\" \"${COMPREPLY[@]}\"'";
   FILE* pipe = ::popen(command.c_str(), "r");
   if (pipe == nullptr) throw std::runtime_error("no bash");
   std::set<std::string> found;
@@ -33,14 +39,31 @@ std::set<std::string> offered(const std::string& words) {
   return found;
 }
 
-TEST(Bash, OffersEveryOptionOfDtactd) {
+std::set<std::string> options_of(const Command& command) {
   std::set<std::string> options;
-  for (const Argument& option : dtactd().options) options.insert(option.names.back());
-  EXPECT_EQ(offered("dtactd --"), options);
+  for (const Argument& option : command.options) options.insert(option.names.back());
+  return options;
+}
+
+TEST(Bash, OffersEveryOptionOfDtactd) {
+  EXPECT_EQ(offered(kDtactd, "dtactd --"), options_of(dtactd()));
 }
 
 TEST(Bash, OffersLevels) {
-  EXPECT_THAT(offered("dtactd --log-level w"), testing::ElementsAre("warn"));
+  EXPECT_THAT(offered(kDtactd, "dtactd --log-level w"), testing::ElementsAre("warn"));
+}
+
+TEST(Bash, OffersEveryOptionOfDtactPerceive) {
+  const Command perceive = dtact_perceive();
+  EXPECT_EQ(offered(kPerceive, "dtact-perceive --"), options_of(perceive));
+  std::set<std::string> names;
+  for (const Command& command : perceive.commands) {
+    names.insert(command.name);
+    std::set<std::string> options = options_of(command);
+    options.insert("--help");
+    EXPECT_EQ(offered(kPerceive, "dtact-perceive --host gripper " + command.name + " --"), options);
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"serve", "watch"}));
 }
 
 }  // namespace

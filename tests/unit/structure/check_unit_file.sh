@@ -8,18 +8,16 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 fail() { echo "FAILED: $1"; exit 1; }
 
-# verify FILE: the complaints about our units, or nothing. The program is the one that was built: the
+# verify FILE: the complaints about our units, or nothing. The program is one that was built: the
 # installed path need not exist.
 verify() {
   local output
   output=$(systemd-analyze verify --man=no "$folder/$1" 2>&1) || { echo "$output"; return; }
-  grep -F dtactd <<<"$output" || true
+  grep -F dtact <<<"$output" || true
 }
 
-for unit in dtactd.service dtactd@.service; do
-  sed "s|/usr/bin/dtactd|$program|" "$source/$unit" >"$folder/$unit"
-done
-for unit in dtactd.service dtactd@.service; do
+for unit in dtactd.service dtactd@.service dtact-perceive.service; do
+  sed -E "s#/usr/bin/dtact(d|-perceive)#$program#" "$source/$unit" >"$folder/$unit"
   complaint=$(verify "$unit")
   [[ -z $complaint ]] || fail "$complaint"
   # In tenths: 1.5. What is left is what the sensor needs: its devices, FIFO, the network.
@@ -28,6 +26,8 @@ for unit in dtactd.service dtactd@.service; do
   tail -n 1 "$folder/score"
   grep -qx 'StartLimitIntervalSec=0' "$source/$unit" || fail "$unit gives up after five failures"
   ! grep -qE '^[^#]*network-online' "$source/$unit" || fail "$unit waits for the network"
+done
+for unit in dtactd.service dtactd@.service; do
   # These would let the units score better, and the capture thread run worse.
   ! grep -qE '^(RestrictRealtime=yes|SystemCallFilter=~.*@resources)' "$source/$unit" || fail "$unit forbids FIFO"
 done
