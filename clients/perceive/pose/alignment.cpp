@@ -90,9 +90,10 @@ Equations equations_of(const std::vector<Pair>& pairs, const Eigen::Vector3d& ce
     Twist row;
     row << from.cross(normal) / arm, normal;
     sum.add(row, pair.distance, weight);
-    for (int axis = 0; axis < 2; ++axis) {
-      // The place moves over the view, whose normal bends; the surfel's own turns.
-      const Eigen::Vector3d bend(pair.sample.bend(axis, 0), pair.sample.bend(axis, 1), 0);
+    // The place moves over the view, whose normal bends; the surfel's own turns. Without the one
+    // the other would say of a ball that its turning is seen, the more the smaller the contact.
+    for (int axis = 0; pair.sample.bend && axis < 2; ++axis) {
+      const Eigen::Vector3d bend((*pair.sample.bend)(axis, 0), (*pair.sample.bend)(axis, 1), 0);
       const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
       const double difference = normal[axis] - pair.turned[axis];
       row << (from.cross(bend) - pair.turned.cross(unit)) / arm, bend;

@@ -70,11 +70,12 @@ std::optional<ContactView::Sample> ContactView::at(double x, double y) const {
   const std::array<std::size_t, 4> around{index(c - kBendPixels, r), index(c + kBendPixels, r),
                                           index(c, r - kBendPixels), index(c, r + kBendPixels)};
   for (const std::size_t one : around) {
-    if (touching_[one] == 0) return sample;  // no change is known: none is used
+    if (touching_[one] == 0) return sample;
   }
   const double span = 2 * kBendPixels * px_;
-  sample.bend.col(0) = (normal(around[1]) - normal(around[0])).head<2>() / span;
-  sample.bend.col(1) = (normal(around[3]) - normal(around[2])).head<2>() / span;
+  Eigen::Matrix2d& bend = sample.bend.emplace();
+  bend.col(0) = (normal(around[1]) - normal(around[0])).head<2>() / span;
+  bend.col(1) = (normal(around[3]) - normal(around[2])).head<2>() / span;
   return sample;
 }
 

@@ -26,8 +26,9 @@ class ContactView {
   struct Sample {
     double z = 0;  ///< Metres.
     Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-    /// How the normal's x and y change along x (first column) and y, per metre.
-    Eigen::Matrix2d bend = Eigen::Matrix2d::Zero();
+    /// How the normal's x and y change along x (first column) and y, per metre; nothing where the
+    /// pixels that it is taken between do not touch.
+    std::optional<Eigen::Matrix2d> bend;
   };
   /// The surface at a place, between the pixels around it; nothing where one of them does not
   /// touch.

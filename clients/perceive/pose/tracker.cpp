@@ -12,7 +12,9 @@ namespace {
 /// Surfels of a keyframe.
 constexpr std::size_t kSurfels = 600;
 /// A contact of fewer pixels has no shape.
-constexpr std::size_t kFewestPixels = 60;
+constexpr std::size_t kFewestPixels = 300;
+/// A contact that has grown so many times shows what its keyframe lacks.
+constexpr std::size_t kGrown = 2;
 /// What a good alignment has at least and at most.
 constexpr double kGoodOverlap = 0.4;
 constexpr double kGoodRms = 4e-5;  // metres
@@ -39,11 +41,10 @@ void Tracker::release() {
   pose_ = {};
 }
 
-void Tracker::add_keyframe(const ContactView& view) {
-  // The first stays: all is measured from it.
-  if (keyframes_.size() == kMostKeyframes) keyframes_.erase(keyframes_.begin() + 1);
+Tracker::Keyframe Tracker::keyframe_of(const ContactView& view) const {
   Keyframe key;
   key.motion = pose_.alignment.motion;
+  key.pixels = view.pixels();
   key.centre = view.centre();
   key.surfels = view.choose(kSurfels);
   const Eigen::Matrix3d back = key.motion.rotation.transpose();
@@ -51,7 +52,13 @@ void Tracker::add_keyframe(const ContactView& view) {
     surfel.point = back * (surfel.point - key.motion.translation);
     surfel.normal = back * surfel.normal;
   }
-  keyframes_.push_back(std::move(key));
+  return key;
+}
+
+void Tracker::add_keyframe(const ContactView& view) {
+  // The first stays: what is nearest to the beginning has the least error.
+  if (keyframes_.size() == kMostKeyframes) keyframes_.erase(keyframes_.begin() + 1);
+  keyframes_.push_back(keyframe_of(view));
   current_ = keyframes_.size() - 1;
 }
 
@@ -130,7 +137,13 @@ const Tracker::Pose& Tracker::follow(const ContactView& view, std::uint64_t sequ
   }
   pose_.state = State::tracked;
   pose_.alignment = found;
-  if (found.overlap < kSharedOverlap) add_keyframe(view);
+  if (view.pixels() >= kGrown * keyframes_[current_].pixels) {
+    // In its place: the tip of what was just touched lies on all that is touched later, and turns
+    // on it as it likes.
+    keyframes_[current_] = keyframe_of(view);
+  } else if (found.overlap < kSharedOverlap) {
+    add_keyframe(view);
+  }
   return pose_;
 }
 

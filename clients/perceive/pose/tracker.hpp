@@ -35,9 +35,12 @@ class Tracker {
   struct Keyframe {
     std::vector<Surfel> surfels;  ///< As they lay in the first frame.
     Motion motion;
+    std::size_t pixels = 0;  ///< Of the contact then.
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Of the contact then, surface frame.
   };
 
+  /// What is seen now, laid back by the present motion.
+  [[nodiscard]] Keyframe keyframe_of(const ContactView& view) const;
   void add_keyframe(const ContactView& view);
   [[nodiscard]] Alignment best(const ContactView& view, const Motion& from);
   [[nodiscard]] bool recover(const ContactView& view);
