@@ -78,7 +78,11 @@ double lowest_mm(const Object& object, const cv::Matx33d& turn) {
     bool lower = false;
     const double x = best_x;
     const double y = best_y;
-    for (int k = 0; k < 9; ++k) lower |= offer(x + (k % 3 - 1) * step, y + (k / 3 - 1) * step);
+    for (int row = -1; row <= 1; ++row) {
+      for (int column = -1; column <= 1; ++column) {
+        lower |= offer(x + column * step, y + row * step);
+      }
+    }
     if (!lower) step /= 2;
   }
   return best;
