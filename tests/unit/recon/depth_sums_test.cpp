@@ -93,7 +93,7 @@ TEST(BendRow, NoPixelAddsMoreThan32Millimetres) {
 class VectorSums : public EveryTarget {
  protected:
   int uniform(int low, int high) {
-    return low + static_cast<int>(random_() % static_cast<unsigned>(high - low + 1));
+    return low + static_cast<int>(random_() % (static_cast<unsigned>(high - low) + 1));
   }
   /// Flat and steep places, ties, holes and both ends of what a depth may be.
   std::vector<std::int16_t> map_of(int pixels) {
