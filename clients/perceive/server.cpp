@@ -40,6 +40,8 @@ void Server::stop() {
   upstream_.reset();
 }
 
+void Server::introduce(v1::HelloReply& reply) const { reply.set_serial(serial()); }
+
 std::string Server::serial() const { return upstream_ ? upstream_->serial() : ""; }
 
 void Server::on_frame() {

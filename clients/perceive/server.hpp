@@ -28,7 +28,7 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
   /// The TCP port it listens on; 0 without TCP.
   [[nodiscard]] std::uint16_t port() const { return entrance_.port(); }
 
-  [[nodiscard]] std::string serial() const override;
+  void introduce(v1::HelloReply& reply) const override;
   void on_greeted() override { update_want(); }
   void on_request(const std::shared_ptr<net::Session>& session,
                   const v1::ClientMessage& message) override;
@@ -39,6 +39,8 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
   void update_want();
   void subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
                  const v1::Subscribe& request);
+  /// The camera's, as far as the daemon tells one.
+  [[nodiscard]] std::string serial() const;
   void fill(v1::Status& status) const;
 
   boost::asio::io_context& io_;

@@ -163,6 +163,8 @@ std::vector<pipeline::StageStatistics> Hub::stages() const {
 // bus.
 std::string Hub::serial() const { return port_.status().camera.identity; }
 
+void Hub::introduce(v1::HelloReply& reply) const { reply.set_serial(serial()); }
+
 void Hub::on_request(const std::shared_ptr<Session>& session, const v1::ClientMessage& message) {
   handlers_.request(session, message);
 }

@@ -71,7 +71,9 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
 
   void on_request(const std::shared_ptr<Session>& session,
                   const v1::ClientMessage& message) override;
-  [[nodiscard]] std::string serial() const override;
+  /// The camera's, as far as it tells one.
+  [[nodiscard]] std::string serial() const;
+  void introduce(v1::HelloReply& reply) const override;
   void on_greeted() override { update_want(); }
   void on_closed(const Session& session) override;
 

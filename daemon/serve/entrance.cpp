@@ -1,36 +1,10 @@
 #include "daemon/serve/entrance.hpp"
 
-#include <fmt/format.h>
-
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
-#include "daemon/serve/limited_log.hpp"
-
 namespace dtact::net {
-namespace {
-
-std::unique_ptr<Tls> make_tls(const NetConfig& config) {
-  if (config.tls_certificate.empty()) return nullptr;
-  return std::make_unique<Tls>(config.tls_certificate, config.tls_key);
-}
-
-NetConfig checked(NetConfig config) {
-  check_security(config);
-  if (is_insecure(config)) {
-    config.log(
-        {LogLevel::warning,
-         fmt::format("net.insecure: whoever can reach {} may {} the sensor, since there is no "
-                     "{}",
-                     config.address, config.token_file.empty() ? "watch and command" : "watch",
-                     config.token_file.empty() ? "token" : "TLS to keep a token secret")});
-  }
-  config.log = limited(std::move(config.log));
-  return config;
-}
-
-}  // namespace
 
 Entrance::Entrance(boost::asio::io_context& io, NetConfig settings)
     : config_(checked(std::move(settings))), tls_(make_tls(config_)), admission_(config_) {

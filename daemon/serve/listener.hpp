@@ -1,6 +1,7 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <cstdint>
 #include <functional>
@@ -30,6 +31,9 @@ class Listener {
   [[nodiscard]] virtual std::uint16_t port() const = 0;
 };
 
+/// A TCP connection as it came, with the socket's options set, and who is at its other end.
+using OnSocket = std::function<void(boost::asio::ip::tcp::socket, Peer)>;
+
 /// Binds config.address and listens, also on an address that no interface has yet: clients can
 /// connect once one has. Throws std::runtime_error naming address, port and remedy. What is passed
 /// by reference or pointer must outlive it; without `tls` it speaks plain TCP.
@@ -37,6 +41,9 @@ class Listener {
                                                    const NetConfig& config,
                                                    boost::asio::ssl::context* tls,
                                                    Listener::OnConnection on_connection);
+/// The same for who speaks something of its own over the sockets.
+[[nodiscard]] std::shared_ptr<Listener> listen_tcp(boost::asio::io_context& io,
+                                                   const NetConfig& config, OnSocket on_socket);
 
 /// Binds config.unix_socket, open to every user of this machine: Peer.trusted says who needs no
 /// token. Takes the place of a socket that nobody listens on any more, and removes its own at the

@@ -4,6 +4,9 @@
 
 #include <boost/asio/ip/address.hpp>
 #include <stdexcept>
+#include <utility>
+
+#include "daemon/serve/limited_log.hpp"
 
 namespace dtact::net {
 
@@ -38,6 +41,20 @@ void check_security(const NetConfig& config) {
                   "token: set {}; or net.insecure = true, if whoever can reach it may watch and "
                   "command; or net.address = \"127.0.0.1\"",
                   config.address, missing));
+}
+
+NetConfig checked(NetConfig config) {
+  check_security(config);
+  if (is_insecure(config)) {
+    config.log(
+        {LogLevel::warning,
+         fmt::format("net.insecure: whoever can reach {} may {} the sensor, since there is no "
+                     "{}",
+                     config.address, config.token_file.empty() ? "watch and command" : "watch",
+                     config.token_file.empty() ? "token" : "TLS to keep a token secret")});
+  }
+  config.log = limited(std::move(config.log));
+  return config;
 }
 
 }  // namespace dtact::net

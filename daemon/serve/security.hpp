@@ -24,5 +24,8 @@ struct EndpointInfo {
 /// daemon to the network without TLS and token and do not say that this is meant, or name half a
 /// TLS pair.
 void check_security(const NetConfig& config);
+/// `config` after check_security(), with a log that strangers cannot fill. Warns of what it leaves
+/// open.
+[[nodiscard]] NetConfig checked(NetConfig config);
 
 }  // namespace dtact::net

@@ -215,7 +215,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   frame.set_origin("centre");
   frame.set_axes("x right, y down, z towards the object, as the camera sees it");
   const auto host = host_.lock();
-  if (host != nullptr) reply.set_serial(host->serial());
+  if (host != nullptr) host->introduce(reply);
   send(message);
   if (host != nullptr) host->on_greeted();
 }

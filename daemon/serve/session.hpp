@@ -20,6 +20,7 @@
 namespace dtact::v1 {
 class ClientMessage;
 class Hello;
+class HelloReply;
 class ServerMessage;
 }  // namespace dtact::v1
 
@@ -35,8 +36,9 @@ class SessionHost {
   SessionHost& operator=(const SessionHost&) = delete;
   virtual ~SessionHost() = default;
 
-  /// The camera's, as far as it tells one.
-  [[nodiscard]] virtual std::string serial() const = 0;
+  /// Adds to the answer to Hello what the settings do not know: the camera's serial number, or all
+  /// that another daemon says of itself.
+  virtual void introduce(v1::HelloReply& reply) const = 0;
   /// The handshake is over: events and, once subscribed, frames flow.
   virtual void on_greeted() = 0;
   /// A request after the handshake, its id checked. Every one is owed exactly one reply.

@@ -96,13 +96,13 @@ std::string describe(const tcp::endpoint& endpoint) {
 
 class TcpListener : public Listener {
  public:
-  TcpListener(asio::io_context& io, const NetConfig& config, asio::ssl::context* tls,
-              OnConnection on_connection)
+  TcpListener(asio::io_context& io, const NetConfig& config, OnSocket on_socket)
       : loop_(std::make_shared<AcceptLoop<tcp>>(
             listen(io, endpoint_of(config), config.log), config.log,
-            [this, tls, dead_after = config.dead_after,
-             on_connection = std::move(on_connection)](tcp::socket socket) {
-              on_connection(over_tcp(std::move(socket), address_, dead_after, tls));
+            [this, on_socket = std::move(on_socket)](tcp::socket socket) {
+              prepare(socket);
+              Peer peer = peer_of(socket, address_);
+              on_socket(std::move(socket), std::move(peer));
             })),
         address_(describe(loop_->acceptor().local_endpoint())) {}
 
@@ -123,7 +123,16 @@ class TcpListener : public Listener {
 std::shared_ptr<Listener> listen_tcp(asio::io_context& io, const NetConfig& config,
                                      asio::ssl::context* tls,
                                      Listener::OnConnection on_connection) {
-  return std::make_shared<TcpListener>(io, config, tls, std::move(on_connection));
+  return listen_tcp(io, config,
+                    [tls, dead_after = config.dead_after, on_connection = std::move(on_connection)](
+                        tcp::socket socket, Peer peer) {
+                      on_connection(over_tcp(std::move(socket), std::move(peer), dead_after, tls));
+                    });
+}
+
+std::shared_ptr<Listener> listen_tcp(asio::io_context& io, const NetConfig& config,
+                                     OnSocket on_socket) {
+  return std::make_shared<TcpListener>(io, config, std::move(on_socket));
 }
 
 }  // namespace dtact::net

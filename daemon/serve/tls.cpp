@@ -95,4 +95,9 @@ Tls::Tls(const std::filesystem::path& certificate, const std::filesystem::path& 
   fingerprint = wire::fingerprint(*leaf);
 }
 
+std::unique_ptr<Tls> make_tls(const NetConfig& config) {
+  if (config.tls_certificate.empty()) return nullptr;
+  return std::make_unique<Tls>(config.tls_certificate, config.tls_key);
+}
+
 }  // namespace dtact::net

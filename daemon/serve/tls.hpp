@@ -2,7 +2,10 @@
 
 #include <boost/asio/ssl/context.hpp>
 #include <filesystem>
+#include <memory>
 #include <string>
+
+#include "daemon/serve/net_config.hpp"
 
 namespace dtact::net {
 
@@ -16,5 +19,8 @@ struct Tls {
   boost::asio::ssl::context context;
   std::string fingerprint;  ///< As Endpoint.fingerprint.
 };
+
+/// Of the files that the settings name; null when they name none. Throws as Tls.
+[[nodiscard]] std::unique_ptr<Tls> make_tls(const NetConfig& config);
 
 }  // namespace dtact::net

@@ -27,15 +27,6 @@ using Unix = asio::local::stream_protocol;
 /// enough to keep a gigabit link busy for a millisecond, the time in which this thread runs again.
 constexpr int kNotSentLowWater = 128 * 1024;
 
-void prepare(tcp::socket& socket) {
-  const auto set = [&socket](int option, int value) {
-    // Each is an improvement and none a condition: without it the connection is only slower.
-    (void)::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof value);
-  };
-  set(TCP_NODELAY, 1);
-  set(TCP_NOTSENT_LOWAT, kNotSentLowWater);
-}
-
 /// One that dials into a dual-stack listener by IPv4 is the same as one that dials by IPv4.
 asio::ip::address unmapped(const asio::ip::address& address) {
   if (!address.is_v6() || !address.to_v6().is_v4_mapped()) return address;
@@ -47,15 +38,6 @@ std::string host_of(const asio::ip::address& address) {
   auto bytes = address.to_v6().to_bytes();
   std::fill(bytes.begin() + 8, bytes.end(), std::uint8_t{0});
   return asio::ip::address_v6(bytes).to_string() + "/64";
-}
-
-Peer describe(const tcp::socket& socket, std::string endpoint) {
-  error_code error;
-  const auto peer = socket.remote_endpoint(error);
-  // A client may be gone before its connection was accepted; reading will say so.
-  if (error) return {"unknown", std::move(endpoint), "unknown", false};
-  return {fmt::format("{}:{}", peer.address().to_string(), peer.port()), std::move(endpoint),
-          host_of(unmapped(peer.address())), false};
 }
 
 /// What all have in common: a stream of Asio's. `Stream` is a socket, or TLS over one.
@@ -140,10 +122,26 @@ class TlsTransport : public TcpTransport<ssl::stream<tcp::socket>> {
 
 }  // namespace
 
-std::unique_ptr<Transport> over_tcp(tcp::socket socket, std::string endpoint,
+void prepare(tcp::socket& socket) {
+  const auto set = [&socket](int option, int value) {
+    // Each is an improvement and none a condition: without it the connection is only slower.
+    (void)::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof value);
+  };
+  set(TCP_NODELAY, 1);
+  set(TCP_NOTSENT_LOWAT, kNotSentLowWater);
+}
+
+Peer peer_of(const tcp::socket& socket, std::string endpoint) {
+  error_code error;
+  const auto peer = socket.remote_endpoint(error);
+  // A client may be gone before its connection was accepted; reading will say so.
+  if (error) return {"unknown", std::move(endpoint), "unknown", false};
+  return {fmt::format("{}:{}", peer.address().to_string(), peer.port()), std::move(endpoint),
+          host_of(unmapped(peer.address())), false};
+}
+
+std::unique_ptr<Transport> over_tcp(tcp::socket socket, Peer peer,
                                     std::chrono::milliseconds dead_after, ssl::context* tls) {
-  prepare(socket);
-  Peer peer = describe(socket, std::move(endpoint));
   if (tls != nullptr) {
     return std::make_unique<TlsTransport>(std::move(peer), dead_after, std::move(socket), *tls);
   }

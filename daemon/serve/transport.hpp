@@ -58,12 +58,16 @@ class Transport {
   Peer peer_;
 };
 
-/// TCP, with the socket's options set: answers at once, frames that do not queue up in the kernel,
-/// and a peer that is gone found after `dead_after`, one that only does not read kept (TcpWatch):
-/// reading then ends with asio::error::timed_out. Without `tls` plain; it must outlive the
-/// transport.
-[[nodiscard]] std::unique_ptr<Transport> over_tcp(boost::asio::ip::tcp::socket socket,
-                                                  std::string endpoint,
+/// Sets the options of a socket that frames are sent through: answers at once, and frames that do
+/// not queue up in the kernel.
+void prepare(boost::asio::ip::tcp::socket& socket);
+/// Who is at the other end.
+[[nodiscard]] Peer peer_of(const boost::asio::ip::tcp::socket& socket, std::string endpoint);
+
+/// TCP over a prepared socket; a peer that is gone is found after `dead_after`, one that only does
+/// not read kept (TcpWatch): reading then ends with asio::error::timed_out. Without `tls` plain; it
+/// must outlive the transport.
+[[nodiscard]] std::unique_ptr<Transport> over_tcp(boost::asio::ip::tcp::socket socket, Peer peer,
                                                   std::chrono::milliseconds dead_after,
                                                   boost::asio::ssl::context* tls);
 
