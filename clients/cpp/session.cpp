@@ -41,6 +41,22 @@ bool is_final(const ConnectionError& error) {
 
 }  // namespace
 
+v1::Hello hello_for(const Options& options, const Connection& connection) {
+  if (!options.token.empty() && !connection.confidential() && !options.insecure) {
+    throw IdentityError(fmt::format(
+        "the token was not sent: {} is another machine, and over plain TCP whoever "
+        "listens on the way could use it. Give the daemon's fingerprint (dtactctl cert --show "
+        "prints it there), or allow this explicitly with insecure",
+        connection.name()));
+  }
+  v1::Hello hello;
+  hello.set_major(wire::kMajor);
+  hello.set_minor(wire::kMinor);
+  hello.set_program(options.program.substr(0, wire::kMaxProgramName));
+  hello.set_token(options.token);
+  return hello;
+}
+
 Session::Session(const Options& options)
     : options_(options), backoff_(options.reconnect.value_or(Reconnect{}), std::random_device{}()) {
   open({Clock::now() + options_.timeout});
@@ -49,19 +65,8 @@ Session::Session(const Options& options)
 void Session::open(const Limit& limit) {
   connection_ = std::make_unique<Connection>(options_, limit);
   local_ = connection_->local();
-  if (!options_.token.empty() && !connection_->confidential() && !options_.insecure) {
-    throw IdentityError(fmt::format(
-        "the token was not sent: {} is another machine, and over plain TCP whoever "
-        "listens on the way could use it. Give the daemon's fingerprint (dtactctl cert --show "
-        "prints it there), or allow this explicitly with insecure",
-        connection_->name()));
-  }
   v1::ClientMessage message;
-  auto& hello = *message.mutable_hello();
-  hello.set_major(wire::kMajor);
-  hello.set_minor(wire::kMinor);
-  hello.set_program(options_.program.substr(0, wire::kMaxProgramName));
-  hello.set_token(options_.token);
+  *message.mutable_hello() = hello_for(options_, *connection_);
   server_ = exchange(message, limit).hello();
   opened_ = Clock::now();
 }

@@ -13,6 +13,10 @@
 
 namespace dtact::client {
 
+/// The Hello to send over `connection`. Throws IdentityError rather than give the token to a peer
+/// that is not known. Not part of the library's interface.
+[[nodiscard]] v1::Hello hello_for(const Options& options, const Connection& connection);
+
 /// A greeted connection with its subscription, both made again after a loss where Options ask for
 /// it. Not part of the library's interface.
 class Session {
