@@ -16,6 +16,9 @@ inline constexpr std::uint16_t kDefaultPort = 7377;
 /// dtact-perceive's own, from the same range.
 inline constexpr std::uint16_t kPerceivePort = 7378;
 
+/// dtact-web's own, which browsers are pointed at: from the same range.
+inline constexpr std::uint16_t kWebPort = 7380;
+
 /// Where the daemon listens, and clients connect to, unless told otherwise: this machine only.
 inline constexpr const char* kDefaultAddress = "127.0.0.1";
 

@@ -32,8 +32,9 @@ class RateLimit {
 
 /// Which parts a program has besides the summary; the other ones are refused.
 enum class Serves : std::uint8_t {
-  images,   ///< Depth, luma and JPEG: dtactd.
-  geometry  ///< Point clouds and poses: dtact-perceive.
+  images,     ///< Depth, luma and JPEG: dtactd.
+  geometry,   ///< Point clouds and poses: dtact-perceive.
+  everything  ///< What those do that stand behind it: dtact-web.
 };
 
 /// What a client wants and when it is due, see dtact.v1.Subscribe.

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "clients/cpp/options.hpp"
+#include "clients/web/link.hpp"
+#include "clients/web/relayed_frame.hpp"
+
+namespace dtact::web {
+
+/// One subscription at a daemon over a connection of its own. Of the frames that come while nobody
+/// takes them the newest is kept.
+class Feed {
+ public:
+  /// All on the feed's own thread.
+  struct Handlers {
+    /// To Subscribe, after each connection; an error when there is none.
+    std::function<void(const v1::Reply&)> answered;
+    std::function<void()> frame;  ///< take() has one.
+  };
+
+  Feed(client::Options options, const v1::Subscribe& subscription, Handlers handlers);
+
+  struct Taken {
+    RelayedFrame frame;
+    std::uint64_t missed = 0;  ///< Between the one taken before and this.
+  };
+  /// The newest frame that was not taken yet. From any thread.
+  [[nodiscard]] std::optional<Taken> take();
+  /// See Link.
+  void stop() noexcept { link_.stop(); }
+  [[nodiscard]] bool ended() const noexcept { return link_.ended(); }
+
+ private:
+  void on_message(const std::string& bytes);
+
+  Handlers handlers_;
+  std::string request_;  ///< Subscribe, serialized.
+  std::mutex mutex_;     ///< Of the next two.
+  std::optional<RelayedFrame> newest_;
+  std::uint64_t missed_ = 0;
+  std::uint64_t dropped_ = 0;  ///< By the daemon, on this connection.
+  Link link_;                  ///< Last: its thread uses the others.
+};
+
+}  // namespace dtact::web

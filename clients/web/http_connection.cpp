@@ -1,0 +1,230 @@
+#include "clients/web/http_connection.hpp"
+
+#include <boost/asio/ssl/stream.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/http/span_body.hpp>
+#include <boost/beast/websocket.hpp>
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+#include "clients/web/beast_web_socket.hpp"
+
+namespace dtact::web {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using asio::ip::tcp;
+using boost::system::error_code;
+
+constexpr std::uint32_t kMaxHead = 8192;
+/// For TLS' handshake and a request's head; also how long a connection may lie idle.
+constexpr std::chrono::seconds kPatience{15};
+/// For an answer, or the answer that opens a WebSocket, to be taken.
+constexpr std::chrono::seconds kDelivery{60};
+
+/// Nothing of strangers': no script, style, picture or connection but from here, none in the page's
+/// own text, and no other page around this one.
+constexpr const char* kPolicy =
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' "
+    "blob:; font-src 'self'; connect-src 'self'; worker-src 'self'; manifest-src 'self'; "
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+
+Answer refusal(http::status status, std::string sentence) {
+  return {.status = status, .text = std::move(sentence)};
+}
+
+template <typename Stream>
+class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream>> {
+ public:
+  template <typename... Arguments>
+  HttpConnection(net::Peer peer, std::weak_ptr<Site> site, std::shared_ptr<void> ticket,
+                 std::chrono::milliseconds dead_after, Arguments&&... arguments)
+      : stream_(std::make_unique<Stream>(std::forward<Arguments>(arguments)...)),
+        timer_(stream_->get_executor()),
+        peer_(std::move(peer)),
+        site_(std::move(site)),
+        ticket_(std::move(ticket)),
+        dead_after_(dead_after) {}
+
+  void start() {
+    if constexpr (kTls) {
+      wait_at_most(kPatience);
+      stream_->async_handshake(asio::ssl::stream_base::server,
+                               [self = this->shared_from_this()](const error_code& error) {
+                                 if (!error) self->read();
+                               });
+    } else {
+      read();
+    }
+  }
+
+ private:
+  using Response = http::response<http::span_body<const char>>;
+  using Channel = beast::websocket::stream<Stream>;
+  static constexpr bool kTls = !std::is_same_v<Stream, tcp::socket>;
+
+  void wait_at_most(std::chrono::seconds time) {
+    timer_.expires_after(time);
+    timer_.async_wait([weak = this->weak_from_this()](const error_code& error) {
+      const auto self = weak.lock();
+      if (error || self == nullptr) return;
+      if (self->stream_) self->hang_up(*self->stream_);
+      if (self->channel_) self->hang_up(*self->channel_);
+    });
+  }
+
+  template <typename Layer>
+  static void hang_up(Layer& layer) {
+    error_code ignored;
+    beast::get_lowest_layer(layer).close(ignored);
+  }
+
+  void read() {
+    parser_.emplace();
+    parser_->header_limit(kMaxHead);
+    wait_at_most(kPatience);
+    http::async_read_header(*stream_, buffer_, *parser_,
+                            [self = this->shared_from_this()](
+                                const error_code& error, std::size_t) { self->on_head(error); });
+  }
+
+  void on_head(const error_code& error) {
+    if (error == http::error::header_limit) {
+      return answer(refusal(http::status::request_header_fields_too_large,
+                            "the request's head is longer than 8192 bytes"),
+                    true);
+    }
+    // The peer left, or it is no HTTP: nobody would read an answer.
+    if (error) return;
+    const Request& request = parser_->get();
+    const auto site = site_.lock();
+    if (site == nullptr) return;
+    if (beast::websocket::is_upgrade(request)) return upgrade(site->upgrade(request));
+    const bool body = parser_->chunked() || parser_->content_length().value_or(0) > 0;
+    if (body) return answer(refusal(http::status::payload_too_large, "send no body"), true);
+    if (request.method() != http::verb::get && request.method() != http::verb::head) {
+      return answer(refusal(http::status::method_not_allowed, "only GET and HEAD are known here"),
+                    true);
+    }
+    answer(site->answer(request), !request.keep_alive());
+  }
+
+  void answer(Answer made, bool last) {
+    answer_ = std::move(made);
+    const Request& request = parser_->get();
+    response_ = Response(answer_.status, 11);
+    response_.set(http::field::content_type,
+                  beast::string_view(answer_.type.data(), answer_.type.size()));
+    response_.set("Content-Security-Policy", kPolicy);
+    response_.set("X-Content-Type-Options", "nosniff");
+    response_.set("Referrer-Policy", "no-referrer");
+    response_.set("Cross-Origin-Resource-Policy", "same-origin");
+    response_.set("Cross-Origin-Opener-Policy", "same-origin");
+    response_.set(http::field::cache_control, answer_.tag.empty() ? "no-store" : "no-cache");
+    if (answer_.status == http::status::method_not_allowed) {
+      response_.set(http::field::allow, "GET, HEAD");
+    }
+    std::string_view bytes = answer_.bytes.empty() ? std::string_view(answer_.text) : answer_.bytes;
+    if (!answer_.tag.empty()) {
+      response_.set(http::field::etag, answer_.tag);
+      if (request[http::field::if_none_match] == answer_.tag) {
+        response_.result(http::status::not_modified);
+        bytes = {};
+      }
+    }
+    response_.keep_alive(!last);
+    response_.content_length(bytes.size());
+    if (request.method() != http::verb::head) response_.body() = {bytes.data(), bytes.size()};
+    wait_at_most(kDelivery);
+    http::async_write(
+        *stream_, response_,
+        [self = this->shared_from_this(), last](const error_code& error, std::size_t) {
+          if (error) return;
+          if (last) return self->end();
+          self->read();
+        });
+  }
+
+  void end() {
+    error_code ignored;
+    if constexpr (!kTls) stream_->shutdown(tcp::socket::shutdown_send, ignored);
+    // What of the peer's was not read would take the answer with it as the socket closes.
+    timer_.expires_after(std::chrono::seconds(1));
+    timer_.async_wait([self = this->shared_from_this()](const error_code&) {});
+  }
+
+  void upgrade(Upgrade wanted) {
+    if (!wanted.open) return answer(std::move(wanted.refusal), true);
+    channel_ = std::make_unique<Channel>(std::move(*stream_));
+    stream_.reset();
+    channel_->read_message_max(wanted.max_message);
+    channel_->auto_fragment(false);
+    channel_->set_option(beast::websocket::stream_base::decorator(
+        [subprotocol = wanted.subprotocol](beast::websocket::response_type& response) {
+          response.set(http::field::server, "dtact-web");
+          if (!subprotocol.empty()) {
+            response.set(http::field::sec_websocket_protocol, subprotocol);
+          }
+        }));
+    wait_at_most(kDelivery);
+    // What the peer sent behind the head waits for the answer in any case (RFC 6455, 4.1).
+    channel_->async_accept(parser_->get(), [self = this->shared_from_this(),
+                                            wanted = std::move(wanted)](const error_code& error) {
+      self->timer_.cancel();
+      if (error) return;
+      wanted.open(
+          std::make_shared<BeastWebSocket<Stream>>(std::move(self->channel_), self->dead_after_),
+          std::move(self->peer_));
+    });
+  }
+
+  std::unique_ptr<Stream> stream_;
+  std::unique_ptr<Channel> channel_;  ///< In its place, once it is being upgraded.
+  asio::steady_timer timer_;
+  net::Peer peer_;
+  std::weak_ptr<Site> site_;
+  std::shared_ptr<void> ticket_;
+  std::chrono::milliseconds dead_after_;
+  beast::flat_buffer buffer_{kMaxHead};
+  std::optional<http::request_parser<http::empty_body>> parser_;
+  Answer answer_;
+  Response response_;
+};
+
+}  // namespace
+
+std::shared_ptr<void> HttpLimits::admit(const std::string& host) {
+  std::size_t& of_host = counts_->hosts[host];
+  if (counts_->all >= kMost || of_host >= kMostOfHost) {
+    if (of_host == 0) counts_->hosts.erase(host);
+    return nullptr;
+  }
+  ++counts_->all;
+  ++of_host;
+  return {counts_.get(), [counts = counts_, host](Counts*) {
+            --counts->all;
+            const auto found = counts->hosts.find(host);
+            if (--found->second == 0) counts->hosts.erase(found);
+          }};
+}
+
+void serve_http(tcp::socket socket, net::Peer peer, asio::ssl::context* tls,
+                std::weak_ptr<Site> site, std::shared_ptr<void> ticket,
+                std::chrono::milliseconds dead_after) {
+  if (tls != nullptr) {
+    std::make_shared<HttpConnection<asio::ssl::stream<tcp::socket>>>(
+        std::move(peer), std::move(site), std::move(ticket), dead_after, std::move(socket), *tls)
+        ->start();
+  } else {
+    std::make_shared<HttpConnection<tcp::socket>>(std::move(peer), std::move(site),
+                                                  std::move(ticket), dead_after, std::move(socket))
+        ->start();
+  }
+}
+
+}  // namespace dtact::web

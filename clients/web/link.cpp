@@ -1,0 +1,125 @@
+#include "clients/web/link.hpp"
+
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <random>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "clients/cpp/backoff.hpp"
+#include "clients/cpp/session.hpp"
+
+namespace dtact::web {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// Between attempts to reach a daemon that is not there: one that restarts is back within a second.
+constexpr client::Reconnect kPauses{std::chrono::milliseconds(200),
+                                    std::chrono::milliseconds(2000)};
+/// As long as it takes: whoever has something to say wakes the thread.
+constexpr std::chrono::hours kForever{24};
+constexpr std::uint64_t kHelloId = 1;
+
+}  // namespace
+
+Link::Link(client::Options options, Handlers handlers)
+    : options_(std::move(options)),
+      handlers_(std::move(handlers)),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  if (!wake_) throw std::system_error(errno, std::generic_category(), "eventfd");
+  thread_ = std::thread([this] { run(); });
+}
+
+Link::~Link() {
+  stop();
+  thread_.join();
+}
+
+void Link::send(std::string message) {
+  {
+    const std::lock_guard lock(mutex_);
+    outgoing_.push_back(std::move(message));
+  }
+  wake();
+}
+
+void Link::stop() noexcept {
+  stopping_ = true;
+  wake();
+}
+
+void Link::wake() const noexcept {
+  const std::uint64_t one = 1;
+  // Fails only when it is awake already.
+  (void)!::write(wake_.get(), &one, sizeof one);
+}
+
+void Link::run() {
+  client::BackOff pauses(kPauses, std::random_device{}());
+  std::string told;
+  while (!stopping_) {
+    try {
+      client::Connection connection(options_, {Clock::now() + options_.timeout, wake_.get()});
+      v1::HelloReply daemon = greet(connection);
+      {
+        // What was meant for the connection before is not for this one.
+        const std::lock_guard lock(mutex_);
+        outgoing_.clear();
+      }
+      told.clear();
+      pauses.reset();
+      handlers_.up(std::move(daemon));
+      serve(connection);
+    } catch (const std::exception& e) {
+      if (stopping_) break;
+      if (std::exchange(told, e.what()) != e.what()) handlers_.down(told);
+      (void)client::wait(-1, 0, {Clock::now() + pauses.next(), wake_.get()});
+    }
+  }
+  ended_ = true;
+}
+
+v1::HelloReply Link::greet(client::Connection& connection) const {
+  const client::Limit limit{Clock::now() + options_.timeout, wake_.get()};
+  v1::ClientMessage hello;
+  hello.set_id(kHelloId);
+  *hello.mutable_hello() = client::hello_for(options_, connection);
+  connection.write(hello.SerializeAsString(), limit);
+  const std::string* bytes = connection.read(limit);
+  if (bytes == nullptr) {
+    throw std::runtime_error(connection.name() + " does not answer: look at journalctl -u dtactd");
+  }
+  v1::ServerMessage answer;
+  if (!answer.ParseFromString(*bytes) || !answer.has_reply()) {
+    throw std::runtime_error(connection.name() +
+                             " is no dtactd: is there another program on this port?");
+  }
+  if (answer.reply().has_error()) throw std::runtime_error(answer.reply().error().message());
+  return std::move(*answer.mutable_reply()->mutable_hello());
+}
+
+void Link::serve(client::Connection& connection) {
+  while (!stopping_) {
+    std::uint64_t count = 0;
+    (void)!::read(wake_.get(), &count, sizeof count);
+    std::vector<std::string> outgoing;
+    {
+      const std::lock_guard lock(mutex_);
+      outgoing.swap(outgoing_);
+    }
+    for (const std::string& message : outgoing) {
+      connection.write(message, {Clock::now() + options_.timeout});
+    }
+    while (const std::string* message = connection.read({Clock::now() + kForever, wake_.get()})) {
+      handlers_.message(*message);
+      if (stopping_) return;
+    }
+  }
+}
+
+}  // namespace dtact::web

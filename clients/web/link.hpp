@@ -1,0 +1,57 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "clients/cpp/connection.hpp"
+#include "clients/cpp/options.hpp"
+#include "hal/base/unique_fd.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::web {
+
+/// A connection to a daemon that carries its messages as they are, on a thread of its own; made
+/// again whenever it is lost.
+class Link {
+ public:
+  /// All on the link's own thread.
+  struct Handlers {
+    std::function<void(v1::HelloReply)> up;  ///< The daemon greeted.
+    std::function<void(std::string)> down;   ///< Why it is away; again with another reason.
+    std::function<void(const std::string&)> message;  ///< A ServerMessage as it came.
+  };
+
+  Link(client::Options options, Handlers handlers);
+  /// Waits for the thread, which looking up a host's name may hold up: stop() and ended() tell when
+  /// it does not.
+  ~Link();
+  Link(const Link&) = delete;
+  Link& operator=(const Link&) = delete;
+
+  /// A ClientMessage, serialized. Lost when the connection is away, or breaks before it is written.
+  void send(std::string message);
+  /// Lets the thread end. No handler is called after the one that runs.
+  void stop() noexcept;
+  [[nodiscard]] bool ended() const noexcept { return ended_; }
+
+ private:
+  void run();
+  [[nodiscard]] v1::HelloReply greet(client::Connection& connection) const;
+  void serve(client::Connection& connection);
+  void wake() const noexcept;
+
+  client::Options options_;
+  Handlers handlers_;
+  base::UniqueFd wake_;  ///< An eventfd.
+  std::atomic<bool> stopping_ = false;
+  std::atomic<bool> ended_ = false;
+  std::mutex mutex_;
+  std::vector<std::string> outgoing_;  ///< Under the mutex.
+  std::thread thread_;
+};
+
+}  // namespace dtact::web

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/web/web_socket.hpp"
+#include "daemon/serve/transport.hpp"
+
+namespace dtact::web {
+
+using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+
+/// What a request is answered with.
+struct Answer {
+  boost::beast::http::status status = boost::beast::http::status::ok;
+  std::string_view type = "text/plain; charset=utf-8";
+  std::string text = {};        ///< The body, …
+  std::string_view bytes = {};  ///< … unless this is it, which lives as long as the program.
+  std::string tag = {};         ///< Of its version; empty: it is not kept.
+};
+
+/// What becomes of a WebSocket, or why there is none.
+struct Upgrade {
+  Answer refusal = {};           ///< Where `open` is null.
+  std::string subprotocol = {};  ///< That was chosen; empty: none was offered.
+  std::size_t max_message = 0;   ///< Of the peer's, bytes.
+  std::function<void(std::shared_ptr<WebSocket>, net::Peer)> open = {};
+};
+
+/// What HTTP connections are there for. On their thread.
+class Site {
+ public:
+  Site() = default;
+  Site(const Site&) = delete;
+  Site& operator=(const Site&) = delete;
+  virtual ~Site() = default;
+
+  [[nodiscard]] virtual Answer answer(const Request& request) = 0;
+  [[nodiscard]] virtual Upgrade upgrade(const Request& request) = 0;
+};
+
+}  // namespace dtact::web

@@ -1,0 +1,150 @@
+#include "clients/web/sensor.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <utility>
+
+#include "clients/web/json_text.hpp"
+#include "daemon/serve/subscription.hpp"
+#include "version.hpp"
+
+namespace dtact::web {
+
+namespace asio = boost::asio;
+using net::Subscription;
+
+namespace {
+
+void send(net::Session& session, std::uint64_t id, v1::Reply reply) {
+  v1::ServerMessage message;
+  *message.mutable_reply() = std::move(reply);
+  message.mutable_reply()->set_id(id);
+  session.send(message);
+}
+
+/// All that the daemon lets through, since rates were its part.
+Subscription every_frame(v1::Subscribe request, std::uint32_t minor) {
+  for (const auto clear :
+       {&v1::Subscribe::clear_every, &v1::Subscribe::clear_depth_hz, &v1::Subscribe::clear_luma_hz,
+        &v1::Subscribe::clear_jpeg_hz, &v1::Subscribe::clear_summary_hz,
+        &v1::Subscribe::clear_cloud_hz, &v1::Subscribe::clear_pose_hz}) {
+    (request.*clear)();
+  }
+  auto made = Subscription::from(request, minor, {}, net::Serves::everything);
+  // The daemon has agreed to it; one that knows more than this release sends more.
+  const auto* subscription = std::get_if<Subscription>(&made);
+  return subscription != nullptr ? *subscription : Subscription();
+}
+
+}  // namespace
+
+Sensor::Sensor(asio::io_context& io, std::shared_ptr<Source> source, const net::NetConfig& config,
+               net::Admission& admission)
+    : io_(io), source_(std::move(source)), config_(config), admission_(admission) {}
+
+void Sensor::start() {
+  source_->follow(this, {.changed = [this] { on_changed(); },
+                         .event = [this](const auto& event) { guests_.broadcast(event); }});
+}
+
+void Sensor::stop() {
+  source_->unfollow(this);
+  for (const auto& session : guests_.all()) source_->leave(session.get());
+  viewers_.clear();
+  guests_.dismiss("dtact-web ends");
+}
+
+void Sensor::admit(std::shared_ptr<WebSocket> socket, net::Peer peer) {
+  auto transport = std::make_unique<WireTransport>(std::move(socket), std::move(peer));
+  WireTransport* const there = transport.get();
+  const auto session =
+      std::make_shared<net::Session>(std::move(transport), config_, admission_, weak_from_this());
+  viewers_[session.get()].transport = there;
+  guests_.admit(session);
+  there->tell(entry());
+}
+
+std::string Sensor::entry() const {
+  std::string text = fmt::format(R"({{"name":{},"connected":{})", json_string(source_->name()),
+                                 source_->connected());
+  if (!source_->connected()) {
+    // Whoever has shown no token is not told of addresses.
+    const std::string error = config_.token_file.empty()
+                                  ? source_->reason()
+                                  : "its daemon is away: dtact-web's log says why";
+    text += fmt::format(R"(,"error":{})", json_string(error));
+  }
+  return text + "}";
+}
+
+void Sensor::on_changed() {
+  const std::string told = source_->connected() ? "is there: " + source_->daemon()->program()
+                                                : "is away: " + source_->reason();
+  config_.log({source_->connected() ? net::LogLevel::info : net::LogLevel::warning,
+               fmt::format("the daemon of {} {}", source_->name(), told)});
+  const std::string text = entry();
+  for (const auto& session : guests_.all()) {
+    if (!source_->connected()) session->subscribe(Subscription());
+    viewers_[session.get()].transport->tell(text);
+  }
+}
+
+void Sensor::introduce(v1::HelloReply& reply) const {
+  const auto& daemon = source_->daemon();
+  if (!daemon) return;
+  reply.set_program(fmt::format("{} by {}", daemon->program(), config_.program));
+  *reply.mutable_features() = daemon->features();
+  *reply.mutable_surface_frame() = daemon->surface_frame();
+  reply.set_name(daemon->name());
+  reply.set_serial(daemon->serial());
+  if (daemon->rights() == v1::RIGHTS_VIEW) reply.set_rights(v1::RIGHTS_VIEW);
+}
+
+void Sensor::on_request(const std::shared_ptr<net::Session>& session,
+                        const v1::ClientMessage& message) {
+  if (message.has_subscribe()) return subscribe(session, message.id(), message.subscribe());
+  source_->request(message, [weak = std::weak_ptr(session), id = message.id()](v1::Reply reply) {
+    if (const auto viewer = weak.lock()) send(*viewer, id, std::move(reply));
+  });
+}
+
+void Sensor::subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
+                       const v1::Subscribe& request) {
+  const auto answered = [weak = std::weak_ptr(session), id, request](v1::Reply reply) {
+    const auto viewer = weak.lock();
+    if (viewer == nullptr) return;
+    if (!reply.has_error()) viewer->subscribe(every_frame(request, viewer->minor_version()));
+    send(*viewer, id, std::move(reply));
+  };
+  source_->subscribe(
+      session.get(), request, answered,
+      [this, session = session.get()](const RelayedFrame& frame, std::uint64_t missed) {
+        on_frame(*session, frame, missed);
+      });
+}
+
+void Sensor::on_frame(net::Session& session, const RelayedFrame& frame, std::uint64_t missed) {
+  const auto viewer = viewers_.find(&session);
+  if (viewer == viewers_.end()) return;
+  std::uint32_t& waiting = viewer->second.waiting;
+  const bool waits = session.outbox().frame_waits();
+  // A picture that comes seldom is not lost to the many frames without one.
+  const bool keeps = waits && (waiting & ~frame.parts) != 0;
+  if (!session.due(frame.monotonic_ns, keeps ? missed + 1 : missed) || keeps) return;
+  waiting = frame.parts;
+  session.send_frame(frame.encoded);
+}
+
+void Sensor::on_closed(const net::Session& session) {
+  // Later, since a session may end while the list is being walked through.
+  asio::post(io_, [weak = weak_from_this(), gone = &session] {
+    const auto self = weak.lock();
+    if (self == nullptr || self->viewers_.erase(gone) == 0) return;
+    self->source_->leave(gone);
+    (void)self->guests_.release(gone);
+  });
+}
+
+}  // namespace dtact::web

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "clients/web/source.hpp"
+#include "clients/web/wire_transport.hpp"
+#include "daemon/serve/admission.hpp"
+#include "daemon/serve/guests.hpp"
+#include "daemon/serve/net_config.hpp"
+#include "daemon/serve/session.hpp"
+
+namespace dtact::web {
+
+/// The viewers of one daemon: clients of its wire over WebSockets, who stay while it is away. On
+/// the thread that runs `io`.
+class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sensor> {
+ public:
+  /// What is passed by reference must outlive it.
+  Sensor(boost::asio::io_context& io, std::shared_ptr<Source> source, const net::NetConfig& config,
+         net::Admission& admission);
+
+  void start();
+  void stop();
+  /// A new viewer.
+  void admit(std::shared_ptr<WebSocket> socket, net::Peer peer);
+  /// As an entry of /sensors, see README.md beside this file.
+  [[nodiscard]] std::string entry() const;
+  [[nodiscard]] Source& source() const noexcept { return *source_; }
+
+  void introduce(v1::HelloReply& reply) const override;
+  void on_greeted() override {}
+  void on_request(const std::shared_ptr<net::Session>& session,
+                  const v1::ClientMessage& message) override;
+  void on_closed(const net::Session& session) override;
+
+ private:
+  struct Viewer {
+    WireTransport* transport = nullptr;  ///< The session's.
+    std::uint32_t waiting = 0;           ///< RelayedFrame::parts of the frame that waits.
+  };
+
+  void on_changed();
+  void subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
+                 const v1::Subscribe& request);
+  void on_frame(net::Session& session, const RelayedFrame& frame, std::uint64_t missed);
+
+  boost::asio::io_context& io_;
+  std::shared_ptr<Source> source_;
+  const net::NetConfig& config_;
+  net::Admission& admission_;
+  net::Guests guests_;
+  std::map<const net::Session*, Viewer> viewers_;
+};
+
+}  // namespace dtact::web

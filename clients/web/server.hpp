@@ -1,0 +1,67 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/options.hpp"
+#include "clients/web/http_connection.hpp"
+#include "clients/web/page.hpp"
+#include "clients/web/request.hpp"
+#include "clients/web/sensor.hpp"
+#include "daemon/serve/admission.hpp"
+#include "daemon/serve/listener.hpp"
+#include "daemon/serve/net_config.hpp"
+#include "daemon/serve/tls.hpp"
+
+namespace dtact::web {
+
+/// A daemon behind the gateway, and what it is called there.
+struct NamedDaemon {
+  std::string name;
+  client::Options options;
+};
+
+struct Settings {
+  net::NetConfig net;
+  std::vector<NamedDaemon> daemons;
+  /// By which browsers may name this machine, besides its addresses.
+  std::vector<std::string> host_names;
+};
+
+/// dtact-web as a whole: the page, and a WebSocket for each daemon. All but the connections to the
+/// daemons is on the thread that runs `io`.
+class Server : public Site, public std::enable_shared_from_this<Server> {
+ public:
+  /// Listens from here on. `page` must outlive it. Throws std::runtime_error naming the setting,
+  /// file, address or port and the remedy.
+  Server(boost::asio::io_context& io, Settings settings, const Page& page);
+
+  void start();
+  void stop();
+  /// "http://127.0.0.1:7380/"
+  [[nodiscard]] std::string address() const;
+  /// The TCP port it listens on.
+  [[nodiscard]] std::uint16_t port() const { return listener_->port(); }
+
+  [[nodiscard]] Answer answer(const Request& request) override;
+  [[nodiscard]] Upgrade upgrade(const Request& request) override;
+
+ private:
+  [[nodiscard]] bool is_for_us(const Request& request) const;
+  [[nodiscard]] std::string sensors() const;
+  [[nodiscard]] std::shared_ptr<Sensor> find(std::string_view path) const;
+
+  net::NetConfig config_;
+  std::vector<std::string> host_names_;
+  const Page& page_;
+  std::unique_ptr<net::Tls> tls_;
+  net::Admission admission_;
+  HttpLimits limits_;
+  std::vector<std::shared_ptr<Sensor>> sensors_;
+  std::shared_ptr<net::Listener> listener_;
+};
+
+}  // namespace dtact::web

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/cpp/options.hpp"
+#include "clients/web/feed.hpp"
+#include "clients/web/link.hpp"
+#include "daemon/serve/token_bucket.hpp"
+
+namespace dtact::web {
+
+/// One daemon behind the gateway: requests passed on, events, and streams of frames that are shared
+/// by all who ask for the same. On the thread that runs `io`.
+class Source : public std::enable_shared_from_this<Source> {
+ public:
+  /// Different streams of one daemon at one time; each is a client of it.
+  static constexpr std::size_t kMaxFeeds = 8;
+  /// Requests a second of all viewers together, and as many at once after a rest: fewer than what
+  /// the daemon ends a connection for (500), so that one viewer does not cost all of them the
+  /// daemon.
+  static constexpr double kMaxRequestsPerS = 400;
+
+  using Answered = std::function<void(v1::Reply)>;
+  using OnFrame = std::function<void(const RelayedFrame&, std::uint64_t missed)>;
+
+  /// Whoever follows the daemon's life.
+  struct Follower {
+    std::function<void()> changed;  ///< It went away, for another reason, or is there again.
+    std::function<void(const v1::ServerMessage&)> event;
+  };
+
+  Source(boost::asio::io_context& io, std::string name, client::Options daemon);
+
+  void start();
+  /// Nobody is called any more.
+  void stop();
+  /// One for each `who`, until unfollow().
+  void follow(const void* who, Follower follower) { followers_[who] = std::move(follower); }
+  void unfollow(const void* who) { followers_.erase(who); }
+
+  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] bool connected() const noexcept { return connected_; }
+  /// Why it is away: a sentence. Empty while it is there.
+  [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
+  /// What the daemon said of itself last; none before it was ever there.
+  [[nodiscard]] const std::optional<v1::HelloReply>& daemon() const noexcept { return daemon_; }
+
+  /// Passes a request on under an id of its own; `answered` is called once, also with an error when
+  /// the daemon goes away first.
+  void request(v1::ClientMessage message, Answered answered);
+  /// Puts `who` on the stream of `request` in place of the one it was on, once the daemon agrees;
+  /// `answered` is called once, and then `frame` for each frame, `missed` ones having been lost
+  /// before it. A request for nothing ends the stream.
+  void subscribe(const void* who, v1::Subscribe request, Answered answered, OnFrame frame);
+  /// Ends the stream of `who`, who is not called any more.
+  void leave(const void* who);
+
+ private:
+  struct Member {
+    const void* who = nullptr;
+    std::uint64_t serial = 0;  ///< Of its subscribe().
+    Answered answered;         ///< Null once it was called.
+    OnFrame frame;
+  };
+  struct Stream {
+    std::uint64_t number = 0;
+    std::string key;  ///< The Subscribe, serialized.
+    std::shared_ptr<Feed> feed;
+    bool agreed = false;
+    std::vector<Member> members;
+  };
+
+  void on_up(const v1::HelloReply& daemon);
+  void on_down(const std::string& reason);
+  void on_message(const v1::ServerMessage& message);
+  void on_answered(std::uint64_t stream, const v1::Reply& reply);
+  void on_frame(std::uint64_t stream);
+  [[nodiscard]] std::shared_ptr<Feed> open(std::uint64_t stream, const v1::Subscribe& request);
+  [[nodiscard]] Stream* find(std::uint64_t stream);
+  [[nodiscard]] v1::Reply away() const;
+  /// Tells those of a stream who wait for it, and takes them off their others when it flows.
+  void settle(Stream& stream, const v1::Reply& reply);
+  void retire_empty();
+  void tell_all();
+
+  boost::asio::io_context& io_;
+  std::string name_;
+  client::Options options_;
+  std::map<const void*, Follower> followers_;
+  std::unique_ptr<Link> link_;
+  bool connected_ = false;
+  std::string reason_ = "it has not answered yet";
+  std::optional<v1::HelloReply> daemon_;
+  net::TokenBucket requests_{kMaxRequestsPerS, kMaxRequestsPerS};
+  std::uint64_t next_id_ = 2;  ///< 1 was Hello's.
+  std::map<std::uint64_t, Answered> pending_;
+  std::vector<Stream> streams_;
+  std::map<const void*, std::uint64_t> newest_;  ///< The serial of each one's last subscribe().
+  std::uint64_t next_serial_ = 1;                ///< Of members and streams.
+  std::vector<std::shared_ptr<Feed>> retired_;   ///< Until their threads have ended.
+};
+
+/// A reply that is an error.
+[[nodiscard]] v1::Reply error_reply(v1::ErrorCode code, std::string sentence);
+
+}  // namespace dtact::web

@@ -1,0 +1,134 @@
+#include "clients/web/web.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <filesystem>
+#include <memory>
+#include <ostream>
+#include <set>
+#include <stdexcept>
+
+#include "clients/web/daemon_option.hpp"
+#include "clients/web/names.hpp"
+#include "clients/web/page.hpp"
+#include "clients/web/server.hpp"
+#include "version.hpp"
+
+namespace dtact::web {
+namespace {
+
+/// What "serve" is told.
+struct Arguments {
+  Settings settings;
+  std::vector<std::string> daemons;
+  std::filesystem::path page;
+};
+
+std::vector<NamedDaemon> daemons_of(const Arguments& arguments, const client::Options& common) {
+  if (arguments.daemons.empty()) return {{"sensor", common}};
+  std::vector<NamedDaemon> daemons;
+  std::set<std::string> names;
+  for (const std::string& text : arguments.daemons) {
+    daemons.push_back(parse_daemon(text, common));
+    if (!names.insert(daemons.back().name).second) {
+      throw std::runtime_error("--daemon: two are named " + daemons.back().name +
+                               ": each needs a name of its own");
+    }
+  }
+  return daemons;
+}
+
+void serve(const cli::Context& context, const Arguments& arguments) {
+  Settings settings = arguments.settings;
+  settings.daemons = daemons_of(arguments, context.target);
+  for (std::string& name : machine_names()) settings.host_names.push_back(std::move(name));
+  net::NetConfig& config = settings.net;
+  config.program = "dtact-web " DTACT_VERSION;
+  config.version = DTACT_VERSION;
+  // A line each, for a terminal and for the journal alike.
+  config.log = [&out = context.out](const net::LogLine& line) { out << line.text << std::endl; };
+  const auto page =
+      arguments.page.empty() ? std::make_unique<Page>() : std::make_unique<Page>(arguments.page);
+  boost::asio::io_context io(1);  // one thread runs it
+  const auto server = std::make_shared<Server>(io, settings, *page);
+  config.log({net::LogLevel::info, "listening on " + server->address()});
+  boost::asio::signal_set signals(io, SIGINT, SIGTERM);
+  signals.async_wait([&](const auto& error, int) {
+    if (error) return;
+    server->stop();
+    // Connections of HTTP are not waited for.
+    io.stop();
+  });
+  server->start();
+  io.run();
+}
+
+void add_serve(CLI::App& app, cli::Context& context) {
+  auto* command = app.add_subcommand(
+      "serve", "Serve the page and the WebSockets behind it, until Ctrl-C or SIGTERM");
+  const auto arguments = std::make_shared<Arguments>();
+  net::NetConfig& net = arguments->settings.net;
+  net.port = wire::kWebPort;
+  net.max_clients = 64;
+  net.max_clients_per_address = 48;
+  command
+      ->add_option("--daemon", arguments->daemons,
+                   "A daemon and its name on the page: "
+                   "NAME=ADDRESS[,fingerprint=SHA256][,ca-file=FILE][,token-file=FILE][,insecure]. "
+                   "Without one it is that of --host, named sensor")
+      ->type_name("NAME=ADDRESS")
+      ->take_all();
+  command
+      ->add_option("--listen", net.address,
+                   "Address to listen on; beyond this machine it needs TLS and tokens")
+      ->type_name("ADDRESS")
+      ->capture_default_str();
+  command->add_option("--listen-port", net.port, "TCP port to listen on; 0: any free one")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 65535));
+  command
+      ->add_option(
+          "--tokens", net.token_file,
+          "Every viewer needs one of these tokens: a file like the daemon's net.token_file")
+      ->type_name("FILE");
+  command
+      ->add_option("--tls-certificate", net.tls_certificate,
+                   "Speak TLS only, with this certificate (PEM)")
+      ->type_name("FILE");
+  command->add_option("--tls-key", net.tls_key, "The certificate's key (PEM)")->type_name("FILE");
+  command->add_flag(
+      "--listen-insecure", net.insecure,
+      "Listen beyond this machine without TLS or tokens: whoever reaches it may watch "
+      "and command");
+  command
+      ->add_option("--name", arguments->settings.host_names,
+                   "A name by which browsers may reach this machine, besides its own and its "
+                   "addresses")
+      ->type_name("HOST")
+      ->take_all();
+  command
+      ->add_option("--page", arguments->page,
+                   "Serve the files of this folder in place of the page that is built in")
+      ->type_name("FOLDER");
+  command->callback([&context, arguments] { serve(context, *arguments); });
+}
+
+}  // namespace
+
+void set_up(CLI::App& app, cli::Context& context) {
+  app.name("dtact-web")
+      ->description(
+          "Shows DTact tactile sensors in a browser, and steers them: a client of any number of "
+          "dtactd, and a server of a page and of WebSockets that carry the daemons' own wire.");
+  cli::add_global_options(app, context);
+  add_serve(app, context);
+}
+
+int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& error) {
+  CLI::App app;
+  cli::Context context{{}, false, out};
+  set_up(app, context);
+  return cli::run(app, arguments, out, error);
+}
+
+}  // namespace dtact::web
