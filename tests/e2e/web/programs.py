@@ -1,0 +1,71 @@
+"""The programs under test, named by the environment: DTACTD, DTACT_WEB, DTACTCTL, CALIBRATE,
+SIM_RENDER."""
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+from typing import Optional
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+from page_client_test import SCENE, calibrate  # noqa: E402
+
+__all__ = ["Daemon", "Gateway", "calibrate"]
+
+
+class Program:
+    """Runs until stop(); its output goes to `log`."""
+
+    def __init__(self, command: list[str], log: pathlib.Path, listening: str) -> None:
+        self.command, self.log, self.listening = command, log, listening
+        self.process: Optional[subprocess.Popen[bytes]] = None
+        self.port = 0
+        self.start()
+
+    def start(self) -> None:
+        with open(self.log, "wb") as out:
+            self.process = subprocess.Popen(self.command, stdout=out, stderr=subprocess.STDOUT)
+        until = time.monotonic() + 60
+        while not (found := re.search(self.listening, self.text())):
+            if self.process.poll() is not None or time.monotonic() > until:
+                raise SystemExit(f"{self.command[0]} did not start:\n{self.text()}")
+            time.sleep(0.05)
+        self.port = int(found[1])
+
+    def text(self) -> str:
+        return self.log.read_text(errors="replace")
+
+    def stop(self, by: int = signal.SIGTERM) -> int:
+        assert self.process is not None
+        self.process.send_signal(by)
+        return self.process.wait(timeout=20)
+
+
+class Daemon(Program):
+    """A dtactd on the simulated sensor, in which a ball is pressed again and again."""
+
+    def __init__(self, folder: pathlib.Path, name: str, *settings: str, port: int = 0) -> None:
+        scene = folder / "scene.toml"
+        scene.write_text(SCENE)
+        # At normal priority: whoever else works on this machine is not pushed away.
+        every = [f"net.port={port}", f"net.name={name}", f"state_dir={folder}/{name}-state",
+                 f"camera.sim.scene={scene}", "capture.fifo_priority=0", "net.fifo_priority=0",
+                 *settings]
+        super().__init__([os.environ["DTACTD"], *(word for one in every for word in ("--set", one))],
+                         folder / f"{name}.log", r"listening on 127\.0\.0\.1:(\d+)")
+
+    def restart(self) -> None:
+        """On the port that it had."""
+        if "net.port=0" in self.command:
+            self.command[self.command.index("net.port=0")] = f"net.port={self.port}"
+        self.start()
+
+
+class Gateway(Program):
+    def __init__(self, folder: pathlib.Path, *arguments: str) -> None:
+        number = len(list(folder.glob("web-*.log")))
+        super().__init__([os.environ["DTACT_WEB"], "serve", "--listen-port", "0", *arguments],
+                         folder / f"web-{number}.log", r"listening on https?://[\d.]+:(\d+)/")

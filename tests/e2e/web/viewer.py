@@ -1,0 +1,147 @@
+"""What the page is to the gateway: a client of the daemon's wire over a WebSocket."""
+import collections
+import json
+import pathlib
+import struct
+import sys
+import time
+from typing import Any, Callable, Protocol
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "page_client"))
+from messages import E, M  # noqa: E402
+from web_socket import BINARY, PATIENCE, TEXT, WebSocket, connect  # noqa: E402
+
+__all__ = ["Client", "Conversation", "E", "M", "Viewer", "length"]
+
+
+def length(size: int) -> bytes:
+    return struct.pack(">I", size)
+
+
+class Link(Protocol):
+    """What carries the wire: each message with its length."""
+
+    def send(self, payload: bytes) -> None: ...
+    def receive(self, seconds: float) -> tuple[int, bytes]: ...
+    def close(self) -> None: ...
+
+
+class TcpLink:
+    """The daemon's own port."""
+
+    def __init__(self, port: int) -> None:
+        self.stream = connect(port)
+        self.file = self.stream.makefile("rb")
+
+    def send(self, payload: bytes) -> None:
+        self.stream.sendall(payload)
+
+    def receive(self, seconds: float) -> tuple[int, bytes]:
+        self.stream.settimeout(seconds)
+        head = self.file.read(4)
+        return BINARY, head + self.file.read(int.from_bytes(head, "big"))
+
+    def close(self) -> None:
+        self.stream.close()
+
+
+class Conversation:
+    """Sorts what comes: `frames`, `events`, `replies` by id, `told` by the gateway itself."""
+
+    def __init__(self, link: Link, token: str = "", greet: bool = True) -> None:
+        self.link = link
+        self.frames: collections.deque[Any] = collections.deque()
+        self.events: collections.deque[Any] = collections.deque()
+        self.told: collections.deque[Any] = collections.deque()
+        self.replies: dict[int, Any] = {}
+        self.next_id = 1
+        if greet:
+            self.hello = self.call(hello=M.Hello(major=1, minor=1, program="test", token=token)).hello
+
+    def __enter__(self) -> Any:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.link.close()
+
+    def ask(self, **what: Any) -> int:
+        number = self.next_id
+        self.next_id += 1
+        body = M.ClientMessage(id=number, **what).SerializeToString()
+        self.link.send(length(len(body)) + body)
+        return number
+
+    def sort(self, seconds: float = PATIENCE) -> None:
+        """Takes one message."""
+        opcode, payload = self.link.receive(seconds)
+        if opcode == TEXT:
+            self.told.append(json.loads(payload))
+            return
+        assert struct.unpack(">I", payload[:4]) == (len(payload) - 4,), "one message, framed"
+        message = M.ServerMessage.FromString(payload[4:])
+        kind = message.WhichOneof("body")
+        if kind == "frame":
+            self.frames.append(message.frame)
+        elif kind == "event":
+            self.events.append(message.event)
+        else:
+            assert message.reply.id not in self.replies, "each request gets exactly one reply"
+            self.replies[message.reply.id] = message.reply
+
+    def until(self, done: Callable[[], Any], what: str) -> Any:
+        """Takes messages until `done` returns something."""
+        end = time.monotonic() + PATIENCE
+        while not (found := done()):
+            assert time.monotonic() < end, f"{what} within {PATIENCE} s"
+            self.sort(max(0.01, end - time.monotonic()))
+        return found
+
+    def answer(self, number: int) -> Any:
+        return self.until(lambda: self.replies.pop(number, None), f"an answer to {number}")
+
+    def call(self, **what: Any) -> Any:
+        """The reply, which is no error."""
+        reply = self.answer(self.ask(**what))
+        assert reply.WhichOneof("result") != "error", reply
+        return reply
+
+    def refused(self, **what: Any) -> Any:
+        """The error that a request is answered with."""
+        reply = self.answer(self.ask(**what))
+        assert reply.WhichOneof("result") == "error", reply
+        return reply.error
+
+    def frame(self, where: Callable[[Any], bool] = lambda frame: True) -> Any:
+        def next_one() -> Any:
+            while self.frames:
+                frame = self.frames.popleft()
+                if where(frame):
+                    return frame
+            return None
+        return self.until(next_one, "a frame")
+
+    def notice(self, where: Callable[[Any], bool]) -> Any:
+        """What the gateway says of its daemon."""
+        def next_one() -> Any:
+            while self.told:
+                told = self.told.popleft()
+                if where(told):
+                    return told
+            return None
+        return self.until(next_one, "a notice")
+
+
+class Viewer(Conversation):
+    """Of dtact-web."""
+
+    def __init__(self, port: int, sensor: str = "left", token: str = "", greet: bool = True,
+                 **options: Any) -> None:
+        self.socket = WebSocket(port, f"/sensors/{sensor}/wire", **options)
+        super().__init__(self.socket, token, greet)
+
+
+class Client(Conversation):
+    """Of dtactd."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(TcpLink(port))
