@@ -1,51 +1,13 @@
 #include "clients/recording/recording_writer.hpp"
 
-#include <google/protobuf/descriptor.pb.h>
-
 #include <algorithm>
-#include <set>
 #include <utility>
-#include <vector>
 
-#include "clients/cpp/maps.hpp"
 #include "clients/recording/channels.hpp"
 #include "clients/recording/foxglove.pb.h"
+#include "clients/recording/pictures.hpp"
 
 namespace dtact::recording {
-namespace {
-
-/// A file and all that it imports, those first, as protoc --include_imports writes them.
-void add_files(const google::protobuf::FileDescriptor& file,
-               std::set<const google::protobuf::FileDescriptor*>& known,
-               google::protobuf::FileDescriptorSet& set) {
-  if (!known.insert(&file).second) return;
-  for (int i = 0; i < file.dependency_count(); ++i) add_files(*file.dependency(i), known, set);
-  file.CopyTo(set.add_file());
-}
-
-template <typename Image>
-void stamp(Image& image, std::uint64_t ns, const std::string& frame_id) {
-  constexpr std::uint64_t kSecond = 1'000'000'000;
-  image.mutable_timestamp()->set_seconds(static_cast<std::int64_t>(ns / kSecond));
-  image.mutable_timestamp()->set_nanos(static_cast<std::int32_t>(ns % kSecond));
-  image.set_frame_id(frame_id);
-}
-
-/// Micrometres, 0 where less or not to be believed.
-std::string picture_of(const v1::DepthMap& map) {
-  const std::vector<std::int16_t> values = client::values_of(map);
-  std::string data;
-  data.reserve(2 * values.size());
-  for (const std::int16_t value : values) {
-    const double um = value == map.untrusted_value() ? 0 : value * map.um_per_unit();
-    const auto pixel = static_cast<std::uint16_t>(std::clamp(um + 0.5, 0.0, 65535.0));
-    data += static_cast<char>(pixel % 256);
-    data += static_cast<char>(pixel / 256);
-  }
-  return data;
-}
-
-}  // namespace
 
 RecordingWriter::RecordingWriter(mcap::Sink& sink, const RecordingOptions& options)
     : writer_(sink, {.library = options.program}),
@@ -59,12 +21,8 @@ RecordingWriter::RecordingWriter(mcap::Sink& sink, const RecordingOptions& optio
 std::uint16_t RecordingWriter::add_channel(const char* topic,
                                            const google::protobuf::Descriptor& type,
                                            const std::map<std::string, std::string>& metadata) {
-  google::protobuf::FileDescriptorSet files;
-  std::set<const google::protobuf::FileDescriptor*> known;
-  add_files(*type.file(), known, files);
-  return writer_.add_channel(
-      writer_.add_schema(type.full_name(), "protobuf", files.SerializeAsString()), topic,
-      "protobuf", metadata);
+  return writer_.add_channel(writer_.add_schema(type.full_name(), "protobuf", schema_of(type)),
+                             topic, "protobuf", metadata);
 }
 
 RecordingWriter::Moment RecordingWriter::moment_of(std::uint64_t sequence,
@@ -108,11 +66,7 @@ void RecordingWriter::add_jpeg(const v1::Frame& frame) {
   if (jpeg_ == 0) {
     jpeg_ = add_channel(kCameraTopic, *foxglove::CompressedImage::descriptor());
   }
-  foxglove::CompressedImage image;
-  stamp(image, now_.log_time, "dtact_camera");
-  image.set_format("jpeg");
-  image.set_data(frame.jpeg().data());
-  add_message(jpeg_, image);
+  add_message(jpeg_, jpeg_picture(frame, now_.log_time));
 }
 
 void RecordingWriter::add_picture(const v1::Frame& frame) {
@@ -120,15 +74,7 @@ void RecordingWriter::add_picture(const v1::Frame& frame) {
     picture_ = add_channel(kDepthTopic, *foxglove::RawImage::descriptor(),
                            {{"unit", "micrometre"}, {"untrusted", "0"}});
   }
-  const v1::DepthMap& map = frame.depth();
-  foxglove::RawImage image;
-  stamp(image, now_.log_time, frame.frame_id());
-  image.set_width(map.width());
-  image.set_height(map.height());
-  image.set_encoding("16UC1");
-  image.set_step(2 * map.width());
-  image.set_data(picture_of(map));
-  add_message(picture_, image);
+  add_message(picture_, depth_picture(frame, now_.log_time));
 }
 
 /// Each light once, from the frame that was exposed under it on.

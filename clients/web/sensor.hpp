@@ -30,6 +30,7 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
   /// As an entry of /sensors, see README.md beside this file.
   [[nodiscard]] std::string entry() const;
   [[nodiscard]] Source& source() const noexcept { return *source_; }
+  [[nodiscard]] const std::shared_ptr<Source>& shared_source() const noexcept { return source_; }
 
   void introduce(v1::HelloReply& reply) const override;
   void on_greeted() override {}

@@ -46,6 +46,7 @@ Answer misdirected(const Request& request) {
 Server::Server(asio::io_context& io, Settings settings, const Page& page)
     : config_(net::checked(std::move(settings.net))),
       host_names_(std::move(settings.host_names)),
+      foxglove_origins_(std::move(settings.foxglove_origins)),
       page_(page),
       tls_(net::make_tls(config_)),
       admission_(config_) {
@@ -53,6 +54,7 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
     auto source = std::make_shared<Source>(io, daemon.name, std::move(daemon.options));
     sensors_.push_back(std::make_shared<Sensor>(io, std::move(source), config_, admission_));
   }
+  foxglove_ = std::make_unique<foxglove::Door>(sources(), config_, admission_);
   listener_ = net::listen_tcp(io, config_, [this](asio::ip::tcp::socket socket, net::Peer peer) {
     // One too many is let go of without a word, as any of HTTP would cost what there is too little
     // of.
@@ -68,11 +70,13 @@ void Server::start() {
     sensor->start();
     sensor->source().start();
   }
+  foxglove_->start();
   listener_->start();
 }
 
 void Server::stop() {
   listener_->stop();
+  foxglove_->stop();
   for (const auto& sensor : sensors_) {
     sensor->stop();
     sensor->source().stop();
@@ -106,11 +110,14 @@ Upgrade Server::upgrade(const Request& request) {
   if (!is_for_us(request)) return {.refusal = misdirected(request)};
   const std::string_view origin = field(request, http::field::origin);
   const std::string_view host = field(request, http::field::host);
+  const bool foxglove = foxglove_->knows(path_of(request));
+  const std::vector<std::string> others = foxglove ? foxglove_origins_ : std::vector<std::string>{};
   // Only browsers say one; other programs may do all that the token lets them do.
-  if (!origin.empty() && !is_own_origin(origin, host, tls_ != nullptr, {})) {
+  if (!origin.empty() && !is_own_origin(origin, host, tls_ != nullptr, others)) {
     return {.refusal = refusal(http::status::forbidden,
                                fmt::format("a page of {} may not look at this sensor", origin))};
   }
+  if (foxglove) return foxglove_->upgrade(request);
   const auto sensor = find(path_of(request));
   if (sensor == nullptr) {
     return {.refusal = refusal(http::status::not_found,
@@ -129,6 +136,12 @@ std::string Server::sensors() const {
     text += sensor->entry();
   }
   return text + ']';
+}
+
+std::vector<std::shared_ptr<Source>> Server::sources() const {
+  std::vector<std::shared_ptr<Source>> all;
+  for (const auto& sensor : sensors_) all.push_back(sensor->shared_source());
+  return all;
 }
 
 /// "/sensors/NAME/wire"

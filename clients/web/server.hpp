@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/cpp/options.hpp"
+#include "clients/web/foxglove/door.hpp"
 #include "clients/web/http_connection.hpp"
 #include "clients/web/page.hpp"
 #include "clients/web/request.hpp"
@@ -29,6 +30,8 @@ struct Settings {
   std::vector<NamedDaemon> daemons;
   /// By which browsers may name this machine, besides its addresses.
   std::vector<std::string> host_names;
+  /// Whose pages may open Foxglove's WebSocket, besides our own: Foxglove's, and its programs'.
+  std::vector<std::string> foxglove_origins{"https://app.foxglove.dev", "file://"};
 };
 
 /// dtact-web as a whole: the page, and a WebSocket for each daemon. All but the connections to the
@@ -53,14 +56,17 @@ class Server : public Site, public std::enable_shared_from_this<Server> {
   [[nodiscard]] bool is_for_us(const Request& request) const;
   [[nodiscard]] std::string sensors() const;
   [[nodiscard]] std::shared_ptr<Sensor> find(std::string_view path) const;
+  [[nodiscard]] std::vector<std::shared_ptr<Source>> sources() const;
 
   net::NetConfig config_;
   std::vector<std::string> host_names_;
+  std::vector<std::string> foxglove_origins_;
   const Page& page_;
   std::unique_ptr<net::Tls> tls_;
   net::Admission admission_;
   HttpLimits limits_;
   std::vector<std::shared_ptr<Sensor>> sensors_;
+  std::unique_ptr<foxglove::Door> foxglove_;
   std::shared_ptr<net::Listener> listener_;
 };
 

@@ -107,6 +107,11 @@ void add_serve(CLI::App& app, cli::Context& context) {
       ->type_name("HOST")
       ->take_all();
   command
+      ->add_option("--foxglove-origin", arguments->settings.foxglove_origins,
+                   "An address whose pages may open /foxglove; in place of Foxglove's own")
+      ->type_name("ORIGIN")
+      ->take_all();
+  command
       ->add_option("--page", arguments->page,
                    "Serve the files of this folder in place of the page that is built in")
       ->type_name("FOLDER");

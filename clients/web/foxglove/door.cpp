@@ -1,0 +1,133 @@
+#include "clients/web/foxglove/door.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/buffer.hpp>
+#include <boost/beast/http/rfc7230.hpp>
+#include <charconv>
+#include <utility>
+
+namespace dtact::web::foxglove {
+
+namespace http = boost::beast::http;
+
+namespace {
+
+/// The one of ours that a client offers; empty: none.
+std::string subprotocol_of(const Request& request) {
+  for (const auto& offered : http::token_list(request[http::field::sec_websocket_protocol])) {
+    const std::string name(offered.data(), offered.size());
+    if (name == kSubprotocol || name == kSdkSubprotocol) return name;
+  }
+  return "";
+}
+
+/// Says why, as the protocol does, and ends.
+void refuse(const std::shared_ptr<WebSocket>& socket, const std::string& sentence) {
+  const auto text = std::make_shared<const std::string>(status(2, sentence));
+  socket->write({boost::asio::buffer(*text)}, true,
+                [socket, text](const boost::system::error_code& error, std::size_t) {
+                  if (!error) socket->end(socket);
+                });
+}
+
+}  // namespace
+
+std::string token_of(std::string_view target) {
+  const auto question = target.find('?');
+  std::string_view rest = question == std::string_view::npos ? "" : target.substr(question + 1);
+  while (!rest.empty()) {
+    std::string_view part = rest.substr(0, rest.find('&'));
+    rest.remove_prefix(std::min(rest.size(), part.size() + 1));
+    if (!part.starts_with("token=")) continue;
+    part.remove_prefix(6);
+    std::string token;
+    while (!part.empty()) {
+      unsigned value = 0;
+      const bool coded =
+          part.size() >= 3 && part[0] == '%' &&
+          std::from_chars(part.data() + 1, part.data() + 3, value, 16).ptr == part.data() + 3;
+      token += coded ? static_cast<char>(value) : part[0];
+      part.remove_prefix(coded ? 3 : 1);
+    }
+    return token;
+  }
+  return "";
+}
+
+Door::Door(const std::vector<std::shared_ptr<Source>>& sources, const net::NetConfig& config,
+           net::Admission& admission)
+    : config_(config), admission_(admission) {
+  for (const auto& source : sources) stations_.push_back(std::make_shared<Station>(source));
+}
+
+void Door::start() {
+  for (const auto& station : stations_) station->start();
+}
+
+void Door::stop() {
+  for (const auto& weak : std::exchange(clients_, {})) {
+    if (const auto client = weak.lock()) client->close("dtact-web ends");
+  }
+  for (const auto& station : stations_) station->stop();
+}
+
+std::vector<Place> Door::places(std::string_view path) const {
+  std::vector<Place> found;
+  for (const auto& station : stations_) {
+    const std::string& name = station->source().name();
+    // One sensor's topics are called as in a recording of it.
+    const bool alone = stations_.size() == 1 || path == fmt::format("/sensors/{}/foxglove", name);
+    if (path == "/foxglove" || path == fmt::format("/sensors/{}/foxglove", name)) {
+      found.push_back({station, alone ? "" : "/" + name});
+    }
+  }
+  return found;
+}
+
+Upgrade Door::upgrade(const Request& request) {
+  const std::string target(request.target().data(), request.target().size());
+  const std::string subprotocol = subprotocol_of(request);
+  if (subprotocol.empty()) {
+    return {.refusal = {.status = http::status::bad_request,
+                        .text = fmt::format("offer the subprotocol {} or {}", kSubprotocol,
+                                            kSdkSubprotocol)}};
+  }
+  return {
+      .subprotocol = subprotocol,
+      .max_message = kMaxMessage,
+      .open = [this, places = places(target.substr(0, target.find('?'))), token = token_of(target)](
+                  std::shared_ptr<WebSocket> socket, const net::Peer& peer) {
+        admit(std::move(socket), peer, token, places);
+      }};
+}
+
+void Door::admit(std::shared_ptr<WebSocket> socket, const net::Peer& peer, const std::string& token,
+                 std::vector<Place> places) {
+  const auto verdict = admission_.enter(peer, token);
+  if (!verdict.rights) {
+    config_.log({net::LogLevel::warning,
+                 fmt::format("Foxglove's client {}: {}", peer.address, verdict.sentence),
+                 peer.address});
+    return refuse(socket, token.empty()
+                              ? verdict.sentence + ": add ?token=… to the address of the connection"
+                              : verdict.sentence);
+  }
+  config_.log({net::LogLevel::info, fmt::format("Foxglove's client {} connected", peer.address),
+               peer.address});
+  const auto ended = [this, peer](const std::string& reason) {
+    admission_.leave(peer);
+    config_.log({net::LogLevel::info,
+                 fmt::format("Foxglove's client {} disconnected: {}", peer.address, reason),
+                 peer.address});
+  };
+  const auto client = std::make_shared<FoxgloveClient>(std::move(socket), std::move(places),
+                                                       *verdict.rights, config_.program, ended);
+  std::erase_if(clients_, [](const auto& weak) { return weak.expired(); });
+  clients_.push_back(client);
+  client->start();
+}
+
+}  // namespace dtact::web::foxglove

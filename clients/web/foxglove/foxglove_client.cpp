@@ -1,0 +1,214 @@
+#include "clients/web/foxglove/foxglove_client.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/post.hpp>
+#include <exception>
+#include <utility>
+
+namespace dtact::web::foxglove {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+namespace {
+
+constexpr int kInfo = 0;
+constexpr int kWarning = 1;
+constexpr int kError = 2;
+
+}  // namespace
+
+FoxgloveClient::FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Place> places,
+                               net::Rights rights, std::string program,
+                               std::function<void(const std::string&)> ended)
+    : socket_(std::move(socket)),
+      places_(std::move(places)),
+      rights_(rights),
+      program_(std::move(program)),
+      ended_(std::move(ended)) {}
+
+void FoxgloveClient::start() {
+  std::vector<std::string> prefixes;
+  for (const Place& place : places_) prefixes.push_back(place.prefix);
+  send(server_info(program_));
+  send(advertise(prefixes));
+  send(advertise_services(prefixes));
+  for (const Place& place : places_) {
+    const Source& source = place.station->source();
+    if (!source.connected()) {
+      send(status(kWarning, fmt::format("the daemon of {} is away", source.name())));
+    }
+  }
+  read();
+}
+
+void FoxgloveClient::close(const std::string& reason) {
+  if (std::exchange(closed_, true)) return;
+  socket_->close();
+  subscriptions_.clear();
+  for (const Place& place : places_) place.station->want(*this, {});
+  ended_(reason);
+}
+
+void FoxgloveClient::read() {
+  socket_->read_some(asio::buffer(input_), [self = shared_from_this()](const error_code& error,
+                                                                       WebSocket::Received got) {
+    if (self->closed_) return;
+    if (error) {
+      return self->close(error == asio::error::eof ? "the client left" : error.message());
+    }
+    // WebSocket bounds a message.
+    self->received_.append(self->input_.data(), got.bytes);
+    if (got.end) self->take(got.text);
+    if (!self->closed_) self->read();
+  });
+}
+
+void FoxgloveClient::take(bool text) {
+  const std::string message = std::exchange(received_, {});
+  if (!requests_.take(1)) return close("more requests a second came than are served");
+  if (!text) {
+    const auto wanted = parse_call(message);
+    if (!wanted) return send(status(kError, "a binary message that is no call of a service"));
+    return call(*wanted);
+  }
+  const auto operation = parse_operation(message);
+  if (!operation) return send(status(kError, "a text that is no operation in JSON"));
+  if (operation->name == "subscribe") {
+    for (const Wish& wish : operation->subscribed) subscribe(wish);
+  } else if (operation->name == "unsubscribe") {
+    for (const std::uint32_t id : operation->ended) subscriptions_.erase(id);
+  } else {
+    return send(status(kWarning, fmt::format("\"{}\" is not done here", operation->name)));
+  }
+  if (!closed_) update_want();
+}
+
+void FoxgloveClient::subscribe(const Wish& wish) {
+  const std::size_t number = std::size_t{wish.channel} - 1;
+  if (wish.channel == 0 || number / kTopics >= places_.size()) {
+    return send(status(kError, fmt::format("there is no channel {}", wish.channel)));
+  }
+  if (subscriptions_.contains(wish.subscription)) {
+    return send(status(kError, fmt::format("subscription {} is there already", wish.subscription)));
+  }
+  if (subscriptions_.size() >= kMaxSubscriptions) {
+    return send(
+        status(kError, fmt::format("{} subscriptions are all there may be", kMaxSubscriptions)));
+  }
+  Subscription made{number / kTopics, static_cast<Topic>(number % kTopics), nullptr};
+  // It comes when it changes: whoever is new has missed it.
+  if (made.topic == Topic::light) made.waiting = places_[made.place].station->light();
+  subscriptions_.emplace(wish.subscription, std::move(made));
+  if (!writing_) write_next();
+}
+
+void FoxgloveClient::update_want() {
+  for (std::size_t place = 0; place < places_.size(); ++place) {
+    Topics wanted;
+    for (const auto& [id, subscription] : subscriptions_) {
+      if (subscription.place == place) wanted.set(index(subscription.topic));
+    }
+    places_[place].station->want(*this, wanted);
+  }
+}
+
+void FoxgloveClient::call(const Call& call) {
+  const std::size_t number = std::size_t{call.service} - 1;
+  const auto fail = [&](std::string_view sentence) {
+    send(service_failure(call.service, call.call, sentence));
+  };
+  if (call.service == 0 || number / kServices >= places_.size()) {
+    return fail("there is no such service");
+  }
+  if (rights_ != net::Rights::control) {
+    return fail("this client's token allows viewing only: connect with one that allows control");
+  }
+  if (call.encoding != "json") return fail("only requests in JSON are understood");
+  try {
+    places_[number / kServices].station->source().request(
+        request_of(static_cast<Service>(number % kServices), call.payload),
+        [weak = weak_from_this(), service = call.service, id = call.call](const v1::Reply& reply) {
+          const auto self = weak.lock();
+          if (self == nullptr) return;
+          if (reply.has_error()) {
+            return self->send(service_failure(service, id, reply.error().message()));
+          }
+          self->send(service_response(service, id, answer_of(reply)), false);
+        });
+  } catch (const std::exception& e) {
+    fail(e.what());
+  }
+}
+
+void FoxgloveClient::on_message(const Station& station, Topic topic,
+                                const std::shared_ptr<const Message>& message) {
+  for (auto& [id, subscription] : subscriptions_) {
+    if (places_[subscription.place].station.get() != &station || subscription.topic != topic) {
+      continue;
+    }
+    subscription.waiting = message;
+  }
+  if (!writing_) write_next();
+}
+
+void FoxgloveClient::on_state(bool well, const std::string& sentence) {
+  send(status(well ? kInfo : kWarning, sentence));
+}
+
+void FoxgloveClient::send(std::string bytes, bool text) {
+  if (closed_) return;
+  control_.push_back({std::move(bytes), text});
+  if (control_.size() > kMaxControl) {
+    // Later, since whoever sends may be walking through the listeners.
+    asio::post(socket_->executor(), [self = shared_from_this()] {
+      self->close("too many answers and notices lay unread");
+    });
+    return;
+  }
+  if (!writing_) write_next();
+}
+
+void FoxgloveClient::write_next() {
+  if (closed_) return;
+  if (!control_.empty()) {
+    writing_ = true;
+    const auto control = std::make_shared<const Control>(std::move(control_.front()));
+    control_.pop_front();
+    return socket_->write({asio::buffer(control->bytes)}, control->text,
+                          [self = shared_from_this(), control](
+                              const error_code& error, std::size_t) { self->on_written(error); });
+  }
+  // From the one behind the last on, so that no channel waits for ever.
+  const auto waits = [](const auto& entry) { return entry.second.waiting != nullptr; };
+  const auto behind = subscriptions_.upper_bound(last_sent_);
+  auto next = std::find_if(behind, subscriptions_.end(), waits);
+  if (next == subscriptions_.end()) next = std::find_if(subscriptions_.begin(), behind, waits);
+  if (next == subscriptions_.end() || !waits(*next)) return;
+  last_sent_ = next->first;
+  write_message(next->first, std::exchange(next->second.waiting, nullptr));
+}
+
+void FoxgloveClient::write_message(std::uint32_t subscription,
+                                   std::shared_ptr<const Message> message) {
+  writing_ = true;
+  const auto head =
+      std::make_shared<const std::string>(message_head(subscription, message->time_ns));
+  const WebSocket::Parts parts{asio::buffer(*head), asio::buffer(message->payload)};
+  socket_->write(parts, false,
+                 [self = shared_from_this(), head, message = std::move(message)](
+                     const error_code& error, std::size_t) { self->on_written(error); });
+}
+
+void FoxgloveClient::on_written(const error_code& error) {
+  writing_ = false;
+  if (closed_) return;
+  if (error) return close(error.message());
+  write_next();
+}
+
+}  // namespace dtact::web::foxglove

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/web/foxglove/protocol.hpp"
+#include "clients/web/foxglove/station.hpp"
+#include "clients/web/web_socket.hpp"
+#include "daemon/serve/rights.hpp"
+#include "daemon/serve/token_bucket.hpp"
+
+namespace dtact::web::foxglove {
+
+/// A sensor, and what stands before its topics.
+struct Place {
+  std::shared_ptr<Station> station;
+  std::string prefix;  ///< "" or "/left"
+};
+
+/// One client of the Foxglove protocol. On the thread that runs the gateway's `io`.
+///
+/// Overflow. Of each channel the newest message waits, in place of one before it. Answers and
+/// notices are never dropped: a client that leaves more than kMaxControl of them unread is let go.
+class FoxgloveClient : public Station::Listener,
+                       public std::enable_shared_from_this<FoxgloveClient> {
+ public:
+  static constexpr std::size_t kMaxControl = 256;
+  static constexpr std::size_t kMaxSubscriptions = 256;
+  static constexpr double kMaxRequestsPerS = 100;
+
+  /// `ended` is called once, with the reason; nothing more comes of this client then.
+  FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Place> places, net::Rights rights,
+                 std::string program, std::function<void(const std::string&)> ended);
+
+  void start();
+  void close(const std::string& reason);
+
+  void on_message(const Station& station, Topic topic,
+                  const std::shared_ptr<const Message>& message) override;
+  void on_state(bool well, const std::string& sentence) override;
+
+ private:
+  struct Subscription {
+    std::size_t place = 0;
+    Topic topic = Topic::frame;
+    std::shared_ptr<const Message> waiting;
+  };
+  struct Control {
+    std::string bytes;
+    bool text = true;
+  };
+
+  void read();
+  void take(bool text);
+  void subscribe(const Wish& wish);
+  void update_want();
+  void call(const Call& call);
+  void send(std::string bytes, bool text = true);
+  void write_next();
+  void write_message(std::uint32_t subscription, std::shared_ptr<const Message> message);
+  void on_written(const boost::system::error_code& error);
+
+  std::shared_ptr<WebSocket> socket_;
+  std::vector<Place> places_;
+  net::Rights rights_;
+  std::string program_;
+  std::function<void(const std::string&)> ended_;
+  net::TokenBucket requests_{kMaxRequestsPerS, kMaxRequestsPerS};
+  std::array<char, 4096> input_{};
+  std::string received_;
+  std::map<std::uint32_t, Subscription> subscriptions_;
+  std::uint32_t last_sent_ = 0;  ///< The subscription; the others come first.
+  std::deque<Control> control_;
+  bool writing_ = false;
+  bool closed_ = false;
+};
+
+}  // namespace dtact::web::foxglove

@@ -1,0 +1,92 @@
+#include "clients/web/foxglove/topics.hpp"
+
+#include <algorithm>
+
+#include "clients/recording/channels.hpp"
+#include "clients/recording/pictures.hpp"
+
+namespace dtact::web::foxglove {
+namespace {
+
+std::shared_ptr<const Message> made(const v1::Frame& frame,
+                                    const google::protobuf::Message& message) {
+  return std::make_shared<const Message>(
+      Message{static_cast<std::uint64_t>(std::max<std::int64_t>(0, frame.wall_ns())),
+              message.SerializeAsString()});
+}
+
+/// As a recording has it: pictures stand on channels of their own.
+std::shared_ptr<const Message> without_pictures(const v1::Frame& frame, bool depth) {
+  v1::Frame plain = frame;
+  plain.clear_luma();
+  plain.clear_jpeg();
+  if (!depth) plain.clear_depth();
+  return made(frame, plain);
+}
+
+}  // namespace
+
+const std::array<TopicInfo, kTopics>& topics() {
+  static const std::array<TopicInfo, kTopics> all{{
+      {Topic::frame, recording::kFrameTopic, v1::Frame::descriptor()},
+      {Topic::summary, "/dtact/summary", v1::Frame::descriptor()},
+      {Topic::contact, "/dtact/contact", v1::Contact::descriptor()},
+      {Topic::light, recording::kLightTopic, v1::LightState::descriptor()},
+      {Topic::event, recording::kEventTopic, v1::Event::descriptor()},
+      {Topic::depth, recording::kDepthTopic, ::foxglove::RawImage::descriptor()},
+      {Topic::luma, "/camera/luma", ::foxglove::RawImage::descriptor()},
+      {Topic::jpeg, recording::kCameraTopic, ::foxglove::CompressedImage::descriptor()},
+  }};
+  return all;
+}
+
+v1::Subscribe subscription_for(Topics wanted) {
+  const auto wants = [wanted](Topic topic) { return wanted.test(index(topic)); };
+  v1::Subscribe request;
+  // Whoever takes whole frames stores them, or looks at them from afar; a picture is made here.
+  if (wants(Topic::frame)) {
+    request.set_depth(v1::DEPTH_PREDICT_ZSTD);
+  } else if (wants(Topic::depth)) {
+    request.set_depth(v1::DEPTH_INT16);
+  }
+  if (request.depth() != v1::DEPTH_NONE) request.set_depth_hz(kMostHz);
+  if (wants(Topic::luma)) {
+    request.set_luma(v1::LUMA_GREY8);
+    request.set_luma_hz(kMostHz);
+  }
+  if (wants(Topic::jpeg)) {
+    request.set_jpeg(true);
+    request.set_jpeg_hz(kMostHz);
+  }
+  if (wants(Topic::frame) || wants(Topic::summary) || wants(Topic::contact) ||
+      wants(Topic::light)) {
+    request.set_summary(true);
+    request.set_summary_hz(kMostHz);
+  }
+  return request;
+}
+
+std::shared_ptr<const Message> message_of(Topic topic, const v1::Frame& frame) {
+  const auto time_ns = static_cast<std::uint64_t>(std::max<std::int64_t>(0, frame.wall_ns()));
+  switch (topic) {
+    case Topic::frame:
+      return without_pictures(frame, true);
+    case Topic::summary:
+      return without_pictures(frame, false);
+    case Topic::contact:
+      return frame.has_contact() ? made(frame, frame.contact()) : nullptr;
+    case Topic::depth:
+      return frame.has_depth() ? made(frame, recording::depth_picture(frame, time_ns)) : nullptr;
+    case Topic::luma:
+      return frame.has_luma() ? made(frame, recording::luma_picture(frame, time_ns)) : nullptr;
+    case Topic::jpeg:
+      return frame.has_jpeg() ? made(frame, recording::jpeg_picture(frame, time_ns)) : nullptr;
+    case Topic::light:
+      return frame.has_light() ? made(frame, frame.light()) : nullptr;
+    case Topic::event:
+      return nullptr;
+  }
+  return nullptr;
+}
+
+}  // namespace dtact::web::foxglove
