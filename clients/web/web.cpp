@@ -73,9 +73,9 @@ void add_serve(CLI::App& app, cli::Context& context) {
   net.max_clients_per_address = 48;
   command
       ->add_option("--daemon", arguments->daemons,
-                   "A daemon and its name on the page: "
-                   "NAME=ADDRESS[,fingerprint=SHA256][,ca-file=FILE][,token-file=FILE][,insecure]. "
-                   "Without one it is that of --host, named sensor")
+                   "A daemon and its name on the page; behind the address, each after a comma, "
+                   "what it is connected to with: fingerprint=SHA256, ca-file=FILE, "
+                   "token-file=FILE, insecure. Without one it is that of --host, named sensor")
       ->type_name("NAME=ADDRESS")
       ->take_all();
   command

@@ -36,6 +36,7 @@ FILES = {
     "dtact-tools": """
         /usr/bin/dtact-calibrate
         /usr/bin/dtact-perceive
+        /usr/bin/dtact-web
         /usr/bin/dtactctl
         UNITS/dtact-perceive.service
         /usr/share/bash-completion/completions/dtact-calibrate
@@ -43,11 +44,13 @@ FILES = {
         /usr/share/bash-completion/completions/dtact-perceive
         /usr/share/man/man1/dtact-calibrate.1.gz
         /usr/share/man/man1/dtact-perceive.1.gz
+        /usr/share/man/man1/dtact-web.1.gz
         /usr/share/man/man1/dtactctl.1.gz
         /usr/share/zsh/vendor-completions/_dtact-calibrate
         /usr/share/zsh/vendor-completions/_dtact-perceive
         /usr/share/zsh/vendor-completions/_dtactctl
-        /usr/share/dtact/foxglove-layout.json""",
+        /usr/share/dtact/foxglove-layout.json
+        /usr/share/dtact/foxglove/dtact-live.json""",
     "libdtact1": """
         LIB/libdtact.so.1""",
     "libdtact-dev": """
@@ -71,7 +74,7 @@ PLACES = {
     "dtactd": r"/etc/dtactd/|/usr/bin/dtactd$|(/usr)?/lib/systemd/system/dtactd|/usr/lib/\w+\.d/dtactd|"
     r"/usr/lib/udev/rules\.d/60-dtactd|/usr/share/dtactd/scenes/|/usr/share/man/man[58]/dtactd|"
     r"/usr/share/(bash|zsh)",
-    "dtact-tools": r"/usr/bin/dtact(ctl|-calibrate|-perceive)$|/usr/share/(bash|zsh)|/usr/share/dtact/foxglove|"
+    "dtact-tools": r"/usr/bin/dtact(ctl|-calibrate|-perceive|-web)$|/usr/share/(bash|zsh)|/usr/share/dtact/foxglove|"
     r"(/usr)?/lib/systemd/system/dtact-perceive\.service$|/usr/share/man/man1/dtact",
     "libdtact1": r"LIB/libdtact\.so\.1$",
     "libdtact-dev": r"/usr/include/dtact/|LIB/(cmake/dtact/|libdtact\.so$|pkgconfig/dtact\.pc$)|"

@@ -21,7 +21,7 @@ inside() {
     mount --rbind /dev "$1/dev"
     exec chroot "$1" /usr/bin/env -i HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
       PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
-      CCACHE_DIR=/ccache bash -euc "$2"' inside "$root" "$1"
+      CCACHE_DIR=/ccache DTACT_WEB_PAGE=/page bash -euc "$2"' inside "$root" "$1"
 }
 
 # prepare SETUP PACKAGE...: makes the chroot, runs SETUP once in it, installs the packages. Scripts that
@@ -53,12 +53,17 @@ prepare() {
   fi
 }
 
-# copy_source: the tree as git sees it, uncommitted changes included, to /source.
+# copy_source: the tree as git sees it, uncommitted changes included, to /source, and its page to /page.
 copy_source() {
   rm -rf "$root/source"
   mkdir -p "$root/source"
   (cd "$source_folder" && git ls-files -z --cached --others --exclude-standard \
     | tar --null --files-from=- --ignore-failed-read -c) | tar -x -C "$root/source"
+  # The page is the same everywhere, and built here: the chroot needs no npm.
+  if [ -e "$source_folder/clients/web/page/package.json" ]; then
+    "$source_folder/clients/web/build_page.sh" "$source_folder/clients/web/page" "$source_folder/proto" \
+      "$root.npm" "$root/page" npm
+  fi
 }
 
 # package OUT ARCHITECTURE [BUILT]: Debian packages of the source, into the folder OUT, which is emptied.

@@ -3,6 +3,7 @@
 #include "clients/calibrate/calibrate.hpp"
 #include "clients/ctl/ctl.hpp"
 #include "clients/perceive/perceive.hpp"
+#include "clients/web/web.hpp"
 #include "daemon/app/options.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/manual/pages.hpp"
@@ -17,6 +18,7 @@ const PageName kConfig{"dtactd.toml", 5};
 const PageName kCtl{"dtactctl", 1};
 const PageName kCalibrate{"dtact-calibrate", 1};
 const PageName kPerceive{"dtact-perceive", 1};
+const PageName kWeb{"dtact-web", 1};
 
 }  // namespace
 
@@ -49,11 +51,19 @@ Command dtact_perceive() {
   return describe(app);
 }
 
+Command dtact_web() {
+  cli::Context context{{}, false, std::cout};
+  CLI::App app;
+  web::set_up(app, context);
+  return describe(app);
+}
+
 std::vector<File> all_files(const std::filesystem::path& root) {
   const Command daemon = dtactd();
   const Command ctl = dtactctl();
   const Command calibrate = dtact_calibrate();
   const Command perceive = dtact_perceive();
+  const Command web = dtact_web();
   const PageNotes of_daemon{
       8,
       "System Administration",
@@ -69,7 +79,8 @@ std::vector<File> all_files(const std::filesystem::path& root) {
       {kConfig, kCtl, kCalibrate, {"systemctl", 1}, {"journalctl", 1}}};
   const PageNotes of_ctl{1, kUserCommands, {}, {kCalibrate, kDtactd, kConfig}};
   const PageNotes of_calibrate{1, kUserCommands, {}, {kCtl, kDtactd, kConfig}};
-  const PageNotes of_perceive{1, kUserCommands, {}, {kDtactd, kCtl}};
+  const PageNotes of_perceive{1, kUserCommands, {}, {kDtactd, kCtl, kWeb}};
+  const PageNotes of_web{1, kUserCommands, {}, {kDtactd, kCtl, kPerceive}};
 
   // As clients/ctl/hand_over.cpp has it.
   const std::string as_is = "words=(dtact-calibrate $words); (( CURRENT++ )); _dtact-calibrate";
@@ -86,6 +97,7 @@ std::vector<File> all_files(const std::filesystem::path& root) {
       {"clients/ctl/dtactctl.1", program_page(ctl, of_ctl)},
       {"clients/calibrate/dtact-calibrate.1", program_page(calibrate, of_calibrate)},
       {"clients/perceive/dtact-perceive.1", program_page(perceive, of_perceive)},
+      {"clients/web/dtact-web.1", program_page(web, of_web)},
       {"config/dtactd.toml.5", config_page(base::read_file(root / "config/dtactd.toml"))},
       {"daemon/dtactd.zsh-completion", zsh_completion(daemon, {})},
       {"clients/ctl/dtactctl.zsh-completion", zsh_completion(ctl, {{"calibrate", guided},

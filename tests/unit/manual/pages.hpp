@@ -38,6 +38,7 @@ struct PageNotes {
 [[nodiscard]] Command dtactctl();
 [[nodiscard]] Command dtact_calibrate();
 [[nodiscard]] Command dtact_perceive();
+[[nodiscard]] Command dtact_web();
 
 /// A file that is made, by its path in the tree.
 struct File {

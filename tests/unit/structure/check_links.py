@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks what the programs link: check_links.py DTACTD DTACTCTL DTACT_CALIBRATE DTACT_PERCEIVE
+"""Checks what the programs link: check_links.py DTACTD DTACTCTL DTACT_CALIBRATE DTACT_PERCEIVE DTACT_WEB
 
 The libraries named by the program itself count (DT_NEEDED), not what those bring along.
 """
@@ -22,6 +22,9 @@ RULES = {
     # Depth it is given.
     "dtact-perceive": ([], ["tomlplusplus", "systemd", "gpiod", "camera", "spdlog"],
                        FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
+    # It passes on.
+    "dtact-web": ([], ["tomlplusplus", "systemd", "gpiod", "camera", "spdlog"],
+                  FITS + ["dtact::calibration::load", "dtact::recon::Reconstructor::run"]),
 }
 
 
