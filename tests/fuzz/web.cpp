@@ -1,0 +1,48 @@
+// What dtact-web reads of daemons and of Foxglove's clients: a frame that is relayed is the frame
+// that was sent, and no text or bytes of a client's break anything.
+#include <stdexcept>
+
+#include "clients/web/foxglove/door.hpp"
+#include "clients/web/foxglove/protocol.hpp"
+#include "clients/web/relayed_frame.hpp"
+#include "tests/fuzz/fuzz.hpp"
+
+namespace dtact::fuzz {
+namespace {
+
+void try_relay(const std::string& bytes) {
+  const auto relayed = web::relay(bytes);
+  v1::ServerMessage message;
+  if (!relayed || !message.ParseFromString(bytes)) return;
+  v1::Frame got;
+  require(got.ParseFromString(relayed->encoded->body), "what is relayed can be read");
+  require(message.frame().dropped() == relayed->dropped, "what the gateway missed is counted");
+  require(message.frame().monotonic_ns() == relayed->monotonic_ns, "it has its own time");
+  message.mutable_frame()->clear_dropped();
+  require(got.SerializeAsString() == message.frame().SerializeAsString(),
+          "what is relayed is what was sent");
+}
+
+void try_foxglove(const std::string& text) {
+  using namespace web::foxglove;
+  (void)parse_operation(text);
+  (void)token_of(text);
+  const auto call = parse_call(text);
+  for (const Service service : {Service::set_light, Service::rezero}) {
+    try {
+      (void)request_of(service, call ? call->payload : text);
+    } catch (const std::runtime_error&) {
+      continue;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace dtact::fuzz
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string bytes(reinterpret_cast<const char*>(data), size);
+  dtact::fuzz::try_relay(bytes);
+  dtact::fuzz::try_foxglove(bytes);
+  return 0;
+}

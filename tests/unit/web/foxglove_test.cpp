@@ -1,0 +1,119 @@
+// Foxglove's protocol, byte for byte.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "clients/recording/foxglove.pb.h"
+#include "clients/web/foxglove/door.hpp"
+#include "clients/web/foxglove/protocol.hpp"
+
+namespace dtact::web::foxglove {
+namespace {
+
+using testing::HasSubstr;
+using namespace std::string_literals;
+
+TEST(FoxgloveProtocol, Heads) {
+  EXPECT_EQ(message_head(0x04030201, 0x0c0b0a0908070605),
+            "\x01\x01\x02\x03\x04\x05\x06\x07\x08\x09\x0a\x0b\x0c"s);
+  EXPECT_EQ(service_response(2, 3, "{}"), "\x03\x02\0\0\0\x03\0\0\0\x04\0\0\0json{}"s);
+  EXPECT_EQ(service_failure(2, 3, "no \"x\"\n"),
+            R"({"op":"serviceCallFailure","serviceId":2,"callId":3,"message":"no \"x\"\u000a"})");
+  EXPECT_EQ(status(2, "a"), R"({"op":"status","level":2,"message":"a"})");
+}
+
+TEST(FoxgloveProtocol, IdsAreAlikeForNoTwo) {
+  EXPECT_EQ(channel_id(0, Topic::frame), 1U);
+  EXPECT_EQ(channel_id(0, Topic::jpeg), 8U);
+  EXPECT_EQ(channel_id(1, Topic::frame), 9U);
+  EXPECT_EQ(service_id(0, Service::rezero), 2U);
+  EXPECT_EQ(service_id(1, Service::set_light), 3U);
+  for (std::size_t i = 0; i < kTopics; ++i) EXPECT_EQ(index(topics()[i].topic), i);
+}
+
+TEST(FoxgloveProtocol, Operations) {
+  const auto subscribe = parse_operation(
+      R"({"op":"subscribe","subscriptions":[{"id":4294967295,"channelId":7},{"id":-1,"channelId":2},)"
+      R"({"id":1.5,"channelId":2},{"id":"x","channelId":2},{"id":3}]})");
+  ASSERT_TRUE(subscribe);
+  EXPECT_EQ(subscribe->name, "subscribe");
+  ASSERT_EQ(subscribe->subscribed.size(), 1U);
+  EXPECT_EQ(subscribe->subscribed[0].subscription, 4294967295U);
+  EXPECT_EQ(subscribe->subscribed[0].channel, 7U);
+  const auto unsubscribe = parse_operation(R"({"op":"unsubscribe","subscriptionIds":[3,"x",4]})");
+  ASSERT_TRUE(unsubscribe);
+  EXPECT_THAT(unsubscribe->ended, testing::ElementsAre(3U, 4U));
+  for (const char* text : {"", "[]", "3", "{", R"({"op":3})", R"({"x":"subscribe"})"}) {
+    EXPECT_FALSE(parse_operation(text)) << text;
+  }
+}
+
+TEST(FoxgloveProtocol, Calls) {
+  const std::string bytes = "\x02\x01\0\0\0\x09\0\0\0\x04\0\0\0json{}"s;
+  const auto call = parse_call(bytes);
+  ASSERT_TRUE(call);
+  EXPECT_EQ(call->service, 1U);
+  EXPECT_EQ(call->call, 9U);
+  EXPECT_EQ(call->encoding, "json");
+  EXPECT_EQ(call->payload, "{}");
+  for (std::size_t size = 0; size < 17; ++size) {
+    EXPECT_FALSE(parse_call(std::string_view(bytes).substr(0, size))) << size;
+  }
+  EXPECT_FALSE(parse_call("\x01\x01\0\0\0\x09\0\0\0\0\0\0\0"s));
+}
+
+TEST(FoxgloveProtocol, Requests) {
+  const auto light = request_of(Service::set_light, R"({"brightness":3,"leds":[{"r":255}]})");
+  EXPECT_EQ(light.set_light().brightness(), 3U);
+  EXPECT_EQ(light.set_light().leds(0).r(), 255U);
+  EXPECT_TRUE(request_of(Service::rezero, R"({"force":true})").rezero().force());
+  EXPECT_TRUE(request_of(Service::rezero, "").has_rezero());
+  EXPECT_THROW((void)request_of(Service::set_light, R"({"brightnes":3})"), std::runtime_error);
+  EXPECT_THROW((void)request_of(Service::set_light, R"({"brightness":-1})"), std::runtime_error);
+}
+
+TEST(FoxgloveTopics, AskForNoMoreThanIsWanted) {
+  EXPECT_EQ(subscription_for({}).SerializeAsString(), "");
+  Topics wanted;
+  wanted.set(index(Topic::event));
+  EXPECT_EQ(subscription_for(wanted).SerializeAsString(), "");
+  wanted.set(index(Topic::depth));
+  EXPECT_EQ(subscription_for(wanted).ShortDebugString(), "depth: DEPTH_INT16 depth_hz: 60");
+  wanted.set(index(Topic::frame));
+  EXPECT_EQ(subscription_for(wanted).ShortDebugString(),
+            "depth: DEPTH_PREDICT_ZSTD summary: true depth_hz: 60 summary_hz: 60");
+}
+
+TEST(FoxgloveTopics, APictureOfDepth) {
+  v1::Frame frame;
+  frame.set_wall_ns(1'000'000'002);
+  frame.set_frame_id("dtact_surface");
+  auto& map = *frame.mutable_depth();
+  map.set_encoding(v1::DEPTH_INT16);
+  map.set_width(2);
+  map.set_height(2);
+  map.set_um_per_unit(2);
+  map.set_untrusted_value(-32768);
+  map.set_data("\x01\0\xff\xff\0\x80\x34\x12"s);  // 1, -1, untrusted, 0x1234
+  const auto message = message_of(Topic::depth, frame);
+  ASSERT_NE(message, nullptr);
+  EXPECT_EQ(message->time_ns, 1'000'000'002U);
+  ::foxglove::RawImage image;
+  ASSERT_TRUE(image.ParseFromString(message->payload));
+  EXPECT_EQ(image.data(), "\x02\0\0\0\0\0\x68\x24"s);
+  EXPECT_EQ(image.step(), 4U);
+  EXPECT_EQ(image.timestamp().nanos(), 2);
+  EXPECT_EQ(message_of(Topic::luma, frame), nullptr);
+  EXPECT_EQ(message_of(Topic::contact, frame), nullptr);
+}
+
+TEST(FoxgloveDoor, ATokenInTheAddress) {
+  EXPECT_EQ(token_of("/foxglove"), "");
+  EXPECT_EQ(token_of("/foxglove?token=abc"), "abc");
+  EXPECT_EQ(token_of("/foxglove?x=1&token=a%2Bb%&y"), "a+b%");
+  EXPECT_EQ(token_of("/foxglove?mytoken=abc"), "");
+}
+
+}  // namespace
+}  // namespace dtact::web::foxglove
