@@ -1,0 +1,68 @@
+// npm run build -- --outdir DIR [--node DIR]: the page into the one folder, and what the tests run
+// under node into the other. Generates the messages from proto/dtact.proto into gen/ (Debian's
+// protobuf-compiler), checks the types and bundles. Nothing of all this is needed to serve the page.
+import * as esbuild from "esbuild";
+import { execFileSync } from "node:child_process";
+import { copyFileSync, mkdirSync, rmSync } from "node:fs";
+import path from "node:path";
+import { parseArgs } from "node:util";
+
+const { values } = parseArgs({
+  options: {
+    outdir: { type: "string" },
+    node: { type: "string" },
+    proto: { type: "string", default: "../../../proto" },
+  },
+});
+if (!values.outdir && !values.node) {
+  console.error("usage: npm run build -- --outdir DIR [--node DIR] [--proto DIR]");
+  process.exit(2);
+}
+const tool = (name) => path.join("node_modules", ".bin", name);
+
+rmSync("gen", { recursive: true, force: true });
+mkdirSync("gen");
+execFileSync(
+  "protoc",
+  [
+    `--plugin=protoc-gen-es=${tool("protoc-gen-es")}`,
+    "--es_out=gen",
+    "--es_opt=target=ts",
+    `--proto_path=${values.proto}`,
+    "dtact.proto",
+  ],
+  { stdio: "inherit" },
+);
+execFileSync(tool("tsc"), [], { stdio: "inherit" });
+
+const common = { bundle: true, format: "esm", legalComments: "eof", logLevel: "warning" };
+const browser = {
+  ...common,
+  outdir: values.outdir,
+  minify: true,
+  target: ["chrome109", "firefox115", "safari16.4"],
+};
+
+if (values.outdir) {
+  mkdirSync(values.outdir, { recursive: true });
+  // The surface is a chunk of its own, loaded when it is looked at for the first time.
+  await esbuild.build({
+    ...browser,
+    entryPoints: { page: "src/main.ts" },
+    splitting: true,
+    chunkNames: "[name]-[hash]",
+  });
+  await esbuild.build({ ...browser, entryPoints: { worker: "src/session/worker.ts" } });
+  for (const file of ["index.html", "icon.svg"]) {
+    copyFileSync(path.join("src", file), path.join(values.outdir, file));
+  }
+}
+if (values.node) {
+  await esbuild.build({
+    ...common,
+    entryPoints: { decoders: "src/wire/depth.ts", framing: "src/wire/framing.ts" },
+    outdir: values.node,
+    outExtension: { ".js": ".mjs" },
+    platform: "node",
+  });
+}
