@@ -1,0 +1,155 @@
+// One sensor as the page sees it: its worker's messages, and requests as promises.
+import { create } from "@bufbuild/protobuf";
+import { GetStatusSchema, Rights } from "../../gen/dtact_pb";
+import type { Event, HelloReply, Reply, Status } from "../../gen/dtact_pb";
+import type { Frame, FromWorker, Link, Request, ToWorker, Wants } from "./messages";
+
+/** An answer that says why not. */
+export class Refusal extends Error {
+  constructor(
+    readonly code: number,
+    message: string,
+  ) {
+    super(message);
+  }
+}
+
+type Result = Exclude<Reply["result"], { case: "error" } | { case: undefined }>;
+
+export interface Watcher {
+  link(link: Link): void;
+  hello(hello: HelloReply): void;
+  /** The newest frame, at most once a drawn picture. */
+  frame(frame: Frame): void;
+  event(event: Event): void;
+  status(status: Status): void;
+}
+
+const HERE = ["localhost", "127.0.0.1", "[::1]"];
+
+export class Sensor {
+  private readonly worker = new Worker("worker.js", { type: "module" });
+  private readonly waiting = new Map<
+    number,
+    { done: (result: Result) => void; failed: (error: Error) => void }
+  >();
+  private nextId = 0;
+  private depth: Int16Array | undefined;
+  private luma: Uint8Array | undefined;
+  rights: Rights = Rights.UNSPECIFIED;
+  features: string[] = [];
+
+  constructor(
+    readonly name: string,
+    token: string,
+    wants: Wants,
+    private readonly watcher: Watcher,
+  ) {
+    this.worker.onmessage = (message: MessageEvent<FromWorker>) => this.take(message.data);
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    this.send({
+      kind: "open",
+      url: `${scheme}://${location.host}/sensors/${encodeURIComponent(name)}/wire`,
+      program: "dtact-web page",
+      token,
+      nearby: HERE.includes(location.hostname),
+      wants,
+    });
+    setInterval(() => void this.askStatus(), 1000);
+  }
+
+  get mayControl(): boolean {
+    return this.rights !== Rights.VIEW;
+  }
+
+  useToken(token: string): void {
+    this.send({ kind: "token", token });
+  }
+
+  want(wants: Wants): void {
+    this.send({ kind: "wants", wants });
+  }
+
+  pause(paused: boolean): void {
+    this.send({ kind: "pause", paused });
+  }
+
+  /** Shows a later frame of those that are kept, or an earlier one. */
+  step(by: number): void {
+    this.send({ kind: "step", by });
+  }
+
+  close(): void {
+    this.worker.terminate();
+  }
+
+  /** Rejects with a Refusal, or an Error where the connection is gone. */
+  request(request: Request): Promise<Result> {
+    const id = ++this.nextId;
+    this.send({ kind: "request", id, request });
+    return new Promise((done, failed) => this.waiting.set(id, { done, failed }));
+  }
+
+  private async askStatus(): Promise<void> {
+    try {
+      const result = await this.request({ case: "getStatus", value: create(GetStatusSchema) });
+      if (result.case === "status") this.watcher.status(result.value);
+    } catch {
+      // The link says that it is gone; a refused status is asked for again.
+    }
+  }
+
+  private send(message: ToWorker, memory: Transferable[] = []): void {
+    this.worker.postMessage(message, memory);
+  }
+
+  private take(message: FromWorker): void {
+    switch (message.kind) {
+      case "link":
+        return this.watcher.link(message.link);
+      case "hello":
+        this.rights = message.hello.rights;
+        this.features = message.hello.features;
+        return this.watcher.hello(message.hello);
+      case "event":
+        return this.watcher.event(message.event);
+      case "frame":
+        return this.takeFrame(message.frame);
+      case "reply": {
+        const asked = this.waiting.get(message.id);
+        this.waiting.delete(message.id);
+        const result = message.reply.result;
+        if (result.case === "error") asked?.failed(new Refusal(result.value.code, result.value.message));
+        else if (result.case) asked?.done(result);
+        return;
+      }
+      case "unanswered":
+        this.waiting.get(message.id)?.failed(new Error("The sensor is away."));
+        this.waiting.delete(message.id);
+        return;
+    }
+  }
+
+  /** Shows it with the next picture, and then asks for another one with the memory of the last. */
+  private takeFrame(frame: Frame): void {
+    const show = (): void => {
+      this.watcher.frame(frame);
+      const taken: ToWorker = { kind: "taken", depth: undefined, luma: undefined };
+      const memory: Transferable[] = [];
+      if (frame.depth) {
+        taken.depth = this.depth;
+        if (this.depth) memory.push(this.depth.buffer);
+        this.depth = frame.depth.values;
+      }
+      if (frame.luma) {
+        taken.luma = this.luma;
+        if (this.luma) memory.push(this.luma.buffer);
+        this.luma = frame.luma.values;
+      }
+      this.send(taken, memory);
+    };
+    // A page in the background draws nothing, and would leave the frames standing.
+    if (document.hidden) show();
+    else requestAnimationFrame(show);
+  }
+}

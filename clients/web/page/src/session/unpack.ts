@@ -1,0 +1,94 @@
+// From the wire's Frame to what the page shows of it.
+import type { DepthMap as WireDepth, Frame as WireFrame, LumaMap as WireLuma } from "../../gen/dtact_pb";
+import { LumaEncoding } from "../../gen/dtact_pb";
+import { decodeDepth, MAX_VALUES } from "../wire/depth";
+import type { DepthMap, Frame, LumaMap } from "./messages";
+
+/** Memory that the page has given back, for the next maps of the same size. */
+export class Spare {
+  private depth: Int16Array[] = [];
+  private luma: Uint8Array[] = [];
+
+  give(depth: Int16Array | undefined, luma: Uint8Array | undefined): void {
+    if (depth && this.depth.length < 3) this.depth.push(depth);
+    if (luma && this.luma.length < 3) this.luma.push(luma);
+  }
+
+  takeDepth(length: number): Int16Array {
+    this.depth = this.depth.filter((spare) => spare.length === length);
+    return this.depth.pop() ?? new Int16Array(length);
+  }
+
+  takeLuma(length: number): Uint8Array {
+    this.luma = this.luma.filter((spare) => spare.length === length);
+    return this.luma.pop() ?? new Uint8Array(length);
+  }
+}
+
+function unpackDepth(map: WireDepth, spare: Spare): DepthMap {
+  const length = map.width * map.height;
+  if (length > MAX_VALUES) throw new Error(`a depth map of ${map.width} x ${map.height}`);
+  const values = spare.takeDepth(length);
+  decodeDepth(map.encoding, map.data, map.width, map.height, values);
+  return {
+    values,
+    width: map.width,
+    height: map.height,
+    mmPerPx: map.mmPerPx,
+    umPerUnit: map.umPerUnit,
+    untrusted: map.untrustedValue,
+    uncertaintyUm: map.uncertaintyUm,
+    decimation: map.decimation,
+    sharpenSteps: map.sharpenSteps,
+  };
+}
+
+function unpackLuma(map: WireLuma, spare: Spare): LumaMap {
+  if (map.encoding !== LumaEncoding.LUMA_GREY8 || map.data.length !== map.width * map.height) {
+    throw new Error(`a luma map of ${map.width} x ${map.height} in ${map.data.length} bytes`);
+  }
+  const values = spare.takeLuma(map.data.length);
+  values.set(map.data);
+  return { values, width: map.width, height: map.height };
+}
+
+/** Of every 16th trusted pixel, micrometres; undefined where there is none. */
+function rootMeanSquareUm(map: DepthMap): number | undefined {
+  let sum = 0;
+  let count = 0;
+  // An odd distance walks through all columns.
+  for (let at = 0; at < map.values.length; at += 17) {
+    const value = map.values[at] as number;
+    if (value === map.untrusted) continue;
+    sum += value * value;
+    ++count;
+  }
+  return count > 0 ? Math.sqrt(sum / count) * map.umPerUnit : undefined;
+}
+
+/** Throws where a map is broken. */
+export function unpack(
+  frame: WireFrame,
+  spare: Spare,
+  capturedMs: number | undefined,
+  dropped: number,
+  behind: number,
+): Frame {
+  const depth = frame.depth && unpackDepth(frame.depth, spare);
+  const untouched = frame.contact?.touching === false;
+  return {
+    sequence: Number(frame.sequence),
+    wallMs: Number(frame.wallNs / 1000n) / 1000,
+    capturedMs,
+    health: frame.health,
+    contact: frame.contact,
+    contactAbsence: frame.contactAbsence,
+    light: frame.light,
+    calibration: frame.calibration === undefined ? undefined : Number(frame.calibration),
+    depth,
+    luma: frame.luma && unpackLuma(frame.luma, spare),
+    untouchedRmsUm: untouched && depth ? rootMeanSquareUm(depth) : undefined,
+    dropped,
+    behind,
+  };
+}
