@@ -1,0 +1,84 @@
+// The daemon's calibrations: which is in use, another one instead, one of this machine's.
+import { create } from "@bufbuild/protobuf";
+import { ActivateCalibrationSchema, ListCalibrationsSchema, UploadCalibrationSchema } from "../../gen/dtact_pb";
+import type { StoredCalibration } from "../../gen/dtact_pb";
+import { button, el, panel, say } from "../dom";
+import type { Sensor } from "../session/sensor";
+
+const FILES = ["calibration.toml", "reference.png"];
+
+export class CalibrationsPanel {
+  private readonly list = el("ul", { class: "calibrations" });
+  private readonly answer = el("p", { class: "answer", role: "alert" });
+  private readonly picker = el("input", { type: "file", multiple: "", accept: ".toml,.png", hidden: "" });
+  private readonly upload = el(
+    "div",
+    { class: "row" },
+    button("Upload…", () => this.picker.click(), { title: `Choose ${FILES.join(" and ")} of a calibration's folder` }),
+    this.picker,
+  );
+  readonly element = panel("Calibrations", this.list, this.upload, this.answer);
+
+  constructor(private readonly sensor: Sensor) {
+    this.picker.addEventListener("change", () => void this.send());
+  }
+
+  async refresh(): Promise<void> {
+    this.upload.hidden = !this.sensor.mayControl;
+    try {
+      const result = await this.sensor.request({ case: "listCalibrations", value: create(ListCalibrationsSchema) });
+      if (result.case !== "calibrations") return;
+      this.list.replaceChildren(...result.value.calibrations.map((stored) => this.item(stored)));
+    } catch (error) {
+      say(this.answer, (error as Error).message);
+    }
+  }
+
+  private item(stored: StoredCalibration): HTMLElement {
+    const configured = stored.number === 0n;
+    const title = configured ? `${stored.name} (configured)` : `${stored.number} ${stored.name}`;
+    const item = el("li", {}, el("span", { class: "name", title: stored.uploaded }, title));
+    if (stored.content.case === "damage") item.append(el("span", { class: "trouble" }, stored.content.value));
+    if (stored.inUse) item.append(el("span", { class: "tag" }, "in use"));
+    else if (this.sensor.mayControl && stored.content.case === "summary") {
+      item.append(button("Use", () => void this.activate(stored.number), { "aria-label": `Use calibration ${title}` }));
+    }
+    return item;
+  }
+
+  private async activate(number: bigint): Promise<void> {
+    await this.change("Changing the calibration.", () =>
+      this.sensor.request({ case: "activateCalibration", value: create(ActivateCalibrationSchema, { number }) }),
+    );
+  }
+
+  private async send(): Promise<void> {
+    const files = [...(this.picker.files ?? [])];
+    const [toml, png] = FILES.map((name) => files.find((file) => file.name === name));
+    this.picker.value = "";
+    if (!toml || !png) return say(this.answer, `Choose both ${FILES.join(" and ")} of the folder.`);
+    // The browser does not tell the folder's name; the moment names it as well.
+    const name = `web-${new Date().toISOString().slice(0, 19).replaceAll(":", "")}`;
+    const [calibrationToml, referencePng] = await Promise.all(
+      [toml, png].map(async (file) => new Uint8Array(await file.arrayBuffer())),
+    );
+    if (!calibrationToml || !referencePng) return;
+    await this.change("Uploading.", () =>
+      this.sensor.request({
+        case: "uploadCalibration",
+        value: create(UploadCalibrationSchema, { name, calibrationToml, referencePng }),
+      }),
+    );
+  }
+
+  private async change(doing: string, ask: () => Promise<unknown>): Promise<void> {
+    say(this.answer, doing);
+    try {
+      await ask();
+      say(this.answer, "");
+    } catch (error) {
+      say(this.answer, (error as Error).message);
+    }
+    await this.refresh();
+  }
+}

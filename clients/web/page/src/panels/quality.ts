@@ -1,0 +1,94 @@
+// What the depth is worth, and what to do where that is less than it could be.
+import { create } from "@bufbuild/protobuf";
+import { GetReferenceSchema } from "../../gen/dtact_pb";
+import type { Event, Status } from "../../gen/dtact_pb";
+import { el, Facts, panel, say } from "../dom";
+import type { Frame } from "../session/messages";
+import type { Sensor } from "../session/sensor";
+import { conditionName, fixed, signedPercent, span, stateName, um } from "../words";
+
+export class QualityPanel {
+  private readonly facts = new Facts({
+    state: { label: "State" },
+    uncertainty: { label: "Depth is worth", hint: "Mean absolute error to expect inside the contact" },
+    untouched: { label: "Untouched RMS", hint: "Of the map in the last frame in which nothing touched; where nothing differs from the reference the daemon writes 0" },
+    reference: { label: "Reference's age", hint: "The untouched image that depth is measured against" },
+    drift: { label: "Light followed", hint: "How far the light has drifted since the reference was taken" },
+    map: { label: "Map" },
+    camera: { label: "Camera" },
+    calibration: { label: "Calibration" },
+  });
+  private readonly conditions = el("ul", { class: "conditions" });
+  private readonly advice = el("p", { class: "advice", role: "status" });
+  readonly element = panel("Quality", this.conditions, this.advice, this.facts.element);
+  private reference: { sequence: number; restored: boolean } | undefined;
+  private fps = 0;
+  private sequence = 0;
+
+  show(frame: Frame): void {
+    this.sequence = frame.sequence;
+    const depth = frame.depth;
+    if (depth) {
+      this.facts.set("uncertainty", `± ${um(depth.uncertaintyUm)}`);
+      const sharpened = depth.sharpenSteps > 0 ? `, sharpened ${depth.sharpenSteps}×` : "";
+      const share = ["", "full", "half", "", "quarter"][depth.decimation] ?? `1/${depth.decimation}`;
+      this.facts.set("map", `${depth.width} × ${depth.height}, ${share}${sharpened}`);
+    }
+    if (frame.untouchedRmsUm !== undefined) this.facts.set("untouched", `${fixed(frame.untouchedRmsUm, 1)} µm`);
+    const reference = this.reference;
+    if (reference && this.fps > 0) {
+      const age = span(Math.max(0, this.sequence - reference.sequence) / this.fps);
+      this.facts.set("reference", `${age}${reference.restored ? ", restored" : ""}`);
+    }
+  }
+
+  event(event: Event): void {
+    if (event.what.case !== "reference") return;
+    const { sequence, restored } = event.what.value;
+    this.reference = { sequence: Number(sequence), restored };
+  }
+
+  /** After a connection was made: events tell only what comes later. */
+  async ask(sensor: Sensor): Promise<void> {
+    this.reference = undefined;
+    this.facts.set("reference", "–");
+    if (!sensor.features.includes("reference")) return;
+    try {
+      const result = await sensor.request({ case: "getReference", value: create(GetReferenceSchema) });
+      if (result.case === "reference") {
+        this.reference ??= { sequence: Number(result.value.sequence), restored: false };
+      }
+    } catch {
+      // There is none yet; the event tells when one is taken.
+    }
+  }
+
+  status(status: Status): void {
+    this.fps = status.camera?.fps ?? 0;
+    this.facts.set("state", stateName(status.state));
+    this.facts.set("drift", signedPercent(status.lightFollowed));
+    const camera = status.camera;
+    if (camera) {
+      const trouble = [
+        [camera.lost, "lost"],
+        [camera.damaged, "damaged"],
+        [camera.disconnects, "unplugged"],
+      ] as const;
+      const told = trouble.filter(([count]) => count > 0n).map(([count, name]) => `, ${count} ${name}`);
+      this.facts.set("camera", `${camera.condition}, ${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${told.join("")}`);
+    }
+    const made = status.calibration;
+    this.facts.set(
+      "calibration",
+      made ? `${made.name}, ${fixed(made.coveredFromMm, 2)} to ${fixed(made.coveredToMm, 2)} mm` : "none",
+    );
+    const names = status.health.map(conditionName);
+    if ([...this.conditions.children].map((item) => item.textContent).join() !== names.join()) {
+      this.conditions.replaceChildren(...names.map((name) => el("li", {}, name)));
+    }
+    const remedy = camera?.remedy || status.ring?.message || "";
+    const advice = status.advice || remedy;
+    say(this.advice, advice || "All is well.");
+    this.advice.classList.toggle("well", advice === "");
+  }
+}

@@ -1,0 +1,133 @@
+// What is drawn over the map: scale bar, centroid and deepest point, the cursor, the drawn line.
+import type { Contact } from "../../gen/dtact_pb";
+
+/** A place of the surface frame, millimetres. */
+export interface Place {
+  xMm: number;
+  yMm: number;
+}
+
+export interface Line {
+  from: Place;
+  to: Place;
+}
+
+/** How the map that is shown lies in the surface frame. */
+export interface Grid {
+  width: number;
+  height: number;
+  mmPerPx: number;
+}
+
+export function placeOf(grid: Grid, column: number, row: number): Place {
+  return {
+    xMm: (column - (grid.width - 1) / 2) * grid.mmPerPx,
+    yMm: (row - (grid.height - 1) / 2) * grid.mmPerPx,
+  };
+}
+
+/** The nearest pixel; undefined outside of the map. */
+export function pixelOf(grid: Grid, place: Place): { column: number; row: number } | undefined {
+  const column = Math.round(place.xMm / grid.mmPerPx + (grid.width - 1) / 2);
+  const row = Math.round(place.yMm / grid.mmPerPx + (grid.height - 1) / 2);
+  const inside = column >= 0 && row >= 0 && column < grid.width && row < grid.height;
+  return inside ? { column, row } : undefined;
+}
+
+const INK = "#ffffff";
+const SHADE = "rgba(0, 0, 0, 0.65)";
+const LENGTHS_MM = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
+
+export interface Marks {
+  grid: Grid;
+  contact: Contact | undefined;
+  cursor: Place | undefined;
+  line: Line | undefined;
+}
+
+/** A length in round millimetres of about a fifth of the picture. */
+export function scaleLength(grid: Grid): number {
+  const fifth = (grid.width * grid.mmPerPx) / 5;
+  return LENGTHS_MM.reduce((best, length) => (length <= fifth * 1.05 ? length : best));
+}
+
+/** Draws the marks into a picture of so many CSS pixels. */
+export function drawMarks(context: CanvasRenderingContext2D, width: number, height: number, marks: Marks): void {
+  const { grid } = marks;
+  const scale = width / grid.width;
+  const at = (place: Place): [number, number] => [
+    (place.xMm / grid.mmPerPx + grid.width / 2) * scale,
+    (place.yMm / grid.mmPerPx + grid.height / 2) * scale,
+  ];
+  // Each stroke twice: a dark one under a light one is seen on any colour.
+  const stroke = (path: () => void, line = 1.5): void => {
+    for (const [colour, thickness] of [
+      [SHADE, line + 2],
+      [INK, line],
+    ] as const) {
+      context.strokeStyle = colour;
+      context.lineWidth = thickness;
+      context.beginPath();
+      path();
+      context.stroke();
+    }
+  };
+  const write = (text: string, x: number, y: number): void => {
+    context.lineWidth = 3;
+    context.strokeStyle = SHADE;
+    context.strokeText(text, x, y);
+    context.fillStyle = INK;
+    context.fillText(text, x, y);
+  };
+  context.font = "12px system-ui, sans-serif";
+  context.textBaseline = "alphabetic";
+  context.lineCap = "round";
+
+  if (marks.contact?.touching) {
+    const [cx, cy] = at({ xMm: marks.contact.xMm, yMm: marks.contact.yMm });
+    stroke(() => context.arc(cx, cy, 6, 0, 2 * Math.PI));
+    const [dx, dy] = at({ xMm: marks.contact.deepestXMm, yMm: marks.contact.deepestYMm });
+    stroke(() => {
+      context.moveTo(dx - 5, dy - 5);
+      context.lineTo(dx + 5, dy + 5);
+      context.moveTo(dx + 5, dy - 5);
+      context.lineTo(dx - 5, dy + 5);
+    });
+  }
+  if (marks.line) {
+    const [x0, y0] = at(marks.line.from);
+    const [x1, y1] = at(marks.line.to);
+    stroke(() => {
+      context.moveTo(x0, y0);
+      context.lineTo(x1, y1);
+    });
+    for (const [x, y, name] of [
+      [x0, y0, "A"],
+      [x1, y1, "B"],
+    ] as const) {
+      stroke(() => context.arc(x, y, 3, 0, 2 * Math.PI));
+      write(name, x + 7, y - 7);
+    }
+  }
+  if (marks.cursor) {
+    const [x, y] = at(marks.cursor);
+    stroke(() => {
+      for (const [ux, uy] of [
+        [1, 0],
+        [-1, 0],
+        [0, 1],
+        [0, -1],
+      ] as const) {
+        context.moveTo(x + 4 * ux, y + 4 * uy);
+        context.lineTo(x + 11 * ux, y + 11 * uy);
+      }
+    }, 1);
+  }
+  const length = scaleLength(grid);
+  const long = (length / grid.mmPerPx) * scale;
+  stroke(() => {
+    context.moveTo(14, height - 14);
+    context.lineTo(14 + long, height - 14);
+  }, 2);
+  write(`${length} mm`, 14, height - 21);
+}

@@ -1,0 +1,306 @@
+// The picture: map or camera, what is drawn over it, and the value under the cursor.
+import { el, say } from "../dom";
+import type { DepthMap, Frame, LumaMap } from "../session/messages";
+import { fixed, mm, um } from "../words";
+import { drawColourBar } from "./colour_bar";
+import { MapCanvas } from "./map_canvas";
+import type { Range } from "./map_canvas";
+import { drawMarks, pixelOf, placeOf } from "./overlay";
+import type { Line, Marks, Place } from "./overlay";
+
+export type View = "depth" | "camera" | "surface";
+export type Tool = "point" | "line";
+
+/** Depth along a line: millimetres from its start, and depth in millimetres or null where untrusted. */
+export interface Profile {
+  alongMm: number[];
+  depthMm: (number | null)[];
+}
+
+/** Draws a 2D canvas at the screen's own resolution. */
+function sharp(canvas: HTMLCanvasElement): { context: CanvasRenderingContext2D; width: number; height: number } {
+  const ratio = devicePixelRatio;
+  const { clientWidth: width, clientHeight: height } = canvas;
+  const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== w || canvas.height !== h) {
+    canvas.width = w;
+    canvas.height = h;
+  }
+  const context = canvas.getContext("2d") as CanvasRenderingContext2D;
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  return { context, width, height };
+}
+
+export class Stage {
+  private readonly canvas = el("canvas", { class: "map", width: "580", height: "580" });
+  private readonly marksCanvas = el("canvas", {
+    class: "marks",
+    tabindex: "0",
+    role: "img",
+    "aria-label": "Depth map. Arrow keys move the cursor; Shift moves it by ten pixels.",
+  });
+  private readonly bar = el("canvas", { class: "bar", role: "img" });
+  private readonly readout = el("output", { class: "readout" }, "Point at the map for its values.");
+  private readonly veil = el("div", { class: "veil", role: "status" });
+  private readonly picture = el("div", { class: "picture" }, this.canvas, this.marksCanvas, this.veil);
+  private readonly host = el("div", { class: "surface" });
+  readonly element = el(
+    "div",
+    { class: "stage" },
+    el("div", { class: "viewport" }, this.picture, this.host, this.bar),
+    this.readout,
+  );
+  private readonly map: MapCanvas;
+  private view: View = "depth";
+  private tool: Tool = "point";
+  private cursor: Place | undefined;
+  private line: Line | undefined;
+  private drawing = false;
+  private frame: Frame | undefined;
+  depth: DepthMap | undefined;
+  luma: LumaMap | undefined;
+  /** Called when the drawn line or its values may have changed. */
+  profiled: (profile: Profile | undefined) => void = () => {};
+
+  /** Throws where the browser has no WebGL 2. */
+  constructor() {
+    this.map = new MapCanvas(this.canvas);
+    const target = this.marksCanvas;
+    target.addEventListener("pointermove", (event) => this.point(event));
+    target.addEventListener("pointerleave", () => {
+      if (!this.drawing) this.moveTo(undefined);
+    });
+    target.addEventListener("pointerdown", (event) => {
+      this.point(event);
+      if (this.tool !== "line" || !this.cursor) return;
+      target.setPointerCapture(event.pointerId);
+      this.drawing = true;
+      this.line = { from: this.cursor, to: this.cursor };
+    });
+    target.addEventListener("pointerup", () => (this.drawing = false));
+    target.addEventListener("keydown", (event) => this.steer(event));
+    new ResizeObserver(() => {
+      this.drawOver();
+      this.drawBar();
+    }).observe(this.element);
+  }
+
+  get range(): Range {
+    return this.map.range;
+  }
+
+  set range(range: Range) {
+    this.map.range = range;
+    this.map.redraw();
+    this.drawBar();
+  }
+
+  get outlineMm(): number {
+    return this.map.outlineMm;
+  }
+
+  set outlineMm(depth: number) {
+    this.map.outlineMm = depth;
+    this.map.redraw();
+  }
+
+  /** Where the surface is drawn when it is looked at. */
+  get surfaceHost(): HTMLElement {
+    return this.host;
+  }
+
+  look(view: View): void {
+    this.view = view;
+    this.element.dataset["view"] = view;
+    if (view === "depth" && this.depth) this.map.drawDepth(this.depth);
+    if (view === "camera" && this.luma) this.map.drawLuma(this.luma);
+    this.shape();
+    this.drawOver();
+    this.drawBar();
+  }
+
+  use(tool: Tool): void {
+    this.tool = tool;
+    if (tool === "point") this.line = undefined;
+    this.tellProfile();
+    this.drawOver();
+  }
+
+  /** Said over the picture; empty: nothing. */
+  cover(sentence: string): void {
+    say(this.veil, sentence);
+    this.picture.classList.toggle("covered", sentence !== "");
+  }
+
+  /** In the light and dark themes the bar's text differs. */
+  drawBar(): void {
+    const { context, height } = sharp(this.bar);
+    if (height === 0) return;
+    const ink = getComputedStyle(this.bar).color;
+    drawColourBar(context, 10, 0, height, this.range, ink);
+    const { fromMm, toMm } = this.range;
+    this.bar.setAttribute("aria-label", `Colours from ${fromMm} to ${toMm} mm, locked`);
+  }
+
+  show(frame: Frame): void {
+    this.frame = frame;
+    if (frame.depth) this.depth = frame.depth;
+    if (frame.luma) this.luma = frame.luma;
+    if (this.view === "depth" && frame.depth) this.map.drawDepth(frame.depth);
+    if (this.view === "camera" && frame.luma) this.map.drawLuma(frame.luma);
+    this.shape();
+    this.drawOver();
+    this.tellValue();
+    if (this.line) this.tellProfile();
+  }
+
+  /** The map as it is shown with its marks, bar and these lines of text below, as a PNG. */
+  picturePng(lines: string[], ink: string, paper: string): Promise<Blob> {
+    const [width, height] = [this.canvas.width, this.canvas.height];
+    const scale = Math.max(1, Math.round(580 / width));
+    const [mapWidth, mapHeight] = [width * scale, height * scale];
+    const bar = this.view === "depth" ? 96 : 12;
+    const made = el("canvas", {
+      width: String(mapWidth + bar + 12),
+      height: String(mapHeight + 24 + 18 * lines.length),
+    });
+    const context = made.getContext("2d") as CanvasRenderingContext2D;
+    context.fillStyle = paper;
+    context.fillRect(0, 0, made.width, made.height);
+    context.imageSmoothingEnabled = false;
+    context.save();
+    context.translate(12, 12);
+    context.drawImage(this.canvas, 0, 0, mapWidth, mapHeight);
+    if (this.view === "depth" && this.depth) drawMarks(context, mapWidth, mapHeight, this.marks(this.depth));
+    if (this.view === "depth") drawColourBar(context, mapWidth + 10, 0, mapHeight, this.range, ink);
+    context.restore();
+    context.fillStyle = ink;
+    context.font = "12px system-ui, sans-serif";
+    context.textBaseline = "top";
+    lines.forEach((text, i) => context.fillText(text, 12, mapHeight + 20 + 18 * i));
+    return new Promise((done, failed) =>
+      made.toBlob((blob) => (blob ? done(blob) : failed(new Error("no picture was made"))), "image/png"),
+    );
+  }
+
+  private shown(): DepthMap | LumaMap | undefined {
+    return this.view === "camera" ? this.luma : this.depth;
+  }
+
+  private shape(): void {
+    const map = this.shown();
+    if (map) this.picture.style.setProperty("--shape", String(map.width / map.height));
+  }
+
+  private marks(grid: DepthMap): Marks {
+    return { grid, contact: this.frame?.contact, cursor: this.cursor, line: this.line };
+  }
+
+  private drawOver(): void {
+    const { context, width, height } = sharp(this.marksCanvas);
+    if (this.view === "depth" && this.depth && width > 0) {
+      drawMarks(context, width, height, this.marks(this.depth));
+    }
+  }
+
+  private point(event: PointerEvent): void {
+    const map = this.shown();
+    const box = this.marksCanvas.getBoundingClientRect();
+    if (!map || box.width === 0) return;
+    const column = Math.floor(((event.clientX - box.left) / box.width) * map.width);
+    const row = Math.floor(((event.clientY - box.top) / box.height) * map.height);
+    const inside = column >= 0 && row >= 0 && column < map.width && row < map.height;
+    if (inside) this.moveTo(placeOf(this.grid(map), column, row));
+  }
+
+  private steer(event: KeyboardEvent): void {
+    const ways: Record<string, [number, number]> = {
+      ArrowLeft: [-1, 0],
+      ArrowRight: [1, 0],
+      ArrowUp: [0, -1],
+      ArrowDown: [0, 1],
+    };
+    const way = ways[event.key];
+    const map = this.shown();
+    if (!way || !map) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const grid = this.grid(map);
+    const from = (this.cursor && pixelOf(grid, this.cursor)) ?? { column: map.width >> 1, row: map.height >> 1 };
+    const by = event.shiftKey ? 10 : 1;
+    const column = Math.min(Math.max(from.column + by * way[0], 0), map.width - 1);
+    const row = Math.min(Math.max(from.row + by * way[1], 0), map.height - 1);
+    this.moveTo(placeOf(grid, column, row));
+  }
+
+  /** The camera's picture has no millimetres of its own: its pixels stand for them. */
+  private grid(map: DepthMap | LumaMap): { width: number; height: number; mmPerPx: number } {
+    return { width: map.width, height: map.height, mmPerPx: "mmPerPx" in map ? map.mmPerPx : 1 };
+  }
+
+  private moveTo(place: Place | undefined): void {
+    this.cursor = place;
+    if (this.drawing && this.line && place) {
+      this.line = { from: this.line.from, to: place };
+      this.tellProfile();
+    }
+    this.drawOver();
+    this.tellValue();
+  }
+
+  /** Depth at a pixel, micrometres; null: untrusted. */
+  private valueUm(depth: DepthMap, column: number, row: number): number | null {
+    const value = depth.values[row * depth.width + column] as number;
+    return value === depth.untrusted ? null : value * depth.umPerUnit;
+  }
+
+  private tellValue(): void {
+    const map = this.shown();
+    const pixel = map && this.cursor && pixelOf(this.grid(map), this.cursor);
+    if (!map || !pixel || !this.cursor) {
+      say(this.readout, this.line && this.view === "depth" ? this.lineText(this.line) : "Point at the map for its values.");
+      return;
+    }
+    const where = `row ${pixel.row}, column ${pixel.column}`;
+    if ("mmPerPx" in map) {
+      const value = this.valueUm(map, pixel.column, pixel.row);
+      const place = `x ${mm(this.cursor.xMm)}, y ${mm(this.cursor.yMm)}`;
+      const told = value === null ? "untrusted" : um(value);
+      const line = this.line ? ` · ${this.lineText(this.line)}` : "";
+      say(this.readout, `${told} · ${where} · ${place}${line}`);
+    } else {
+      say(this.readout, `grey ${map.values[pixel.row * map.width + pixel.column]} of 255 · ${where}`);
+    }
+  }
+
+  private lineText(line: Line): string {
+    const long = Math.hypot(line.to.xMm - line.from.xMm, line.to.yMm - line.from.yMm);
+    const ends = [line.from, line.to].map((place) => {
+      const pixel = this.depth && pixelOf(this.depth, place);
+      return pixel && this.depth ? this.valueUm(this.depth, pixel.column, pixel.row) : null;
+    });
+    const [a, b] = ends;
+    const step = typeof a === "number" && typeof b === "number" ? `, B − A ${um(b - a)}` : "";
+    return `A–B ${mm(long)}${step}`;
+  }
+
+  private tellProfile(): void {
+    const { depth, line } = this;
+    if (!depth || !line || this.view !== "depth") return this.profiled(undefined);
+    const long = Math.hypot(line.to.xMm - line.from.xMm, line.to.yMm - line.from.yMm);
+    const count = Math.max(2, Math.round(long / depth.mmPerPx) + 1);
+    const profile: Profile = { alongMm: [], depthMm: [] };
+    for (let i = 0; i < count; ++i) {
+      const share = i / (count - 1);
+      const pixel = pixelOf(depth, {
+        xMm: line.from.xMm + share * (line.to.xMm - line.from.xMm),
+        yMm: line.from.yMm + share * (line.to.yMm - line.from.yMm),
+      });
+      const value = pixel ? this.valueUm(depth, pixel.column, pixel.row) : null;
+      profile.alongMm.push(Number(fixed(share * long, 4).replace("−", "-")));
+      profile.depthMm.push(value === null ? null : value / 1000);
+    }
+    this.profiled(profile);
+  }
+}
