@@ -1,0 +1,150 @@
+// The page: which sensors there are, which are shown, light or dark, the keyboard.
+import "uplot/dist/uPlot.min.css";
+import "./page.css";
+import { button, el, say } from "./dom";
+import { Pane } from "./pane";
+
+interface SensorEntry {
+  name: string;
+  connected: boolean;
+  error?: string;
+}
+
+const POLL_MS = 3000;
+const THEME = "dtact theme";
+
+class Page {
+  private readonly chooser = el("nav", { class: "chooser", "aria-label": "Sensors" });
+  private readonly notice = el("p", { class: "notice", role: "status", hidden: "" });
+  private readonly panes = el("main", { class: "panes" });
+  private readonly help = this.makeHelp();
+  private readonly shown = new Map<string, Pane>();
+  private readonly buttons = new Map<string, HTMLButtonElement>();
+  /** The pane that keys go to: the one that was touched last. */
+  private active = "";
+
+  constructor() {
+    document.body.append(
+      el(
+        "header",
+        { class: "top" },
+        el("h1", {}, "dtact"),
+        this.chooser,
+        el(
+          "span",
+          { class: "row end" },
+          button("Keys", () => this.help.showModal(), { title: "?" }),
+          button("Light / dark", () => this.switchTheme(), { "aria-label": "Switch between light and dark" }),
+        ),
+      ),
+      this.notice,
+      this.panes,
+      this.help,
+    );
+    const stored = localStorage.getItem(THEME);
+    if (stored) document.documentElement.dataset["theme"] = stored;
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
+    document.addEventListener("keydown", (event) => this.key(event));
+    void this.poll();
+    setInterval(() => void this.poll(), POLL_MS);
+  }
+
+  private async poll(): Promise<void> {
+    try {
+      const response = await fetch("sensors", { cache: "no-store" });
+      if (!response.ok) throw new Error(`status ${response.status}`);
+      this.list((await response.json()) as SensorEntry[]);
+      this.tell("");
+    } catch (error) {
+      this.tell(`dtact-web does not answer (${(error as Error).message}). Trying again.`);
+    }
+  }
+
+  private tell(sentence: string): void {
+    say(this.notice, sentence);
+    this.notice.hidden = sentence === "";
+  }
+
+  private list(sensors: SensorEntry[]): void {
+    for (const { name, connected, error } of sensors) {
+      let made = this.buttons.get(name);
+      if (!made) {
+        made = button(name, () => this.toggle(name));
+        this.buttons.set(name, made);
+        this.chooser.append(made);
+        // All that were there at first, as far as they fit beside each other.
+        if (this.shown.size < 2) this.toggle(name);
+      }
+      made.dataset["connected"] = String(connected);
+      made.title = error ?? "connected";
+      made.setAttribute("aria-pressed", String(this.shown.has(name)));
+    }
+    if (sensors.length === 0) this.tell("dtact-web is not told of any sensor: see its --help.");
+    this.chooser.hidden = sensors.length < 2;
+  }
+
+  private toggle(name: string): void {
+    const shown = this.shown.get(name);
+    if (shown) {
+      if (this.shown.size === 1) return;
+      shown.close();
+      this.shown.delete(name);
+    } else {
+      try {
+        const pane = new Pane(name);
+        this.shown.set(name, pane);
+        this.panes.append(pane.element);
+        pane.start();
+        pane.element.addEventListener("pointerdown", () => (this.active = name));
+        pane.element.addEventListener("focusin", () => (this.active = name));
+      } catch (error) {
+        this.panes.append(el("p", { class: "notice", role: "alert" }, (error as Error).message));
+      }
+    }
+    this.panes.dataset["count"] = String(this.shown.size);
+    this.buttons.get(name)?.setAttribute("aria-pressed", String(this.shown.has(name)));
+  }
+
+  private key(event: KeyboardEvent): void {
+    const target = event.target as HTMLElement;
+    const typing = target.closest("input, textarea, select, dialog") !== null;
+    if (typing || event.ctrlKey || event.metaKey || event.altKey) return;
+    // Space on a button presses that.
+    if (event.key === " " && target.closest("button") !== null) return;
+    if (event.key === "?") return this.help.showModal();
+    const pane = this.shown.get(this.active) ?? this.shown.values().next().value;
+    if (pane?.key(event.key)) event.preventDefault();
+  }
+
+  private makeHelp(): HTMLDialogElement {
+    const keys: [string, string][] = [
+      ["1 2 3", "depth, camera, surface"],
+      ["P L", "point, line from A to B"],
+      ["arrows on the map", "move the cursor; with Shift by ten"],
+      ["Space", "pause, and on"],
+      ["← →", "step through the last seconds, paused"],
+      ["S", "snapshot"],
+      ["Z", "re-zero"],
+      ["?", "these keys"],
+    ];
+    const list = el("dl", { class: "keys" });
+    for (const [key, what] of keys) list.append(el("dt", {}, key), el("dd", {}, what));
+    const dialog = el("dialog", { "aria-label": "Keys" }, el("h2", {}, "Keys"), list);
+    dialog.append(button("Close", () => dialog.close()));
+    return dialog;
+  }
+
+  private switchTheme(): void {
+    const root = document.documentElement;
+    const dark = root.dataset["theme"] ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    root.dataset["theme"] = dark === "dark" ? "light" : "dark";
+    localStorage.setItem(THEME, root.dataset["theme"]);
+    this.recolour();
+  }
+
+  private recolour(): void {
+    for (const pane of this.shown.values()) pane.recolour();
+  }
+}
+
+new Page();

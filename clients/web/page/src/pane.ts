@@ -1,0 +1,323 @@
+// One sensor: its picture, its panels, and what its connection says.
+import type { Event, HelloReply, Status } from "../gen/dtact_pb";
+import { button, Choice, el, say } from "./dom";
+import { CalibrationsPanel } from "./panels/calibrations";
+import { ContactPanel } from "./panels/contact";
+import { LightPanel } from "./panels/light";
+import { Plots, ProfilePlot } from "./panels/plots";
+import { QualityPanel } from "./panels/quality";
+import { nowMs } from "./session/clock";
+import type { Frame, Link, Wants } from "./session/messages";
+import { Sensor } from "./session/sensor";
+import type { SurfaceView } from "./surface/surface";
+import { Stage } from "./view/stage";
+import type { Tool, View } from "./view/stage";
+import { fixed } from "./words";
+
+/** Numbers that change with every frame are told so often: more cannot be read. */
+const TELL_MS = 100;
+
+/** Shown frames of the last second, and how late the last one was. */
+class Meter {
+  private readonly shown: number[] = [];
+  latencyMs: number | undefined;
+
+  count(frame: Frame): void {
+    const now = nowMs();
+    this.shown.push(now);
+    while (now - (this.shown[0] as number) > 1000) this.shown.shift();
+    this.latencyMs = frame.capturedMs === undefined ? undefined : now - frame.capturedMs;
+  }
+
+  get fps(): number {
+    const spanMs = (this.shown.at(-1) ?? 0) - (this.shown[0] ?? 0);
+    return spanMs > 0 ? (1000 * (this.shown.length - 1)) / spanMs : 0;
+  }
+}
+
+/** The words of a token stay with this window alone, and end with it. */
+const tokenKey = (name: string): string => `dtact token ${name}`;
+
+export class Pane {
+  readonly element: HTMLElement;
+  private readonly stage = new Stage();
+  private readonly sensor: Sensor;
+  private readonly contact = new ContactPanel();
+  private readonly quality = new QualityPanel();
+  private readonly light: LightPanel;
+  private readonly calibrations: CalibrationsPanel;
+  private readonly plots = new Plots();
+  private readonly profile = new ProfilePlot();
+  private readonly meter = new Meter();
+  private readonly notice = el("p", { class: "notice", role: "status" });
+  private readonly rate = el("span", { class: "rate", "data-fact": "rate" });
+  private readonly state = el("span", { class: "link" }, "connecting");
+  private readonly tokenForm = this.makeTokenForm();
+  private readonly pauseButton = button("Pause", () => this.pause(!this.paused), { title: "Space" });
+  private readonly steps = el("span", { class: "row steps", hidden: "" });
+  private readonly behind = el("span", { class: "quiet" });
+  private readonly lower = el("input", { type: "number", step: "0.1", value: "0", "aria-label": "Range from, mm" });
+  private readonly upper = el("input", { type: "number", step: "0.1", value: "1.5", "aria-label": "Range to, mm" });
+  private readonly outline = el("input", { type: "number", step: "0.05", min: "0", value: "0.1", "aria-label": "Outline at, mm; 0 for none" });
+  private readonly views: Choice<View>;
+  private readonly tools: Choice<Tool>;
+  private surface: SurfaceView | undefined;
+  private frame: Frame | undefined;
+  private lastStatus: Status | undefined;
+  private paused = false;
+  private toldAt = 0;
+
+  /** Throws where the browser has no WebGL 2. */
+  constructor(readonly name: string) {
+    this.views = new Choice<View>("View", { depth: "Depth", camera: "Camera", surface: "Surface" }, "depth", (view) => void this.look(view));
+    this.tools = new Choice<Tool>("Tool", { point: "Point", line: "Line" }, "point", (tool) => this.stage.use(tool));
+    this.sensor = new Sensor(name, sessionStorage.getItem(tokenKey(name)) ?? "", this.wants(), {
+      link: (link) => this.link(link),
+      hello: (hello) => this.hello(hello),
+      frame: (frame) => this.show(frame),
+      event: (event) => this.event(event),
+      status: (status) => this.status(status),
+    });
+    this.light = new LightPanel(this.sensor);
+    this.calibrations = new CalibrationsPanel(this.sensor);
+    this.steps.append(
+      button("◂", () => this.sensor.step(-1), { "aria-label": "One frame back" }),
+      button("▸", () => this.sensor.step(1), { "aria-label": "One frame on" }),
+      this.behind,
+    );
+    this.element = this.build();
+    this.stage.profiled = (profile) => this.profile.show(profile, this.stage.range);
+    for (const input of [this.lower, this.upper, this.outline]) {
+      input.addEventListener("change", () => this.takeRange());
+    }
+    this.stage.look("depth");
+    this.stage.cover("Waiting for the first frame.");
+  }
+
+  /** Once the element is in the page. */
+  start(): void {
+    this.plots.start();
+    this.stage.drawBar();
+  }
+
+  close(): void {
+    this.sensor.close();
+    this.element.remove();
+  }
+
+  /** Colours that canvases have from the theme. */
+  recolour(): void {
+    this.stage.drawBar();
+    this.plots.draw();
+  }
+
+  /** Whether the key meant something here. */
+  key(key: string): boolean {
+    const actions: Record<string, () => void> = {
+      "1": () => this.views.choose("depth"),
+      "2": () => this.views.choose("camera"),
+      "3": () => this.views.choose("surface"),
+      p: () => this.tools.choose("point"),
+      l: () => this.tools.choose("line"),
+      s: () => void this.snapshot(),
+      z: () => {
+        if (this.sensor.mayControl) void this.light.rezero(false);
+      },
+      " ": () => this.pause(!this.paused),
+      ArrowLeft: () => this.sensor.step(-1),
+      ArrowRight: () => this.sensor.step(1),
+    };
+    const action = actions[key];
+    if (!action) return false;
+    action();
+    return true;
+  }
+
+  private build(): HTMLElement {
+    const head = el(
+      "header",
+      { class: "panehead" },
+      el("h2", {}, this.name),
+      this.state,
+      this.rate,
+      el(
+        "span",
+        { class: "row" },
+        this.steps,
+        this.pauseButton,
+        button("Snapshot", () => void this.snapshot(), { title: "A PNG with time and settings (S)" }),
+      ),
+    );
+    const tools = el(
+      "div",
+      { class: "tools", role: "toolbar", "aria-label": "View" },
+      this.views.element,
+      this.tools.element,
+      el("span", { class: "row lock", title: "The range never follows the depth: a colour always means the same depth" },
+        el("span", { class: "quiet" }, "Range"), this.lower, "to", this.upper, "mm"),
+      el("label", { class: "row lock" }, el("span", { class: "quiet" }, "Outline"), this.outline, "mm"),
+    );
+    return el(
+      "article",
+      { class: "pane", "aria-label": `Sensor ${this.name}`, "data-sensor": this.name },
+      el(
+        "div",
+        { class: "frame" },
+        head,
+        this.notice,
+        this.tokenForm,
+        el(
+          "div",
+          { class: "body" },
+          el("div", { class: "main" }, tools, this.stage.element, this.profile.element),
+          el("div", { class: "side" }, this.contact.element, this.quality.element),
+          el("div", { class: "side" }, this.light.element, this.calibrations.element),
+        ),
+        this.plots.element,
+      ),
+    );
+  }
+
+  private makeTokenForm(): HTMLFormElement {
+    const input = el("input", { type: "password", autocomplete: "off", "aria-label": "Token" });
+    const form = el("form", { class: "token row", hidden: "" }, input, el("button", { type: "submit" }, "Connect"));
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      sessionStorage.setItem(tokenKey(this.name), input.value);
+      form.hidden = true;
+      this.sensor.useToken(input.value);
+      input.value = "";
+    });
+    return form;
+  }
+
+  private wants(): Wants {
+    return { depth: this.views.value !== "camera", luma: this.views.value === "camera" };
+  }
+
+  private async look(view: View): Promise<void> {
+    this.stage.look(view);
+    this.sensor.want(this.wants());
+    if (view !== "surface") return;
+    if (!this.surface) {
+      const { SurfaceView } = await import("./surface/surface");
+      this.surface ??= new SurfaceView(this.stage.surfaceHost);
+    }
+    if (this.stage.depth) this.surface.show(this.stage.depth, this.stage.range);
+  }
+
+  private takeRange(): void {
+    const [fromMm, toMm, outlineMm] = [this.lower, this.upper, this.outline].map((input) => input.valueAsNumber) as [number, number, number];
+    const bad = !(toMm - fromMm >= 0.01);
+    this.lower.setAttribute("aria-invalid", String(bad));
+    this.upper.setAttribute("aria-invalid", String(bad));
+    if (!bad) this.stage.range = { fromMm, toMm };
+    if (outlineMm >= 0) this.stage.outlineMm = outlineMm;
+  }
+
+  private link(link: Link): void {
+    this.element.dataset["link"] = link.state;
+    say(this.state, { connecting: "connecting", live: "live", away: "away", token: "token needed", ended: "ended" }[link.state]);
+    this.tellNotice(link.state === "live" && link.sentence === "Connected." ? "" : link.sentence);
+    this.tokenForm.hidden = link.state !== "token";
+    if (link.state !== "live") {
+      this.stage.cover(this.frame ? "The last frame; the sensor is away." : link.sentence);
+      say(this.rate, "");
+    }
+  }
+
+  private tellNotice(sentence: string): void {
+    say(this.notice, sentence);
+    this.notice.hidden = sentence === "";
+  }
+
+  private hello(hello: HelloReply): void {
+    const title = [hello.program, hello.name, hello.serial].filter((part) => part !== "").join(" · ");
+    this.state.title = title;
+    this.light.allow(this.sensor.mayControl);
+    this.pause(false);
+    void this.quality.ask(this.sensor);
+    void this.calibrations.refresh();
+  }
+
+  private event(event: Event): void {
+    this.quality.event(event);
+    if (event.what.case === "calibration") {
+      void this.calibrations.refresh();
+      void this.quality.ask(this.sensor);
+    }
+    if (event.what.case === "light") this.light.show(event.what.value);
+  }
+
+  private status(status: Status): void {
+    this.lastStatus = status;
+    this.quality.status(status);
+    if (status.light) this.light.show(status.light);
+  }
+
+  private show(frame: Frame): void {
+    this.frame = frame;
+    if (!this.paused) this.meter.count(frame);
+    this.stage.cover(this.coverOf(frame));
+    this.stage.show(frame);
+    if (this.views.value === "surface" && frame.depth) this.surface?.show(frame.depth, this.stage.range);
+    if (!this.paused) this.plots.add(frame, this.meter.latencyMs);
+    const now = performance.now();
+    if (now - this.toldAt < TELL_MS && !this.paused) return;
+    this.toldAt = now;
+    this.contact.show(frame);
+    this.quality.show(frame);
+    this.element.dataset["sequence"] = String(frame.sequence);
+    this.tellRate(frame);
+  }
+
+  private coverOf(frame: Frame): string {
+    if (this.views.value === "camera") return frame.luma || this.stage.luma ? "" : "Waiting for the camera's picture.";
+    if (frame.depth) return "";
+    if (frame.contact) return this.stage.depth ? "" : "Waiting for depth.";
+    const advice = this.lastStatus?.advice ?? "";
+    return this.frame && advice ? advice : "No depth at present.";
+  }
+
+  private tellRate(frame: Frame): void {
+    if (this.paused) {
+      say(this.behind, frame.behind === 0 ? `frame ${frame.sequence}` : `frame ${frame.sequence}, ${frame.behind} back`);
+      return;
+    }
+    const latency = this.meter.latencyMs;
+    const late = latency === undefined ? "" : ` · ${fixed(latency, 0)} ms to the screen`;
+    say(this.rate, `${fixed(this.meter.fps, 1)} fps${late} · ${frame.dropped} dropped`);
+  }
+
+  private pause(paused: boolean): void {
+    if (paused === this.paused) return;
+    this.paused = paused;
+    this.sensor.pause(paused);
+    say(this.pauseButton, paused ? "Resume" : "Pause");
+    this.pauseButton.setAttribute("aria-pressed", String(paused));
+    this.steps.hidden = !paused;
+    this.element.classList.toggle("paused", paused);
+    if (paused) this.sensor.step(0);
+  }
+
+  private async snapshot(): Promise<void> {
+    const frame = this.frame;
+    if (!frame) return;
+    const time = new Date(frame.wallMs).toISOString();
+    const light = frame.light ? `brightness ${frame.light.brightness}` : "light unknown";
+    const depth = this.stage.depth;
+    const { fromMm, toMm } = this.stage.range;
+    const made = this.lastStatus?.calibration?.name ?? "none";
+    const lines = [`${this.name} · ${time} · frame ${frame.sequence}`];
+    if (this.views.value !== "camera" && depth) {
+      lines.push(`range ${fromMm} to ${toMm} mm · ± ${fixed(depth.uncertaintyUm, 0)} µm · ${fixed(depth.mmPerPx, 4)} mm/px`);
+    }
+    lines.push(`calibration ${made} · ${light}`);
+    const style = getComputedStyle(document.documentElement);
+    const blob = await this.stage.picturePng(lines, style.getPropertyValue("--ink").trim(), style.getPropertyValue("--panel").trim());
+    const url = URL.createObjectURL(blob);
+    const link = el("a", { href: url, download: `${this.name}-${time.replaceAll(":", "")}.png` });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(url), 10_000);
+  }
+}
