@@ -60,7 +60,11 @@ if (values.outdir) {
 if (values.node) {
   await esbuild.build({
     ...common,
-    entryPoints: { decoders: "src/wire/depth.ts", framing: "src/wire/framing.ts" },
+    entryPoints: {
+      colour_map: "src/view/colour_map.ts",
+      decoders: "src/wire/depth.ts",
+      framing: "src/wire/framing.ts",
+    },
     outdir: values.node,
     outExtension: { ".js": ".mjs" },
     platform: "node",

@@ -1,0 +1,385 @@
+// The page in a browser, on simulated sensors: what it shows against what the daemon sent.
+import assert from "node:assert/strict";
+import path from "node:path";
+import { after, before, test } from "node:test";
+import { canvas, fact, numberOf, open, pause, PHONE, resume, until } from "./browser.mjs";
+import { calibration, startDaemon, startGateway, status, stopAll, tokenFile, work } from "./programs.mjs";
+import { Tap } from "./tap.mjs";
+
+const { colourMap } = await import(path.resolve(process.env.PAGE_NODE, "colour_map.mjs"));
+
+/** The locked range of 0 to 1.5 mm in 256 colours. */
+const STEP_MM = 1.5 / 256;
+
+let left;
+let tap;
+let view;
+let pane;
+
+before(async () => {
+  left = await startDaemon("left");
+  const right = await startDaemon("right");
+  const gateway = await startGateway({ left: left.port, right: right.port });
+  tap = new Tap(left.port);
+  view = await open(gateway);
+  pane = view.page.locator('[data-sensor="left"]');
+});
+
+after(async () => {
+  tap?.close();
+  await view?.close();
+  await stopAll();
+});
+
+const COLOURS = new Map();
+for (let i = 0; i < 256; ++i) COLOURS.set(colourMap.subarray(4 * i, 4 * i + 3).join(), (i + 0.5) * STEP_MM);
+
+/** Depth by the colour of a pixel; undefined for one that the map does not have. */
+const depthOf = (picture, row, column) => {
+  const at = 4 * (row * picture.width + column);
+  return COLOURS.get(picture.rgba.subarray(at, at + 3).join());
+};
+
+/** Waits for a press of about this depth, and pauses there. */
+async function pausedAt(deepestMm) {
+  await until(
+    () => numberOf(pane, "deepest"),
+    (mm) => Math.abs(mm - deepestMm) < 0.08,
+  );
+  const sequence = await pause(pane);
+  const frame = await until(
+    () => tap.frame(sequence),
+    (kept) => kept !== undefined,
+    5000,
+  );
+  return { sequence, frame };
+}
+
+/** What is pressed deeper than half a millimetre by the canvas' colours: where and how deep. */
+function pressed(picture, mmPerPx) {
+  let [sum, x, y, deepest] = [0, 0, 0, 0];
+  for (let row = 0; row < picture.height; ++row) {
+    for (let column = 0; column < picture.width; ++column) {
+      const mm = depthOf(picture, row, column);
+      if (mm === undefined || mm < 0.5) continue;
+      sum += mm;
+      x += mm * (column - (picture.width - 1) / 2) * mmPerPx;
+      y += mm * (row - (picture.height - 1) / 2) * mmPerPx;
+      deepest = Math.max(deepest, mm);
+    }
+  }
+  return { x: x / sum, y: y / sum, deepest };
+}
+
+/** Every 7th pixel's colour means the frame's depth, but where the outline is drawn. */
+function assertEqual(picture, frame) {
+  let compared = 0;
+  for (let row = 0; row < frame.height; row += 7) {
+    for (let column = 0; column < frame.width; column += 7) {
+      const shown = depthOf(picture, row, column);
+      if (shown === undefined) continue;
+      const mm = frame.um(row, column) / 1000;
+      ++compared;
+      const within = Math.abs(Math.min(Math.max(mm, 0), 1.5) - shown) <= 0.51 * STEP_MM;
+      assert.ok(within, `row ${row}, column ${column}: ${mm} mm is shown as ${shown} mm`);
+    }
+  }
+  assert.ok(compared > 6500, `${compared} pixels of the map's colours`);
+}
+
+test("the ball is at its place and depth, within the map's step of the frame", async () => {
+  const { frame } = await pausedAt(1.0);
+  const picture = await canvas(pane);
+  assert.equal(picture.width, 580);
+  assertEqual(picture, frame);
+  const ball = pressed(picture, frame.mmPerPx);
+  // The scene's own numbers; how true the depth is, is tested elsewhere.
+  assert.ok(Math.hypot(ball.x - 3.0, ball.y + 2.0) < 0.1, `at ${ball.x}, ${ball.y}`);
+  assert.ok(Math.abs(ball.deepest - 1.0) < 0.08, `${ball.deepest} mm deep`);
+  await resume(pane);
+});
+
+test("the range stays when something deeper comes", async () => {
+  const { frame } = await pausedAt(1.3);
+  const picture = await canvas(pane);
+  assertEqual(picture, frame);
+  const ball = pressed(picture, frame.mmPerPx);
+  assert.ok(Math.hypot(ball.x + 4.0, ball.y - 3.0) < 0.1, `at ${ball.x}, ${ball.y}`);
+  assert.equal(await pane.getByLabel("Range to, mm").inputValue(), "1.5");
+  await resume(pane);
+});
+
+test("deeper than the range has a colour of its own", async () => {
+  const upper = pane.getByLabel("Range to, mm");
+  await upper.fill("0.5");
+  await upper.press("Enter");
+  const { frame } = await pausedAt(1.0);
+  const picture = await canvas(pane);
+  const row = Math.round(-2.0 / frame.mmPerPx + 289.5);
+  const column = Math.round(3.0 / frame.mmPerPx + 289.5);
+  const at = 4 * (row * picture.width + column);
+  assert.deepEqual([...picture.rgba.subarray(at, at + 3)], [255, 138, 128]);
+  await resume(pane);
+  await upper.fill("1.5");
+  await upper.press("Enter");
+});
+
+test("the cursor tells the frame's value, by mouse and by keyboard", async () => {
+  const { frame } = await pausedAt(1.0);
+  const marks = pane.locator("canvas.marks");
+  const box = await marks.boundingBox();
+  await view.page.mouse.move(box.x + 0.625 * box.width, box.y + 0.415 * box.height);
+  const readout = pane.locator("output.readout");
+  const told = async () => {
+    const text = (await readout.textContent()).replaceAll("−", "-");
+    const [, um, row, column, x, y] =
+      /^(-?\d+) µm · row (\d+), column (\d+) · x (-?[\d.]+) mm, y (-?[\d.]+) mm/.exec(text) ?? [];
+    return { um: Number(um), row: Number(row), column: Number(column), x: Number(x), y: Number(y) };
+  };
+  const mouse = await told();
+  assert.equal(mouse.column, Math.floor(0.625 * 580));
+  assert.equal(mouse.row, Math.floor(0.415 * 580));
+  assert.equal(mouse.um, frame.um(mouse.row, mouse.column));
+  assert.ok(mouse.um > 500);
+  assert.equal(mouse.x, Number(((mouse.column - 289.5) * frame.mmPerPx).toFixed(2)));
+  assert.equal(mouse.y, Number(((mouse.row - 289.5) * frame.mmPerPx).toFixed(2)));
+  await marks.focus();
+  await view.page.keyboard.press("ArrowRight");
+  await view.page.keyboard.press("Shift+ArrowDown");
+  const keys = await told();
+  assert.equal(keys.column, mouse.column + 1);
+  assert.equal(keys.row, mouse.row + 10);
+  assert.equal(keys.um, frame.um(keys.row, keys.column));
+  await resume(pane);
+});
+
+test("a line tells its length and the difference of its ends", async () => {
+  const { frame } = await pausedAt(1.0);
+  await pane.getByRole("radio", { name: "Line" }).click();
+  const box = await pane.locator("canvas.marks").boundingBox();
+  const at = (column, row) => [box.x + ((column + 0.5) / 580) * box.width, box.y + ((row + 0.5) / 580) * box.height];
+  await view.page.mouse.move(...at(200, 241));
+  await view.page.mouse.down();
+  await view.page.mouse.move(...at(362, 241));
+  await view.page.mouse.up();
+  const text = (await pane.locator("output.readout").textContent()).replaceAll("−", "-");
+  const [, long, step] = /A–B ([\d.]+) mm, B - A (-?\d+) µm/.exec(text) ?? [];
+  assert.equal(Number(long), Number((162 * frame.mmPerPx).toFixed(2)));
+  assert.equal(Number(step), frame.um(241, 362) - frame.um(241, 200));
+  assert.ok(await pane.locator("figure.profile").isVisible());
+  await pane.getByRole("radio", { name: "Point" }).click();
+  assert.ok(!(await pane.locator("figure.profile").isVisible()));
+  await resume(pane);
+});
+
+test("a re-zero while something touches is refused in words, and offered anyway", async () => {
+  await until(
+    () => fact(pane, "touching").textContent(),
+    (text) => text === "touching",
+  );
+  await pane.getByRole("button", { name: "Re-zero", exact: true }).click();
+  const answer = pane.getByLabel("Light", { exact: true }).locator(".answer");
+  await until(
+    () => answer.textContent(),
+    (text) => text !== "" && text !== "Taking a new reference.",
+    10_000,
+  );
+  assert.match(await answer.textContent(), /touches|still/);
+  assert.ok(await pane.getByRole("button", { name: "Re-zero anyway" }).isVisible());
+});
+
+test("slider, scheme and colour change the simulated light", async () => {
+  await pane.getByLabel("Brightness").fill("128");
+  await until(
+    () => status(left).light.brightness,
+    (brightness) => brightness === 128,
+    10_000,
+  );
+  await pane.getByRole("button", { name: "Scheme 1" }).click();
+  const lit = () => status(left).light.leds.map((led) => ((led.r ?? 0) > 0 ? 1 : 0)).join("");
+  await until(lit, (leds) => leds === "11001100", 10_000);
+  await pane.getByRole("button", { name: "LED 2" }).click();
+  await pane.getByLabel("Colour of the LED").fill("#ff8000");
+  await until(
+    () => status(left).light.leds[2],
+    (led) => led.r === 255 && led.g === 128 && (led.b ?? 0) === 0,
+    10_000,
+  );
+  await pane.getByRole("button", { name: "All LEDs" }).click();
+  await pane.getByLabel("Brightness").fill("255");
+  await until(
+    () => status(left).light.brightness,
+    (brightness) => brightness === 255,
+    10_000,
+  );
+});
+
+test("the camera's picture and its grey values", async () => {
+  await pane.getByRole("radio", { name: "Camera" }).click();
+  await until(
+    () => pane.locator("canvas.map").getAttribute("width"),
+    (width) => width === "800",
+    10_000,
+  );
+  const box = await pane.locator("canvas.marks").boundingBox();
+  await view.page.mouse.move(box.x + 5, box.y + 5);
+  assert.match(await pane.locator("output.readout").textContent(), /^grey \d+ of 255 · row \d+, column \d+$/);
+  await pane.getByRole("radio", { name: "Depth" }).click();
+});
+
+test("a snapshot is a PNG with its time in its name", async () => {
+  const [download] = await Promise.all([
+    view.page.waitForEvent("download"),
+    pane.getByRole("button", { name: "Snapshot" }).click(),
+  ]);
+  assert.match(download.suggestedFilename(), /^left-\d{4}-\d\d-\d\dT\d{6}\.\d{3}Z\.png$/);
+});
+
+test("a calibration is uploaded, used and left again; a bad one is refused in words", async () => {
+  const panel = pane.getByLabel("Calibrations");
+  await until(
+    () => panel.locator("li").count(),
+    (count) => count === 1,
+    10_000,
+  );
+  const picker = panel.locator("input[type=file]");
+  const folder = calibration();
+  await picker.setInputFiles([path.join(folder, "calibration.toml"), path.join(folder, "reference.png")]);
+  await until(
+    () => panel.locator("li").count(),
+    (count) => count === 2,
+    30_000,
+  );
+  await until(
+    () => panel.locator("li", { hasText: "in use" }).textContent(),
+    (text) => /^1 web-/.test(text),
+    10_000,
+  );
+  await panel.getByRole("button", { name: /configured/ }).click();
+  await until(
+    () => panel.locator("li", { hasText: "in use" }).textContent(),
+    (text) => /configured/.test(text),
+    10_000,
+  );
+  await picker.setInputFiles([
+    { name: "calibration.toml", mimeType: "text/plain", buffer: Buffer.from("nonsense") },
+    { name: "reference.png", mimeType: "image/png", buffer: Buffer.from("no picture") },
+  ]);
+  await until(
+    () => panel.locator(".answer").textContent(),
+    (text) => text !== "" && text !== "Uploading.",
+    10_000,
+  );
+  await picker.setInputFiles([{ name: "other.toml", mimeType: "text/plain", buffer: Buffer.from("") }]);
+  assert.match(await panel.locator(".answer").textContent(), /Choose both calibration\.toml and reference\.png/);
+});
+
+test("the surface is loaded when it is looked at", async () => {
+  await pane.getByRole("radio", { name: "Surface" }).click();
+  await pane.locator(".surface canvas").waitFor();
+  await until(
+    () => pane.locator(".surface").getAttribute("data-every"),
+    (every) => Number(every) >= 2,
+    20_000,
+  );
+  await pane.getByLabel("Exaggeration of depth").fill("1");
+  assert.equal(await pane.locator(".exaggeration output").textContent(), "true scale");
+  await pane.getByRole("radio", { name: "Depth" }).click();
+});
+
+test("a daemon that dies is told at once, and the page goes on when it is back", async () => {
+  const { port } = left;
+  await left.stop("SIGKILL");
+  await until(
+    () => pane.getAttribute("data-link"),
+    (link) => link === "away",
+    15_000,
+  );
+  assert.match(await pane.locator(".notice").textContent(), /away|Trying again/);
+  const before = Number(await pane.getAttribute("data-sequence"));
+  left = await startDaemon("left", port);
+  await until(
+    () => pane.getAttribute("data-link"),
+    (link) => link === "live",
+    30_000,
+  );
+  await until(
+    () => pane.getAttribute("data-sequence"),
+    (sequence) => Number(sequence) > 0 && Number(sequence) !== before,
+    30_000,
+  );
+  assert.equal(await pane.locator(".notice").isVisible(), false);
+});
+
+test("two sensors beside each other", async () => {
+  const other = view.page.locator('[data-sensor="right"]');
+  await until(
+    () => numberOf(other, "deepest"),
+    (mm) => mm > 0.5,
+  );
+  const [a, b] = await Promise.all([pane.boundingBox(), other.boundingBox()]);
+  assert.ok(a.x + a.width <= b.x && a.y === b.y, "beside each other");
+  await view.page.getByRole("navigation").getByRole("button", { name: "right" }).click();
+  assert.equal(await other.count(), 0);
+});
+
+test("on a phone everything is below each other and nothing is cut off", async () => {
+  await view.page.setViewportSize(PHONE);
+  await until(
+    () => view.page.evaluate(() => document.documentElement.scrollWidth),
+    (width) => width <= 390,
+    5000,
+  );
+  const boxes = await Promise.all(
+    [".stage", '[aria-label="Contact"]', '[aria-label="Quality"]', '[aria-label="Light"]', ".plots"].map((part) =>
+      pane.locator(part).first().boundingBox(),
+    ),
+  );
+  for (let i = 1; i < boxes.length; ++i) {
+    assert.ok(boxes[i].y >= boxes[i - 1].y + boxes[i - 1].height, `part ${i} begins below the one before`);
+    assert.ok(boxes[i].x >= 0 && boxes[i].x + boxes[i].width <= 390);
+  }
+  await view.page.screenshot({ path: path.join(work, "phone.png"), fullPage: true });
+  await view.page.setViewportSize({ width: 1440, height: 900 });
+});
+
+test("on a desktop picture, numbers and plots are seen at once", async () => {
+  await until(
+    () => numberOf(pane, "deepest"),
+    (mm) => mm > 0.9,
+  );
+  for (const part of [".stage", '[aria-label="Contact"]', '[aria-label="Light"]', ".plots"]) {
+    const box = await pane.locator(part).first().boundingBox();
+    assert.ok(box.y >= 0 && box.y + box.height <= 900, `${part} ends at ${box.y + box.height}`);
+  }
+  await view.page.screenshot({ path: path.join(work, "desktop.png") });
+});
+
+test("a token that may watch sees no control that would fail", async () => {
+  const { file, token } = tokenFile("view");
+  const guarded = await startGateway({ left: left.port }, ["--tokens", file]);
+  const watching = await open(guarded);
+  try {
+    const form = watching.page.locator("form.token");
+    await form.waitFor();
+    await form.getByLabel("Token").fill("wrong");
+    await form.getByRole("button").click();
+    await form.waitFor({ state: "hidden" });
+    await form.waitFor();
+    await form.getByLabel("Token").fill(token);
+    await form.getByRole("button").click();
+    await until(
+      () => watching.page.locator("[data-sensor]").getAttribute("data-sequence"),
+      (sequence) => Number(sequence) > 0,
+      20_000,
+    );
+    const light = watching.page.getByLabel("Light", { exact: true });
+    assert.equal(await light.getByRole("button", { name: "Re-zero" }).isVisible(), false);
+    assert.equal(await light.getByLabel("Brightness").isDisabled(), true);
+    assert.equal(await watching.page.getByRole("button", { name: "Upload…" }).isVisible(), false);
+    assert.match(await light.textContent(), /may watch/);
+  } finally {
+    await watching.close();
+    await guarded.stop();
+  }
+});

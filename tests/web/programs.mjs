@@ -1,0 +1,110 @@
+// The programs that the tests run, on the simulated sensor: DTACTD, DTACTCTL, DTACT_WEB, CALIBRATE and
+// SIM_RENDER name them; FOLDER is for what they write. PAGE_DIST may name a folder with a page that is
+// to be tried in place of the one built into the gateway.
+import { execFileSync, spawn } from "node:child_process";
+import { existsSync, mkdirSync, mkdtempSync, rmSync, statSync, writeFileSync } from "node:fs";
+import path from "node:path";
+import { fileURLToPath } from "node:url";
+
+const here = path.dirname(fileURLToPath(import.meta.url));
+const { DTACTD, DTACTCTL, DTACT_WEB, CALIBRATE, SIM_RENDER, FOLDER } = process.env;
+/** Of the daemon's pictures a second: few, so that the tests run beside others. */
+const FPS = process.env.WEB_FPS ?? "20";
+
+export const scene = path.join(here, "presses.toml");
+export const work = mkdtempSync(path.join(FOLDER, "run-"));
+
+/** Made by a press of a known ball, as ./dev run does; kept until a program changes. */
+export function calibration() {
+  const folder = path.join(FOLDER, "calibrated");
+  const made = path.join(folder, "calibration");
+  const changed = (program) => statSync(program).mtimeMs > statSync(made).mtimeMs;
+  if (existsSync(path.join(made, "reference.png")) && ![CALIBRATE, SIM_RENDER].some(changed)) return made;
+  rmSync(folder, { recursive: true, force: true });
+  mkdirSync(folder);
+  const ball = path.resolve(here, "../../config/scenes/calibrate_ball.toml");
+  for (const [name, frames] of [["reference", "0:32"], ["ball", "200:232"]]) {
+    execFileSync(SIM_RENDER, ["--scene", ball, "--frames", frames, "-o", path.join(folder, name)]);
+  }
+  const depth = ["depth", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400"];
+  const from = ["--reference", path.join(folder, "reference"), "--ball", path.join(folder, "ball")];
+  execFileSync(CALIBRATE, [...depth, ...from, "--crop", "580,580", "-o", made]);
+  return made;
+}
+
+const running = new Set();
+
+class Program {
+  output = "";
+
+  constructor(program, words) {
+    this.name = path.basename(program);
+    this.child = spawn(program, words, { stdio: ["ignore", "pipe", "pipe"] });
+    running.add(this);
+    this.ended = new Promise((done) => this.child.once("exit", done)).then(() => running.delete(this));
+    for (const stream of [this.child.stdout, this.child.stderr]) {
+      stream.on("data", (text) => (this.output += text));
+    }
+  }
+
+  async listening() {
+    for (let tries = 0; tries < 200; ++tries) {
+      const port = /listening on (?:https?:\/\/)?127\.0\.0\.1:(\d+)/.exec(this.output)?.[1];
+      if (port) return Number(port);
+      if (this.child.exitCode !== null) break;
+      await new Promise((done) => setTimeout(done, 100));
+    }
+    throw new Error(`${this.name} did not start:\n${this.output}`);
+  }
+
+  async stop(signal = "SIGTERM") {
+    this.child.kill(signal);
+    await this.ended;
+  }
+}
+
+/** All that are still there, also when a start failed half-way. */
+export async function stopAll() {
+  await Promise.all([...running].map((program) => program.stop()));
+}
+
+/** A daemon on the simulated sensor. Port 0: any free one. */
+export async function startDaemon(name, port = 0, settings = []) {
+  const state = path.join(work, `state-${name}`);
+  mkdirSync(state, { recursive: true });
+  const all = [
+    `net.port=${port}`,
+    `net.name=${name}`,
+    `calibration=${calibration()}`,
+    `state_dir=${state}`,
+    `camera.sim.scene=${scene}`,
+    `camera.fps=${FPS}`,
+    "capture.fifo_priority=0",
+    ...settings,
+  ];
+  const daemon = new Program(DTACTD, all.flatMap((setting) => ["--set", setting]));
+  daemon.port = await daemon.listening();
+  return daemon;
+}
+
+/** The gateway to daemons by name, each at a port of this machine. */
+export async function startGateway(daemons, words = []) {
+  const names = Object.entries(daemons).flatMap(([name, port]) => ["--daemon", `${name}=127.0.0.1:${port}`]);
+  const page = process.env.PAGE_DIST ? ["--page", process.env.PAGE_DIST] : [];
+  const gateway = new Program(DTACT_WEB, ["serve", "--listen-port", "0", ...names, ...page, ...words]);
+  gateway.port = await gateway.listening();
+  return gateway;
+}
+
+export function status(daemon) {
+  const words = ["--port", String(daemon.port), "--json", "status"];
+  return JSON.parse(execFileSync(DTACTCTL, words, { encoding: "utf8" }));
+}
+
+/** A token of these rights and the file that lets it in. */
+export function tokenFile(rights) {
+  const line = execFileSync(DTACTCTL, ["token", "--new", rights], { encoding: "utf8" }).trim();
+  const file = path.join(work, `tokens-${rights}`);
+  writeFileSync(file, `${line}\n`, { mode: 0o600 });
+  return { file, token: line.split(" ")[1] };
+}
