@@ -12,7 +12,7 @@ const { DTACTD, DTACTCTL, DTACT_WEB, CALIBRATE, SIM_RENDER, FOLDER } = process.e
 const FPS = process.env.WEB_FPS ?? "20";
 
 export const scene = path.join(here, "presses.toml");
-export const work = mkdtempSync(path.join(FOLDER, "run-"));
+export const work = mkdtempSync(path.join(FOLDER, `run-${path.basename(process.argv[1]).split("_")[0]}-`));
 
 /** Made by a press of a known ball, as ./dev run does; kept until a program changes. */
 export function calibration() {

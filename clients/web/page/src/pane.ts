@@ -220,7 +220,9 @@ export class Pane {
     say(this.state, { connecting: "connecting", live: "live", away: "away", token: "token needed", ended: "ended" }[link.state]);
     this.tellNotice(link.state === "live" && link.sentence === "Connected." ? "" : link.sentence);
     this.tokenForm.hidden = link.state !== "token";
-    if (link.state !== "live") {
+    // A paused view goes on showing its frame.
+    if (this.paused) this.stage.cover("");
+    else if (link.state !== "live") {
       this.stage.cover(this.frame ? "The last frame; the sensor is away." : link.sentence);
       say(this.rate, "");
     }
@@ -255,7 +257,9 @@ export class Pane {
     if (status.light) this.light.show(status.light);
   }
 
-  private show(frame: Frame): void {
+  private show(frame: Frame): boolean {
+    // One that was still on its way when the view was paused, or went on.
+    if (this.paused !== (frame.behind !== undefined)) return false;
     this.frame = frame;
     if (!this.paused) this.meter.count(frame);
     this.stage.cover(this.coverOf(frame));
@@ -263,12 +267,14 @@ export class Pane {
     if (this.views.value === "surface" && frame.depth) this.surface?.show(frame.depth, this.stage.range);
     if (!this.paused) this.plots.add(frame, this.meter.latencyMs);
     const now = performance.now();
-    if (now - this.toldAt < TELL_MS && !this.paused) return;
+    if (now - this.toldAt < TELL_MS && !this.paused) return true;
     this.toldAt = now;
     this.contact.show(frame);
+    if (frame.contact?.touching === false) this.light.untouched();
     this.quality.show(frame);
     this.element.dataset["sequence"] = String(frame.sequence);
     this.tellRate(frame);
+    return true;
   }
 
   private coverOf(frame: Frame): string {

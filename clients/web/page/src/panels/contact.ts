@@ -1,9 +1,33 @@
 // What touches, in numbers.
+import { ObjectPose_Tracking } from "../../gen/dtact_pb";
+import type { ObjectPose, Vector3 } from "../../gen/dtact_pb";
 import { Facts, panel } from "../dom";
 import type { Frame } from "../session/messages";
 import { absence, fixed, mm } from "../words";
 
+const TRACKING: Record<number, string> = {
+  [ObjectPose_Tracking.STARTED]: "from here",
+  [ObjectPose_Tracking.LOST]: "lost",
+  [ObjectPose_Tracking.RECOVERED]: "found again",
+};
+
+/** What moved since the contact was made, as dtact-perceive tells it. */
+function motion(pose: ObjectPose | undefined): { moved: string; turned: string } {
+  if (!pose) return { moved: "–", turned: "–" };
+  const told = (vector: Vector3 | undefined, digits: number): string =>
+    vector ? [vector.x, vector.y, vector.z].map((part) => fixed(part, digits)).join(", ") : "–";
+  const how = TRACKING[pose.tracking];
+  return {
+    moved: `${told(pose.translationMm, 2)} mm${how ? `, ${how}` : ""}`,
+    turned: `${told(pose.rotationDeg, 1)}°${pose.unobservable.length > 0 ? `, ${pose.unobservable.length} unseen` : ""}`,
+  };
+}
+
 export class ContactPanel {
+  private readonly motion = new Facts({
+    moved: { label: "Moved", hint: "Since the contact was made: x, y, z of the surface frame" },
+    turned: { label: "Turned", hint: "Axis times angle; directions that the shape does not show are unseen" },
+  });
   private readonly facts = new Facts({
     touching: { label: "State" },
     deepest: { label: "× Deepest", hint: "Indentation along the surface's normal" },
@@ -12,9 +36,17 @@ export class ContactPanel {
     centroid: { label: "○ Centroid", hint: "Weighted by depth; x to the right, y down, from the map's centre" },
     force: { label: "Force", hint: "Along the surface's normal; needs a calibration by dtact-calibrate force" },
   });
-  readonly element = panel("Contact", this.facts.element);
+  readonly element = panel("Contact", this.facts.element, this.motion.element);
+
+  constructor() {
+    this.motion.element.hidden = true;
+  }
 
   show(frame: Frame): void {
+    if (frame.pose) this.motion.element.hidden = false;
+    const { moved, turned } = motion(frame.pose);
+    this.motion.set("moved", moved);
+    this.motion.set("turned", turned);
     const contact = frame.contact;
     const touching = contact?.touching === true;
     this.facts.set("touching", contact ? (touching ? "touching" : "nothing touches") : absence(frame.contactAbsence));

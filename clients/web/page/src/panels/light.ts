@@ -91,6 +91,13 @@ export class LightPanel {
     if (selected && document.activeElement !== this.colour) this.colour.value = hex(selected);
   }
 
+  /** Nothing touches any more: there is nothing to do anyway. */
+  untouched(): void {
+    if (this.anyway.hidden) return;
+    this.anyway.hidden = true;
+    say(this.answer, "");
+  }
+
   async rezero(force: boolean): Promise<void> {
     this.anyway.hidden = true;
     say(this.answer, "Taking a new reference.");
@@ -154,6 +161,7 @@ export class LightPanel {
   private async set(change: { brightness?: number; scheme?: string; leds?: Rgb[] }): Promise<void> {
     try {
       const result = await this.sensor.request({ case: "setLight", value: create(SetLightSchema, change) });
+      this.anyway.hidden = true;
       say(this.answer, "");
       if (result.case === "light") this.show(result.value);
     } catch (error) {

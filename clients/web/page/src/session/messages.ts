@@ -1,5 +1,5 @@
 // What the page and the worker that holds a sensor's connection say to each other.
-import type { ClientMessage, Contact, Event, HelloReply, LightState, Reply } from "../../gen/dtact_pb";
+import type { ClientMessage, Contact, Event, HelloReply, LightState, ObjectPose, Reply } from "../../gen/dtact_pb";
 import type { ContactAbsence, Health } from "../../gen/dtact_pb";
 
 /** Which parts of a frame the page shows at present. */
@@ -44,12 +44,14 @@ export interface Frame {
   calibration: number | undefined;
   depth: DepthMap | undefined;
   luma: LumaMap | undefined;
+  /** Of dtact-perceive alone. */
+  pose: ObjectPose | undefined;
   /** Root mean square of trusted depth, micrometres, while nothing touches; not of every frame. */
   untouchedRmsUm: number | undefined;
   /** Frames that were missed since the connection was made: by the daemon's count, and here. */
   dropped: number;
-  /** How far behind the newest one of the frames that are kept; 0 unless the view is paused. */
-  behind: number;
+  /** How far behind the newest one that is kept, of a paused view; undefined of a live one. */
+  behind: number | undefined;
 }
 
 /** Where a connection stands; `sentence` says it, and what to do. */

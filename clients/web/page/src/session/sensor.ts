@@ -19,8 +19,8 @@ type Result = Exclude<Reply["result"], { case: "error" } | { case: undefined }>;
 export interface Watcher {
   link(link: Link): void;
   hello(hello: HelloReply): void;
-  /** The newest frame, at most once a drawn picture. */
-  frame(frame: Frame): void;
+  /** The newest frame, at most once a drawn picture; false: it is not shown, the one before stays. */
+  frame(frame: Frame): boolean;
   event(event: Event): void;
   status(status: Status): void;
 }
@@ -133,20 +133,14 @@ export class Sensor {
   /** Shows it with the next picture, and then asks for another one with the memory of the last. */
   private takeFrame(frame: Frame): void {
     const show = (): void => {
-      this.watcher.frame(frame);
-      const taken: ToWorker = { kind: "taken", depth: undefined, luma: undefined };
-      const memory: Transferable[] = [];
-      if (frame.depth) {
-        taken.depth = this.depth;
-        if (this.depth) memory.push(this.depth.buffer);
-        this.depth = frame.depth.values;
+      const shown = this.watcher.frame(frame);
+      const back = { depth: frame.depth?.values, luma: frame.luma?.values };
+      if (shown) {
+        [this.depth, back.depth] = [back.depth ?? this.depth, back.depth && this.depth];
+        [this.luma, back.luma] = [back.luma ?? this.luma, back.luma && this.luma];
       }
-      if (frame.luma) {
-        taken.luma = this.luma;
-        if (this.luma) memory.push(this.luma.buffer);
-        this.luma = frame.luma.values;
-      }
-      this.send(taken, memory);
+      const memory = [back.depth, back.luma].flatMap((map) => (map ? [map.buffer] : []));
+      this.send({ kind: "taken", ...back }, memory);
     };
     // A page in the background draws nothing, and would leave the frames standing.
     if (document.hidden) show();

@@ -72,7 +72,7 @@ export function unpack(
   spare: Spare,
   capturedMs: number | undefined,
   dropped: number,
-  behind: number,
+  behind: number | undefined,
 ): Frame {
   const depth = frame.depth && unpackDepth(frame.depth, spare);
   const untouched = frame.contact?.touching === false;
@@ -87,6 +87,7 @@ export function unpack(
     calibration: frame.calibration === undefined ? undefined : Number(frame.calibration),
     depth,
     luma: frame.luma && unpackLuma(frame.luma, spare),
+    pose: frame.pose,
     untouchedRmsUm: untouched && depth ? rootMeanSquareUm(depth) : undefined,
     dropped,
     behind,

@@ -77,7 +77,7 @@ class Session {
       case "taken":
         this.spare.give(message.depth, message.luma);
         this.underWay = false;
-        if (this.waiting) this.show(this.waiting, 0);
+        if (this.waiting) this.show(this.waiting, undefined);
         break;
       case "pause":
         this.behind = message.paused ? 0 : undefined;
@@ -125,6 +125,7 @@ class Session {
       luma: this.wants.luma ? LumaEncoding.LUMA_GREY8 : LumaEncoding.LUMA_NONE,
       lumaHz: LUMA_HZ,
       summary: true,
+      pose: this.features.includes("pose"),
     });
     this.connection.request(SUBSCRIBE_IDS + ++this.nextId, { case: "subscribe", value });
   }
@@ -136,11 +137,11 @@ class Session {
       if (this.waiting) ++this.gaveWay;
       this.waiting = frame;
     } else {
-      this.show(frame, 0);
+      this.show(frame, undefined);
     }
   }
 
-  private show(frame: WireFrame, behind: number): void {
+  private show(frame: WireFrame, behind: number | undefined): void {
     this.waiting = undefined;
     const dropped = Number(frame.dropped) + this.connection.gaveWay + this.gaveWay;
     try {

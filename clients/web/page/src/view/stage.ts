@@ -48,7 +48,7 @@ export class Stage {
   readonly element = el(
     "div",
     { class: "stage" },
-    el("div", { class: "viewport" }, this.picture, this.host, this.bar),
+    el("div", { class: "viewport" }, this.picture, this.host, el("div", { class: "beside" }, this.bar)),
     this.readout,
   );
   private readonly map: MapCanvas;
