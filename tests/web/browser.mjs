@@ -23,7 +23,7 @@ const SWITCHES = [
 ];
 
 /** Opens a page of the gateway. What its console complains of, and each foreign address, fails it. */
-export async function open(gateway, { viewport = DESKTOP, dark = true } = {}) {
+export async function open(gateway, { viewport = DESKTOP, dark = true, before = undefined } = {}) {
   const context = await chromium.launchPersistentContext(path.join(work, `profile-${Date.now()}`), {
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
     args: SWITCHES,
@@ -44,6 +44,8 @@ export async function open(gateway, { viewport = DESKTOP, dark = true } = {}) {
     const { protocol, host } = new URL(request.url());
     if (protocol !== "blob:" && host !== `127.0.0.1:${gateway.port}`) complaints.push(request.url());
   });
+  // Runs in the page before its own scripts.
+  if (before) await page.addInitScript(before);
   await page.goto(`http://127.0.0.1:${gateway.port}/`);
   return {
     page,

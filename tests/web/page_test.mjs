@@ -12,6 +12,7 @@ const { colourMap } = await import(path.resolve(process.env.PAGE_NODE, "colour_m
 const STEP_MM = 1.5 / 256;
 
 let left;
+let gateway;
 let tap;
 let view;
 let pane;
@@ -19,7 +20,7 @@ let pane;
 before(async () => {
   left = await startDaemon("left");
   const right = await startDaemon("right");
-  const gateway = await startGateway({ left: left.port, right: right.port });
+  gateway = await startGateway({ left: left.port, right: right.port });
   tap = new Tap(left.port);
   view = await open(gateway);
   pane = view.page.locator('[data-sensor="left"]');
@@ -395,4 +396,19 @@ test("a token that may watch sees no control that would fail", async () => {
     await watching.close();
     await guarded.stop();
   }
+});
+
+test("a browser without WebGL 2 is told so", async () => {
+  const withoutWebGl = await open(gateway, {
+    before: () => {
+      const plain = HTMLCanvasElement.prototype.getContext;
+      HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+        return kind === "webgl2" ? null : plain.call(this, kind, ...more);
+      };
+    },
+  });
+  const told = withoutWebGl.page.getByRole("alert").first();
+  await told.waitFor();
+  assert.match(await told.textContent(), /no WebGL 2.*Switch on hardware acceleration/);
+  await withoutWebGl.close();
 });

@@ -3,7 +3,7 @@
 // protobuf-compiler), checks the types and bundles. Nothing of all this is needed to serve the page.
 import * as esbuild from "esbuild";
 import { execFileSync } from "node:child_process";
-import { copyFileSync, mkdirSync, rmSync } from "node:fs";
+import { copyFileSync, existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import path from "node:path";
 import { parseArgs } from "node:util";
 
@@ -43,6 +43,18 @@ const browser = {
   target: ["chrome109", "firefox115", "safari16.4"],
 };
 
+/** What the packages that become part of the page ask to be told with it. */
+function licences() {
+  const { dependencies } = JSON.parse(readFileSync("package.json", "utf8"));
+  return Object.keys(dependencies).map((name) => {
+    const folder = path.join("node_modules", name);
+    const { version, license } = JSON.parse(readFileSync(path.join(folder, "package.json"), "utf8"));
+    const file = path.join(folder, "LICENSE");
+    const text = existsSync(file) ? readFileSync(file, "utf8").trim() : "";
+    return `${name} ${version}: ${license}\n\n${text}\n`;
+  });
+}
+
 if (values.outdir) {
   mkdirSync(values.outdir, { recursive: true });
   // The surface is a chunk of its own, loaded when it is looked at for the first time.
@@ -56,6 +68,7 @@ if (values.outdir) {
   for (const file of ["index.html", "icon.svg"]) {
     copyFileSync(path.join("src", file), path.join(values.outdir, file));
   }
+  writeFileSync(path.join(values.outdir, "licences.txt"), licences().join("\n"));
 }
 if (values.node) {
   await esbuild.build({

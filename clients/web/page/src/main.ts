@@ -129,8 +129,9 @@ class Page {
     ];
     const list = el("dl", { class: "keys" });
     for (const [key, what] of keys) list.append(el("dt", {}, key), el("dd", {}, what));
+    const licences = el("a", { href: "licences.txt", target: "_blank" }, "Licences");
     const dialog = el("dialog", { "aria-label": "Keys" }, el("h2", {}, "Keys"), list);
-    dialog.append(button("Close", () => dialog.close()));
+    dialog.append(el("p", { class: "row" }, button("Close", () => dialog.close()), licences));
     return dialog;
   }
 

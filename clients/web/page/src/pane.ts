@@ -169,7 +169,8 @@ export class Pane {
         el(
           "div",
           { class: "body" },
-          el("div", { class: "main" }, tools, this.stage.element, this.profile.element),
+          el("div", { class: "main" }, tools, this.stage.element),
+          this.profile.element,
           el("div", { class: "side" }, this.contact.element, this.quality.element),
           el("div", { class: "side" }, this.light.element, this.calibrations.element),
         ),

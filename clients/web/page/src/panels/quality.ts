@@ -75,7 +75,8 @@ export class QualityPanel {
         [camera.disconnects, "unplugged"],
       ] as const;
       const told = trouble.filter(([count]) => count > 0n).map(([count, name]) => `, ${count} ${name}`);
-      this.facts.set("camera", `${camera.condition}, ${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${told.join("")}`);
+      const condition = camera.condition === "streaming" ? "" : `${camera.condition}, `;
+      this.facts.set("camera", `${condition}${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${told.join("")}`);
     }
     const made = status.calibration;
     this.facts.set(

@@ -34,6 +34,7 @@ export class Sensor {
     { done: (result: Result) => void; failed: (error: Error) => void }
   >();
   private nextId = 0;
+  private readonly asking: ReturnType<typeof setInterval>;
   private depth: Int16Array | undefined;
   private luma: Uint8Array | undefined;
   rights: Rights = Rights.UNSPECIFIED;
@@ -55,7 +56,7 @@ export class Sensor {
       nearby: HERE.includes(location.hostname),
       wants,
     });
-    setInterval(() => void this.askStatus(), 1000);
+    this.asking = setInterval(() => void this.askStatus(), 1000);
   }
 
   get mayControl(): boolean {
@@ -80,6 +81,7 @@ export class Sensor {
   }
 
   close(): void {
+    clearInterval(this.asking);
     this.worker.terminate();
   }
 

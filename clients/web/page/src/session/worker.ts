@@ -9,8 +9,8 @@ import { History } from "./history";
 import type { FromWorker, ToWorker, Wants } from "./messages";
 import { Spare, unpack } from "./unpack";
 
-/** The camera's picture is for looking at: more often would only cost bandwidth. */
-const LUMA_HZ = 20;
+/** The camera's picture is for looking at: half a megabyte each, it comes less often from afar. */
+const LUMA_HZ = { nearby: 20, afar: 5 };
 /** A Pong must not be mistaken for an answer to the page, whose ids count up from 1. */
 const PING_IDS = 2 ** 41;
 const SUBSCRIBE_IDS = 2 ** 42;
@@ -123,7 +123,7 @@ class Session {
     const value: Subscribe = create(SubscribeSchema, {
       depth: this.wants.depth ? this.encoding() : DepthEncoding.DEPTH_NONE,
       luma: this.wants.luma ? LumaEncoding.LUMA_GREY8 : LumaEncoding.LUMA_NONE,
-      lumaHz: LUMA_HZ,
+      lumaHz: this.nearby ? LUMA_HZ.nearby : LUMA_HZ.afar,
       summary: true,
       pose: this.features.includes("pose"),
     });

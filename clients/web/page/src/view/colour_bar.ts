@@ -41,6 +41,8 @@ export function drawColourBar(
     context.lineTo(left + width + 4, y);
     context.stroke();
     const text = value.toFixed(every < 0.1 ? 2 : every === 0.25 ? 2 : 1);
-    context.fillText(`${text}${Math.abs(value - range.toMm) < 1e-9 ? " mm" : ""}`, left + width + 8, y);
+    // What is below has the lowest colour, too.
+    const below = Math.abs(value - range.fromMm) < 1e-9 ? "≤ " : "";
+    context.fillText(`${below}${text}${Math.abs(value - range.toMm) < 1e-9 ? " mm" : ""}`, left + width + 8, y);
   }
 }
