@@ -11,7 +11,9 @@ const { DTACTD, DTACTCTL, DTACT_WEB, CALIBRATE, SIM_RENDER, FOLDER } = process.e
 /** Of the daemon's pictures a second: few, so that the tests run beside others. */
 const FPS = process.env.WEB_FPS ?? "20";
 
-export const scene = path.join(here, "presses.toml");
+const scene = path.join(here, "presses.toml");
+/** A ball pressed deeper than the calibration covers, and held. */
+export const beyond = path.join(here, "beyond.toml");
 export const work = mkdtempSync(path.join(FOLDER, `run-${path.basename(process.argv[1]).split("_")[0]}-`));
 
 /** Made by a press of a known ball, as ./dev run does; kept until a program changes. */

@@ -2,7 +2,7 @@
 // made them, in DEPTH_INT16, read from the bytes by proto/README.md and dtact.proto's field numbers.
 import net from "node:net";
 
-const KEPT = 60;
+const KEPT = 100;
 const HELLO = [8, 1, 0x12, 7, 8, 1, 0x10, 1, 0x1a, 1, 0x78]; // id 1, version 1.1, program "x"
 const SUBSCRIBE = [8, 2, 0x1a, 2, 8, 1]; // id 2, depth: DEPTH_INT16
 

@@ -12,13 +12,16 @@ const MOST_POINTS = 1800;
 type Value = number | null;
 
 /** What is plotted of a frame; null: not measured. */
-const SERIES: Record<string, { title: string; of: (frame: Frame, latencyMs: Value) => Value }> = {
-  deepest: { title: "Deepest, mm", of: (frame) => frame.contact?.deepestMm ?? null },
-  area: { title: "Area, mm²", of: (frame) => frame.contact?.areaMm2 ?? null },
-  volume: { title: "Volume, mm³", of: (frame) => frame.contact?.volumeMm3 ?? null },
-  force: { title: "Force, N", of: (frame) => frame.contact?.forceN ?? null },
-  light: { title: "Brightness of the light", of: (frame) => frame.light?.brightness ?? null },
-  latency: { title: "Latency, ms", of: (_, latencyMs) => latencyMs },
+const SERIES: Record<
+  string,
+  { title: string; /** The axis reaches at least this. */ top: number; of: (frame: Frame, latencyMs: Value) => Value }
+> = {
+  deepest: { title: "Deepest, mm", top: 0.1, of: (frame) => frame.contact?.deepestMm ?? null },
+  area: { title: "Area, mm²", top: 1, of: (frame) => frame.contact?.areaMm2 ?? null },
+  volume: { title: "Volume, mm³", top: 1, of: (frame) => frame.contact?.volumeMm3 ?? null },
+  force: { title: "Force, N", top: 0.1, of: (frame) => frame.contact?.forceN ?? null },
+  light: { title: "Brightness of the light", top: 255, of: (frame) => frame.light?.brightness ?? null },
+  latency: { title: "Latency, ms", top: 10, of: (_, latencyMs) => latencyMs },
 };
 
 function theme(): { ink: string; grid: string; line: string } {
@@ -59,7 +62,7 @@ export class Plots {
 
   /** Call once the element is in the page. */
   start(): void {
-    for (const [name, { title, of }] of Object.entries(SERIES)) {
+    for (const [name, { title, top, of }] of Object.entries(SERIES)) {
       const canvas = el("div", { class: "plot" });
       const place = el("figure", { "data-plot": name }, el("figcaption", {}, title), canvas);
       this.element.append(place);
@@ -73,7 +76,7 @@ export class Plots {
             padding: [6, 12, 0, 0],
             scales: {
               x: { time: false, range: () => [-SECONDS, 0] },
-              y: { range: (_, least, most) => (least === null ? [0, 1] : [Math.min(0, least), Math.max(most * 1.08, 1e-3)]) },
+              y: { range: (_, least, most) => (least === null ? [0, top] : [Math.min(0, least), Math.max(most * 1.05, top)]) },
             },
             axes: axes((value) => `${value} s`.replace("-", "−")),
             series: [{}, { stroke: () => theme().line, width: 1.5, points: { show: false } }],
