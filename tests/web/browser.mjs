@@ -4,7 +4,9 @@ import { createRequire } from "node:module";
 import path from "node:path";
 import { work } from "./programs.mjs";
 
-const { chromium } = createRequire(path.resolve(process.env.FOLDER, "browser/package.json"))("playwright-core");
+const { chromium } = createRequire(path.resolve(process.env.FOLDER, "browser/package.json"))(
+  "playwright-core",
+);
 
 export const DESKTOP = { width: 1440, height: 900 };
 export const PHONE = { width: 390, height: 844 };
@@ -42,7 +44,8 @@ export async function open(gateway, { viewport = DESKTOP, dark = true, before = 
   });
   page.on("request", (request) => {
     const { protocol, host } = new URL(request.url());
-    if (protocol !== "blob:" && host !== `127.0.0.1:${gateway.port}`) complaints.push(request.url());
+    if (protocol !== "blob:" && host !== `127.0.0.1:${gateway.port}`)
+      complaints.push(request.url());
   });
   // Runs in the page before its own scripts.
   if (before) await page.addInitScript(before);
@@ -98,7 +101,8 @@ export async function canvas(pane) {
     context.drawImage(element, 0, 0);
     const { data, width, height } = context.getImageData(0, 0, copy.width, copy.height);
     let text = "";
-    for (let at = 0; at < data.length; at += 8192) text += String.fromCharCode(...data.subarray(at, at + 8192));
+    for (let at = 0; at < data.length; at += 8192)
+      text += String.fromCharCode(...data.subarray(at, at + 8192));
     return { width, height, text: btoa(text) };
   });
   return { width: png.width, height: png.height, rgba: Buffer.from(png.text, "base64") };

@@ -54,14 +54,28 @@ for (const name of names) {
 }
 
 test("the worked example of proto/README.md", () => {
-  const rvl = Uint8Array.from([0xca, 0x91, 0x24, 0x17, 0xb8, 0x9f, 0x0f, 0xf3, 0x20, 0x88, 0x98, 0x2e]);
+  const rvl = Uint8Array.from([
+    0xca, 0x91, 0x24, 0x17, 0xb8, 0x9f, 0x0f, 0xf3, 0x20, 0x88, 0x98, 0x2e,
+  ]);
   assert.deepEqual([...decoded(3, rvl, 4, 2)], [0, 1, 3, -2, 1000, 1000, -32768, 7]);
 });
 
 test("a zstd frame that announces too much is refused before it is decompressed", () => {
   const frame = vector("worked_example.txt").bytes("delta_zstd");
   // A single segment with a content size of 8 bytes: 2^40.
-  const liar = Uint8Array.from([...frame.slice(0, 4), 0xe0, 0, 0, 0, 0, 0, 1, 0, 0, ...frame.slice(6)]);
+  const liar = Uint8Array.from([
+    ...frame.slice(0, 4),
+    0xe0,
+    0,
+    0,
+    0,
+    0,
+    0,
+    1,
+    0,
+    0,
+    ...frame.slice(6),
+  ]);
   assert.throws(() => decoded(2, liar, 4, 2), /says 1099511627776 bytes/);
 });
 

@@ -13,12 +13,19 @@ const wait = (seconds) => new Promise((done) => setTimeout(done, 1000 * seconds)
 
 /** Milliseconds of the page's main thread, computing and with what it waited for; pictures drawn. */
 function mainThread(trace) {
-  const named = trace.filter((event) => event.name === "thread_name" && event.args.name === "CrRendererMain");
+  const named = trace.filter(
+    (event) => event.name === "thread_name" && event.args.name === "CrRendererMain",
+  );
   const frames = (thread) =>
-    trace.filter((event) => event.pid === thread.pid && event.tid === thread.tid && event.name === "FireAnimationFrame");
+    trace.filter(
+      (event) =>
+        event.pid === thread.pid && event.tid === thread.tid && event.name === "FireAnimationFrame",
+    );
   // Of the renderers' main threads the one that draws.
   const thread = named.sort((a, b) => frames(b).length - frames(a).length)[0];
-  const mine = trace.filter((event) => event.pid === thread.pid && event.tid === thread.tid && event.ph === "X");
+  const mine = trace.filter(
+    (event) => event.pid === thread.pid && event.tid === thread.tid && event.ph === "X",
+  );
   // Of tasks that lie inside of each other the outer one counts.
   const tasks = mine.filter((event) => /RunTask$/.test(event.name)).sort((a, b) => a.ts - b.ts);
   let [busyUs, takenUs, end] = [0, 0, 0];
@@ -53,10 +60,15 @@ test("memory does not grow, and what a frame costs", async (t) => {
     const nodes = async () => (await session.send("Memory.getDOMCounters")).nodes;
     const browser = await page.context().browser()?.newBrowserCDPSession();
     const renderers = async () => {
-      const { processInfo } = (await browser?.send("SystemInfo.getProcessInfo")) ?? { processInfo: [] };
+      const { processInfo } = (await browser?.send("SystemInfo.getProcessInfo")) ?? {
+        processInfo: [],
+      };
       const resident = processInfo
         .filter(({ type }) => type === "renderer")
-        .map(({ id }) => Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${id}/status`, "utf8"))[1]) / 1024);
+        .map(
+          ({ id }) =>
+            Number(/VmRSS:\s+(\d+)/.exec(readFileSync(`/proc/${id}/status`, "utf8"))[1]) / 1024,
+        );
       return Math.max(0, ...resident);
     };
     await wait(2);
@@ -67,7 +79,9 @@ test("memory does not grow, and what a frame costs", async (t) => {
     const last = { heap: await heap(), nodes: await nodes() };
     const resident = await renderers();
     t.diagnostic(`heap ${first.heap.toFixed(1)} to ${last.heap.toFixed(1)} MiB in ${SECONDS} s`);
-    t.diagnostic(`the renderer's memory ${middle.toFixed(0)} to ${resident.toFixed(0)} MiB in the second half`);
+    t.diagnostic(
+      `the renderer's memory ${middle.toFixed(0)} to ${resident.toFixed(0)} MiB in the second half`,
+    );
     assert.ok(last.heap - first.heap < 2, `${first.heap} MiB of heap grew to ${last.heap}`);
     assert.ok(last.nodes - first.nodes < 50, `${first.nodes} nodes grew to ${last.nodes}`);
 
@@ -75,7 +89,8 @@ test("memory does not grow, and what a frame costs", async (t) => {
     const events = [];
     traced.on("Tracing.dataCollected", ({ value }) => events.push(...value));
     const complete = new Promise((done) => traced.once("Tracing.tracingComplete", done));
-    const categories = "devtools.timeline,disabled-by-default-devtools.timeline,toplevel,__metadata";
+    const categories =
+      "devtools.timeline,disabled-by-default-devtools.timeline,toplevel,__metadata";
     const before = Number(await pane.getAttribute("data-sequence"));
     await traced.send("Tracing.start", { categories, transferMode: "ReportEvents" });
     await wait(5);
@@ -91,7 +106,9 @@ test("memory does not grow, and what a frame costs", async (t) => {
       return gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER);
     });
     const [computed, taken] = [busyMs, takenMs].map((ms) => (ms / pictures).toFixed(2));
-    t.diagnostic(`main thread: ${computed} ms computing a picture, ${taken} ms with waiting for the compositor`);
+    t.diagnostic(
+      `main thread: ${computed} ms computing a picture, ${taken} ms with waiting for the compositor`,
+    );
     t.diagnostic(`${pictures} pictures of ${made} frames in 5 s`);
     t.diagnostic(`${rate}; drawn by ${renderer}`);
     assert.ok(pictures > 0, "no picture in 5 s");

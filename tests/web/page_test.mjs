@@ -3,7 +3,16 @@ import assert from "node:assert/strict";
 import path from "node:path";
 import { after, before, beforeEach, test } from "node:test";
 import { canvas, fact, numberOf, open, pause, PHONE, resume, until } from "./browser.mjs";
-import { beyond, calibration, startDaemon, startGateway, status, stopAll, tokenFile, work } from "./programs.mjs";
+import {
+  beyond,
+  calibration,
+  startDaemon,
+  startGateway,
+  status,
+  stopAll,
+  tokenFile,
+  work,
+} from "./programs.mjs";
 import { Tap } from "./tap.mjs";
 
 const { colourMap } = await import(path.resolve(process.env.PAGE_NODE, "colour_map.mjs"));
@@ -41,7 +50,8 @@ beforeEach(async () => {
 });
 
 const COLOURS = new Map();
-for (let i = 0; i < 256; ++i) COLOURS.set(colourMap.subarray(4 * i, 4 * i + 3).join(), (i + 0.5) * STEP_MM);
+for (let i = 0; i < 256; ++i)
+  COLOURS.set(colourMap.subarray(4 * i, 4 * i + 3).join(), (i + 0.5) * STEP_MM);
 
 /** Depth by the colour of a pixel; undefined for one that the map does not have. */
 const depthOf = (picture, row, column) => {
@@ -173,7 +183,10 @@ test("a line tells its length and the difference of its ends", async () => {
   const frame = await pausedAt(1.0);
   await pane.getByRole("radio", { name: "Line" }).click();
   const box = await pane.locator("canvas.marks").boundingBox();
-  const at = (column, row) => [box.x + ((column + 0.5) / 580) * box.width, box.y + ((row + 0.5) / 580) * box.height];
+  const at = (column, row) => [
+    box.x + ((column + 0.5) / 580) * box.width,
+    box.y + ((row + 0.5) / 580) * box.height,
+  ];
   await view.page.mouse.move(...at(200, 241));
   await view.page.mouse.down();
   await view.page.mouse.move(...at(362, 241));
@@ -212,7 +225,10 @@ test("slider, scheme and colour change the simulated light", async () => {
     10_000,
   );
   await pane.getByRole("button", { name: "Scheme 1" }).click();
-  const lit = () => status(left).light.leds.map((led) => ((led.r ?? 0) > 0 ? 1 : 0)).join("");
+  const lit = () =>
+    status(left)
+      .light.leds.map((led) => ((led.r ?? 0) > 0 ? 1 : 0))
+      .join("");
   await until(lit, (leds) => leds === "11001100", 10_000);
   await pane.getByRole("button", { name: "LED 2" }).click();
   await pane.getByLabel("Colour of the LED").fill("#ff8000");
@@ -239,7 +255,10 @@ test("the camera's picture and its grey values", async () => {
   );
   const box = await pane.locator("canvas.marks").boundingBox();
   await view.page.mouse.move(box.x + 5, box.y + 5);
-  assert.match(await pane.locator("output.readout").textContent(), /^grey \d+ of 255 · row \d+, column \d+$/);
+  assert.match(
+    await pane.locator("output.readout").textContent(),
+    /^grey \d+ of 255 · row \d+, column \d+$/,
+  );
   await pane.getByRole("radio", { name: "Depth" }).click();
 });
 
@@ -260,7 +279,10 @@ test("a calibration is uploaded, used and left again; a bad one is refused in wo
   );
   const picker = panel.locator("input[type=file]");
   const folder = calibration();
-  await picker.setInputFiles([path.join(folder, "calibration.toml"), path.join(folder, "reference.png")]);
+  await picker.setInputFiles([
+    path.join(folder, "calibration.toml"),
+    path.join(folder, "reference.png"),
+  ]);
   await until(
     () => panel.locator("li").count(),
     (count) => count === 2,
@@ -286,8 +308,13 @@ test("a calibration is uploaded, used and left again; a bad one is refused in wo
     (text) => text !== "" && text !== "Uploading.",
     10_000,
   );
-  await picker.setInputFiles([{ name: "other.toml", mimeType: "text/plain", buffer: Buffer.from("") }]);
-  assert.match(await panel.locator(".answer").textContent(), /Choose both calibration\.toml and reference\.png/);
+  await picker.setInputFiles([
+    { name: "other.toml", mimeType: "text/plain", buffer: Buffer.from("") },
+  ]);
+  assert.match(
+    await panel.locator(".answer").textContent(),
+    /Choose both calibration\.toml and reference\.png/,
+  );
 });
 
 test("the surface is loaded when it is looked at", async () => {
@@ -353,7 +380,10 @@ test("untrusted pixels are striped, and told as such", async () => {
   assert.ok(untrusted.length > 10, `${untrusted.length} untrusted pixels in the row`);
   const box = await other.locator("canvas.marks").boundingBox();
   const column = untrusted[untrusted.length >> 1];
-  await view.page.mouse.move(box.x + ((column + 0.5) / 580) * box.width, box.y + (row + 0.5) / 580 * box.height);
+  await view.page.mouse.move(
+    box.x + ((column + 0.5) / 580) * box.width,
+    box.y + ((row + 0.5) / 580) * box.height,
+  );
   assert.match(await other.locator("output.readout").textContent(), /^untrusted · row 290/);
   await resume(other);
 });
@@ -372,16 +402,26 @@ test("on a phone everything is below each other and nothing is cut off", async (
     5000,
   );
   const boxes = await Promise.all(
-    [".stage", '[aria-label="Contact"]', '[aria-label="Quality"]', '[aria-label="Light"]', ".plots"].map((part) =>
-      pane.locator(part).first().boundingBox(),
-    ),
+    [
+      ".stage",
+      '[aria-label="Contact"]',
+      '[aria-label="Quality"]',
+      '[aria-label="Light"]',
+      ".plots",
+    ].map((part) => pane.locator(part).first().boundingBox()),
   );
   for (let i = 1; i < boxes.length; ++i) {
-    assert.ok(boxes[i].y >= boxes[i - 1].y + boxes[i - 1].height, `part ${i} begins below the one before`);
+    assert.ok(
+      boxes[i].y >= boxes[i - 1].y + boxes[i - 1].height,
+      `part ${i} begins below the one before`,
+    );
     assert.ok(boxes[i].x >= 0 && boxes[i].x + boxes[i].width <= 390);
   }
   const picture = await pane.locator(".picture").boundingBox();
-  assert.ok(Math.abs(picture.width - picture.height) < 1, `a square map of ${picture.width} x ${picture.height}`);
+  assert.ok(
+    Math.abs(picture.width - picture.height) < 1,
+    `a square map of ${picture.width} x ${picture.height}`,
+  );
   await until(
     () => numberOf(pane, "deepest"),
     (mm) => mm > 0.9,

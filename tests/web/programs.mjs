@@ -14,18 +14,24 @@ const FPS = process.env.WEB_FPS ?? "20";
 const scene = path.join(here, "presses.toml");
 /** A ball pressed deeper than the calibration covers, and held. */
 export const beyond = path.join(here, "beyond.toml");
-export const work = mkdtempSync(path.join(FOLDER, `run-${path.basename(process.argv[1]).split("_")[0]}-`));
+export const work = mkdtempSync(
+  path.join(FOLDER, `run-${path.basename(process.argv[1]).split("_")[0]}-`),
+);
 
 /** Made by a press of a known ball, as ./dev run does; kept until a program changes. */
 export function calibration() {
   const folder = path.join(FOLDER, "calibrated");
   const made = path.join(folder, "calibration");
   const changed = (program) => statSync(program).mtimeMs > statSync(made).mtimeMs;
-  if (existsSync(path.join(made, "reference.png")) && ![CALIBRATE, SIM_RENDER].some(changed)) return made;
+  if (existsSync(path.join(made, "reference.png")) && ![CALIBRATE, SIM_RENDER].some(changed))
+    return made;
   rmSync(folder, { recursive: true, force: true });
   mkdirSync(folder);
   const ball = path.resolve(here, "../../config/scenes/calibrate_ball.toml");
-  for (const [name, frames] of [["reference", "0:32"], ["ball", "200:232"]]) {
+  for (const [name, frames] of [
+    ["reference", "0:32"],
+    ["ball", "200:232"],
+  ]) {
     execFileSync(SIM_RENDER, ["--scene", ball, "--frames", frames, "-o", path.join(folder, name)]);
   }
   const depth = ["depth", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400"];
@@ -43,7 +49,9 @@ class Program {
     this.name = path.basename(program);
     this.child = spawn(program, words, { stdio: ["ignore", "pipe", "pipe"] });
     running.add(this);
-    this.ended = new Promise((done) => this.child.once("exit", done)).then(() => running.delete(this));
+    this.ended = new Promise((done) => this.child.once("exit", done)).then(() =>
+      running.delete(this),
+    );
     for (const stream of [this.child.stdout, this.child.stderr]) {
       stream.on("data", (text) => (this.output += text));
     }
@@ -84,16 +92,29 @@ export async function startDaemon(name, port = 0, settings = []) {
     "capture.fifo_priority=0",
     ...settings,
   ];
-  const daemon = new Program(DTACTD, all.flatMap((setting) => ["--set", setting]));
+  const daemon = new Program(
+    DTACTD,
+    all.flatMap((setting) => ["--set", setting]),
+  );
   daemon.port = await daemon.listening();
   return daemon;
 }
 
 /** The gateway to daemons by name, each at a port of this machine. */
 export async function startGateway(daemons, words = []) {
-  const names = Object.entries(daemons).flatMap(([name, port]) => ["--daemon", `${name}=127.0.0.1:${port}`]);
+  const names = Object.entries(daemons).flatMap(([name, port]) => [
+    "--daemon",
+    `${name}=127.0.0.1:${port}`,
+  ]);
   const page = process.env.PAGE_DIST ? ["--page", process.env.PAGE_DIST] : [];
-  const gateway = new Program(DTACT_WEB, ["serve", "--listen-port", "0", ...names, ...page, ...words]);
+  const gateway = new Program(DTACT_WEB, [
+    "serve",
+    "--listen-port",
+    "0",
+    ...names,
+    ...page,
+    ...words,
+  ]);
   gateway.port = await gateway.listening();
   return gateway;
 }

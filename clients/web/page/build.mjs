@@ -48,7 +48,9 @@ function licences() {
   const { dependencies } = JSON.parse(readFileSync("package.json", "utf8"));
   return Object.keys(dependencies).map((name) => {
     const folder = path.join("node_modules", name);
-    const { version, license } = JSON.parse(readFileSync(path.join(folder, "package.json"), "utf8"));
+    const { version, license } = JSON.parse(
+      readFileSync(path.join(folder, "package.json"), "utf8"),
+    );
     const file = path.join(folder, "LICENSE");
     const text = existsSync(file) ? readFileSync(file, "utf8").trim() : "";
     return `${name} ${version}: ${license}\n\n${text}\n`;

@@ -34,7 +34,9 @@ class Page {
           "span",
           { class: "row end" },
           button("Keys", () => this.help.showModal(), { title: "?" }),
-          button("Light / dark", () => this.switchTheme(), { "aria-label": "Switch between light and dark" }),
+          button("Light / dark", () => this.switchTheme(), {
+            "aria-label": "Switch between light and dark",
+          }),
         ),
       ),
       this.notice,
@@ -131,13 +133,22 @@ class Page {
     for (const [key, what] of keys) list.append(el("dt", {}, key), el("dd", {}, what));
     const licences = el("a", { href: "licences.txt", target: "_blank" }, "Licences");
     const dialog = el("dialog", { "aria-label": "Keys" }, el("h2", {}, "Keys"), list);
-    dialog.append(el("p", { class: "row" }, button("Close", () => dialog.close()), licences));
+    dialog.append(
+      el(
+        "p",
+        { class: "row" },
+        button("Close", () => dialog.close()),
+        licences,
+      ),
+    );
     return dialog;
   }
 
   private switchTheme(): void {
     const root = document.documentElement;
-    const dark = root.dataset["theme"] ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
+    const dark =
+      root.dataset["theme"] ??
+      (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     root.dataset["theme"] = dark === "dark" ? "light" : "dark";
     localStorage.setItem(THEME, root.dataset["theme"]);
     this.recolour();

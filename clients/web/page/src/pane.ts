@@ -1,39 +1,23 @@
 // One sensor: its picture, its panels, and what its connection says.
 import type { Event, HelloReply, Status } from "../gen/dtact_pb";
 import { button, Choice, el, say } from "./dom";
+import { Meter } from "./meter";
 import { CalibrationsPanel } from "./panels/calibrations";
 import { ContactPanel } from "./panels/contact";
 import { LightPanel } from "./panels/light";
 import { Plots, ProfilePlot } from "./panels/plots";
 import { QualityPanel } from "./panels/quality";
-import { nowMs } from "./session/clock";
 import type { Frame, Link, Wants } from "./session/messages";
 import { Sensor } from "./session/sensor";
+import { saveSnapshot } from "./snapshot";
 import type { SurfaceView } from "./surface/surface";
+import { RangeForm } from "./view/range_form";
 import { Stage } from "./view/stage";
 import type { Tool, View } from "./view/stage";
 import { fixed } from "./words";
 
 /** Numbers that change with every frame are told so often: more cannot be read. */
 const TELL_MS = 100;
-
-/** Shown frames of the last second, and how late the last one was. */
-class Meter {
-  private readonly shown: number[] = [];
-  latencyMs: number | undefined;
-
-  count(frame: Frame): void {
-    const now = nowMs();
-    this.shown.push(now);
-    while (now - (this.shown[0] as number) > 1000) this.shown.shift();
-    this.latencyMs = frame.capturedMs === undefined ? undefined : now - frame.capturedMs;
-  }
-
-  get fps(): number {
-    const spanMs = (this.shown.at(-1) ?? 0) - (this.shown[0] ?? 0);
-    return spanMs > 0 ? (1000 * (this.shown.length - 1)) / spanMs : 0;
-  }
-}
 
 /** The words of a token stay with this window alone, and end with it. */
 const tokenKey = (name: string): string => `dtact token ${name}`;
@@ -53,12 +37,15 @@ export class Pane {
   private readonly rate = el("span", { class: "rate", "data-fact": "rate" });
   private readonly state = el("span", { class: "link" }, "connecting");
   private readonly tokenForm = this.makeTokenForm();
-  private readonly pauseButton = button("Pause", () => this.pause(!this.paused), { title: "Space" });
+  private readonly pauseButton = button("Pause", () => this.pause(!this.paused), {
+    title: "Space",
+  });
   private readonly steps = el("span", { class: "row steps", hidden: "" });
   private readonly behind = el("span", { class: "quiet" });
-  private readonly lower = el("input", { type: "number", step: "0.1", value: "0", "aria-label": "Range from, mm" });
-  private readonly upper = el("input", { type: "number", step: "0.1", value: "1.5", "aria-label": "Range to, mm" });
-  private readonly outline = el("input", { type: "number", step: "0.05", min: "0", value: "0.1", "aria-label": "Outline at, mm; 0 for none" });
+  private readonly range = new RangeForm((range, outlineMm) => {
+    if (range) this.stage.range = range;
+    if (outlineMm !== undefined) this.stage.outlineMm = outlineMm;
+  });
   private readonly views: Choice<View>;
   private readonly tools: Choice<Tool>;
   private surface: SurfaceView | undefined;
@@ -69,8 +56,15 @@ export class Pane {
 
   /** Throws where the browser has no WebGL 2. */
   constructor(readonly name: string) {
-    this.views = new Choice<View>("View", { depth: "Depth", camera: "Camera", surface: "Surface" }, "depth", (view) => void this.look(view));
-    this.tools = new Choice<Tool>("Tool", { point: "Point", line: "Line" }, "point", (tool) => this.stage.use(tool));
+    this.views = new Choice<View>(
+      "View",
+      { depth: "Depth", camera: "Camera", surface: "Surface" },
+      "depth",
+      (view) => void this.look(view),
+    );
+    this.tools = new Choice<Tool>("Tool", { point: "Point", line: "Line" }, "point", (tool) =>
+      this.stage.use(tool),
+    );
     this.sensor = new Sensor(name, sessionStorage.getItem(tokenKey(name)) ?? "", this.wants(), {
       link: (link) => this.link(link),
       hello: (hello) => this.hello(hello),
@@ -87,9 +81,6 @@ export class Pane {
     );
     this.element = this.build();
     this.stage.profiled = (profile) => this.profile.show(profile, this.stage.range);
-    for (const input of [this.lower, this.upper, this.outline]) {
-      input.addEventListener("change", () => this.takeRange());
-    }
     this.stage.look("depth");
     this.stage.cover("Waiting for the first frame.");
   }
@@ -145,7 +136,9 @@ export class Pane {
         { class: "row" },
         this.steps,
         this.pauseButton,
-        button("Snapshot", () => void this.snapshot(), { title: "A PNG with time and settings (S)" }),
+        button("Snapshot", () => void this.snapshot(), {
+          title: "A PNG with time and settings (S)",
+        }),
       ),
     );
     const tools = el(
@@ -153,9 +146,7 @@ export class Pane {
       { class: "tools", role: "toolbar", "aria-label": "View" },
       this.views.element,
       this.tools.element,
-      el("span", { class: "row lock", title: "The range never follows the depth: a colour always means the same depth" },
-        el("span", { class: "quiet" }, "Range"), this.lower, "to", this.upper, "mm"),
-      el("label", { class: "row lock" }, el("span", { class: "quiet" }, "Outline"), this.outline, "mm"),
+      ...this.range.elements,
     );
     return el(
       "article",
@@ -181,7 +172,12 @@ export class Pane {
 
   private makeTokenForm(): HTMLFormElement {
     const input = el("input", { type: "password", autocomplete: "off", "aria-label": "Token" });
-    const form = el("form", { class: "token row", hidden: "" }, input, el("button", { type: "submit" }, "Connect"));
+    const form = el(
+      "form",
+      { class: "token row", hidden: "" },
+      input,
+      el("button", { type: "submit" }, "Connect"),
+    );
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       sessionStorage.setItem(tokenKey(this.name), input.value);
@@ -207,18 +203,18 @@ export class Pane {
     if (this.stage.depth) this.surface.show(this.stage.depth, this.stage.range);
   }
 
-  private takeRange(): void {
-    const [fromMm, toMm, outlineMm] = [this.lower, this.upper, this.outline].map((input) => input.valueAsNumber) as [number, number, number];
-    const bad = !(toMm - fromMm >= 0.01);
-    this.lower.setAttribute("aria-invalid", String(bad));
-    this.upper.setAttribute("aria-invalid", String(bad));
-    if (!bad) this.stage.range = { fromMm, toMm };
-    if (outlineMm >= 0) this.stage.outlineMm = outlineMm;
-  }
-
   private link(link: Link): void {
     this.element.dataset["link"] = link.state;
-    say(this.state, { connecting: "connecting", live: "live", away: "away", token: "token needed", ended: "ended" }[link.state]);
+    say(
+      this.state,
+      {
+        connecting: "connecting",
+        live: "live",
+        away: "away",
+        token: "token needed",
+        ended: "ended",
+      }[link.state],
+    );
     this.tellNotice(link.state === "live" && link.sentence === "Connected." ? "" : link.sentence);
     this.tokenForm.hidden = link.state !== "token";
     // A paused view goes on showing its frame.
@@ -235,7 +231,9 @@ export class Pane {
   }
 
   private hello(hello: HelloReply): void {
-    const title = [hello.program, hello.name, hello.serial].filter((part) => part !== "").join(" · ");
+    const title = [hello.program, hello.name, hello.serial]
+      .filter((part) => part !== "")
+      .join(" · ");
     this.state.title = title;
     this.light.allow(this.sensor.mayControl);
     this.pause(false);
@@ -265,7 +263,8 @@ export class Pane {
     if (!this.paused) this.meter.count(frame);
     this.stage.cover(this.coverOf(frame));
     this.stage.show(frame);
-    if (this.views.value === "surface" && frame.depth) this.surface?.show(frame.depth, this.stage.range);
+    if (this.views.value === "surface" && frame.depth)
+      this.surface?.show(frame.depth, this.stage.range);
     if (!this.paused) this.plots.add(frame, this.meter.latencyMs);
     const now = performance.now();
     if (now - this.toldAt < TELL_MS && !this.paused) return true;
@@ -279,7 +278,8 @@ export class Pane {
   }
 
   private coverOf(frame: Frame): string {
-    if (this.views.value === "camera") return frame.luma || this.stage.luma ? "" : "Waiting for the camera's picture.";
+    if (this.views.value === "camera")
+      return frame.luma || this.stage.luma ? "" : "Waiting for the camera's picture.";
     if (frame.depth) return "";
     if (frame.contact) return this.stage.depth ? "" : "Waiting for depth.";
     const advice = this.lastStatus?.advice ?? "";
@@ -288,7 +288,12 @@ export class Pane {
 
   private tellRate(frame: Frame): void {
     if (this.paused) {
-      say(this.behind, frame.behind === 0 ? `frame ${frame.sequence}` : `frame ${frame.sequence}, ${frame.behind} back`);
+      say(
+        this.behind,
+        frame.behind === 0
+          ? `frame ${frame.sequence}`
+          : `frame ${frame.sequence}, ${frame.behind} back`,
+      );
       return;
     }
     const latency = this.meter.latencyMs;
@@ -308,23 +313,7 @@ export class Pane {
   }
 
   private async snapshot(): Promise<void> {
-    const frame = this.frame;
-    if (!frame) return;
-    const time = new Date(frame.wallMs).toISOString();
-    const light = frame.light ? `brightness ${frame.light.brightness}` : "light unknown";
-    const depth = this.stage.depth;
-    const { fromMm, toMm } = this.stage.range;
-    const made = this.lastStatus?.calibration?.name ?? "none";
-    const lines = [`${this.name} · ${time} · frame ${frame.sequence}`];
-    if (this.views.value !== "camera" && depth) {
-      lines.push(`range ${fromMm} to ${toMm} mm · ± ${fixed(depth.uncertaintyUm, 0)} µm · ${fixed(depth.mmPerPx, 4)} mm/px`);
-    }
-    lines.push(`calibration ${made} · ${light}`);
-    const style = getComputedStyle(document.documentElement);
-    const blob = await this.stage.picturePng(lines, style.getPropertyValue("--ink").trim(), style.getPropertyValue("--panel").trim());
-    const url = URL.createObjectURL(blob);
-    const link = el("a", { href: url, download: `${this.name}-${time.replaceAll(":", "")}.png` });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(url), 10_000);
+    if (!this.frame) return;
+    await saveSnapshot(this.name, this.views.value, this.stage, this.frame, this.lastStatus);
   }
 }

@@ -1,6 +1,10 @@
 // The daemon's calibrations: which is in use, another one instead, one of this machine's.
 import { create } from "@bufbuild/protobuf";
-import { ActivateCalibrationSchema, ListCalibrationsSchema, UploadCalibrationSchema } from "../../gen/dtact_pb";
+import {
+  ActivateCalibrationSchema,
+  ListCalibrationsSchema,
+  UploadCalibrationSchema,
+} from "../../gen/dtact_pb";
 import type { StoredCalibration } from "../../gen/dtact_pb";
 import { button, el, panel, say } from "../dom";
 import type { Sensor } from "../session/sensor";
@@ -10,11 +14,18 @@ const FILES = ["calibration.toml", "reference.png"];
 export class CalibrationsPanel {
   private readonly list = el("ul", { class: "calibrations" });
   private readonly answer = el("p", { class: "answer", role: "alert" });
-  private readonly picker = el("input", { type: "file", multiple: "", accept: ".toml,.png", hidden: "" });
+  private readonly picker = el("input", {
+    type: "file",
+    multiple: "",
+    accept: ".toml,.png",
+    hidden: "",
+  });
   private readonly upload = el(
     "div",
     { class: "row" },
-    button("Upload…", () => this.picker.click(), { title: `Choose ${FILES.join(" and ")} of a calibration's folder` }),
+    button("Upload…", () => this.picker.click(), {
+      title: `Choose ${FILES.join(" and ")} of a calibration's folder`,
+    }),
     this.picker,
   );
   readonly element = panel("Calibrations", this.list, this.upload, this.answer);
@@ -26,7 +37,10 @@ export class CalibrationsPanel {
   async refresh(): Promise<void> {
     this.upload.hidden = !this.sensor.mayControl;
     try {
-      const result = await this.sensor.request({ case: "listCalibrations", value: create(ListCalibrationsSchema) });
+      const result = await this.sensor.request({
+        case: "listCalibrations",
+        value: create(ListCalibrationsSchema),
+      });
       if (result.case !== "calibrations") return;
       this.list.replaceChildren(...result.value.calibrations.map((stored) => this.item(stored)));
     } catch (error) {
@@ -38,17 +52,25 @@ export class CalibrationsPanel {
     const configured = stored.number === 0n;
     const title = configured ? `${stored.name} (configured)` : `${stored.number} ${stored.name}`;
     const item = el("li", {}, el("span", { class: "name", title: stored.uploaded }, title));
-    if (stored.content.case === "damage") item.append(el("span", { class: "trouble" }, stored.content.value));
+    if (stored.content.case === "damage")
+      item.append(el("span", { class: "trouble" }, stored.content.value));
     if (stored.inUse) item.append(el("span", { class: "tag" }, "in use"));
     else if (this.sensor.mayControl && stored.content.case === "summary") {
-      item.append(button("Use", () => void this.activate(stored.number), { "aria-label": `Use calibration ${title}` }));
+      item.append(
+        button("Use", () => void this.activate(stored.number), {
+          "aria-label": `Use calibration ${title}`,
+        }),
+      );
     }
     return item;
   }
 
   private async activate(number: bigint): Promise<void> {
     await this.change("Changing the calibration.", () =>
-      this.sensor.request({ case: "activateCalibration", value: create(ActivateCalibrationSchema, { number }) }),
+      this.sensor.request({
+        case: "activateCalibration",
+        value: create(ActivateCalibrationSchema, { number }),
+      }),
     );
   }
 

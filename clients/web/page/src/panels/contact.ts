@@ -17,24 +17,34 @@ function motion(pose: ObjectPose | undefined): { moved: string; turned: string }
   const told = (vector: Vector3 | undefined, digits: number): string =>
     vector ? [vector.x, vector.y, vector.z].map((part) => fixed(part, digits)).join(", ") : "–";
   const how = TRACKING[pose.tracking];
+  const unseen = pose.unobservable.length;
   return {
     moved: `${told(pose.translationMm, 2)} mm${how ? `, ${how}` : ""}`,
-    turned: `${told(pose.rotationDeg, 1)}°${pose.unobservable.length > 0 ? `, ${pose.unobservable.length} unseen` : ""}`,
+    turned: `${told(pose.rotationDeg, 1)}°${unseen > 0 ? `, ${unseen} unseen` : ""}`,
   };
 }
 
 export class ContactPanel {
   private readonly motion = new Facts({
     moved: { label: "Moved", hint: "Since the contact was made: x, y, z of the surface frame" },
-    turned: { label: "Turned", hint: "Axis times angle; directions that the shape does not show are unseen" },
+    turned: {
+      label: "Turned",
+      hint: "Axis times angle; directions that the shape does not show are unseen",
+    },
   });
   private readonly facts = new Facts({
     touching: { label: "State" },
     deepest: { label: "× Deepest", hint: "Indentation along the surface's normal" },
     area: { label: "Area", hint: "Pressed deeper than the daemon's contact threshold" },
     volume: { label: "Volume" },
-    centroid: { label: "○ Centroid", hint: "Weighted by depth; x to the right, y down, from the map's centre" },
-    force: { label: "Force", hint: "Along the surface's normal; needs a calibration by dtact-calibrate force" },
+    centroid: {
+      label: "○ Centroid",
+      hint: "Weighted by depth; x to the right, y down, from the map's centre",
+    },
+    force: {
+      label: "Force",
+      hint: "Along the surface's normal; needs a calibration by dtact-calibrate force",
+    },
   });
   readonly element = panel("Contact", this.facts.element, this.motion.element);
 
@@ -49,7 +59,10 @@ export class ContactPanel {
     this.motion.set("turned", turned);
     const contact = frame.contact;
     const touching = contact?.touching === true;
-    this.facts.set("touching", contact ? (touching ? "touching" : "nothing touches") : absence(frame.contactAbsence));
+    this.facts.set(
+      "touching",
+      contact ? (touching ? "touching" : "nothing touches") : absence(frame.contactAbsence),
+    );
     this.facts.set("deepest", touching ? mm(contact.deepestMm, 3) : "–");
     this.facts.set("area", touching ? `${fixed(contact.areaMm2, 1)} mm²` : "–");
     this.facts.set("volume", touching ? `${fixed(contact.volumeMm3, 2)} mm³` : "–");

@@ -19,16 +19,29 @@ function rgb(colour: string): Rgb {
 }
 
 export class LightPanel {
-  private readonly slider = el("input", { type: "range", min: "0", max: "255", step: "1", "aria-label": "Brightness" });
+  private readonly slider = el("input", {
+    type: "range",
+    min: "0",
+    max: "255",
+    step: "1",
+    "aria-label": "Brightness",
+  });
   private readonly number = el("output", {}, "–");
   private readonly leds: SVGElement[] = [];
-  private readonly colour = el("input", { type: "color", "aria-label": "Colour of the LED", value: "#ffffff" });
+  private readonly colour = el("input", {
+    type: "color",
+    "aria-label": "Colour of the LED",
+    value: "#ffffff",
+  });
   private readonly chosen = el("span", { class: "quiet" });
   private readonly answer = el("p", { class: "answer", role: "alert" });
   private readonly zero = button("Re-zero", () => void this.rezero(false), {
     title: "Take the present image as untouched (Z)",
   });
-  private readonly anyway = button("Re-zero anyway", () => void this.rezero(true), { class: "warn", hidden: "" });
+  private readonly anyway = button("Re-zero anyway", () => void this.rezero(true), {
+    class: "warn",
+    hidden: "",
+  });
   private readonly controls: HTMLElement;
   readonly element: HTMLElement;
   private light: LightState | undefined;
@@ -63,7 +76,11 @@ export class LightPanel {
           "div",
           { class: "column" },
           el("label", { class: "row" }, this.chosen, this.colour),
-          el("div", { class: "row wrap schemes", role: "group", "aria-label": "Schemes of the light" }, ...schemes),
+          el(
+            "div",
+            { class: "row wrap schemes", role: "group", "aria-label": "Schemes of the light" },
+            ...schemes,
+          ),
           el("div", { class: "row wrap" }, this.zero, this.anyway),
         ),
       ),
@@ -75,7 +92,8 @@ export class LightPanel {
   /** With a token that may only watch, the light is shown and nothing can be set. */
   allow(control: boolean): void {
     for (const input of this.controls.querySelectorAll("input")) input.disabled = !control;
-    for (const made of this.controls.querySelectorAll<HTMLElement>(".column")) made.hidden = !control;
+    for (const made of this.controls.querySelectorAll<HTMLElement>(".column"))
+      made.hidden = !control;
     say(this.answer, control ? "" : "This token may watch, not set the light.");
   }
 
@@ -111,13 +129,27 @@ export class LightPanel {
   }
 
   private makeRing(): SVGElement {
-    const ring = svg("svg", { class: "ring", viewBox: "-60 -60 120 120", role: "group", "aria-label": "LEDs, as the camera sees them" });
+    const ring = svg("svg", {
+      class: "ring",
+      viewBox: "-60 -60 120 120",
+      role: "group",
+      "aria-label": "LEDs, as the camera sees them",
+    });
     ring.append(svg("circle", { class: "rim", r: "44", cx: "0", cy: "0" }));
     for (let i = 0; i < LEDS; ++i) {
       // LED 0 at the image's right, the others clockwise as the camera sees them.
       const angle = (2 * Math.PI * i) / LEDS;
       const [x, y] = [44 * Math.cos(angle), 44 * Math.sin(angle)];
-      const led = svg("circle", { class: "led", r: "11", cx: String(x), cy: String(y), fill: "#000", tabindex: "0", role: "button", "aria-label": `LED ${i}` });
+      const led = svg("circle", {
+        class: "led",
+        r: "11",
+        cx: String(x),
+        cy: String(y),
+        fill: "#000",
+        tabindex: "0",
+        role: "button",
+        "aria-label": `LED ${i}`,
+      });
       led.addEventListener("click", () => this.select(i));
       led.addEventListener("keydown", (event) => {
         const key = (event as KeyboardEvent).key;
@@ -143,7 +175,9 @@ export class LightPanel {
   }
 
   private async paint(): Promise<void> {
-    const leds = this.light?.leds.map((led, i) => (i === this.selected ? rgb(this.colour.value) : led));
+    const leds = this.light?.leds.map((led, i) =>
+      i === this.selected ? rgb(this.colour.value) : led,
+    );
     if (leds?.length === LEDS) await this.set({ leds });
   }
 
@@ -160,7 +194,10 @@ export class LightPanel {
 
   private async set(change: { brightness?: number; scheme?: string; leds?: Rgb[] }): Promise<void> {
     try {
-      const result = await this.sensor.request({ case: "setLight", value: create(SetLightSchema, change) });
+      const result = await this.sensor.request({
+        case: "setLight",
+        value: create(SetLightSchema, change),
+      });
       this.anyway.hidden = true;
       say(this.answer, "");
       if (result.case === "light") this.show(result.value);

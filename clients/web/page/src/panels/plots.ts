@@ -2,7 +2,7 @@
 import uPlot from "uplot";
 import { el } from "../dom";
 import type { Frame } from "../session/messages";
-import type { Profile } from "../view/stage";
+import type { Profile } from "../view/reading";
 
 const SECONDS = 30;
 const REDRAW_MS = 250;
@@ -14,13 +14,21 @@ type Value = number | null;
 /** What is plotted of a frame; null: not measured. */
 const SERIES: Record<
   string,
-  { title: string; /** The axis reaches at least this. */ top: number; of: (frame: Frame, latencyMs: Value) => Value }
+  {
+    title: string;
+    /** The axis reaches at least this. */ top: number;
+    of: (frame: Frame, latencyMs: Value) => Value;
+  }
 > = {
   deepest: { title: "Deepest, mm", top: 0.1, of: (frame) => frame.contact?.deepestMm ?? null },
   area: { title: "Area, mm²", top: 1, of: (frame) => frame.contact?.areaMm2 ?? null },
   volume: { title: "Volume, mm³", top: 1, of: (frame) => frame.contact?.volumeMm3 ?? null },
   force: { title: "Force, N", top: 0.1, of: (frame) => frame.contact?.forceN ?? null },
-  light: { title: "Brightness of the light", top: 255, of: (frame) => frame.light?.brightness ?? null },
+  light: {
+    title: "Brightness of the light",
+    top: 255,
+    of: (frame) => frame.light?.brightness ?? null,
+  },
   latency: { title: "Latency, ms", top: 10, of: (_, latencyMs) => latencyMs },
 };
 
@@ -56,7 +64,12 @@ function plotIn(place: HTMLElement, height: number, make: (width: number) => uPl
 
 export class Plots {
   readonly element = el("section", { class: "plots", "aria-label": "The last 30 seconds" });
-  private readonly plots: { of: (typeof SERIES)[string]["of"]; plot: uPlot; values: Value[]; place: HTMLElement }[] = [];
+  private readonly plots: {
+    of: (typeof SERIES)[string]["of"];
+    plot: uPlot;
+    values: Value[];
+    place: HTMLElement;
+  }[] = [];
   private readonly times: number[] = [];
   private drawnAt = 0;
 
@@ -66,24 +79,30 @@ export class Plots {
       const canvas = el("div", { class: "plot" });
       const place = el("figure", { "data-plot": name }, el("figcaption", {}, title), canvas);
       this.element.append(place);
-      const plot = plotIn(canvas, 96, (width) =>
-        new uPlot(
-          {
-            width,
-            height: 96,
-            legend: { show: false },
-            cursor: { show: false },
-            padding: [6, 12, 0, 0],
-            scales: {
-              x: { time: false, range: () => [-SECONDS, 0] },
-              y: { range: (_, least, most) => (least === null ? [0, top] : [Math.min(0, least), Math.max(most * 1.05, top)]) },
+      const plot = plotIn(
+        canvas,
+        96,
+        (width) =>
+          new uPlot(
+            {
+              width,
+              height: 96,
+              legend: { show: false },
+              cursor: { show: false },
+              padding: [6, 12, 0, 0],
+              scales: {
+                x: { time: false, range: () => [-SECONDS, 0] },
+                y: {
+                  range: (_, least, most) =>
+                    least === null ? [0, top] : [Math.min(0, least), Math.max(most * 1.05, top)],
+                },
+              },
+              axes: axes((value) => `${value} s`.replace("-", "−")),
+              series: [{}, { stroke: () => theme().line, width: 1.5, points: { show: false } }],
             },
-            axes: axes((value) => `${value} s`.replace("-", "−")),
-            series: [{}, { stroke: () => theme().line, width: 1.5, points: { show: false } }],
-          },
-          [[], []],
-          canvas,
-        ),
+            [[], []],
+            canvas,
+          ),
       );
       this.plots.push({ of, plot, values: [], place });
     }
@@ -135,21 +154,32 @@ export class ProfilePlot {
     this.element.hidden = profile === undefined;
     if (!profile || performance.now() - this.drawnAt < 60) return;
     this.drawnAt = performance.now();
-    this.plot ??= plotIn(this.canvas, 130, (width) =>
-      new uPlot(
-        {
-          width,
-          height: 130,
-          legend: { show: false },
-          cursor: { show: false },
-          padding: [6, 16, 0, 0],
-          scales: { x: { time: false }, y: { range: (_, least, most) => [Math.min(range.fromMm, least ?? 0), Math.max(most ?? 0, 0.2)] } },
-          axes: axes((value) => `${value} mm`),
-          series: [{}, { stroke: () => theme().line, width: 1.5, points: { show: false } }],
-        },
-        [[], []],
-        this.canvas,
-      ),
+    this.plot ??= plotIn(
+      this.canvas,
+      130,
+      (width) =>
+        new uPlot(
+          {
+            width,
+            height: 130,
+            legend: { show: false },
+            cursor: { show: false },
+            padding: [6, 16, 0, 0],
+            scales: {
+              x: { time: false },
+              y: {
+                range: (_, least, most) => [
+                  Math.min(range.fromMm, least ?? 0),
+                  Math.max(most ?? 0, 0.2),
+                ],
+              },
+            },
+            axes: axes((value) => `${value} mm`),
+            series: [{}, { stroke: () => theme().line, width: 1.5, points: { show: false } }],
+          },
+          [[], []],
+          this.canvas,
+        ),
     );
     this.plot.setData([profile.alongMm, profile.depthMm]);
   }

@@ -10,10 +10,22 @@ import { conditionName, fixed, signedPercent, span, stateName, um } from "../wor
 export class QualityPanel {
   private readonly facts = new Facts({
     state: { label: "State" },
-    uncertainty: { label: "Depth is worth", hint: "Mean absolute error to expect inside the contact" },
-    untouched: { label: "Untouched RMS", hint: "Of the map in the last frame in which nothing touched; where nothing differs from the reference the daemon writes 0" },
-    reference: { label: "Reference's age", hint: "The untouched image that depth is measured against" },
-    drift: { label: "Light followed", hint: "How far the light has drifted since the reference was taken" },
+    uncertainty: {
+      label: "Depth is worth",
+      hint: "Mean absolute error to expect inside the contact",
+    },
+    untouched: {
+      label: "Untouched RMS",
+      hint: "In the last frame in which nothing touched; 0 where nothing differs from the reference",
+    },
+    reference: {
+      label: "Reference's age",
+      hint: "The untouched image that depth is measured against",
+    },
+    drift: {
+      label: "Light followed",
+      hint: "How far the light has drifted since the reference was taken",
+    },
     map: { label: "Map" },
     camera: { label: "Camera" },
     calibration: { label: "Calibration" },
@@ -31,10 +43,12 @@ export class QualityPanel {
     if (depth) {
       this.facts.set("uncertainty", `± ${um(depth.uncertaintyUm)}`);
       const sharpened = depth.sharpenSteps > 0 ? `, sharpened ${depth.sharpenSteps}×` : "";
-      const share = ["", "full", "half", "", "quarter"][depth.decimation] ?? `1/${depth.decimation}`;
+      const share =
+        ["", "full", "half", "", "quarter"][depth.decimation] ?? `1/${depth.decimation}`;
       this.facts.set("map", `${depth.width} × ${depth.height}, ${share}${sharpened}`);
     }
-    if (frame.untouchedRmsUm !== undefined) this.facts.set("untouched", `${fixed(frame.untouchedRmsUm, 1)} µm`);
+    if (frame.untouchedRmsUm !== undefined)
+      this.facts.set("untouched", `${fixed(frame.untouchedRmsUm, 1)} µm`);
     const reference = this.reference;
     if (reference && this.fps > 0) {
       const age = span(Math.max(0, this.sequence - reference.sequence) / this.fps);
@@ -54,7 +68,10 @@ export class QualityPanel {
     this.facts.set("reference", "–");
     if (!sensor.features.includes("reference")) return;
     try {
-      const result = await sensor.request({ case: "getReference", value: create(GetReferenceSchema) });
+      const result = await sensor.request({
+        case: "getReference",
+        value: create(GetReferenceSchema),
+      });
       if (result.case === "reference") {
         this.reference ??= { sequence: Number(result.value.sequence), restored: false };
       }
@@ -74,14 +91,21 @@ export class QualityPanel {
         [camera.damaged, "damaged"],
         [camera.disconnects, "unplugged"],
       ] as const;
-      const told = trouble.filter(([count]) => count > 0n).map(([count, name]) => `, ${count} ${name}`);
+      const told = trouble
+        .filter(([count]) => count > 0n)
+        .map(([count, name]) => `, ${count} ${name}`);
       const condition = camera.condition === "streaming" ? "" : `${camera.condition}, `;
-      this.facts.set("camera", `${condition}${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${told.join("")}`);
+      this.facts.set(
+        "camera",
+        `${condition}${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${told.join("")}`,
+      );
     }
     const made = status.calibration;
     this.facts.set(
       "calibration",
-      made ? `${made.name}, ${fixed(made.coveredFromMm, 2)} to ${fixed(made.coveredToMm, 2)} mm` : "none",
+      made
+        ? `${made.name}, ${fixed(made.coveredFromMm, 2)} to ${fixed(made.coveredToMm, 2)} mm`
+        : "none",
     );
     const names = status.health.map(conditionName);
     if ([...this.conditions.children].map((item) => item.textContent).join() !== names.join()) {

@@ -141,13 +141,10 @@ export class Connection {
 
   private tell(): void {
     if (!this.greeted) return;
+    const why = this.why && `: ${this.why}`;
+    const away = `The sensor is away${why}. It goes on by itself when it is back.`;
     this.listener.link(
-      this.reached
-        ? { state: "live", sentence: "Connected." }
-        : {
-            state: "away",
-            sentence: `The sensor is away${this.why && `: ${this.why}`}. It goes on by itself when it is back.`,
-          },
+      this.reached ? { state: "live", sentence: "Connected." } : { state: "away", sentence: away },
     );
   }
 

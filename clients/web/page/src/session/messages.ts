@@ -1,5 +1,13 @@
 // What the page and the worker that holds a sensor's connection say to each other.
-import type { ClientMessage, Contact, Event, HelloReply, LightState, ObjectPose, Reply } from "../../gen/dtact_pb";
+import type {
+  ClientMessage,
+  Contact,
+  Event,
+  HelloReply,
+  LightState,
+  ObjectPose,
+  Reply,
+} from "../../gen/dtact_pb";
 import type { ContactAbsence, Health } from "../../gen/dtact_pb";
 
 /** Which parts of a frame the page shows at present. */

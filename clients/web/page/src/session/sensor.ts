@@ -121,7 +121,8 @@ export class Sensor {
         const asked = this.waiting.get(message.id);
         this.waiting.delete(message.id);
         const result = message.reply.result;
-        if (result.case === "error") asked?.failed(new Refusal(result.value.code, result.value.message));
+        if (result.case === "error")
+          asked?.failed(new Refusal(result.value.code, result.value.message));
         else if (result.case) asked?.done(result);
         return;
       }

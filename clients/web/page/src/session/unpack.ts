@@ -1,5 +1,9 @@
 // From the wire's Frame to what the page shows of it.
-import type { DepthMap as WireDepth, Frame as WireFrame, LumaMap as WireLuma } from "../../gen/dtact_pb";
+import type {
+  DepthMap as WireDepth,
+  Frame as WireFrame,
+  LumaMap as WireLuma,
+} from "../../gen/dtact_pb";
 import { LumaEncoding } from "../../gen/dtact_pb";
 import { decodeDepth, MAX_VALUES } from "../wire/depth";
 import type { DepthMap, Frame, LumaMap } from "./messages";

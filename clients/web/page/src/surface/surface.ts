@@ -95,7 +95,10 @@ function gridGeometry(columns: number, rows: number): BufferGeometry {
   for (let row = 0; row + 1 < rows; ++row) {
     for (let column = 0; column + 1 < columns; ++column) {
       const corner = row * columns + column;
-      indices.set([corner, corner + columns, corner + 1, corner + 1, corner + columns, corner + columns + 1], at);
+      indices.set(
+        [corner, corner + columns, corner + 1, corner + 1, corner + columns, corner + columns + 1],
+        at,
+      );
       at += 6;
     }
   }
@@ -118,7 +121,14 @@ export class SurfaceView {
   private shape = "";
   private pictures = 0;
   private readonly pixel = new Uint8Array(4);
-  private readonly scale = el("input", { type: "range", min: "1", max: "10", step: "0.5", value: "3", "aria-label": "Exaggeration of depth" });
+  private readonly scale = el("input", {
+    type: "range",
+    min: "1",
+    max: "10",
+    step: "0.5",
+    value: "3",
+    "aria-label": "Exaggeration of depth",
+  });
   private readonly told = el("output", {}, "3 ×");
 
   constructor(private readonly host: HTMLElement) {
@@ -143,9 +153,15 @@ export class SurfaceView {
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.setClearColor(new Color(0, 0, 0), 0);
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 1.5));
-    this.renderer.domElement.setAttribute("aria-label", "The surface in space; drag to turn, wheel to come closer");
+    this.renderer.domElement.setAttribute(
+      "aria-label",
+      "The surface in space; drag to turn, wheel to come closer",
+    );
     const full = el("span", {}, "Depth");
-    host.append(this.renderer.domElement, el("label", { class: "row exaggeration" }, full, this.scale, this.told));
+    host.append(
+      this.renderer.domElement,
+      el("label", { class: "row exaggeration" }, full, this.scale, this.told),
+    );
     this.camera.position.set(0, -30, 26);
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);

@@ -43,6 +43,10 @@ export function drawColourBar(
     const text = value.toFixed(every < 0.1 ? 2 : every === 0.25 ? 2 : 1);
     // What is below has the lowest colour, too.
     const below = Math.abs(value - range.fromMm) < 1e-9 ? "≤ " : "";
-    context.fillText(`${below}${text}${Math.abs(value - range.toMm) < 1e-9 ? " mm" : ""}`, left + width + 8, y);
+    context.fillText(
+      `${below}${text}${Math.abs(value - range.toMm) < 1e-9 ? " mm" : ""}`,
+      left + width + 8,
+      y,
+    );
   }
 }

@@ -28,11 +28,7 @@ function pathAt(t: number): Triple {
   const hue = ((FIRST_HUE_DEG + (LAST_HUE_DEG - FIRST_HUE_DEG) * t) * Math.PI) / 180;
   // What sRGB has room for: least where blue turns into green.
   const chroma = 0.075 + 0.085 * t - 0.045 * Math.sin(Math.PI * t) ** 2;
-  return [
-    DARKEST + (LIGHTEST - DARKEST) * t,
-    chroma * Math.cos(hue),
-    chroma * Math.sin(hue),
-  ];
+  return [DARKEST + (LIGHTEST - DARKEST) * t, chroma * Math.cos(hue), chroma * Math.sin(hue)];
 }
 
 function byte(linear: number): number {

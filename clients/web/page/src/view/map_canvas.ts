@@ -139,7 +139,17 @@ class MapTexture {
     if (width === this.width && height === this.height) {
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, this.format, this.type, values);
     } else {
-      gl.texImage2D(gl.TEXTURE_2D, 0, this.internal, width, height, 0, this.format, this.type, values);
+      gl.texImage2D(
+        gl.TEXTURE_2D,
+        0,
+        this.internal,
+        width,
+        height,
+        0,
+        this.format,
+        this.type,
+        values,
+      );
       this.width = width;
       this.height = height;
     }
@@ -178,10 +188,15 @@ export class MapCanvas {
   /** Throws where the browser has no WebGL 2; the sentence says what to do. */
   constructor(readonly canvas: HTMLCanvasElement) {
     // Kept after drawing, so that a picture can be taken of it at any time.
-    const gl = canvas.getContext("webgl2", { alpha: false, antialias: false, preserveDrawingBuffer: true });
+    const gl = canvas.getContext("webgl2", {
+      alpha: false,
+      antialias: false,
+      preserveDrawingBuffer: true,
+    });
     if (!gl) {
       throw new Error(
-        "This browser offers no WebGL 2, in which depth is drawn. Switch on hardware acceleration, or take a current Chromium, Firefox or Safari.",
+        "This browser offers no WebGL 2, in which depth is drawn. Switch on hardware " +
+          "acceleration, or take a current Chromium, Firefox or Safari.",
       );
     }
     this.graphics = prepare(gl);

@@ -52,7 +52,12 @@ export function scaleLength(grid: Grid): number {
 }
 
 /** Draws the marks into a picture of so many CSS pixels. */
-export function drawMarks(context: CanvasRenderingContext2D, width: number, height: number, marks: Marks): void {
+export function drawMarks(
+  context: CanvasRenderingContext2D,
+  width: number,
+  height: number,
+  marks: Marks,
+): void {
   const { grid } = marks;
   const scale = width / grid.width;
   const at = (place: Place): [number, number] => [

@@ -1,24 +1,24 @@
 // The picture: map or camera, what is drawn over it, and the value under the cursor.
 import { el, say } from "../dom";
 import type { DepthMap, Frame, LumaMap } from "../session/messages";
-import { fixed, mm, um } from "../words";
+import { mm, um } from "../words";
 import { drawColourBar } from "./colour_bar";
 import { MapCanvas } from "./map_canvas";
 import type { Range } from "./map_canvas";
 import { drawMarks, pixelOf, placeOf } from "./overlay";
 import type { Line, Marks, Place } from "./overlay";
+import { lineText, profileOf, valueUm } from "./reading";
+import type { Profile } from "./reading";
 
 export type View = "depth" | "camera" | "surface";
 export type Tool = "point" | "line";
 
-/** Depth along a line: millimetres from its start, and depth in millimetres or null where untrusted. */
-export interface Profile {
-  alongMm: number[];
-  depthMm: (number | null)[];
-}
-
 /** Draws a 2D canvas at the screen's own resolution. */
-function sharp(canvas: HTMLCanvasElement): { context: CanvasRenderingContext2D; width: number; height: number } {
+function sharp(canvas: HTMLCanvasElement): {
+  context: CanvasRenderingContext2D;
+  width: number;
+  height: number;
+} {
   const ratio = devicePixelRatio;
   const { clientWidth: width, clientHeight: height } = canvas;
   const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
@@ -43,12 +43,24 @@ export class Stage {
   private readonly bar = el("canvas", { class: "bar", role: "img" });
   private readonly readout = el("output", { class: "readout" }, "Point at the map for its values.");
   private readonly veil = el("div", { class: "veil", role: "status" });
-  private readonly picture = el("div", { class: "picture" }, this.canvas, this.marksCanvas, this.veil);
+  private readonly picture = el(
+    "div",
+    { class: "picture" },
+    this.canvas,
+    this.marksCanvas,
+    this.veil,
+  );
   private readonly host = el("div", { class: "surface" });
   readonly element = el(
     "div",
     { class: "stage" },
-    el("div", { class: "viewport" }, this.picture, this.host, el("div", { class: "beside" }, this.bar)),
+    el(
+      "div",
+      { class: "viewport" },
+      this.picture,
+      this.host,
+      el("div", { class: "beside" }, this.bar),
+    ),
     this.readout,
   );
   private readonly map: MapCanvas;
@@ -172,7 +184,8 @@ export class Stage {
     context.save();
     context.translate(12, 12);
     context.drawImage(this.canvas, 0, 0, mapWidth, mapHeight);
-    if (this.view === "depth" && this.depth) drawMarks(context, mapWidth, mapHeight, this.marks(this.depth));
+    if (this.view === "depth" && this.depth)
+      drawMarks(context, mapWidth, mapHeight, this.marks(this.depth));
     if (this.view === "depth") drawColourBar(context, mapWidth + 10, 0, mapHeight, this.range, ink);
     context.restore();
     context.fillStyle = ink;
@@ -180,7 +193,10 @@ export class Stage {
     context.textBaseline = "top";
     lines.forEach((text, i) => context.fillText(text, 12, mapHeight + 20 + 18 * i));
     return new Promise((done, failed) =>
-      made.toBlob((blob) => (blob ? done(blob) : failed(new Error("no picture was made"))), "image/png"),
+      made.toBlob(
+        (blob) => (blob ? done(blob) : failed(new Error("no picture was made"))),
+        "image/png",
+      ),
     );
   }
 
@@ -227,7 +243,10 @@ export class Stage {
     event.preventDefault();
     event.stopPropagation();
     const grid = this.grid(map);
-    const from = (this.cursor && pixelOf(grid, this.cursor)) ?? { column: map.width >> 1, row: map.height >> 1 };
+    const from = (this.cursor && pixelOf(grid, this.cursor)) ?? {
+      column: map.width >> 1,
+      row: map.height >> 1,
+    };
     const by = event.shiftKey ? 10 : 1;
     const column = Math.min(Math.max(from.column + by * way[0], 0), map.width - 1);
     const row = Math.min(Math.max(from.row + by * way[1], 0), map.height - 1);
@@ -249,58 +268,35 @@ export class Stage {
     this.tellValue();
   }
 
-  /** Depth at a pixel, micrometres; null: untrusted. */
-  private valueUm(depth: DepthMap, column: number, row: number): number | null {
-    const value = depth.values[row * depth.width + column] as number;
-    return value === depth.untrusted ? null : value * depth.umPerUnit;
-  }
-
   private tellValue(): void {
     const map = this.shown();
     const pixel = map && this.cursor && pixelOf(this.grid(map), this.cursor);
     if (!map || !pixel || !this.cursor) {
-      say(this.readout, this.line && this.view === "depth" ? this.lineText(this.line) : "Point at the map for its values.");
+      say(
+        this.readout,
+        this.line && this.view === "depth"
+          ? lineText(this.depth, this.line)
+          : "Point at the map for its values.",
+      );
       return;
     }
     const where = `row ${pixel.row}, column ${pixel.column}`;
     if ("mmPerPx" in map) {
-      const value = this.valueUm(map, pixel.column, pixel.row);
+      const value = valueUm(map, pixel.column, pixel.row);
       const place = `x ${mm(this.cursor.xMm)}, y ${mm(this.cursor.yMm)}`;
       const told = value === null ? "untrusted" : um(value);
-      const line = this.line ? ` · ${this.lineText(this.line)}` : "";
+      const line = this.line ? ` · ${lineText(this.depth, this.line)}` : "";
       say(this.readout, `${told} · ${where} · ${place}${line}`);
     } else {
-      say(this.readout, `grey ${map.values[pixel.row * map.width + pixel.column]} of 255 · ${where}`);
+      say(
+        this.readout,
+        `grey ${map.values[pixel.row * map.width + pixel.column]} of 255 · ${where}`,
+      );
     }
-  }
-
-  private lineText(line: Line): string {
-    const long = Math.hypot(line.to.xMm - line.from.xMm, line.to.yMm - line.from.yMm);
-    const ends = [line.from, line.to].map((place) => {
-      const pixel = this.depth && pixelOf(this.depth, place);
-      return pixel && this.depth ? this.valueUm(this.depth, pixel.column, pixel.row) : null;
-    });
-    const [a, b] = ends;
-    const step = typeof a === "number" && typeof b === "number" ? `, B − A ${um(b - a)}` : "";
-    return `A–B ${mm(long)}${step}`;
   }
 
   private tellProfile(): void {
     const { depth, line } = this;
-    if (!depth || !line || this.view !== "depth") return this.profiled(undefined);
-    const long = Math.hypot(line.to.xMm - line.from.xMm, line.to.yMm - line.from.yMm);
-    const count = Math.max(2, Math.round(long / depth.mmPerPx) + 1);
-    const profile: Profile = { alongMm: [], depthMm: [] };
-    for (let i = 0; i < count; ++i) {
-      const share = i / (count - 1);
-      const pixel = pixelOf(depth, {
-        xMm: line.from.xMm + share * (line.to.xMm - line.from.xMm),
-        yMm: line.from.yMm + share * (line.to.yMm - line.from.yMm),
-      });
-      const value = pixel ? this.valueUm(depth, pixel.column, pixel.row) : null;
-      profile.alongMm.push(Number(fixed(share * long, 4).replace("−", "-")));
-      profile.depthMm.push(value === null ? null : value / 1000);
-    }
-    this.profiled(profile);
+    this.profiled(depth && line && this.view === "depth" ? profileOf(depth, line) : undefined);
   }
 }
