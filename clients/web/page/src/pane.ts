@@ -307,6 +307,8 @@ export class Pane {
     this.sensor.pause(paused);
     say(this.pauseButton, paused ? "Resume" : "Pause");
     this.pauseButton.setAttribute("aria-pressed", String(paused));
+    // Not the number that it told when it was paused before.
+    say(this.behind, "");
     this.steps.hidden = !paused;
     this.element.classList.toggle("paused", paused);
     if (paused) this.sensor.step(0);
