@@ -15,7 +15,7 @@ export function drawColourBar(
 ): void {
   const width = 14;
   const cap = 10;
-  const low = top + height - 6;
+  const low = top + height - 24;
   const high = top + cap + 14;
   context.fillStyle = `rgb(${BEYOND.join(" ")})`;
   context.fillRect(left, top + 6, width, cap - 2);
@@ -32,6 +32,16 @@ export function drawColourBar(
   context.fillStyle = ink;
   context.strokeStyle = ink;
   context.lineWidth = 1;
+  // As the map marks what is not to be believed.
+  for (let x = 0; x < width; ++x) {
+    for (let y = 0; y < cap - 2; ++y) {
+      context.fillStyle =
+        Math.floor((x + y) / 4) % 2 === 0 ? "rgb(107 107 107)" : "rgb(143 143 143)";
+      context.fillRect(left + x, low + 14 + y, 1, 1);
+    }
+  }
+  context.fillStyle = ink;
+  context.fillText("untrusted", left + width + 8, low + 14 + (cap - 2) / 2);
   context.fillText("above", left + width + 8, top + 6 + (cap - 2) / 2);
   for (let i = Math.ceil(range.fromMm / every - 1e-9); i * every <= range.toMm + 1e-9; ++i) {
     const value = i * every;

@@ -31,7 +31,7 @@ out vec4 colour;
 
 float mmAt(ivec2 at) {
   int value = texelFetch(depth, clamp(at, ivec2(0), size - 1), 0).r;
-  return value == untrusted ? -1e3 : float(value) * mmPerUnit;
+  return value == untrusted ? 1e3 : float(value) * mmPerUnit;
 }
 
 void main() {
