@@ -14,6 +14,8 @@ source_folder=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 
 # inside COMMAND: runs a shell command in the chroot, with /proc and /sys, which are gone afterwards.
 inside() {
+  local page=OFF
+  if [ -e "$root/page/index.html" ]; then page=/page; fi
   # shellcheck disable=SC2016  # the inner shell expands it
   unshare --mount bash -c '
     mount -t proc proc "$1/proc"
@@ -21,7 +23,7 @@ inside() {
     mount --rbind /dev "$1/dev"
     exec chroot "$1" /usr/bin/env -i HOME=/root LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
       PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
-      CCACHE_DIR=/ccache DTACT_WEB_PAGE=/page bash -euc "$2"' inside "$root" "$1"
+      CCACHE_DIR=/ccache DTACT_WEB_PAGE="$3" bash -euc "$2"' inside "$root" "$1" "$page"
 }
 
 # prepare SETUP PACKAGE...: makes the chroot, runs SETUP once in it, installs the packages. Scripts that
