@@ -53,7 +53,7 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, int the_steps)
       gain_q12(at(grid.height)),
       untrusted(at(grid.height)) {
   if (steps > 0) {
-    sharpener.emplace(*model->scattering, steps, model->mm_per_px, grid.width, grid.height);
+    sharpener.emplace(model->scattering.value(), steps, model->mm_per_px, grid.width, grid.height);
     marks_q12.resize(at(grid.height));
   }
   rectify_reference(model->reference_q8);
@@ -202,7 +202,8 @@ void Reconstructor::run_active(const std::uint8_t* luma, std::ptrdiff_t stride,
 const TileGrid& Reconstructor::grid() const noexcept { return impl_->grid; }
 
 int Reconstructor::radius() const noexcept {
-  return impl_->smoother.radius() + (impl_->sharpener ? impl_->sharpener->reach() : 0);
+  const std::optional<Sharpener>& sharpener = impl_->sharpener;
+  return impl_->smoother.radius() + (sharpener ? sharpener->reach() : 0);
 }
 
 }  // namespace dtact::recon

@@ -109,8 +109,9 @@ struct Reconstructor::Impl {
   [[nodiscard]] MapArea area_of(const TileRows& tiles) const noexcept;
   void set_tiles(const MapArea& area, TileRows& tiles) const noexcept;
   /// Levels of the rows of tiles, sharpened and looked up.
-  void run_sharpened(const std::uint8_t* luma, const TileRows& tiles, std::int16_t* depth,
-                     StripSums* sums, StepTimes& times, Stopwatch& watch) noexcept;
+  void run_sharpened(Sharpener& filter, const std::uint8_t* luma, const TileRows& tiles,
+                     std::int16_t* depth, StripSums* sums, StepTimes& times,
+                     Stopwatch& watch) noexcept;
   /// The map's pixels [x0, x1) of row `y` before smoothing.
   void rectify(const std::uint8_t* luma, int y, int x0, int x1, std::int16_t* row) noexcept;
   /// Fetches what the last step on a row of tiles reads and writes. Whole maps are fetched by the

@@ -106,7 +106,7 @@ void Reconstructor::Impl::smooth_tiles(const std::uint8_t* luma, const TileRows&
 void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& tiles,
                                    std::int16_t* depth, StripSums* sums, StepTimes& times,
                                    Stopwatch& watch) noexcept {
-  if (sharpener) return run_sharpened(luma, tiles, depth, sums, times, watch);
+  if (sharpener) return run_sharpened(*sharpener, luma, tiles, depth, sums, times, watch);
   const auto look_up = [&](int row, int first, int last) {
     const std::size_t here = at(row * TileGrid::kRows);
     look_up_rows({out.row(0), out.stride(), gain_q12.data() + here, vec::padded(grid.width)}, row,
@@ -165,30 +165,30 @@ void Reconstructor::Impl::set_tiles(const MapArea& area, TileRows& tiles) const 
   }
 }
 
-void Reconstructor::Impl::run_sharpened(const std::uint8_t* luma, const TileRows& tiles,
-                                        std::int16_t* depth, StripSums* sums, StepTimes& times,
-                                        Stopwatch& watch) noexcept {
+void Reconstructor::Impl::run_sharpened(Sharpener& filter, const std::uint8_t* luma,
+                                        const TileRows& tiles, std::int16_t* depth, StripSums* sums,
+                                        StepTimes& times, Stopwatch& watch) noexcept {
   // The filter reaches over several tiles: what it reads is nearly a rectangle anyway.
   const MapArea area = area_of(tiles);
-  set_tiles(sharpener->needed(area), sharpener_tiles);
+  set_tiles(filter.needed(area), sharpener_tiles);
   const auto take_levels = [&](int row, int first, int last) {
     const int y0 = row * TileGrid::kRows;
     for (int y = y0; y < std::min(y0 + TileGrid::kRows, grid.height); ++y) {
-      vec::lit_row(out.row(y - y0), gain_q12.data() + at(y), first, last, sharpener->level(y));
+      vec::lit_row(out.row(y - y0), gain_q12.data() + at(y), first, last, filter.level(y));
     }
     times.list_ns += watch.lap();
   };
   const auto nothing = [](int) {};
   smooth_tiles(luma, sharpener_tiles, times, watch, nothing, take_levels, nothing);
-  sharpener->run(area);
+  filter.run(area);
   times.smooth_ns += watch.lap();
   for (int row = 0; row < grid.rows(); ++row) {
     const int y = row * TileGrid::kRows;
     for_each_run(tiles[static_cast<std::size_t>(row)], [&](int first, int last) {
-      look_up_rows({sharpener->sharpened(y), sharpener->stride(), marks_q12.data() + at(y),
-                    vec::padded(grid.width)},
-                   row, first * grid.blocks_per_tile,
-                   std::min(last * grid.blocks_per_tile, grid.blocks()), depth);
+      look_up_rows(
+          {filter.sharpened(y), filter.stride(), marks_q12.data() + at(y), vec::padded(grid.width)},
+          row, first * grid.blocks_per_tile, std::min(last * grid.blocks_per_tile, grid.blocks()),
+          depth);
     });
     times.list_ns += watch.lap();
     finish(row, sums, times, watch);

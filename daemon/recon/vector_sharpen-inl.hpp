@@ -97,7 +97,7 @@ void SharpenRow(const SharpenRows& rows, int16_t wide_share_q15, int first, int 
       const auto next = down(8 * block + 1);
       hn::StoreInterleaved4(Between(here, before, far_share), Between(here, before, near_share),
                             Between(here, next, near_share), Between(here, next, far_share), d8,
-                            wide + (block - begin) * kBlock);
+                            wide + static_cast<ptrdiff_t>(block - begin) * kBlock);
     }
     for (int x = begin * kBlock; x < end * kBlock; x += kLanes) {
       const auto mean = hn::Load(d16, wide + (x - begin * kBlock));

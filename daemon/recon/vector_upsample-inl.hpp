@@ -29,7 +29,7 @@ void WidenRow(const int16_t* coarse, const kernels::Phases& phases, int count, i
     const auto before = hn::LoadU(d8, coarse + k - 1);
     const auto here = hn::LoadU(d8, coarse + k);
     const auto next = hn::LoadU(d8, coarse + k + 1);
-    int16_t* const out = fine + phases.count * k;
+    int16_t* const out = fine + static_cast<ptrdiff_t>(phases.count) * k;
     if (phases.count == 4) {
       hn::StoreInterleaved4(
           DepthBetween(d8, here, before, share[0]), DepthBetween(d8, here, before, share[1]),
