@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <boost/asio/buffer.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/http/rfc7230.hpp>
 #include <charconv>
+#include <chrono>
 #include <utility>
 
 namespace dtact::web::foxglove {
@@ -24,8 +26,13 @@ std::string subprotocol_of(const Request& request) {
   return "";
 }
 
+/// How long who is refused may take to read why.
+constexpr std::chrono::seconds kLinger{2};
+
 /// Says why, as the protocol does, and ends.
 void refuse(const std::shared_ptr<WebSocket>& socket, const std::string& sentence) {
+  const auto timer = std::make_shared<boost::asio::steady_timer>(socket->executor(), kLinger);
+  timer->async_wait([timer, socket](const boost::system::error_code&) { socket->close(); });
   const auto text = std::make_shared<const std::string>(status(2, sentence));
   socket->write({boost::asio::buffer(*text)}, true,
                 [socket, text](const boost::system::error_code& error, std::size_t) {

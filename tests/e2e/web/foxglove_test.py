@@ -11,12 +11,13 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import unittest
 from typing import Any
 
 from programs import Daemon, Gateway, calibrate
 from viewer import Client, E, M
-from web_socket import Closed, Refused, WebSocket
+from web_socket import Closed, Refused, WebSocket, request
 
 import numpy
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
@@ -155,8 +156,8 @@ class FoxglovesClient(unittest.TestCase):
 
     def frames(self, frames: list[tuple[int, Any]]) -> None:
         self.assertEqual(len(frames), 15)
-        for time, message in frames:
-            self.assertEqual(time, message.wall_ns)
+        for time_ns, message in frames:
+            self.assertEqual(time_ns, message.wall_ns)
             # There is none while the light settles that was set.
             if message.HasField("depth"):
                 self.assertEqual(message.depth.encoding, E.DEPTH_PREDICT_ZSTD)
@@ -165,12 +166,12 @@ class FoxglovesClient(unittest.TestCase):
     def pictures(self, pictures: list[tuple[int, Any]], direct: DirectFrames) -> None:
         """A picture is the depth that the daemon sends to all."""
         compared = 0
-        for time, picture in pictures:
-            self.assertEqual(picture.timestamp.seconds * 10**9 + picture.timestamp.nanos, time)
+        for time_ns, picture in pictures:
+            self.assertEqual(picture.timestamp.seconds * 10**9 + picture.timestamp.nanos, time_ns)
             self.assertEqual((picture.encoding, picture.step), ("16UC1", 2 * picture.width))
             self.assertEqual(direct.sizes, {(picture.width, picture.height)})
-            if time in direct.digests:
-                self.assertEqual(hashlib.sha256(picture.data).digest(), direct.digests[time])
+            if time_ns in direct.digests:
+                self.assertEqual(hashlib.sha256(picture.data).digest(), direct.digests[time_ns])
                 compared += 1
         self.assertGreater(compared, 0)
 
@@ -225,6 +226,30 @@ class Protocol(unittest.TestCase):
                 self.assertEqual(json.loads(socket.receive()[1])["op"], "status", payload)
             socket.send(b"\x02" + struct.pack("<III", 7, 1, 4) + b"json{}")
             self.assertEqual(json.loads(socket.receive()[1])["op"], "serviceCallFailure")
+
+    def test_tokens(self) -> None:
+        tokens = pathlib.Path(FOLDER.name, "tokens")
+        tokens.write_text("view a-token-to-look-on\ncontrol a-token-to-command\n")
+        tokens.chmod(0o600)
+        gate = Gateway(pathlib.Path(FOLDER.name), "--host", f"127.0.0.1:{daemon.port}", "--tokens", str(tokens))
+        while not json.loads(request(gate.port, "/sensors")[2])[0]["connected"]:
+            time.sleep(0.1)
+        for target, word in (("/foxglove", "add ?token=\u2026"), ("/foxglove?token=x", "does not know the token")):
+            with WebSocket(gate.port, target, Sec_WebSocket_Protocol=V1) as socket:
+                self.assertIn(word, json.loads(socket.receive()[1])["message"])
+                # Also of one that does not take its leave.
+                with self.assertRaises(Closed):
+                    while True:
+                        socket.receive()
+        call = b"\x02" + struct.pack("<III", 1, 1, 4) + b'json{"brightness":255}'
+        for token, opcode in (("a-token-to-look-on", 1), ("a-token-to-comman%64", 2)):
+            with WebSocket(gate.port, f"/foxglove?token={token}", Sec_WebSocket_Protocol=V1) as socket:
+                for _ in range(3):
+                    socket.receive()
+                socket.send(call)
+                answer = socket.receive()
+                self.assertEqual(answer[0], opcode, answer)
+        self.assertEqual(gate.stop(), 0)
 
     def test_messages_are_bounded(self) -> None:
         with self.open() as socket:
