@@ -200,9 +200,9 @@ void Source::settle(Stream& stream, const v1::Reply& reply) {
   }
   // Of the one before comes no frame after the answer.
   for (Stream& other : streams_) {
-    for (const auto& [who, serial] : joined) {
+    for (const auto& mover : joined) {
       std::erase_if(other.members, [&](const Member& member) {
-        return member.who == who && member.serial < serial && !waits(member);
+        return member.who == mover.first && member.serial < mover.second && !waits(member);
       });
     }
   }
