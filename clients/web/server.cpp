@@ -140,6 +140,7 @@ std::string Server::sensors() const {
 
 std::vector<std::shared_ptr<Source>> Server::sources() const {
   std::vector<std::shared_ptr<Source>> all;
+  all.reserve(sensors_.size());
   for (const auto& sensor : sensors_) all.push_back(sensor->shared_source());
   return all;
 }

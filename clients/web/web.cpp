@@ -27,6 +27,7 @@ struct Arguments {
 std::vector<NamedDaemon> daemons_of(const Arguments& arguments, const client::Options& common) {
   if (arguments.daemons.empty()) return {{"sensor", common}};
   std::vector<NamedDaemon> daemons;
+  daemons.reserve(arguments.daemons.size());
   std::set<std::string> names;
   for (const std::string& text : arguments.daemons) {
     daemons.push_back(parse_daemon(text, common));

@@ -67,6 +67,7 @@ std::string token_of(std::string_view target) {
 Door::Door(const std::vector<std::shared_ptr<Source>>& sources, const net::NetConfig& config,
            net::Admission& admission)
     : config_(config), admission_(admission) {
+  stations_.reserve(sources.size());
   for (const auto& source : sources) stations_.push_back(std::make_shared<Station>(source));
 }
 

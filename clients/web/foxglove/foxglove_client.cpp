@@ -33,6 +33,7 @@ FoxgloveClient::FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Pl
 
 void FoxgloveClient::start() {
   std::vector<std::string> prefixes;
+  prefixes.reserve(places_.size());
   for (const Place& place : places_) prefixes.push_back(place.prefix);
   send(server_info(program_));
   send(advertise(prefixes));
