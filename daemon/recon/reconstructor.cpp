@@ -52,8 +52,9 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, int the_steps)
       reference_q6(at(grid.height)),
       gain_q12(at(grid.height)),
       untrusted(at(grid.height)) {
-  if (steps > 0) {
-    sharpener.emplace(model->scattering.value(), steps, model->mm_per_px, grid.width, grid.height);
+  // check() wants the scattering where there are lists for steps.
+  if (const auto& scattering = model->scattering; steps > 0 && scattering) {
+    sharpener.emplace(*scattering, steps, model->mm_per_px, grid.width, grid.height);
     marks_q12.resize(at(grid.height));
   }
   rectify_reference(model->reference_q8);

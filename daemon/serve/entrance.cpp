@@ -55,6 +55,7 @@ void Entrance::reload(const NetConfig& fresh) {
 
 std::vector<std::string> Entrance::addresses() const {
   std::vector<std::string> all;
+  all.reserve(listeners_.size());
   for (const auto& listener : listeners_) all.push_back(listener->address());
   return all;
 }
