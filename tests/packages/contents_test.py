@@ -39,15 +39,18 @@ FILES = {
         /usr/bin/dtact-web
         /usr/bin/dtactctl
         UNITS/dtact-perceive.service
+        UNITS/dtact-web.service
         /usr/share/bash-completion/completions/dtact-calibrate
         /usr/share/bash-completion/completions/dtactctl
         /usr/share/bash-completion/completions/dtact-perceive
+        /usr/share/bash-completion/completions/dtact-web
         /usr/share/man/man1/dtact-calibrate.1.gz
         /usr/share/man/man1/dtact-perceive.1.gz
         /usr/share/man/man1/dtact-web.1.gz
         /usr/share/man/man1/dtactctl.1.gz
         /usr/share/zsh/vendor-completions/_dtact-calibrate
         /usr/share/zsh/vendor-completions/_dtact-perceive
+        /usr/share/zsh/vendor-completions/_dtact-web
         /usr/share/zsh/vendor-completions/_dtactctl
         /usr/share/dtact/foxglove-layout.json
         /usr/share/dtact/foxglove/dtact-live.json""",
@@ -75,7 +78,7 @@ PLACES = {
     r"/usr/lib/udev/rules\.d/60-dtactd|/usr/share/dtactd/scenes/|/usr/share/man/man[58]/dtactd|"
     r"/usr/share/(bash|zsh)",
     "dtact-tools": r"/usr/bin/dtact(ctl|-calibrate|-perceive|-web)$|/usr/share/(bash|zsh)|/usr/share/dtact/foxglove|"
-    r"(/usr)?/lib/systemd/system/dtact-perceive\.service$|/usr/share/man/man1/dtact",
+    r"(/usr)?/lib/systemd/system/dtact-(perceive|web)\.service$|/usr/share/man/man1/dtact",
     "libdtact1": r"LIB/libdtact\.so\.1$",
     "libdtact-dev": r"/usr/include/dtact/|LIB/(cmake/dtact/|libdtact\.so$|pkgconfig/dtact\.pc$)|"
     r"/usr/share/dtact/proto/",
@@ -154,7 +157,8 @@ class Contents(unittest.TestCase):
 
     def test_what_stands_beside_the_daemon_waits_to_be_wanted(self) -> None:
         self.assertNotRegex(control("dtact-tools", "postinst"), r"deb-systemd-(helper enable|invoke)")
-        self.assertIn("deb-systemd-helper purge 'dtact-perceive.service'", control("dtact-tools", "postrm"))
+        for unit in ("dtact-perceive.service", "dtact-web.service"):
+            self.assertRegex(control("dtact-tools", "postrm"), f"deb-systemd-helper purge .*'{unit}'")
 
     def test_each_depends_on_what_it_needs_and_no_more(self) -> None:
         version = field("libdtact1", "Version")

@@ -106,6 +106,7 @@ std::vector<File> all_files(const std::filesystem::path& root) {
                                                                    {"evaluate", as_is}})},
       {"clients/calibrate/dtact-calibrate.zsh-completion", zsh_completion(calibrate, {})},
       {"clients/perceive/dtact-perceive.zsh-completion", zsh_completion(perceive, {})},
+      {"clients/web/dtact-web.zsh-completion", zsh_completion(web, {})},
   };
 }
 

@@ -19,6 +19,7 @@ struct Completion {
 };
 const Completion kDtactd{"daemon/dtactd.bash-completion", "_dtactd"};
 const Completion kPerceive{"clients/perceive/dtact-perceive.bash-completion", "_dtact_perceive"};
+const Completion kWeb{"clients/web/dtact-web.bash-completion", "_dtact_web"};
 
 /// What bash offers for the last of `words`, which are separated by blanks.
 std::set<std::string> offered(const Completion& completion, const std::string& words) {
@@ -53,18 +54,22 @@ TEST(Bash, OffersLevels) {
   EXPECT_THAT(offered(kDtactd, "dtactd --log-level w"), testing::ElementsAre("warn"));
 }
 
-TEST(Bash, OffersEveryOptionOfDtactPerceive) {
-  const Command perceive = dtact_perceive();
-  EXPECT_EQ(offered(kPerceive, "dtact-perceive --"), options_of(perceive));
-  std::set<std::string> names;
-  for (const Command& command : perceive.commands) {
-    names.insert(command.name);
+/// Of a program and each of its commands.
+void expect_every_option(const Completion& completion, const Command& program) {
+  EXPECT_EQ(offered(completion, program.name + " --"), options_of(program));
+  for (const Command& command : program.commands) {
     std::set<std::string> options = options_of(command);
     options.insert("--help");
-    EXPECT_EQ(offered(kPerceive, "dtact-perceive --host gripper " + command.name + " --"), options);
+    const std::string line = program.name + " --host gripper " + command.name + " --";
+    EXPECT_EQ(offered(completion, line), options);
+    EXPECT_THAT(offered(completion, program.name + " " + command.name.substr(0, 1)),
+                testing::Contains(command.name));
   }
-  EXPECT_EQ(names, (std::set<std::string>{"serve", "watch"}));
 }
+
+TEST(Bash, OffersEveryOptionOfDtactPerceive) { expect_every_option(kPerceive, dtact_perceive()); }
+
+TEST(Bash, OffersEveryOptionOfDtactWeb) { expect_every_option(kWeb, dtact_web()); }
 
 }  // namespace
 }  // namespace dtact::manual

@@ -83,14 +83,15 @@ void collect(const std::string& line, const Command& command, const Words& every
 
 TEST_F(Zsh, OffersEveryCommandAndOption) {
   std::map<std::string, Words> expected;
-  for (const Command& program : {dtactctl(), dtact_calibrate(), dtact_perceive(), dtactd()}) {
+  for (const Command& program :
+       {dtactctl(), dtact_calibrate(), dtact_perceive(), dtact_web(), dtactd()}) {
     collect(program.name, program, long_names(program.options), expected);
   }
   std::vector<std::string> lines;
   for (const auto& [line, words] : expected) lines.push_back(line);
   // dtactctl, its 17 commands, 5 of calibration; dtact-calibrate and its 7; dtact-perceive and its
   // 2; dtactd.
-  EXPECT_EQ(lines.size(), 1U + 17 + 5 + 2 + 1 + 7 + 1 + 1 + 2 + 1 + 1);
+  EXPECT_EQ(lines.size(), 1U + 17 + 5 + 2 + 1 + 7 + 1 + 1 + 2 + 1 + 1 + 1 + 1 + 1);
   for (const auto& [line, words] : offers(lines)) {
     EXPECT_THAT(expected.at(line), IsSubsetOf(words)) << line;
   }
@@ -113,8 +114,8 @@ TEST_F(Zsh, OffersWhatDtactCalibrateDoesToDtactctl) {
 TEST_F(Zsh, OffersValuesAndFiles) {
   std::fclose(std::fopen((folder_ / "press.mcap").c_str(), "w"));
   fs::create_directory(folder_ / "calibration");
-  const Words files{"calibration",      "press.mcap", "_dtactctl",
-                    "_dtact-calibrate", "_dtactd",    "_dtact-perceive"};
+  const Words files{"calibration", "press.mcap",      "_dtactctl", "_dtact-calibrate",
+                    "_dtactd",     "_dtact-perceive", "_dtact-web"};
   const std::map<std::string, Words> expected{
       {"dtactctl export press.mcap --to ", {"npy", "png", "ply", "pcd", "csv"}},
       {"dtact-calibrate depth --method=p", {"published"}},

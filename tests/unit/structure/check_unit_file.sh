@@ -16,8 +16,8 @@ verify() {
   grep -F dtact <<<"$output" || true
 }
 
-for unit in dtactd.service dtactd@.service dtact-perceive.service; do
-  sed -E "s#/usr/bin/dtact(d|-perceive)#$program#" "$source/$unit" >"$folder/$unit"
+for unit in dtactd.service dtactd@.service dtact-perceive.service dtact-web.service; do
+  sed -E "s#/usr/bin/dtact(d|-perceive|-web)#$program#" "$source/$unit" >"$folder/$unit"
   complaint=$(verify "$unit")
   [[ -z $complaint ]] || fail "$complaint"
   # In tenths: 1.5. What is left is what the sensor needs: its devices, FIFO, the network.
