@@ -94,7 +94,7 @@ Key named(std::string path, int& field, const std::vector<std::pair<std::string,
 Key named_or(std::string path, int& field, const std::vector<std::pair<std::string, int>>& names,
              std::vector<std::int64_t> numbers) {
   Key name = named(path, field, names);
-  Key number = one_of(std::move(path), field, numbers);
+  const Key number = one_of(std::move(path), field, numbers);
   return {name.path, fmt::format("{}, or {}", name.allowed, fmt::join(numbers, " or ")),
           [name, number](const toml::node& node, const fs::path& folder) {
             return name.assign(node, folder) || number.assign(node, folder);

@@ -141,9 +141,10 @@ void CloudMaker::flat_row(const DepthGrid& depth, int row, int reach, const Row&
 
 void CloudMaker::curved_row(const DepthGrid& depth, int row, int reach, const Row& out) const {
   const std::size_t size = depth_.size();
-  const std::ptrdiff_t above = (std::max(0, row - reach) - row) * depth.width;
-  const std::ptrdiff_t below = (std::min(depth.height - 1, row + reach) - row) * depth.width;
-  const float* x = points_.data() + std::ptrdiff_t{row} * depth.width;
+  const std::ptrdiff_t width = depth.width;
+  const std::ptrdiff_t above = (std::max(0, row - reach) - row) * width;
+  const std::ptrdiff_t below = (std::min(depth.height - 1, row + reach) - row) * width;
+  const float* x = points_.data() + row * width;
   for (std::size_t part = 0; part < 3; ++part) {
     std::copy_n(x + part * size, depth.width, out[part]);
   }
