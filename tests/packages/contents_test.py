@@ -156,8 +156,11 @@ class Contents(unittest.TestCase):
             self.assertNotRegex(control("dtactd", script), r"(invoke start|enable) 'dtactd@")
 
     def test_what_stands_beside_the_daemon_waits_to_be_wanted(self) -> None:
-        self.assertNotRegex(control("dtact-tools", "postinst"), r"deb-systemd-(helper enable|invoke)")
+        postinst = control("dtact-tools", "postinst")
+        self.assertNotIn("deb-systemd-invoke", postinst)
         for unit in ("dtact-perceive.service", "dtact-web.service"):
+            # Enabled again where somebody had enabled it, and nowhere else.
+            self.assertIn(f"deb-systemd-helper debian-installed '{unit}'", postinst)
             self.assertRegex(control("dtact-tools", "postrm"), f"deb-systemd-helper purge .*'{unit}'")
 
     def test_each_depends_on_what_it_needs_and_no_more(self) -> None:
