@@ -8,11 +8,12 @@ import socket
 import ssl
 import subprocess
 import tempfile
+import time
 import unittest
 
 from programs import Daemon, Gateway, calibrate
 from viewer import Client, E, M, Viewer, length
-from web_socket import BINARY, TEXT, Closed, Refused, WebSocket, connect, request
+from web_socket import BINARY, PATIENCE, TEXT, Closed, Refused, WebSocket, connect, request
 
 FOLDER = tempfile.TemporaryDirectory(prefix="dtact_web_")
 HERE = pathlib.Path(FOLDER.name)
@@ -36,6 +37,10 @@ def setUpModule() -> None:
     for name in ("left", "right"):
         with Viewer(gateway.port, name) as viewer:
             viewer.notice(lambda told: told["connected"])
+    # Depth comes once the reference is taken.
+    with Client(left.port) as client:
+        client.call(subscribe=M.Subscribe(**EVERYTHING))
+        client.frame(lambda frame: frame.HasField("depth"))
 
 
 def tearDownModule() -> None:
@@ -304,7 +309,14 @@ class Http(unittest.TestCase):
         finally:
             for stream in held:
                 stream.close()
-        request(gateway.port, "/")
+        # That those are gone is found one by one.
+        until = time.monotonic() + PATIENCE
+        while True:
+            try:
+                self.assertEqual(request(gateway.port, "/")[0], 200)
+                return
+            except ConnectionError:
+                self.assertLess(time.monotonic(), until)
 
 
 class BadMessages(unittest.TestCase):
