@@ -80,7 +80,7 @@ std::optional<ContactView::Sample> ContactView::at(double x, double y) const {
 }
 
 std::vector<Surfel> ContactView::choose(std::size_t most) const {
-  std::array<std::vector<std::size_t>, kDirections * kDirections> by_direction;
+  std::array<std::vector<std::size_t>, std::size_t{kDirections} * kDirections> by_direction;
   const auto step = [](float component) {
     return std::clamp(static_cast<int>((component + 1) / 2 * kDirections), 0, kDirections - 1);
   };

@@ -82,7 +82,7 @@ Alignment Tracker::best(const ContactView& view, const Motion& from) {
     }
   }
   if (nearest == current_) return found;
-  const Alignment other = align(keyframes_[nearest].surfels, view, from);
+  Alignment other = align(keyframes_[nearest].surfels, view, from);
   const bool better = is_good(other) && (!is_good(found) || other.overlap >= found.overlap);
   if (!better) return found;
   current_ = nearest;

@@ -66,7 +66,7 @@ void for_points_about(double pole, double from, double to, const Add& add) {
     return;
   }
   const bool below = pole >= to;
-  double near = below ? to : from;  // the end next to the pole
+  const double near = below ? to : from;  // the end next to the pole
   const double far = below ? from : to;
   const double gap = std::abs(near - pole);
   double outer = far;

@@ -145,6 +145,7 @@ FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& 
   made.light_levels = light_of(model->rectify, set.reference_q8);
   const MapOptics optics{made.light_levels, model->smoothing_px * set.mm_per_px, set.mm_per_px};
   std::vector<PressProfile> profiles;
+  profiles.reserve(seen.presses.size());
   for (const SettledPress& press : seen.presses) {
     profiles.push_back(profile_of(press, optics.light_levels, optics.smoothing_mm));
   }

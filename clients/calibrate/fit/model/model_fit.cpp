@@ -181,7 +181,7 @@ ModelFit refine(std::span<const PressProfile> presses, State best) {
         "reference and frame are not exchanged");
   }
   const auto residuals_of = [&](std::size_t p, double doubt) {
-    RingCost cost(presses[p], doubt, best.shared.size());
+    const RingCost cost(presses[p], doubt, best.shared.size());
     std::vector<double> residuals(presses[p].loss.size());
     const std::array<const double*, 2> parameters = {best.shared.data(), best.own[p].data()};
     (void)cost(parameters.data(), residuals.data());
