@@ -33,6 +33,7 @@ struct Options {
 
 std::vector<Pair> measured(const Options& options, const calibration::Calibration& calibration) {
   std::vector<Reading> readings;
+  readings.reserve(options.pairs.size());
   for (const std::string& text : options.pairs) readings.push_back(parse_reading(text));
   if (!options.csv.empty()) {
     for (Reading& reading : read_readings(options.csv)) readings.push_back(std::move(reading));

@@ -77,7 +77,7 @@ cli::FolderReport report_of(const FolderEvaluation& e) {
   report.set_lens_skipped(e.no_pins);
   if (e.pins) *report.mutable_lens() = report_of(*e.pins);
   report.set_ball_skipped(e.no_ball);
-  if (e.ball) {
+  if (e.ball && e.calibration) {  // which made it
     *report.mutable_ball() = report_of(*e.ball);
     for (const std::string& doubt : calibration::doubts_about(e.calibration->model->list)) {
       report.mutable_ball()->add_doubts(doubt);

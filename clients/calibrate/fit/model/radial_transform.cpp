@@ -23,7 +23,8 @@ const RadialTransform& RadialTransform::instance() {
 RadialTransform::RadialTransform() {
   std::vector<double> nodes;
   std::vector<double> weights;
-  for (double from = 0; from < kLastWaveNumber; from += kPanel) {
+  for (int panel = 0; panel * kPanel < kLastWaveNumber; ++panel) {
+    const double from = panel * kPanel;
     for_gauss_points(from, from + kPanel, [&](double k, double w) {
       nodes.push_back(k);
       weights.push_back(w);
