@@ -172,7 +172,7 @@ class Exporter {
   explicit Exporter(const ExportOptions& options)
       : options_(options),
         folder_(options.output),
-        range_(options.frames.empty() ? Range{} : parse_range(options.frames).value()),
+        range_(parse_range(options.frames).value_or(Range{})),
         frames_(folder_ / "frames.csv"),
         events_(folder_ / "events.csv") {
     frames_.write(kFrameColumns);

@@ -100,7 +100,7 @@ class Watch {
       meter->add(frame, now_ns, client_.same_machine(), counts);
     }
     last_ = std::move(frame);
-    if (screen_ && last_.has_depth()) draw();
+    if (screen_ && last_.has_depth()) draw(*screen_);
     if (last_.has_depth()) last_.mutable_depth()->clear_data();
   }
 
@@ -114,8 +114,7 @@ class Watch {
     interval_.reset();
   }
 
-  void draw() {
-    Screen& screen = screen_.value();
+  void draw(Screen& screen) {
     const Canvas canvas = screen.canvas();
     if (canvas.columns < kLeastColumns || canvas.rows < kLeastRows) {
       return screen.show({fmt::format("at least {} x {}, please", kLeastColumns, kLeastRows)});

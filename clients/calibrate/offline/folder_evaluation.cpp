@@ -178,7 +178,7 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
   } else {
     lines.push_back("lens: skipped: " + e.no_pins);
   }
-  if (e.ball) {
+  if (e.ball && e.calibration) {  // which made it
     lines.push_back(fmt::format(
         "ball: contact at row {:.1f}, column {:.1f} of the rectified image, offset {:+.4f} mm "
         "taken "
