@@ -40,31 +40,32 @@ void FrameMaker::begin(v1::Frame frame, bool pose) {
   const bool flat = clouds_.surface().kind == recon::Surface::Kind::plane;
   const bool gone = frame_.has_contact() && !frame_.contact().touching();
   if (!pose || !flat || gone) tracker_.release();
-  if (pose && flat && depth_) follow(frame_.depth().uncertainty_um());
+  if (pose && flat && depth_) follow(*depth_, frame_.depth().uncertainty_um());
   frame_.clear_depth();
 }
 
-void FrameMaker::follow(double uncertainty_um) {
-  const std::optional<DepthGrid> grid = depth_->contact();
+void FrameMaker::follow(DepthPart& depth, double uncertainty_um) {
+  const std::optional<DepthGrid> grid = depth.contact();
   if (!grid) return;
   const std::uint32_t took = timed([&] {
     clouds_.make(*grid, 1, cloud_);
     (void)tracker_.follow(ContactView(*grid, cloud_, uncertainty_um), frame_.sequence());
   });
   if (tracker_.pose().state == Tracker::State::idle) return;
-  fill(tracker_.pose(), pose_.emplace());
-  pose_->set_track_ns(took);
+  v1::ObjectPose& pose = pose_.emplace();
+  fill(tracker_.pose(), pose);
+  pose.set_track_ns(took);
 }
 
-void FrameMaker::add_cloud(const net::FrameKind& kind, v1::PointCloud& out) {
-  std::optional<DepthGrid> grid = depth_->whole();
-  if (kind.contact_box) grid = depth_->contact();
-  if (kind.spec.region) grid = depth_->cut(*kind.spec.region);
+void FrameMaker::add_cloud(DepthPart& depth, const net::FrameKind& kind, v1::PointCloud& out) {
+  std::optional<DepthGrid> grid = depth.whole();
+  if (kind.contact_box) grid = depth.contact();
+  if (kind.spec.region) grid = depth.cut(*kind.spec.region);
   if (!grid) return;
-  const int stride = std::max(1, kind.spec.decimation / depth_->decimation());
+  const int stride = std::max(1, kind.spec.decimation / depth.decimation());
   const std::uint32_t took = timed([&] { clouds_.make(*grid, stride, cloud_); });
   fill(cloud_, kind.cloud, out);
-  out.set_decimation(static_cast<std::uint32_t>(stride * depth_->decimation()));
+  out.set_decimation(static_cast<std::uint32_t>(stride * depth.decimation()));
   out.set_make_ns(took);
 }
 
@@ -72,7 +73,7 @@ std::shared_ptr<const net::EncodedFrame> FrameMaker::make(const net::FrameKind& 
   const auto found = std::ranges::find(done_, kind, [](const auto& one) { return one.first; });
   if (found != done_.end()) return found->second;
   v1::Frame message = frame_;
-  if (kind.cloud != v1::CLOUD_NONE && depth_) add_cloud(kind, *message.mutable_cloud());
+  if (kind.cloud != v1::CLOUD_NONE && depth_) add_cloud(*depth_, kind, *message.mutable_cloud());
   if (message.cloud().points() == 0) message.clear_cloud();
   if (kind.pose && pose_) *message.mutable_pose() = *pose_;
   auto encoded = std::make_shared<net::EncodedFrame>();

@@ -29,8 +29,8 @@ class FrameMaker {
   [[nodiscard]] const v1::Frame& frame() const noexcept { return frame_; }
 
  private:
-  void add_cloud(const net::FrameKind& kind, v1::PointCloud& out);
-  void follow(double uncertainty_um);
+  void add_cloud(DepthPart& depth, const net::FrameKind& kind, v1::PointCloud& out);
+  void follow(DepthPart& depth, double uncertainty_um);
 
   v1::Frame frame_;  ///< Without what is made here, and without the depth map.
   std::optional<DepthPart> depth_;

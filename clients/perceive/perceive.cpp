@@ -19,7 +19,9 @@ void serve(const cli::Context& context, net::NetConfig config) {
   config.version = DTACT_VERSION;
   config.features = wire::kPerceiveFeatures;
   // A line each, for a terminal and for the journal alike.
-  config.log = [&out = context.out](const net::LogLine& line) { out << line.text << std::endl; };
+  config.log = [&out = context.out](const net::LogLine& line) {
+    out << line.text << '\n' << std::flush;
+  };
   boost::asio::io_context io;
   const auto server = std::make_shared<Server>(io, config, context.target);
   for (const std::string& address : server->addresses()) {

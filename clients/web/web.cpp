@@ -47,7 +47,9 @@ void serve(const cli::Context& context, const Arguments& arguments) {
   config.program = "dtact-web " DTACT_VERSION;
   config.version = DTACT_VERSION;
   // A line each, for a terminal and for the journal alike.
-  config.log = [&out = context.out](const net::LogLine& line) { out << line.text << std::endl; };
+  config.log = [&out = context.out](const net::LogLine& line) {
+    out << line.text << '\n' << std::flush;
+  };
   const auto page =
       arguments.page.empty() ? std::make_unique<Page>() : std::make_unique<Page>(arguments.page);
   boost::asio::io_context io(1);  // one thread runs it

@@ -18,8 +18,7 @@ void WireTransport::tell(std::string text) {
 
 void WireTransport::write_text() {
   writing_ = true;
-  const auto text = std::make_shared<const std::string>(std::move(*text_));
-  text_.reset();
+  const auto text = std::make_shared<const std::string>(std::exchange(text_, {}).value_or(""));
   // Nobody else waits for this, so it keeps what it needs itself.
   socket_->write(
       {asio::buffer(*text)}, true,
