@@ -35,7 +35,7 @@ class Tracker {
   struct Keyframe {
     std::vector<Surfel> surfels;  ///< As they lay in the first frame.
     Motion motion;
-    std::size_t pixels = 0;  ///< Of the contact then.
+    std::size_t pixels = 0;                            ///< Of the contact then.
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Of the contact then, surface frame.
   };
 
