@@ -1,0 +1,57 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "tests/accuracy/study/figures.hpp"
+#include "tests/accuracy/study/rows.hpp"
+#include "tests/accuracy/study/study.hpp"
+
+namespace dtact::study {
+
+/// Nothing where a law was not put through that.
+using Value = std::optional<double>;
+
+[[nodiscard]] bool within(Value value, const figures::Range& range);
+/// Within two standard deviations of the units.
+[[nodiscard]] bool within(Value value, const figures::Spread& spread);
+[[nodiscard]] Value median(std::vector<double> values);
+
+/// Rows as they are made, by whoever knows a subject of the study: it knows which results belong to
+/// which law and layer. `results` must outlive it.
+class Comparison {
+ public:
+  explicit Comparison(const std::vector<Result>& results);
+
+  /// The first one is judged.
+  [[nodiscard]] const std::vector<std::string>& laws() const noexcept { return laws_; }
+  /// Null where there is none.
+  [[nodiscard]] const Result* find(const std::string& law, double thickness_mm) const;
+  /// Mean over the layers.
+  [[nodiscard]] Value over_layers(const std::string& law,
+                                  const std::function<Value(const Result&)>& value) const;
+
+  void add(Row row) { rows_.push_back(std::move(row)); }
+  /// A row whose figure is `value` of a law.
+  void add(const std::string& what, const std::string& study, int digits,
+           const std::function<Value(const std::string&)>& value,
+           const std::function<bool(Value)>& agrees, const std::string& remark);
+  /// One row a layer.
+  void by_layer(const std::string& what, std::span<const figures::Range> study, int digits,
+                const std::function<Value(const Result&)>& value, const std::string& remark);
+
+  [[nodiscard]] std::vector<Row> take() { return std::move(rows_); }
+
+ private:
+  const std::vector<Result>& results_;
+  std::vector<std::string> laws_;
+  std::vector<Row> rows_;
+};
+
+/// Two pillars: dips between them, how many spacings are resolved, how they lean.
+void add_pillars(Comparison& comparison);
+
+}  // namespace dtact::study
