@@ -6,6 +6,7 @@
 #include <ostream>
 #include <string>
 
+#include "clients/common/listen_options.hpp"
 #include "clients/perceive/server.hpp"
 #include "clients/perceive/watch.hpp"
 #include "daemon/serve/net_config.hpp"
@@ -40,28 +41,10 @@ void add_serve(CLI::App& app, cli::Context& context) {
       "serve", "Serve point clouds and poses of the daemon's frames, until Ctrl-C or SIGTERM");
   const auto settings = std::make_shared<net::NetConfig>();
   settings->port = wire::kPerceivePort;
-  command
-      ->add_option("--listen", settings->address,
-                   "Address to listen on; beyond this machine it needs TLS and tokens")
-      ->type_name("ADDRESS")
-      ->capture_default_str();
-  command->add_option("--listen-port", settings->port, "TCP port to listen on; 0: any free one")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 65535));
+  cli::add_listen_options(*command, *settings);
   command
       ->add_option("--unix-socket", settings->unix_socket,
                    "A socket for clients on this machine, too")
-      ->type_name("FILE");
-  command
-      ->add_option(
-          "--tokens", settings->token_file,
-          "Every client needs one of these tokens: a file like the daemon's net.token_file")
-      ->type_name("FILE");
-  command
-      ->add_option("--tls-certificate", settings->tls_certificate,
-                   "Speak TLS only, with this certificate (PEM)")
-      ->type_name("FILE");
-  command->add_option("--tls-key", settings->tls_key, "The certificate's key (PEM)")
       ->type_name("FILE");
   command->callback([&context, settings] { serve(context, *settings); });
 }

@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "clients/common/listen_options.hpp"
 #include "clients/web/daemon_option.hpp"
 #include "clients/web/names.hpp"
 #include "clients/web/page.hpp"
@@ -81,24 +82,7 @@ void add_serve(CLI::App& app, cli::Context& context) {
                    "token-file=FILE, insecure. Without one it is that of --host, named sensor")
       ->type_name("NAME=ADDRESS")
       ->take_all();
-  command
-      ->add_option("--listen", net.address,
-                   "Address to listen on; beyond this machine it needs TLS and tokens")
-      ->type_name("ADDRESS")
-      ->capture_default_str();
-  command->add_option("--listen-port", net.port, "TCP port to listen on; 0: any free one")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 65535));
-  command
-      ->add_option(
-          "--tokens", net.token_file,
-          "Every viewer needs one of these tokens: a file like the daemon's net.token_file")
-      ->type_name("FILE");
-  command
-      ->add_option("--tls-certificate", net.tls_certificate,
-                   "Speak TLS only, with this certificate (PEM)")
-      ->type_name("FILE");
-  command->add_option("--tls-key", net.tls_key, "The certificate's key (PEM)")->type_name("FILE");
+  cli::add_listen_options(*command, net);
   command->add_flag(
       "--listen-insecure", net.insecure,
       "Listen beyond this machine without TLS or tokens: whoever reaches it may watch "

@@ -1,0 +1,29 @@
+#include "clients/common/listen_options.hpp"
+
+#include <CLI/CLI.hpp>
+
+namespace dtact::cli {
+
+void add_listen_options(CLI::App& command, net::NetConfig& settings) {
+  command
+      .add_option("--listen", settings.address,
+                  "Address to listen on; beyond this machine it needs TLS and tokens")
+      ->type_name("ADDRESS")
+      ->capture_default_str();
+  command.add_option("--listen-port", settings.port, "TCP port to listen on; 0: any free one")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 65535));
+  command
+      .add_option("--tokens", settings.token_file,
+                  "Whoever connects needs one of these tokens: a file like the daemon's "
+                  "net.token_file")
+      ->type_name("FILE");
+  command
+      .add_option("--tls-certificate", settings.tls_certificate,
+                  "Speak TLS only, with this certificate (PEM)")
+      ->type_name("FILE");
+  command.add_option("--tls-key", settings.tls_key, "The certificate's key (PEM)")
+      ->type_name("FILE");
+}
+
+}  // namespace dtact::cli
