@@ -1,0 +1,120 @@
+# shellcheck shell=bash
+# The parts of `./dev test`, which sources this file and has the lists of packages.
+# shellcheck disable=SC2154
+
+# part NAME COMMAND...: a part of the tests, and how long it takes.
+# One that fails does not keep the others from running: end_of_parts fails for it. One that passed is
+# noted in build/passed with what the tree was, so that --resume need not repeat it.
+failed_parts=()
+resume=0
+part() {
+  local name=$1 began=$SECONDS status=0 passed=build/passed/$1 tree
+  shift
+  tree=$(tree_digest)
+  if ((resume)) && [[ -e $passed && $(<"$passed") == "$tree" ]]; then
+    echo "dev: $name passed on this very tree before"
+    return
+  fi
+  # In `( … ) || …` the shell would go on after a command that fails inside.
+  set +e
+  (set -e; "$@")
+  status=$?
+  set -e
+  if ((status == 0)); then
+    mkdir -p build/passed
+    echo "$tree" >"$passed"
+  else
+    failed_parts+=("$name")
+  fi
+  echo "dev: $name took $((SECONDS - began)) s$( ((status)) && echo " and FAILED")"
+}
+
+# Of every file of the tree as git sees it, uncommitted changes included.
+tree_digest() {
+  git ls-files -z --cached --others --exclude-standard | xargs -0 sha256sum 2>&1 | sha256sum
+}
+
+end_of_parts() {
+  ((${#failed_parts[@]} == 0)) && return
+  printf 'dev: failed: %s\n' "${failed_parts[@]}" >&2
+  exit 1
+}
+
+test_dev() {
+  build_preset dev
+  # Those compute; the others have daemons and guests that want the machine for themselves.
+  ctest --test-dir build/dev --output-on-failure -L 'unit|accuracy' -j"$(nproc)"
+  ctest --test-dir build/dev --output-on-failure -LE 'unit|accuracy'
+}
+
+check_format() {
+  sources | xargs clang-format-19 --dry-run --Werror
+  git ls-files '*.sh' | xargs shellcheck dev .ci/run debian/dtactd.p* tests/kernel/{umlrun,selftest,guest-init} \
+    tests/install/guest/dtact-test
+}
+
+# test_sanitized PRESET LABELS TESTS: all tests but those with such labels or names.
+test_sanitized() {
+  build_preset "$1" hal/all daemon/all clients/all tests/{unit,fuzz,e2e,soak}/all bench_memory bench_tls
+  # End to end a test has the machine for itself; the unit tests' deadlines stand company.
+  ctest --test-dir "build/$1" --output-on-failure -L unit -E "$3" -j"$(nproc)"
+  ctest --test-dir "build/$1" --output-on-failure -LE "unit|$2" -E "$3"
+}
+
+# As users get them, and the same bytes from another place.
+test_compiled_packages() {
+  tests/packages/build.sh build/packages
+  /usr/bin/python3 -B tests/packages/contents_test.py build/packages
+  tests/packages/lintian.sh build/packages
+  tests/packages/reproducible.sh build/packages
+}
+
+test_platform() {
+  local ended=0
+  "tests/platform/$1.sh" "${build_packages[@]}" "${test_packages[@]}" "${package_packages[@]}" || ended=$?
+  ((ended == 0)) || { ((ended == 77)) && echo "dev: $1 skipped, see above"; }
+}
+
+# test_installed OPTION...: packages in a Debian that boots with systemd.
+test_installed() {
+  local ended=0
+  tests/install/run.py "$@" || ended=$?
+  ((ended == 0)) || { ((ended == 77)) && echo "dev: skipped, see above"; }
+}
+
+run_tests() {
+  local all=0
+  case "$*" in
+    '') ;;
+    --all) all=1 ;;
+    '--all --resume') all=1 resume=1 ;;
+    *) echo "dev: test does not know '$*'; see ./dev --help" >&2; exit 2 ;;
+  esac
+  need "${build_packages[@]}" "${test_packages[@]}" "${package_packages[@]}" lintian
+  part 'the dev build and its tests' test_dev
+  if ((!all)); then
+    end_of_parts
+    return
+  fi
+
+  need "${all_packages[@]}"
+  part 'the format' check_format
+  # Nothing is compiled: clang-tidy reads what the dev build was compiled with.
+  part clang-tidy tests/tidy.py build/dev
+  # The guest kernel has no memory for the sanitizers' shadows. The accuracy tests run the code of the
+  # unit tests on more images and take longer than all others together.
+  part 'the address and undefined-behaviour sanitizers' test_sanitized asan-ubsan 'kernel|accuracy|web' '^python_test$'
+  # Those named have one thread; a live session is too slow. Where threads are watched protobuf's maps
+  # look otherwise than Debian's library has them: what reads Foxglove's JSON cannot run.
+  part 'the thread sanitizer' test_sanitized tsan 'kernel|accuracy|live' \
+    '^((recon|calibration|offline|lens_calibration|sim_parts|luma|mjpeg|wire|python|web)_test|e2e_foxglove|fuzz_web)$'
+  part 'the packages, built twice' test_compiled_packages
+  part 'Debian 13' test_platform debian13
+  part arm64 test_platform arm64
+  part 'installation, faults and power cuts' test_installed --all --cuts 20
+  # Of what the part "Debian 13" has built.
+  part 'installation on Debian 13' test_installed --suite trixie \
+    --packages "build/dev/packages-debian13-$(dpkg --print-architecture)"
+  end_of_parts
+  echo "dev: all passed in $SECONDS s"
+}
