@@ -17,14 +17,15 @@ namespace dtact::web {
 /// without a word is found after `dead_after`, one that only does not read is kept: reading then
 /// ends with asio::error::timed_out.
 template <typename Stream>
-class BeastWebSocket : public WebSocket {
+class BeastWebSocket final : public WebSocket {
   using Error = boost::system::error_code;
   using Channel = boost::beast::websocket::stream<Stream>;
 
  public:
   BeastWebSocket(std::unique_ptr<Channel> channel, std::chrono::milliseconds dead_after)
       : channel_(std::move(channel)),
-        watch_(std::make_shared<net::TcpWatch>(executor(), socket().native_handle(), dead_after)) {
+        watch_(std::make_shared<net::TcpWatch>(channel_->get_executor(), socket().native_handle(),
+                                               dead_after)) {
     watch_->start([this] {
       dead_ = true;
       Error ignored;

@@ -65,6 +65,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
 
  private:
   using Response = http::response<http::span_body<const char>>;
+  using Parser = http::request_parser<http::empty_body>;
   using Channel = beast::websocket::stream<Stream>;
   static constexpr bool kTls = !std::is_same_v<Stream, tcp::socket>;
 
@@ -85,38 +86,42 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   }
 
   void read() {
-    parser_.emplace();
-    parser_->header_limit(kMaxHead);
+    Parser& parser = parser_.emplace();
+    parser.header_limit(kMaxHead);
     wait_at_most(kPatience);
-    http::async_read_header(*stream_, buffer_, *parser_,
-                            [self = this->shared_from_this()](
-                                const error_code& error, std::size_t) { self->on_head(error); });
+    http::async_read_header(
+        *stream_, buffer_, parser,
+        [self = this->shared_from_this(), &parser](const error_code& error, std::size_t) {
+          self->on_head(error, parser);
+        });
   }
 
-  void on_head(const error_code& error) {
+  void on_head(const error_code& error, const Parser& parser) {
     if (error == http::error::header_limit) {
-      return answer(refusal(http::status::request_header_fields_too_large,
+      return answer(parser.get(),
+                    refusal(http::status::request_header_fields_too_large,
                             "the request's head is longer than 8192 bytes"),
                     true);
     }
     // The peer left, or it is no HTTP: nobody would read an answer.
     if (error) return;
-    const Request& request = parser_->get();
+    const Request& request = parser.get();
     const auto site = site_.lock();
     if (site == nullptr) return;
-    if (beast::websocket::is_upgrade(request)) return upgrade(site->upgrade(request));
-    const bool body = parser_->chunked() || parser_->content_length().value_or(0) > 0;
-    if (body) return answer(refusal(http::status::payload_too_large, "send no body"), true);
+    if (beast::websocket::is_upgrade(request)) return upgrade(request, site->upgrade(request));
+    const bool body = parser.chunked() || parser.content_length().value_or(0) > 0;
+    if (body)
+      return answer(request, refusal(http::status::payload_too_large, "send no body"), true);
     if (request.method() != http::verb::get && request.method() != http::verb::head) {
-      return answer(refusal(http::status::method_not_allowed, "only GET and HEAD are known here"),
+      return answer(request,
+                    refusal(http::status::method_not_allowed, "only GET and HEAD are known here"),
                     true);
     }
-    answer(site->answer(request), !request.keep_alive());
+    answer(request, site->answer(request), !request.keep_alive());
   }
 
-  void answer(Answer made, bool last) {
+  void answer(const Request& request, Answer made, bool last) {
     answer_ = std::move(made);
-    const Request& request = parser_->get();
     response_ = Response(answer_.status, 11);
     response_.set(http::field::content_type,
                   beast::string_view(answer_.type.data(), answer_.type.size()));
@@ -158,8 +163,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
     timer_.async_wait([self = this->shared_from_this()](const error_code&) {});
   }
 
-  void upgrade(Upgrade wanted) {
-    if (!wanted.open) return answer(std::move(wanted.refusal), true);
+  void upgrade(const Request& request, Upgrade wanted) {
+    if (!wanted.open) return answer(request, std::move(wanted.refusal), true);
     channel_ = std::make_unique<Channel>(std::move(*stream_));
     stream_.reset();
     channel_->read_message_max(wanted.max_message);
@@ -173,8 +178,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
         }));
     wait_at_most(kDelivery);
     // What the peer sent behind the head waits for the answer in any case (RFC 6455, 4.1).
-    channel_->async_accept(parser_->get(), [self = this->shared_from_this(),
-                                            wanted = std::move(wanted)](const error_code& error) {
+    channel_->async_accept(request, [self = this->shared_from_this(),
+                                     wanted = std::move(wanted)](const error_code& error) {
       self->timer_.cancel();
       if (error) return;
       wanted.open(
@@ -191,7 +196,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   std::shared_ptr<void> ticket_;
   std::chrono::milliseconds dead_after_;
   beast::flat_buffer buffer_{kMaxHead};
-  std::optional<http::request_parser<http::empty_body>> parser_;
+  std::optional<Parser> parser_;  ///< Of the request at hand.
   Answer answer_;
   Response response_;
 };

@@ -80,10 +80,12 @@ std::string Sensor::entry() const {
 }
 
 void Sensor::on_changed() {
-  const std::string told = source_->connected() ? "is there: " + source_->daemon()->program()
-                                                : "is away: " + source_->reason();
-  config_.log({source_->connected() ? net::LogLevel::info : net::LogLevel::warning,
-               fmt::format("the daemon of {} {}", source_->name(), told)});
+  const auto& daemon = source_->daemon();
+  const bool there = daemon && source_->connected();
+  config_.log(
+      {there ? net::LogLevel::info : net::LogLevel::warning,
+       fmt::format("the daemon of {} {}", source_->name(),
+                   there ? "is there: " + daemon->program() : "is away: " + source_->reason())});
   const std::string text = entry();
   for (const auto& session : guests_.all()) {
     if (!source_->connected()) session->subscribe(Subscription());
