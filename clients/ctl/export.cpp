@@ -46,6 +46,7 @@ std::optional<Range> parse_range(const std::string& text) {
     return error == std::errc() && stop == digits.data() + digits.size() ? std::optional(value)
                                                                          : std::nullopt;
   };
+  if (text.empty()) return std::nullopt;
   const std::size_t colon = text.find(':');
   const auto first = number(std::string_view(text).substr(0, colon), 0);
   if (!first) return std::nullopt;

@@ -105,6 +105,8 @@ TEST_F(Export, SaysWhatIsWrong) {
   EXPECT_EQ(run({"--to", "npy"}), 1);
   EXPECT_THAT(said_, HasSubstr("is not empty"));
   EXPECT_EQ(run({"--to", "npy", "--force"}), 0);
+  EXPECT_THAT(said_, HasSubstr("5 frames, 5 depth maps"));
+  EXPECT_EQ(run({"--to", "npy", "--force", "--frames", ""}), 2);
   EXPECT_EQ(run({"--to", "exr"}), 2);
   EXPECT_EQ(run({"--to", "npy", "--frames", "3:x"}), 2);
   base::write_file_atomically(file_, "no mcap");
