@@ -1,4 +1,4 @@
-#include "clients/web/link.hpp"
+#include "clients/common/link.hpp"
 
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -13,7 +13,7 @@
 #include "clients/cpp/backoff.hpp"
 #include "clients/cpp/session.hpp"
 
-namespace dtact::web {
+namespace dtact::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -43,6 +43,7 @@ Link::~Link() {
 void Link::send(std::string message) {
   {
     const std::lock_guard lock(mutex_);
+    if (!up_) return;
     outgoing_.push_back(std::move(message));
   }
   wake();
@@ -62,26 +63,45 @@ void Link::wake() const noexcept {
 void Link::run() {
   client::BackOff pauses(kPauses, std::random_device{}());
   std::string told;
+  // A daemon that greets and ends the connection at once is not asked any oftener for that.
+  auto lasted_from = Clock::time_point::max();
   while (!stopping_) {
     try {
       client::Connection connection(options_, {Clock::now() + options_.timeout, wake_.get()});
       v1::HelloReply daemon = greet(connection);
       {
-        // What was meant for the connection before is not for this one.
         const std::lock_guard lock(mutex_);
-        outgoing_.clear();
+        up_ = true;
       }
       told.clear();
-      pauses.reset();
-      handlers_.up(std::move(daemon));
+      lasted_from = Clock::now() + kPauses.max;
+      handlers_.up(std::move(daemon), connection.local());
       serve(connection);
     } catch (const std::exception& e) {
+      forget_outgoing();
       if (stopping_) break;
+      if (Clock::now() > std::exchange(lasted_from, Clock::time_point::max())) pauses.reset();
       if (std::exchange(told, e.what()) != e.what()) handlers_.down(told);
       (void)client::wait(-1, 0, {Clock::now() + pauses.next(), wake_.get()});
     }
   }
   ended_ = true;
+}
+
+/// What was meant for the connection that is lost is not for the next one.
+void Link::forget_outgoing() {
+  {
+    const std::lock_guard lock(mutex_);
+    up_ = false;
+    outgoing_.clear();
+  }
+  drain();
+}
+
+/// Waits only for what comes from here on.
+void Link::drain() const noexcept {
+  std::uint64_t count = 0;
+  (void)!::read(wake_.get(), &count, sizeof count);
 }
 
 v1::HelloReply Link::greet(client::Connection& connection) const {
@@ -104,9 +124,10 @@ v1::HelloReply Link::greet(client::Connection& connection) const {
 }
 
 void Link::serve(client::Connection& connection) {
-  while (!stopping_) {
-    std::uint64_t count = 0;
-    (void)!::read(wake_.get(), &count, sizeof count);
+  for (;;) {
+    // First, so that the word of stop() is not taken without being heeded.
+    drain();
+    if (stopping_) return;
     std::vector<std::string> outgoing;
     {
       const std::lock_guard lock(mutex_);
@@ -122,4 +143,4 @@ void Link::serve(client::Connection& connection) {
   }
 }
 
-}  // namespace dtact::web
+}  // namespace dtact::cli

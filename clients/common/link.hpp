@@ -12,7 +12,7 @@
 #include "hal/base/unique_fd.hpp"
 #include "proto/dtact.pb.h"
 
-namespace dtact::web {
+namespace dtact::cli {
 
 /// A connection to a daemon that carries its messages as they are, on a thread of its own; made
 /// again whenever it is lost.
@@ -20,8 +20,9 @@ class Link {
  public:
   /// All on the link's own thread.
   struct Handlers {
-    std::function<void(v1::HelloReply)> up;  ///< The daemon greeted.
-    std::function<void(std::string)> down;   ///< Why it is away; again with another reason.
+    /// The daemon greeted; whether it is on this machine.
+    std::function<void(v1::HelloReply, bool)> up;
+    std::function<void(std::string)> down;  ///< Why it is away; again with another reason.
     std::function<void(const std::string&)> message;  ///< A ServerMessage as it came.
   };
 
@@ -42,7 +43,9 @@ class Link {
   void run();
   [[nodiscard]] v1::HelloReply greet(client::Connection& connection) const;
   void serve(client::Connection& connection);
+  void forget_outgoing();
   void wake() const noexcept;
+  void drain() const noexcept;
 
   client::Options options_;
   Handlers handlers_;
@@ -50,8 +53,10 @@ class Link {
   std::atomic<bool> stopping_ = false;
   std::atomic<bool> ended_ = false;
   std::mutex mutex_;
-  std::vector<std::string> outgoing_;  ///< Under the mutex.
+  // Under the mutex:
+  bool up_ = false;
+  std::vector<std::string> outgoing_;
   std::thread thread_;
 };
 
-}  // namespace dtact::web
+}  // namespace dtact::cli

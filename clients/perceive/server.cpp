@@ -4,6 +4,7 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
+#include "clients/cpp/errors.hpp"
 #include "daemon/serve/who.hpp"
 #include "hal/base/clock.hpp"
 

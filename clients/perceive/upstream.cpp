@@ -1,35 +1,24 @@
 #include "clients/perceive/upstream.hpp"
 
-#include <condition_variable>
 #include <utility>
 
+#include "clients/cpp/features.hpp"
+
 namespace dtact::perceive {
-namespace {
-
-/// Between attempts to reach a daemon that is not there.
-constexpr std::chrono::seconds kPause{1};
-
-/// Waits, but not beyond `stop`.
-void pause(const std::stop_token& stop) {
-  std::mutex mutex;
-  std::condition_variable_any changed;
-  std::unique_lock lock(mutex);
-  changed.wait_for(lock, stop, kPause, [] { return false; });
-}
-
-}  // namespace
 
 Upstream::Upstream(client::Options options, Handlers handlers)
-    : options_(std::move(options)),
-      handlers_(std::move(handlers)),
-      thread_([this](const std::stop_token& stop) { run(stop); }) {}
-
-Upstream::~Upstream() = default;
+    : handlers_(std::move(handlers)),
+      host_(options.host),
+      link_(std::move(options),
+            {.up = [this](const v1::HelloReply& daemon,
+                          bool same_machine) { on_up(daemon, same_machine); },
+             .down = handlers_.notice,
+             .message = [this](const std::string& bytes) { on_message(bytes); }}) {}
 
 void Upstream::want(const v1::Subscribe& subscription) {
   const std::lock_guard lock(mutex_);
   wanted_ = subscription;
-  changed_ = true;
+  subscribe();
 }
 
 std::optional<Upstream::Taken> Upstream::take() {
@@ -42,53 +31,40 @@ std::string Upstream::serial() const {
   return serial_;
 }
 
-void Upstream::run(const std::stop_token& stop) {
-  std::string told;
-  while (!stop.stop_requested()) {
-    try {
-      client::Client client(options_);
-      told.clear();
-      {
-        const std::lock_guard lock(mutex_);
-        serial_ = client.server().serial();
-        changed_ = true;
-      }
-      handlers_.notice("connected to " + client.server().program() + " at " + options_.host);
-      serve(client, stop);
-    } catch (const std::exception& e) {
-      // The same once.
-      if (std::exchange(told, e.what()) != e.what()) handlers_.notice(e.what());
-      pause(stop);
-    }
+void Upstream::on_up(const v1::HelloReply& daemon, bool same_machine) {
+  {
+    const std::lock_guard lock(mutex_);
+    serial_ = daemon.serial();
+    // Raw values cost least where they need not travel.
+    compressed_ = !same_machine && client::lists_feature(daemon, "predict_zstd");
+    subscribe();
   }
+  handlers_.notice("connected to " + daemon.program() + " at " + host_);
 }
 
-void Upstream::serve(client::Client& client, const std::stop_token& stop) {
-  while (!stop.stop_requested()) {
-    std::optional<v1::Subscribe> subscription;
-    {
-      const std::lock_guard lock(mutex_);
-      if (std::exchange(changed_, false)) subscription = wanted_;
-    }
-    if (subscription) {
-      // Raw values cost least where they need not travel.
-      if (subscription->depth() != v1::DEPTH_NONE && !client.same_machine() &&
-          client.has_feature("predict_zstd")) {
-        subscription->set_depth(v1::DEPTH_PREDICT_ZSTD);
-      }
-      client.subscribe(*subscription);
-    }
-    auto item = client.next(kPatience);
-    if (!item) continue;
-    if (auto* frame = std::get_if<v1::Frame>(&*item)) keep(std::move(*frame));
+/// Under the mutex, so that what is wanted last is said last. Lost while the daemon is away:
+/// on_up() says it again.
+void Upstream::subscribe() {
+  v1::ClientMessage message;
+  message.set_id(2);
+  *message.mutable_subscribe() = wanted_;
+  if (compressed_ && wanted_.depth() != v1::DEPTH_NONE) {
+    message.mutable_subscribe()->set_depth(v1::DEPTH_PREDICT_ZSTD);
   }
+  link_.send(message.SerializeAsString());
 }
 
-void Upstream::keep(v1::Frame frame) {
+void Upstream::on_message(const std::string& bytes) {
+  v1::ServerMessage message;
+  if (!message.ParseFromString(bytes)) {
+    return handlers_.notice(host_ + " sends what is no message of the wire");
+  }
+  if (message.reply().has_error()) return handlers_.notice(message.reply().error().message());
+  if (!message.has_frame()) return;
   {
     const std::lock_guard lock(mutex_);
     const std::uint64_t missed = newest_ ? newest_->missed + 1 : 0;
-    newest_ = Taken{std::move(frame), missed};
+    newest_ = Taken{std::move(*message.mutable_frame()), missed};
   }
   handlers_.frame();
 }

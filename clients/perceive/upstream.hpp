@@ -1,31 +1,29 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <string>
-#include <thread>
 
-#include "clients/cpp/client.hpp"
+#include "clients/common/link.hpp"
 
 namespace dtact::perceive {
 
-/// The connection to the daemon, on a thread of its own: made again whenever it is lost, subscribed
-/// to what is wanted at the time. Frames that come while the last one is being worked on take each
-/// other's place.
+/// The connection to the daemon, made again whenever it is lost, subscribed to what is wanted at
+/// the time. Frames that come while the last one is being worked on take each other's place.
 class Upstream {
  public:
+  /// On the connection's own thread.
   struct Handlers {
-    std::function<void()> frame;                     ///< take() has one. On the own thread.
-    std::function<void(const std::string&)> notice;  ///< A sentence for the log. The same.
+    std::function<void()> frame;                     ///< take() has one.
+    std::function<void(const std::string&)> notice;  ///< A sentence for the log.
   };
 
+  /// Its end waits for the connection's thread; an attempt under way is let end.
   Upstream(client::Options options, Handlers handlers);
-  /// Waits for its thread; a connection attempt under way is let end.
-  ~Upstream();
-  Upstream(const Upstream&) = delete;
-  Upstream& operator=(const Upstream&) = delete;
 
-  /// What to subscribe to from now on; within kPatience.
+  /// What to subscribe to from now on.
   void want(const v1::Subscribe& subscription);
 
   struct Taken {
@@ -37,20 +35,18 @@ class Upstream {
   [[nodiscard]] std::string serial() const;
 
  private:
-  void run(const std::stop_token& stop);
-  void serve(client::Client& client, const std::stop_token& stop);
-  void keep(v1::Frame frame);
+  void on_up(const v1::HelloReply& daemon, bool same_machine);
+  void on_message(const std::string& bytes);
+  void subscribe();
 
-  static constexpr std::chrono::milliseconds kPatience{20};
-
-  client::Options options_;
-  Handlers handlers_;
-  mutable std::mutex mutex_;  ///< Of all that follows but the thread.
+  const Handlers handlers_;
+  const std::string host_;
+  mutable std::mutex mutex_;  ///< Of all that follows but the link.
   v1::Subscribe wanted_;
-  bool changed_ = false;
+  bool compressed_ = false;  ///< Depth, since it travels.
   std::optional<Taken> newest_;
   std::string serial_;
-  std::jthread thread_;
+  cli::Link link_;  ///< Last: its thread uses the others.
 };
 
 }  // namespace dtact::perceive

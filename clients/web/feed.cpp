@@ -22,7 +22,7 @@ Feed::Feed(client::Options options, const v1::Subscribe& subscription, Handlers 
       request_(serialized(subscription)),
       link_(std::move(options),
             {.up =
-                 [this](const v1::HelloReply&) {
+                 [this](const v1::HelloReply&, bool) {
                    dropped_ = 0;
                    link_.send(request_);
                  },

@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "clients/common/link.hpp"
 #include "clients/cpp/options.hpp"
-#include "clients/web/link.hpp"
 #include "clients/web/relayed_frame.hpp"
 
 namespace dtact::web {
@@ -44,7 +44,7 @@ class Feed {
   std::optional<RelayedFrame> newest_;
   std::uint64_t missed_ = 0;
   std::uint64_t dropped_ = 0;  ///< By the daemon, on this connection.
-  Link link_;                  ///< Last: its thread uses the others.
+  cli::Link link_;             ///< Last: its thread uses the others.
 };
 
 }  // namespace dtact::web

@@ -45,11 +45,11 @@ void Source::start() {
       if (self != nullptr && self->link_ != nullptr) call(*self);
     });
   };
-  link_ = std::make_unique<Link>(
+  link_ = std::make_unique<cli::Link>(
       options_,
-      Link::Handlers{
+      cli::Link::Handlers{
           .up =
-              [on_io](v1::HelloReply daemon) {
+              [on_io](v1::HelloReply daemon, bool) {
                 on_io([daemon = std::move(daemon)](Source& self) { self.on_up(daemon); });
               },
           .down =

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "clients/common/link.hpp"
 #include "clients/cpp/options.hpp"
 #include "clients/web/feed.hpp"
-#include "clients/web/link.hpp"
 #include "daemon/serve/token_bucket.hpp"
 
 namespace dtact::web {
@@ -95,7 +95,7 @@ class Source : public std::enable_shared_from_this<Source> {
   std::string name_;
   client::Options options_;
   std::map<const void*, Follower> followers_;
-  std::unique_ptr<Link> link_;
+  std::unique_ptr<cli::Link> link_;
   bool connected_ = false;
   std::string reason_ = "it has not answered yet";
   std::optional<v1::HelloReply> daemon_;
