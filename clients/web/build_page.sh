@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# build_page.sh SOURCES PROTO WORK OUT NPM: builds the page of the folder SOURCES into the folder OUT, which is
-# emptied. npm works in the folder WORK, so that the tree stays as it is; PROTO is the folder of dtact.proto.
+# build_page.sh SOURCES TREE WORK OUT NPM: builds the page of the folder SOURCES into the folder OUT, which is
+# emptied. npm works in the folder WORK, so that the tree stays as it is; TREE is the repository, whose messages
+# it uses.
 set -euo pipefail
-sources=$1 proto=$2 work=$3 out=$4 npm=$5
+sources=$1 tree=$2 work=$3 out=$4 npm=$5
 mkdir -p "$work"
 # What npm has installed stays.
 find "$work" -mindepth 1 -maxdepth 1 ! -name node_modules -exec rm -rf {} +
@@ -18,5 +19,5 @@ if ! cmp -s package-lock.json node_modules/.installed; then
   cp package-lock.json node_modules/.installed
 fi
 rm -rf "$out"
-"$npm" run --silent build -- --outdir "$out" --proto "$proto" >&2
+"$npm" run --silent build -- --outdir "$out" --tree "$tree" >&2
 [[ -f $out/index.html ]] || { say "the page's build left no index.html in $out"; exit 1; }

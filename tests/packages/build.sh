@@ -33,7 +33,7 @@ if [ -n "${DTACT_BUILT-}" ]; then
 fi
 # The page is built here: the package's build needs neither npm nor a network.
 if [ -z "${DTACT_BUILT-}" ] && [ -e "$tree/clients/web/page/package.json" ]; then
-  "$tree/clients/web/build_page.sh" "$tree/clients/web/page" "$tree/proto" "$source/npm" "$source/page" npm
+  "$tree/clients/web/build_page.sh" "$tree/clients/web/page" "$tree" "$source/npm" "$source/page" npm
   export DTACT_WEB_PAGE=$source/page
 fi
 # debhelper gives the build an empty home folder.

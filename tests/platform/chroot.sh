@@ -63,7 +63,7 @@ copy_source() {
     | tar --null --files-from=- --ignore-failed-read -c) | tar -x -C "$root/source"
   # The page is the same everywhere, and built here: the chroot needs no npm.
   if [ -e "$source_folder/clients/web/page/package.json" ]; then
-    "$source_folder/clients/web/build_page.sh" "$source_folder/clients/web/page" "$source_folder/proto" \
+    "$source_folder/clients/web/build_page.sh" "$source_folder/clients/web/page" "$source_folder" \
       "$root.npm" "$root/page" npm
   fi
 }

@@ -31,4 +31,4 @@ if [[ -n $browser ]]; then install "$here" "$folder/browser"; fi
 rm -rf "$folder/page/src"
 cp -r "$page/src" "$page/build.mjs" "$page/tsconfig.json" "$folder/page"
 cd "$folder/page"
-npm run --silent build -- --node "$folder/node" --proto "$page/../../../proto"
+npm run --silent build -- --node "$folder/node" --tree "$page/../../.."

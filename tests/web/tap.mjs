@@ -59,6 +59,11 @@ export class Tap {
     return this.#frames.get(sequence);
   }
 
+  /** Of the frames that are kept, oldest first. */
+  sequences() {
+    return [...this.#frames.keys()];
+  }
+
   close() {
     this.#socket.destroy();
   }

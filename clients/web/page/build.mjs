@@ -1,9 +1,10 @@
-// npm run build -- --outdir DIR [--node DIR]: the page into the one folder, and what the tests run
-// under node into the other. Generates the messages from proto/dtact.proto into gen/ (Debian's
-// protobuf-compiler), checks the types and bundles. Nothing of all this is needed to serve the page.
+// npm run build -- --outdir DIR [--node DIR] [--tree DIR]: the page into the one folder, and what the
+// tests run under node into the other. Generates the messages of the wire and of recordings from the
+// repository TREE into gen/ (Debian's protobuf-compiler), checks the types and bundles. Nothing of all
+// this is needed to serve the page.
 import * as esbuild from "esbuild";
 import { execFileSync } from "node:child_process";
-import { copyFileSync, existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { copyFileSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import path from "node:path";
 import { parseArgs } from "node:util";
 
@@ -11,11 +12,11 @@ const { values } = parseArgs({
   options: {
     outdir: { type: "string" },
     node: { type: "string" },
-    proto: { type: "string", default: "../../../proto" },
+    tree: { type: "string", default: "../../.." },
   },
 });
 if (!values.outdir && !values.node) {
-  console.error("usage: npm run build -- --outdir DIR [--node DIR] [--proto DIR]");
+  console.error("usage: npm run build -- --outdir DIR [--node DIR] [--tree DIR]");
   process.exit(2);
 }
 const tool = (name) => path.join("node_modules", ".bin", name);
@@ -28,8 +29,10 @@ execFileSync(
     `--plugin=protoc-gen-es=${tool("protoc-gen-es")}`,
     "--es_out=gen",
     "--es_opt=target=ts",
-    `--proto_path=${values.proto}`,
+    `--proto_path=${values.tree}/proto`,
+    `--proto_path=${values.tree}/clients/recording`,
     "dtact.proto",
+    "foxglove.proto",
   ],
   { stdio: "inherit" },
 );
@@ -43,16 +46,28 @@ const browser = {
   target: ["chrome109", "firefox115", "safari16.4"],
 };
 
+/** A package and all that it needs, each once. */
+function withNeeded(name, known = new Set()) {
+  if (known.has(name)) return known;
+  known.add(name);
+  const described = JSON.parse(
+    readFileSync(path.join("node_modules", name, "package.json"), "utf8"),
+  );
+  for (const needed of Object.keys(described.dependencies ?? {})) withNeeded(needed, known);
+  return known;
+}
+
 /** What the packages that become part of the page ask to be told with it. */
 function licences() {
   const { dependencies } = JSON.parse(readFileSync("package.json", "utf8"));
-  return Object.keys(dependencies).map((name) => {
+  const names = new Set(Object.keys(dependencies).flatMap((name) => [...withNeeded(name)]));
+  return [...names].map((name) => {
     const folder = path.join("node_modules", name);
     const { version, license } = JSON.parse(
       readFileSync(path.join(folder, "package.json"), "utf8"),
     );
-    const file = path.join(folder, "LICENSE");
-    const text = existsSync(file) ? readFileSync(file, "utf8").trim() : "";
+    const file = readdirSync(folder).find((entry) => /^licen[cs]e/i.test(entry));
+    const text = file ? readFileSync(path.join(folder, file), "utf8").trim() : "";
     return `${name} ${version}: ${license}\n\n${text}\n`;
   });
 }

@@ -126,6 +126,7 @@ class Page {
       ["Space", "pause, and on"],
       ["← →", "step through the last seconds, paused"],
       ["S", "snapshot"],
+      ["R", "record, and stop"],
       ["Z", "re-zero"],
       ["?", "these keys"],
     ];

@@ -7,6 +7,7 @@ import { ContactPanel } from "./panels/contact";
 import { LightPanel } from "./panels/light";
 import { Plots, ProfilePlot } from "./panels/plots";
 import { QualityPanel } from "./panels/quality";
+import { RecordButton } from "./record_button";
 import type { Frame, Link, Wants } from "./session/messages";
 import { Sensor } from "./session/sensor";
 import { saveSnapshot } from "./snapshot";
@@ -30,6 +31,7 @@ export class Pane {
   private readonly quality = new QualityPanel();
   private readonly light: LightPanel;
   private readonly calibrations: CalibrationsPanel;
+  private readonly recording: RecordButton;
   private readonly plots = new Plots();
   private readonly profile = new ProfilePlot();
   private readonly meter = new Meter();
@@ -71,9 +73,11 @@ export class Pane {
       frame: (frame) => this.show(frame),
       event: (event) => this.event(event),
       status: (status) => this.status(status),
+      recorded: (recorded) => this.recording.tell(recorded),
     });
     this.light = new LightPanel(this.sensor);
     this.calibrations = new CalibrationsPanel(this.sensor);
+    this.recording = new RecordButton(this.sensor);
     this.steps.append(
       button("◂", () => this.sensor.step(-1), { "aria-label": "One frame back" }),
       button("▸", () => this.sensor.step(1), { "aria-label": "One frame on" }),
@@ -111,6 +115,7 @@ export class Pane {
       p: () => this.tools.choose("point"),
       l: () => this.tools.choose("line"),
       s: () => void this.snapshot(),
+      r: () => this.recording.toggle(),
       z: () => {
         if (this.sensor.mayControl) void this.light.rezero(false);
       },
@@ -139,6 +144,7 @@ export class Pane {
         button("Snapshot", () => void this.snapshot(), {
           title: "A PNG with time and settings (S)",
         }),
+        this.recording.element,
       ),
     );
     const tools = el(
@@ -216,6 +222,7 @@ export class Pane {
       }[link.state],
     );
     this.tellNotice(link.state === "live" && link.sentence === "Connected." ? "" : link.sentence);
+    this.recording.allow(link.state === "live");
     this.tokenForm.hidden = link.state !== "token";
     // A paused view goes on showing its frame.
     if (this.paused) this.stage.cover("");

@@ -43,6 +43,8 @@ export class Connection {
   private readonly later = new MessageChannel();
   /** Frames that gave way here. */
   gaveWay = 0;
+  /** No frame gives way. */
+  every = false;
 
   constructor(
     private readonly url: string,
@@ -157,6 +159,10 @@ export class Connection {
       return this.lost();
     }
     if (message[0] !== FRAME_TAG) return this.takeWord(message);
+    if (this.every) {
+      this.takePending();
+      return this.deliver(message);
+    }
     if (this.pending) ++this.gaveWay;
     // Behind what has come meanwhile, so that of several frames that wait the newest is decoded.
     else this.later.port2.postMessage(null);
@@ -166,7 +172,10 @@ export class Connection {
   private takePending(): void {
     const message = this.pending;
     this.pending = undefined;
-    if (!message || !this.greeted) return;
+    if (message && this.greeted) this.deliver(message);
+  }
+
+  private deliver(message: Uint8Array): void {
     const body = fromBinary(ServerMessageSchema, message).body;
     if (body.case === "frame") this.listener.frame(body.value, message.length);
   }

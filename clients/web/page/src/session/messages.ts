@@ -9,6 +9,7 @@ import type {
   Reply,
 } from "../../gen/dtact_pb";
 import type { ContactAbsence, Health } from "../../gen/dtact_pb";
+import type { Recorded } from "../recording/recorder";
 
 /** Which parts of a frame the page shows at present. */
 export interface Wants {
@@ -76,6 +77,7 @@ export type ToWorker =
   /** The page has taken a frame and gives memory back that it does not show any more. */
   | { kind: "taken"; depth: Int16Array | undefined; luma: Uint8Array | undefined }
   | { kind: "pause"; paused: boolean }
+  | { kind: "record"; on: boolean }
   | { kind: "step"; by: number };
 
 export type FromWorker =
@@ -83,6 +85,7 @@ export type FromWorker =
   | { kind: "hello"; hello: HelloReply }
   | { kind: "frame"; frame: Frame }
   | { kind: "event"; event: Event }
+  | { kind: "recorded"; recorded: Recorded }
   | { kind: "reply"; id: number; reply: Reply }
   /** A request that will have no answer: the connection is gone. */
   | { kind: "unanswered"; id: number };

@@ -2,6 +2,7 @@
 import { create } from "@bufbuild/protobuf";
 import { GetStatusSchema, Rights } from "../../gen/dtact_pb";
 import type { Event, HelloReply, Reply, Status } from "../../gen/dtact_pb";
+import type { Recorded } from "../recording/recorder";
 import type { Frame, FromWorker, Link, Request, ToWorker, Wants } from "./messages";
 
 /** An answer that says why not. */
@@ -23,6 +24,7 @@ export interface Watcher {
   frame(frame: Frame): boolean;
   event(event: Event): void;
   status(status: Status): void;
+  recorded(recorded: Recorded): void;
 }
 
 const HERE = ["localhost", "127.0.0.1", "[::1]"];
@@ -75,6 +77,11 @@ export class Sensor {
     this.send({ kind: "pause", paused });
   }
 
+  /** Begins a recording, or ends it: its file comes with recorded(). */
+  record(on: boolean): void {
+    this.send({ kind: "record", on });
+  }
+
   /** Shows a later frame of those that are kept, or an earlier one. */
   step(by: number): void {
     this.send({ kind: "step", by });
@@ -115,6 +122,8 @@ export class Sensor {
         return this.watcher.hello(message.hello);
       case "event":
         return this.watcher.event(message.event);
+      case "recorded":
+        return this.watcher.recorded(message.recorded);
       case "frame":
         return this.takeFrame(message.frame);
       case "reply": {

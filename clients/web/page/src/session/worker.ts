@@ -2,18 +2,18 @@
 // At most one frame is on its way to the page; of those that come meanwhile the newest one waits.
 import { create } from "@bufbuild/protobuf";
 import { DepthEncoding, LumaEncoding, PingSchema, SubscribeSchema } from "../../gen/dtact_pb";
-import type { Frame as WireFrame, HelloReply, Subscribe } from "../../gen/dtact_pb";
+import type { Frame as WireFrame, HelloReply, Reply, Subscribe } from "../../gen/dtact_pb";
+import { Recorder } from "../recording/recorder";
 import { ClockOffset, nowMs } from "./clock";
 import { Connection } from "./connection";
 import { History } from "./history";
-import type { FromWorker, ToWorker, Wants } from "./messages";
+import type { FromWorker, Link, Request, ToWorker, Wants } from "./messages";
 import { Spare, unpack } from "./unpack";
 
 /** The camera's picture is for looking at: half a megabyte each, it comes less often from afar. */
 const LUMA_HZ = { nearby: 20, afar: 5 };
-/** A Pong must not be mistaken for an answer to the page, whose ids count up from 1. */
-const PING_IDS = 2 ** 41;
-const SUBSCRIBE_IDS = 2 ** 42;
+/** What is asked from here must not be mistaken for a request of the page, whose ids count up from 1. */
+const OWN_IDS = 2 ** 41;
 
 class Session {
   private wants: Wants;
@@ -22,13 +22,15 @@ class Session {
   private readonly history = new History();
   private readonly clock = new ClockOffset();
   private readonly spare = new Spare();
-  private readonly pings = new Map<number, number>();
-  private nextId = 0;
+  /** Who waits for an answer to what was asked from here; undefined: none will come. */
+  private readonly asked = new Map<number, (reply: Reply | undefined) => void>();
+  private nextId = OWN_IDS;
   private features: string[] = [];
   /** The page has not taken the last frame yet. */
   private underWay = false;
   private waiting: WireFrame | undefined;
   private gaveWay = 0;
+  private recorder: Recorder | undefined;
   /** Frames behind the newest that a paused page looks at. */
   private behind: number | undefined;
 
@@ -36,23 +38,19 @@ class Session {
     this.wants = open.wants;
     this.nearby = open.nearby;
     this.connection = new Connection(open.url, open.program, open.token, {
-      link: (link) => post({ kind: "link", link }),
+      link: (link) => this.tellLink(link),
       hello: (hello) => this.greet(hello),
       again: () => this.begin(),
       reply: (id, reply) => {
-        const sent = this.pings.get(id);
-        if (sent === undefined) {
-          if (id < PING_IDS) post({ kind: "reply", id, reply });
-        } else if (reply.result.case === "pong") {
-          this.clock.add(sent, nowMs(), reply.result.value.monotonicNs);
-        }
-        this.pings.delete(id);
+        if (!this.answered(id, reply)) post({ kind: "reply", id, reply });
       },
       unanswered: (id) => {
-        if (id < PING_IDS) post({ kind: "unanswered", id });
-        this.pings.delete(id);
+        if (!this.answered(id, undefined)) post({ kind: "unanswered", id });
       },
-      event: (event) => post({ kind: "event", event }),
+      event: (event) => {
+        this.recorder?.addEvent(event);
+        post({ kind: "event", event });
+      },
       frame: (frame, bytes) => this.takeFrame(frame, bytes),
     });
     setInterval(() => this.ping(), 1000);
@@ -82,10 +80,19 @@ class Session {
       case "pause":
         this.behind = message.paused ? 0 : undefined;
         break;
+      case "record":
+        if (message.on) this.record();
+        else this.stopRecording();
+        break;
       case "step":
         if (this.behind !== undefined) this.step(this.behind - message.by);
         break;
     }
+  }
+
+  private tellLink(link: Link): void {
+    if (link.state !== "live") this.stopRecording("The connection was lost.");
+    post({ kind: "link", link });
   }
 
   private greet(hello: HelloReply): void {
@@ -105,11 +112,56 @@ class Session {
 
   private ping(): void {
     if (!this.features.includes("ping")) return;
-    const id = PING_IDS + ++this.nextId;
-    this.pings.set(id, nowMs());
-    if (!this.connection.request(id, { case: "ping", value: create(PingSchema) })) {
-      this.pings.delete(id);
-    }
+    const sent = nowMs();
+    void this.ask({ case: "ping", value: create(PingSchema) }).then((reply) => {
+      if (reply?.result.case === "pong") {
+        this.clock.add(sent, nowMs(), reply.result.value.monotonicNs);
+      }
+    });
+  }
+
+  private ask(request: Request): Promise<Reply | undefined> {
+    const id = ++this.nextId;
+    return new Promise((done) => {
+      this.asked.set(id, done);
+      if (!this.connection.request(id, request)) this.answered(id, undefined);
+    });
+  }
+
+  /** Whether it was asked from here. */
+  private answered(id: number, reply: Reply | undefined): boolean {
+    const waiting = this.asked.get(id);
+    this.asked.delete(id);
+    waiting?.(reply);
+    return id > OWN_IDS;
+  }
+
+  private record(): void {
+    if (this.recorder) return;
+    const recorder: Recorder = new Recorder("dtact-web page", {
+      ask: (request) => this.ask(request),
+      features: () => this.features,
+      tell: (recorded) => {
+        // Over by itself.
+        if (recorded.file && this.recorder === recorder) this.forgetRecorder();
+        post({ kind: "recorded", recorded });
+      },
+    });
+    this.recorder = recorder;
+    this.connection.every = true;
+    this.subscribe();
+  }
+
+  private stopRecording(why?: string): void {
+    void this.recorder?.finish(why);
+    this.forgetRecorder();
+  }
+
+  private forgetRecorder(): void {
+    if (!this.recorder) return;
+    this.recorder = undefined;
+    this.connection.every = false;
+    this.subscribe();
   }
 
   /** The cheapest encoding: of bytes from another machine, of work on the same. */
@@ -121,16 +173,20 @@ class Session {
 
   private subscribe(): void {
     const value: Subscribe = create(SubscribeSchema, {
-      depth: this.wants.depth ? this.encoding() : DepthEncoding.DEPTH_NONE,
+      depth: this.wants.depth || this.recorder ? this.encoding() : DepthEncoding.DEPTH_NONE,
       luma: this.wants.luma ? LumaEncoding.LUMA_GREY8 : LumaEncoding.LUMA_NONE,
       lumaHz: this.nearby ? LUMA_HZ.nearby : LUMA_HZ.afar,
       summary: true,
+      jpeg: this.recorder !== undefined && this.features.includes("jpeg"),
       pose: this.features.includes("pose"),
     });
-    this.connection.request(SUBSCRIBE_IDS + ++this.nextId, { case: "subscribe", value });
+    void this.ask({ case: "subscribe", value });
   }
 
   private takeFrame(frame: WireFrame, bytes: number): void {
+    this.recorder?.addFrame(frame);
+    // Not shown, and too large to be kept for stepping back.
+    delete frame.jpeg;
     if (this.behind !== undefined) return;
     this.history.add(frame, bytes);
     if (this.underWay) {

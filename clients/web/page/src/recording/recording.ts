@@ -1,0 +1,161 @@
+// A recording as dtactctl makes it, in the browser: clients/recording/README.md says what it holds.
+import { create, toBinary } from "@bufbuild/protobuf";
+import type { DescMessage, MessageShape } from "@bufbuild/protobuf";
+import type { GenFile } from "@bufbuild/protobuf/codegenv2";
+import { FileDescriptorSetSchema, TimestampSchema } from "@bufbuild/protobuf/wkt";
+import { McapWriter } from "@mcap/core";
+import { EventSchema, FrameSchema, LightStateSchema, StatusSchema } from "../../gen/dtact_pb";
+import type { Event, Frame, Status } from "../../gen/dtact_pb";
+import { CompressedImageSchema } from "../../gen/foxglove_pb";
+import { GrowingFile } from "./file";
+
+const CHUNK_BYTES = 4 * 1024 * 1024;
+const SECOND_NS = 1_000_000_000n;
+
+/** What describes frames beside themselves. */
+export interface Attachment {
+  name: "calibration.toml" | "reference.png" | "untouched.png";
+  mediaType: string;
+  data: Uint8Array;
+}
+
+interface Moment {
+  logTime: bigint;
+  publishTime: bigint;
+  sequence: number;
+}
+
+interface Stamped {
+  sequence: bigint;
+  monotonicNs: bigint;
+  wallNs: bigint;
+}
+
+/** A file's descriptor and those of all that it imports, these first. */
+function withImports(file: GenFile, known: Set<string>): GenFile["proto"][] {
+  if (known.has(file.name)) return [];
+  known.add(file.name);
+  return [...file.dependencies.flatMap((needed) => withImports(needed, known)), file.proto];
+}
+
+export class Recording {
+  frames = 0;
+  private readonly file = new GrowingFile();
+  private readonly writer = new McapWriter({ writable: this.file, chunkSize: CHUNK_BYTES });
+  /** The writer does one thing after another. */
+  private last: Promise<unknown>;
+  private readonly channels = new Map<string, Promise<number>>();
+  /** Wall time of the monotonic clock's zero, at what came first. */
+  private epochNs: bigint | undefined;
+  private now: Moment = { logTime: 0n, publishTime: 0n, sequence: 0 };
+  private first = 0n;
+  private newest = 0n;
+  private lastLight = "";
+  /** These wait for the first frame. */
+  private status: Status | undefined;
+  private attachments: Attachment[] = [];
+
+  constructor(program: string) {
+    this.last = this.writer.start({ profile: "", library: program });
+  }
+
+  get bytes(): number {
+    return this.file.bytes;
+  }
+
+  /** Frames between the first one and the newest that are not in the file. */
+  get missed(): number {
+    return this.frames === 0 ? 0 : Number(this.newest - this.first) + 1 - this.frames;
+  }
+
+  addFrame(frame: Frame): void {
+    this.now = this.momentOf(frame);
+    const { jpeg, ...rest } = frame;
+    if (jpeg) {
+      const timestamp = create(TimestampSchema, {
+        seconds: this.now.logTime / SECOND_NS,
+        nanos: Number(this.now.logTime % SECOND_NS),
+      });
+      const picture = { timestamp, frameId: "dtact_camera", data: jpeg.data, format: "jpeg" };
+      this.add("/camera/jpeg", CompressedImageSchema, create(CompressedImageSchema, picture));
+    }
+    if (frame.light) {
+      const light = toBinary(LightStateSchema, frame.light).join();
+      if (light !== this.lastLight) this.add("/dtact/light", LightStateSchema, frame.light);
+      this.lastLight = light;
+    }
+    this.add("/dtact/frame", FrameSchema, rest);
+    if (this.frames++ === 0) {
+      this.first = frame.sequence;
+      if (this.status) this.add("/dtact/status", StatusSchema, this.status);
+    }
+    this.newest = frame.sequence;
+    for (const attachment of this.attachments.splice(0)) this.put(attachment);
+  }
+
+  addEvent(event: Event): void {
+    if (event.monotonicNs === 0n && this.epochNs === undefined) return;
+    if (event.monotonicNs !== 0n) this.now = this.momentOf(event);
+    this.add("/dtact/event", EventSchema, event);
+  }
+
+  /** As of the first frame. */
+  addStatus(status: Status): void {
+    if (this.frames === 0) this.status = status;
+    else this.add("/dtact/status", StatusSchema, status);
+  }
+
+  attach(attachment: Attachment): void {
+    if (this.frames === 0) this.attachments.push(attachment);
+    else this.put(attachment);
+  }
+
+  /** Nothing may be added any more. */
+  async finish(): Promise<Blob> {
+    await this.queue(() => this.writer.end());
+    return this.file.whole();
+  }
+
+  private momentOf({ sequence, monotonicNs, wallNs }: Stamped): Moment {
+    this.epochNs ??= wallNs - monotonicNs;
+    return {
+      logTime: this.epochNs + monotonicNs,
+      publishTime: wallNs,
+      sequence: Number(sequence & 0xffffffffn),
+    };
+  }
+
+  private queue<T>(step: () => Promise<T>): Promise<T> {
+    const done = this.last.then(step);
+    this.last = done;
+    return done;
+  }
+
+  private put(attachment: Attachment): void {
+    const { logTime } = this.now;
+    void this.queue(() => this.writer.addAttachment({ logTime, createTime: logTime, ...attachment }));
+  }
+
+  private add<D extends DescMessage>(topic: string, schema: D, message: MessageShape<D>): void {
+    const data = toBinary(schema, message);
+    const { now } = this;
+    void this.queue(async () => {
+      const channelId = await this.channelOf(topic, schema);
+      await this.writer.addMessage({ channelId, ...now, data });
+    });
+  }
+
+  private channelOf(topic: string, type: DescMessage): Promise<number> {
+    const known = this.channels.get(topic);
+    if (known) return known;
+    const file = withImports(type.file as GenFile, new Set());
+    const data = toBinary(FileDescriptorSetSchema, create(FileDescriptorSetSchema, { file }));
+    const made = this.writer
+      .registerSchema({ name: type.typeName, encoding: "protobuf", data })
+      .then((schemaId) =>
+        this.writer.registerChannel({ schemaId, topic, messageEncoding: "protobuf", metadata: new Map() }),
+      );
+    this.channels.set(topic, made);
+    return made;
+  }
+}

@@ -1,0 +1,118 @@
+// A recording made in the browser, read by the command-line tools and held against what another client
+// of the daemon received.
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { readFileSync } from "node:fs";
+import path from "node:path";
+import { after, before, test } from "node:test";
+import { fact, open, until } from "./browser.mjs";
+import { calibration, startDaemon, startGateway, stopAll, work } from "./programs.mjs";
+import { Tap } from "./tap.mjs";
+
+let daemon;
+let tap;
+let view;
+let pane;
+
+before(async () => {
+  daemon = await startDaemon("left");
+  tap = new Tap(daemon.port);
+  view = await open(await startGateway({ left: daemon.port }));
+  pane = view.page.locator('[data-sensor="left"]');
+  await until(
+    () => pane.getAttribute("data-sequence"),
+    (sequence) => sequence !== null,
+  );
+});
+
+after(async () => {
+  tap?.close();
+  await view?.close();
+  await stopAll();
+});
+
+const ctl = (...words) => execFileSync(process.env.DTACTCTL, words, { encoding: "utf8" });
+
+/** The frames of a recording as dtactctl exports them, and their depth in millimetres. */
+function framesOf(recording) {
+  const folder = `${recording}-npy`;
+  ctl("export", recording, "--to", "npy", "-o", folder);
+  const [names, ...lines] = readFileSync(path.join(folder, "frames.csv"), "utf8")
+    .trim()
+    .split("\n")
+    .map((line) => line.split(","));
+  const npy = readFileSync(path.join(folder, "depth.npy"));
+  const shape = /'shape': \((\d+), (\d+), (\d+)\)/.exec(npy.subarray(0, 128).toString("latin1"));
+  const [, , height, width] = shape.map(Number);
+  const data = 10 + npy.readUInt16LE(8);
+  return lines.map((line) => {
+    const frame = Object.fromEntries(names.map((name, at) => [name, line[at]]));
+    const at = (row, column) => (Number(frame.map) * height + row) * width + column;
+    return {
+      sequence: Number(frame.sequence),
+      map: frame.map,
+      height,
+      width,
+      mm: (row, column) => npy.readFloatLE(data + 4 * at(row, column)),
+    };
+  });
+}
+
+/** Records for three seconds and until `ended`, which ends it, is done: the file, and what the page says. */
+async function record(ended) {
+  await pane.getByRole("button", { name: "Record" }).click();
+  await until(
+    () => fact(pane, "recording").textContent(),
+    (text) => Number(/^(\d+) s/.exec(text)?.[1]) >= 3,
+  );
+  const coming = view.page.waitForEvent("download");
+  await ended();
+  const download = await coming;
+  const file = path.join(work, download.suggestedFilename());
+  await download.saveAs(file);
+  return { file, told: await fact(pane, "recording").textContent() };
+}
+
+test("what is recorded is what the daemon sent", async () => {
+  let sent = [];
+  const { file, told } = await record(async () => {
+    // While the other client still has them.
+    sent = tap.sequences().map((sequence) => ({ sequence, ...tap.frame(sequence) }));
+    await pane.getByRole("button", { name: "Stop" }).click();
+  });
+  assert.match(path.basename(file), /^left-\d{4}-\d\d-\d\dT\d{6}Z\.mcap$/);
+  const frames = framesOf(file);
+  assert.ok(frames.length > 20, `${frames.length} frames`);
+  assert.ok(told.includes(`: ${frames.length} frames, `), told);
+  const both = sent.flatMap((other) => {
+    const frame = frames.find(({ sequence, map }) => sequence === other.sequence && map !== "");
+    return frame ? [[frame, other]] : [];
+  });
+  assert.ok(both.length > 0, "no frame that both clients have");
+  for (const [frame, other] of both) {
+    assert.deepEqual([frame.width, frame.height], [other.width, other.height]);
+    for (let row = 0; row < other.height; row += 3) {
+      for (let column = 0; column < other.width; column += 3) {
+        const mm = frame.mm(row, column);
+        const same = Number.isNaN(mm) || Math.abs(1000 * mm - other.um(row, column)) < 0.01;
+        assert.ok(same, `frame ${frame.sequence}, ${row}, ${column}: ${mm} mm`);
+      }
+    }
+  }
+});
+
+test("depth can be made anew from it", async () => {
+  const { file } = await record(() => pane.getByRole("button", { name: "Stop" }).click());
+  const anew = `${file}-anew.mcap`;
+  execFileSync(process.env.CALIBRATE, ["reprocess", file, "--calibration", calibration(), "-o", anew]);
+  const [recorded, remade] = [framesOf(file), framesOf(anew)];
+  assert.equal(remade.length, recorded.length);
+  const remadeMaps = remade.filter(({ map }) => map !== "");
+  assert.ok(remadeMaps.length > 0, "without the camera's pictures there would be no depth");
+});
+
+test("a daemon that ends leaves what was recorded until then", async () => {
+  const { file, told } = await record(() => daemon.stop("SIGKILL"));
+  assert.match(told, /^The connection was lost\. left-/);
+  assert.ok(framesOf(file).length > 20);
+});
