@@ -156,8 +156,10 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   }
 
   void end() {
-    error_code ignored;
-    if constexpr (!kTls) stream_->shutdown(tcp::socket::shutdown_send, ignored);
+    if constexpr (!kTls) {
+      error_code ignored;
+      stream_->shutdown(tcp::socket::shutdown_send, ignored);
+    }
     // What of the peer's was not read would take the answer with it as the socket closes.
     timer_.expires_after(std::chrono::seconds(1));
     timer_.async_wait([self = this->shared_from_this()](const error_code&) {});

@@ -100,14 +100,14 @@ class SteppedLoop {
                                        std::chrono::nanoseconds /*timeout*/) noexcept override {
       owner.clock.now += static_cast<std::int64_t>(1e9 * slower / description.fps);
       if (status != hal::GrabStatus::ok) return status;
-      hal::FrameInfo frame;
-      frame.sequence = sequence++;
-      frame.timestamp_ns = owner.clock.now - delay_ns;
-      frame.ready_ns = owner.clock.now;
-      frame.meaning = hal::TimestampMeaning::start_of_exposure;
-      frame.flags = std::exchange(flags, hal::kFrameNormal);
-      toy_paint(scene, frame.sequence, pixels.data());
-      out = hal::Frame(*this, 0, {pixels.data(), kToyWidth, kToyHeight, kToyWidth}, frame, jpeg);
+      hal::FrameInfo grabbed;
+      grabbed.sequence = sequence++;
+      grabbed.timestamp_ns = owner.clock.now - delay_ns;
+      grabbed.ready_ns = owner.clock.now;
+      grabbed.meaning = hal::TimestampMeaning::start_of_exposure;
+      grabbed.flags = std::exchange(flags, hal::kFrameNormal);
+      toy_paint(scene, grabbed.sequence, pixels.data());
+      out = hal::Frame(*this, 0, {pixels.data(), kToyWidth, kToyHeight, kToyWidth}, grabbed, jpeg);
       return hal::GrabStatus::ok;
     }
     void give_back(int /*index*/) noexcept override {}

@@ -358,7 +358,8 @@ TEST(BuildRegression, CountsTheDistanceFromTheCentreItIsGiven) {
   for (auto& press : set.presses) {
     for (std::size_t i = 0; i < press.frames[0].pixels.size(); ++i) {
       const double x_mm = 0.05 * (static_cast<double>(i % 260) - 129.5) - 3;
-      const double y_mm = 0.05 * (static_cast<double>(i / 260) - 119.5);
+      const std::size_t row = i / 260;
+      const double y_mm = 0.05 * (static_cast<double>(row) - 119.5);
       auto& pixel = press.frames[0].pixels[i];
       pixel = static_cast<std::uint8_t>(
           std::lround(200 - 1.5 * (200 - pixel) / (1 + 0.2 * std::hypot(x_mm, y_mm))));

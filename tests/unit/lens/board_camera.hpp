@@ -43,8 +43,9 @@ struct BoardCamera {
       for (int x = 0; x < width; ++x) {
         double sum = 0;
         for (int s = 0; s < samples * samples; ++s) {
-          const cv::Point2d inside((s % samples + 0.5) / samples - 0.5,
-                                   (s / samples + 0.5) / samples - 0.5);
+          const int column = s % samples;
+          const int row = s / samples;
+          const cv::Point2d inside((column + 0.5) / samples - 0.5, (row + 0.5) / samples - 0.5);
           sum += pattern(surface(to_camera, cv::Point2d(x, y) + inside));
         }
         image(y, x) = static_cast<float>(sum / (samples * samples));

@@ -250,7 +250,7 @@ TEST_F(Mcap, AFullDiskLosesTheOpenChunkOnly) {
 }
 
 TEST_F(Mcap, SaysWhereAFileIsDamaged) {
-  const auto failure = [this](std::string bytes) {
+  const auto failure = [this](const std::string& bytes) {
     write(bytes);
     return [this] { (void)read(Reader(file())); };
   };

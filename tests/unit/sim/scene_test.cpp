@@ -98,12 +98,14 @@ TEST(Scene, RefusesAResponseThatIsNone) {
 }
 
 class CalibratedScene : public ::testing::Test {
+ public:
+  ~CalibratedScene() override { std::filesystem::remove_all(folder_); }
+
  protected:
   void write(const std::string& toml) {
     std::filesystem::create_directories(folder_);
     base::write_file_atomically(folder_ / "calibration.toml", toml);
   }
-  ~CalibratedScene() override { std::filesystem::remove_all(folder_); }
 
   std::filesystem::path folder_ =
       std::filesystem::path(::testing::TempDir()) / fmt::format("calibrated_scene_{}", ::getpid());

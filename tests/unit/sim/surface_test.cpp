@@ -121,8 +121,9 @@ keys = [ { t = 0.0, y = 5.0, depth = 0.8 } ]
   const auto deepest = std::max_element(map.begin(), map.end()) - map.begin();
   EXPECT_NEAR(map[static_cast<std::size_t>(deepest)], 0.8, 0.02);
   // The pixel that shows it: 5 mm of arc are a quarter of a radian.
-  const cv::Vec3d at =
-      truth.surface_at(static_cast<double>(deepest % 160), static_cast<double>(deepest / 160)).at;
+  const auto column = deepest % 160;
+  const auto row = deepest / 160;
+  const cv::Vec3d at = truth.surface_at(static_cast<double>(column), static_cast<double>(row)).at;
   EXPECT_NEAR(cv::norm(at - cv::Vec3d(0, 20 * std::sin(0.25), 20 * std::cos(0.25) - 20)), 0, 0.25);
   const auto pose = truth.pose(0, 0);
   ASSERT_TRUE(pose);
