@@ -45,7 +45,7 @@ ROOMS = {
     # Of the reconstruction the surface's shape alone.
     "clients/perceive/geometry": ["daemon/recon"],
     "clients/perceive/pose": ["clients/perceive/geometry"],
-    "clients/common": ["daemon/serve", "hal/image", "proto", "daemon/recon", "clients/cpp", "clients/perceive/geometry"],
+    "clients/common": ["daemon/serve", "hal/base", "hal/image", "proto", "daemon/recon", "clients/cpp", "clients/perceive/geometry"],
     "clients/recording": ["hal/mcap", "proto", "clients/cpp"],
     "clients/calibrate/fit": ["hal/image", "daemon/recon", "daemon/calibration"],
     "clients/calibrate/fit/model": ["hal/image", "daemon/recon", "daemon/calibration", "clients/calibrate/fit"],
