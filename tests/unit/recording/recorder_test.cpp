@@ -72,10 +72,15 @@ class StuckDisk final : public mcap::Sink {
 
 TEST_F(RecorderTest, ASlowDiskDropsFramesAndNoEvents) {
   StuckDisk disk(path_);
-  const std::size_t frame = sample_frame(100).ByteSizeLong();
-  Recorder recorder(disk, {.program = "test"}, 20 * frame);
+  // Some 14 of them are a chunk, which is written at once, and then nothing goes on.
+  const auto large = [](std::uint64_t sequence) {
+    v1::Frame frame = sample_frame(sequence);
+    frame.mutable_jpeg()->set_data(std::string(300'000, 'x'));
+    return frame;
+  };
+  Recorder recorder(disk, {.program = "test"}, 20 * large(100).ByteSizeLong());
   for (std::uint64_t i = 0; i < 100; ++i) {
-    recorder.add(sample_frame(100 + i));
+    recorder.add(large(100 + i));
     recorder.add(event());
   }
   const auto counts = recorder.counts();
