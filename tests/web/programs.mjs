@@ -1,5 +1,5 @@
-// The programs that the tests run, on the simulated sensor: DTACTD, DTACTCTL, DTACT_WEB, CALIBRATE and
-// SIM_RENDER name them; FOLDER is for what they write. PAGE_DIST may name a folder with a page that is
+// The programs that the tests run, on the simulated sensor: DTACTD, DTACTCTL, DTACT_WEB, DTACT_PERCEIVE,
+// CALIBRATE and SIM_RENDER name them; FOLDER is for what they write. PAGE_DIST may name a folder with a page that is
 // to be tried in place of the one built into the gateway.
 import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, rmSync, statSync, writeFileSync } from "node:fs";
@@ -7,7 +7,7 @@ import path from "node:path";
 import { fileURLToPath } from "node:url";
 
 const here = path.dirname(fileURLToPath(import.meta.url));
-const { DTACTD, DTACTCTL, DTACT_WEB, CALIBRATE, SIM_RENDER, FOLDER } = process.env;
+const { DTACTD, DTACTCTL, DTACT_WEB, DTACT_PERCEIVE, CALIBRATE, SIM_RENDER, FOLDER } = process.env;
 /** Of the daemon's pictures a second: few, so that the tests run beside others. */
 const FPS = process.env.WEB_FPS ?? "20";
 
@@ -117,6 +117,14 @@ export async function startGateway(daemons, words = []) {
   ]);
   gateway.port = await gateway.listening();
   return gateway;
+}
+
+/** dtact-perceive beside a daemon of this machine. */
+export async function startPerceive(port) {
+  const words = ["--port", String(port), "serve", "--listen-port", "0"];
+  const perceive = new Program(DTACT_PERCEIVE, words);
+  perceive.port = await perceive.listening();
+  return perceive;
 }
 
 export function status(daemon) {

@@ -11,6 +11,7 @@ import { RecordButton } from "./record_button";
 import type { Frame, Link, Wants } from "./session/messages";
 import { Sensor } from "./session/sensor";
 import { saveSnapshot } from "./snapshot";
+import type { CloudView } from "./surface/cloud";
 import type { SurfaceView } from "./surface/surface";
 import { RangeForm } from "./view/range_form";
 import { Stage } from "./view/stage";
@@ -19,6 +20,8 @@ import { fixed } from "./words";
 
 /** Numbers that change with every frame are told so often: more cannot be read. */
 const TELL_MS = 100;
+
+const KEYS_OF_POINTS = [" ", "ArrowLeft", "ArrowRight"];
 
 /** The words of a token stay with this window alone, and end with it. */
 const tokenKey = (name: string): string => `dtact token ${name}`;
@@ -42,6 +45,9 @@ export class Pane {
   private readonly pauseButton = button("Pause", () => this.pause(!this.paused), {
     title: "Space",
   });
+  private readonly snapshotButton = button("Snapshot", () => void this.snapshot(), {
+    title: "A PNG with time and settings (S)",
+  });
   private readonly steps = el("span", { class: "row steps", hidden: "" });
   private readonly behind = el("span", { class: "quiet" });
   private readonly range = new RangeForm((range, outlineMm) => {
@@ -51,8 +57,10 @@ export class Pane {
   private readonly views: Choice<View>;
   private readonly tools: Choice<Tool>;
   private surface: SurfaceView | undefined;
+  private cloud: CloudView | undefined;
   private frame: Frame | undefined;
   private lastStatus: Status | undefined;
+  private servesPoints = false;
   private paused = false;
   private toldAt = 0;
 
@@ -124,7 +132,8 @@ export class Pane {
       ArrowRight: () => this.sensor.step(1),
     };
     const action = actions[key];
-    if (!action) return false;
+    // Points are only looked at.
+    if (!action || (this.servesPoints && !KEYS_OF_POINTS.includes(key))) return false;
     action();
     return true;
   }
@@ -141,9 +150,7 @@ export class Pane {
         { class: "row" },
         this.steps,
         this.pauseButton,
-        button("Snapshot", () => void this.snapshot(), {
-          title: "A PNG with time and settings (S)",
-        }),
+        this.snapshotButton,
         this.recording.element,
       ),
     );
@@ -169,7 +176,7 @@ export class Pane {
           el("div", { class: "main" }, tools, this.stage.element),
           this.profile.element,
           el("div", { class: "side" }, this.contact.element, this.quality.element),
-          el("div", { class: "side" }, this.light.element, this.calibrations.element),
+          el("div", { class: "side commands" }, this.light.element, this.calibrations.element),
         ),
         this.plots.element,
       ),
@@ -209,6 +216,16 @@ export class Pane {
     if (this.stage.depth) this.surface.show(this.stage.depth, this.stage.range);
   }
 
+  /** dtact-perceive serves no maps, and is commanded nothing. */
+  private async lookAtPoints(): Promise<void> {
+    this.element.dataset["kind"] = "points";
+    this.snapshotButton.hidden = this.recording.element.hidden = true;
+    this.stage.look("surface");
+    if (this.cloud) return;
+    const { CloudView } = await import("./surface/cloud");
+    this.cloud ??= new CloudView(this.stage.surfaceHost);
+  }
+
   private link(link: Link): void {
     this.element.dataset["link"] = link.state;
     say(
@@ -244,6 +261,8 @@ export class Pane {
     this.state.title = title;
     this.light.allow(this.sensor.mayControl);
     this.pause(false);
+    this.servesPoints = hello.features.includes("cloud");
+    if (this.servesPoints) return void this.lookAtPoints();
     void this.quality.ask(this.sensor);
     void this.calibrations.refresh();
   }
@@ -272,6 +291,7 @@ export class Pane {
     this.stage.show(frame);
     if (this.views.value === "surface" && frame.depth)
       this.surface?.show(frame.depth, this.stage.range);
+    this.cloud?.show(frame);
     if (!this.paused) this.plots.add(frame, this.meter.latencyMs);
     const now = performance.now();
     if (now - this.toldAt < TELL_MS && !this.paused) return true;

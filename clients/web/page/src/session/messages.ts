@@ -40,6 +40,17 @@ export interface LumaMap {
   height: number;
 }
 
+/** Points with normals, in the surface frame, on a grid of pixels; of dtact-perceive alone. */
+export interface Cloud {
+  /** x, y, z in units, then the normals in 1/32767: six arrays of width * height. -32768: no point. */
+  values: Int16Array;
+  width: number;
+  height: number;
+  mmPerUnit: number;
+  /** That are there. */
+  points: number;
+}
+
 export interface Frame {
   sequence: number;
   /** UTC, milliseconds since 1970, by the daemon's clock. */
@@ -53,8 +64,9 @@ export interface Frame {
   calibration: number | undefined;
   depth: DepthMap | undefined;
   luma: LumaMap | undefined;
-  /** Of dtact-perceive alone. */
+  /** Of dtact-perceive alone, as is the cloud. */
   pose: ObjectPose | undefined;
+  cloud: Cloud | undefined;
   /** Root mean square of trusted depth, micrometres, while nothing touches; not of every frame. */
   untouchedRmsUm: number | undefined;
   /** Frames that were missed since the connection was made: by the daemon's count, and here. */

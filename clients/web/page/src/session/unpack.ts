@@ -3,10 +3,11 @@ import type {
   DepthMap as WireDepth,
   Frame as WireFrame,
   LumaMap as WireLuma,
+  PointCloud as WireCloud,
 } from "../../gen/dtact_pb";
-import { LumaEncoding } from "../../gen/dtact_pb";
+import { CloudEncoding, LumaEncoding } from "../../gen/dtact_pb";
 import { decodeDepth, MAX_VALUES } from "../wire/depth";
-import type { DepthMap, Frame, LumaMap } from "./messages";
+import type { Cloud, DepthMap, Frame, LumaMap } from "./messages";
 
 /** Memory that the page has given back, for the next maps of the same size. */
 export class Spare {
@@ -56,6 +57,21 @@ function unpackLuma(map: WireLuma, spare: Spare): LumaMap {
   return { values, width: map.width, height: map.height };
 }
 
+/** x, y, z and the normal's. */
+const CLOUD_PARTS = 6;
+
+function unpackCloud(cloud: WireCloud): Cloud {
+  const { width, height, data } = cloud;
+  const bytes = CLOUD_PARTS * width * height * Int16Array.BYTES_PER_ELEMENT;
+  const known = cloud.encoding === CloudEncoding.CLOUD_INT16;
+  if (!known || width * height > MAX_VALUES || data.length !== bytes) {
+    throw new Error(`a cloud of ${width} x ${height} in ${data.length} bytes`);
+  }
+  // Where it lies in the message is no place for 16-bit numbers.
+  const values = new Int16Array(data.slice().buffer);
+  return { values, width, height, mmPerUnit: 1000 * cloud.metresPerUnit, points: cloud.points };
+}
+
 /** Of every 16th trusted pixel, micrometres; undefined where there is none. */
 function rootMeanSquareUm(map: DepthMap): number | undefined {
   let sum = 0;
@@ -92,6 +108,7 @@ export function unpack(
     depth,
     luma: frame.luma && unpackLuma(frame.luma, spare),
     pose: frame.pose,
+    cloud: frame.cloud && unpackCloud(frame.cloud),
     untouchedRmsUm: untouched && depth ? rootMeanSquareUm(depth) : undefined,
     dropped,
     behind,

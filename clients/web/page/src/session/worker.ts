@@ -1,8 +1,9 @@
 // Runs beside the page: holds one sensor's connection, decodes its frames and keeps the last seconds.
 // At most one frame is on its way to the page; of those that come meanwhile the newest one waits.
 import { create } from "@bufbuild/protobuf";
-import { DepthEncoding, LumaEncoding, PingSchema, SubscribeSchema } from "../../gen/dtact_pb";
-import type { Frame as WireFrame, HelloReply, Reply, Subscribe } from "../../gen/dtact_pb";
+import type { MessageInitShape } from "@bufbuild/protobuf";
+import { CloudEncoding, DepthEncoding, LumaEncoding, PingSchema, SubscribeSchema } from "../../gen/dtact_pb";
+import type { Frame as WireFrame, HelloReply, Reply } from "../../gen/dtact_pb";
 import { Recorder } from "../recording/recorder";
 import { ClockOffset, nowMs } from "./clock";
 import { Connection } from "./connection";
@@ -12,6 +13,7 @@ import { Spare, unpack } from "./unpack";
 
 /** The camera's picture is for looking at: half a megabyte each, it comes less often from afar. */
 const LUMA_HZ = { nearby: 20, afar: 5 };
+const CLOUD_HZ = { nearby: 30, afar: 10 };
 /** What is asked from here must not be mistaken for a request of the page, whose ids count up from 1. */
 const OWN_IDS = 2 ** 41;
 
@@ -172,15 +174,30 @@ class Session {
   }
 
   private subscribe(): void {
-    const value: Subscribe = create(SubscribeSchema, {
+    // dtact-perceive has points in place of maps.
+    const value = create(SubscribeSchema, this.features.includes("cloud") ? this.points() : this.maps());
+    void this.ask({ case: "subscribe", value });
+  }
+
+  private maps(): MessageInitShape<typeof SubscribeSchema> {
+    return {
       depth: this.wants.depth || this.recorder ? this.encoding() : DepthEncoding.DEPTH_NONE,
       luma: this.wants.luma ? LumaEncoding.LUMA_GREY8 : LumaEncoding.LUMA_NONE,
       lumaHz: this.nearby ? LUMA_HZ.nearby : LUMA_HZ.afar,
       summary: true,
       jpeg: this.recorder !== undefined && this.features.includes("jpeg"),
-      pose: this.features.includes("pose"),
-    });
-    void this.ask({ case: "subscribe", value });
+    };
+  }
+
+  private points(): MessageInitShape<typeof SubscribeSchema> {
+    return {
+      summary: true,
+      cloud: CloudEncoding.CLOUD_INT16,
+      cloudHz: this.nearby ? CLOUD_HZ.nearby : CLOUD_HZ.afar,
+      decimation: 2,
+      region: { case: "contactBox", value: true },
+      pose: true,
+    };
   }
 
   private takeFrame(frame: WireFrame, bytes: number): void {
@@ -205,6 +222,7 @@ class Session {
       const memory: Transferable[] = [];
       if (shown.depth) memory.push(shown.depth.values.buffer);
       if (shown.luma) memory.push(shown.luma.values.buffer);
+      if (shown.cloud) memory.push(shown.cloud.values.buffer);
       this.underWay = true;
       post({ kind: "frame", frame: shown }, memory);
     } catch (error) {

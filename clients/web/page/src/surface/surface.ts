@@ -4,27 +4,22 @@ import {
   BufferAttribute,
   BufferGeometry,
   ClampToEdgeWrapping,
-  Color,
   DataTexture,
   FloatType,
   GLSL3,
   Mesh,
   NearestFilter,
-  PerspectiveCamera,
   RawShaderMaterial,
   RedFormat,
   RGBAFormat,
-  Scene,
   Sphere,
-  SRGBColorSpace,
   Vector3,
-  WebGLRenderer,
 } from "three";
-import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { el, say } from "../dom";
 import type { DepthMap } from "../session/messages";
 import { colourMap, COLOURS } from "../view/colour_map";
 import type { Range } from "../view/map_canvas";
+import { Space } from "./space";
 
 /** Points along the longer side; halved as long as a picture takes too long. */
 const FINEST = 290;
@@ -109,10 +104,7 @@ function gridGeometry(columns: number, rows: number): BufferGeometry {
 }
 
 export class SurfaceView {
-  private readonly renderer = new WebGLRenderer({ antialias: true, alpha: true });
-  private readonly scene = new Scene();
-  private readonly camera = new PerspectiveCamera(35, 1, 0.1, 500);
-  private readonly controls: OrbitControls;
+  private readonly space: Space;
   private readonly material: RawShaderMaterial;
   private mesh: Mesh | undefined;
   private values = new Float32Array(0);
@@ -120,7 +112,6 @@ export class SurfaceView {
   private finest = FINEST;
   private shape = "";
   private pictures = 0;
-  private readonly pixel = new Uint8Array(4);
   private readonly scale = el("input", {
     type: "range",
     min: "1",
@@ -149,34 +140,15 @@ export class SurfaceView {
         toMm: { value: 1.5 },
       },
     });
-    // The map's colours are for the screen as they are.
-    this.renderer.outputColorSpace = SRGBColorSpace;
-    this.renderer.setClearColor(new Color(0, 0, 0), 0);
-    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 1.5));
-    this.renderer.domElement.setAttribute(
-      "aria-label",
-      "The surface in space; drag to turn, wheel to come closer",
-    );
+    this.space = new Space(host, "The surface in space; drag to turn, wheel to come closer");
     const full = el("span", {}, "Depth");
-    host.append(
-      this.renderer.domElement,
-      el("label", { class: "row exaggeration" }, full, this.scale, this.told),
-    );
-    this.camera.position.set(0, -30, 26);
-    this.camera.up.set(0, 0, 1);
-    this.controls = new OrbitControls(this.camera, this.renderer.domElement);
-    this.controls.target = new Vector3(0, 0, 0);
-    this.controls.minDistance = 4;
-    this.controls.maxDistance = 120;
-    this.controls.addEventListener("change", () => this.render());
+    host.append(el("label", { class: "row corner exaggeration" }, full, this.scale, this.told));
     this.scale.addEventListener("input", () => {
       const times = Number(this.scale.value);
       say(this.told, times === 1 ? "true scale" : `${times} ×`);
       this.uniform("exaggeration", times);
-      this.render();
+      this.space.render();
     });
-    new ResizeObserver(() => this.fit()).observe(host);
-    this.fit();
   }
 
   show(depth: DepthMap, range: Range): void {
@@ -197,18 +169,11 @@ export class SurfaceView {
     this.uniform("spacingMm", depth.mmPerPx * every);
     this.uniform("fromMm", range.fromMm);
     this.uniform("toMm", range.toMm);
-    this.render();
-    if (++this.pictures % JUDGED_EVERY === 0) this.judge();
-  }
-
-  /** A coarser mesh where pictures take too long, for good: a changing one would flicker. */
-  private judge(): void {
-    const gl = this.renderer.getContext();
-    const began = performance.now();
-    this.render();
-    // Reading a pixel waits until the picture is done.
-    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, this.pixel);
-    if (performance.now() - began > SLOW_MS) this.finest = Math.max(COARSEST, this.finest / 2);
+    this.space.render();
+    // A coarser mesh where pictures take too long, for good: a changing one would flicker.
+    if (++this.pictures % JUDGED_EVERY === 0 && this.space.renderMs() > SLOW_MS) {
+      this.finest = Math.max(COARSEST, this.finest / 2);
+    }
   }
 
   private uniform(name: string, value: unknown): void {
@@ -223,7 +188,7 @@ export class SurfaceView {
     this.host.dataset["every"] = String(every);
     this.texture?.dispose();
     this.mesh?.geometry.dispose();
-    if (this.mesh) this.scene.remove(this.mesh);
+    if (this.mesh) this.space.scene.remove(this.mesh);
     this.values = new Float32Array(columns * rows);
     this.texture = new DataTexture(this.values, columns, rows, RedFormat, FloatType);
     this.texture.magFilter = this.texture.minFilter = NearestFilter;
@@ -235,19 +200,6 @@ export class SurfaceView {
     // Its true extent is the shader's to know.
     this.mesh.frustumCulled = false;
     this.mesh.geometry.boundingSphere = new Sphere(new Vector3(), 100);
-    this.scene.add(this.mesh);
-  }
-
-  private fit(): void {
-    const { clientWidth: width, clientHeight: height } = this.host;
-    if (width === 0 || height === 0) return;
-    this.renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    this.render();
-  }
-
-  private render(): void {
-    this.renderer.render(this.scene, this.camera);
+    this.space.scene.add(this.mesh);
   }
 }

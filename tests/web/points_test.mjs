@@ -1,0 +1,75 @@
+// dtact-perceive behind the gateway: its points and motion on the page.
+import assert from "node:assert/strict";
+import path from "node:path";
+import { after, before, test } from "node:test";
+import { fact, numberOf, open, until } from "./browser.mjs";
+import { startDaemon, startGateway, startPerceive, stopAll, work } from "./programs.mjs";
+
+let view;
+let pane;
+
+before(async () => {
+  const daemon = await startDaemon("left");
+  const perceive = await startPerceive(daemon.port);
+  view = await open(await startGateway({ touch: perceive.port }));
+  pane = view.page.locator('[data-sensor="touch"]');
+});
+
+after(async () => {
+  await view?.close();
+  await stopAll();
+});
+
+/** How much of the canvas is drawn, its middle, and how many colours there are. */
+const drawn = () =>
+  pane.locator(".surface canvas").evaluate((canvas) => {
+    const copy = document.createElement("canvas");
+    [copy.width, copy.height] = [canvas.width, canvas.height];
+    const context = copy.getContext("2d");
+    // What was drawn stays only until the browser has shown it.
+    return new Promise((done) =>
+      requestAnimationFrame(() => {
+        context.drawImage(canvas, 0, 0);
+        const { data } = context.getImageData(0, 0, copy.width, copy.height);
+        const colours = new Set();
+        let pixels = 0;
+        for (let at = 0; at < data.length; at += 4) {
+          if (data[at + 3] < 128) continue;
+          ++pixels;
+          colours.add((data[at] << 16) | (data[at + 1] << 8) | data[at + 2]);
+        }
+        done({ pixels, colours: colours.size });
+      }),
+    );
+  });
+
+test("points are drawn while something touches, and none else", async () => {
+  await until(
+    () => fact(pane, "points").textContent(),
+    (text) => /^\d+ points/.test(text),
+  );
+  const told = await until(
+    () => numberOf(pane, "points"),
+    (points) => points > 500,
+  );
+  assert.ok(told < 580 * 580);
+  const lit = await until(drawn, ({ pixels }) => pixels > 500);
+  assert.ok(lit.colours > 20, `${lit.colours} shades of a ball`);
+  await view.page.screenshot({ path: path.join(work, "points.png") });
+  await until(
+    () => fact(pane, "points").textContent(),
+    (text) => text.startsWith("Nothing touches"),
+  );
+  await until(drawn, ({ pixels }) => pixels === 0);
+});
+
+test("motion is told, and nothing can be commanded that dtact-perceive does not know", async () => {
+  await until(
+    () => fact(pane, "moved").textContent(),
+    (text) => /mm/.test(text),
+  );
+  for (const name of ["Record", "Snapshot", "Re-zero"]) {
+    assert.equal(await pane.getByRole("button", { name }).isVisible(), false, name);
+  }
+  assert.equal(await pane.locator(".tools").isVisible(), false);
+});
