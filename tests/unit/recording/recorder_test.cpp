@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <mutex>
 
 #include "clients/recording/channels.hpp"
@@ -53,13 +54,16 @@ v1::Event event() {
 /// A disk that takes nothing until it is let go.
 class StuckDisk final : public mcap::Sink {
  public:
-  explicit StuckDisk(const fs::path& path) : file_(path, true) { stuck_.lock(); }
+  explicit StuckDisk(const fs::path& path) : file_(path, true) {}
+  void get_stuck() {
+    stuck_.lock();
+    sticks_ = true;
+  }
   void let_go() { stuck_.unlock(); }
   void append(std::string_view bytes) override {
-    if (head_) {
+    if (sticks_) {
       const std::scoped_lock wait(stuck_);
     }
-    head_ = head_ || bytes.size() > 10'000;  // the schemas are written at once
     file_.append(bytes);
   }
   void sync() override {}
@@ -67,7 +71,7 @@ class StuckDisk final : public mcap::Sink {
  private:
   mcap::FileSink file_;
   std::mutex stuck_;
-  bool head_ = false;
+  std::atomic<bool> sticks_ = false;
 };
 
 TEST_F(RecorderTest, ASlowDiskDropsFramesAndNoEvents) {
@@ -79,6 +83,7 @@ TEST_F(RecorderTest, ASlowDiskDropsFramesAndNoEvents) {
     return frame;
   };
   Recorder recorder(disk, {.program = "test"}, 20 * large(100).ByteSizeLong());
+  disk.get_stuck();
   for (std::uint64_t i = 0; i < 100; ++i) {
     recorder.add(large(100 + i));
     recorder.add(event());
