@@ -178,7 +178,8 @@ class PlayedDaemon {
         try {
           Peer peer(listening_.get(), tls);
           play(peer);
-        } catch (const std::runtime_error&) {
+        } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch)
+          // The client left in the middle of the play.
         }
       }
     });

@@ -2,7 +2,6 @@
 
 #include <sstream>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "clients/ctl/ctl.hpp"
@@ -17,7 +16,7 @@ struct Result {
   std::string error;
 };
 
-inline Result ctl(std::vector<std::string> arguments) {
+inline Result ctl(const std::vector<std::string>& arguments) {
   std::ostringstream out;
   std::ostringstream error;
   const int code = run(arguments, out, error);
@@ -27,7 +26,7 @@ inline Result ctl(std::vector<std::string> arguments) {
 /// With the rig's port.
 inline Result ctl(const net::test::Rig& rig, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {"--port", std::to_string(rig.tcp_port())});
-  return ctl(std::move(arguments));
+  return ctl(arguments);
 }
 
 }  // namespace dtact::ctl::test

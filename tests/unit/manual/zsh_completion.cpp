@@ -54,9 +54,9 @@ std::string option_spec(const Argument& option) {
   for (const std::string& name : option.names) {
     // Its value may also follow without a blank.
     const char* joined = option.value.empty() ? "" : name.starts_with("--") ? "=" : "+";
-    std::string flat = before + name + joined + text;
+    std::string flat = fmt::format("{}{}{}{}", before, name, joined, text);
     std::ranges::replace(flat, '\n', ' ');
-    words += " \\\n    " + in_quotes(flat);
+    words.append(" \\\n    ").append(in_quotes(flat));
   }
   return words;
 }

@@ -97,7 +97,7 @@ TEST(StoppedReader, IsKeptAndToldWhatItMissed) {
   std::uint64_t sequence = 0;
   // TCP_USER_TIMEOUT alone ends it after kDeadAfter.
   publish_for(rig, 3 * kDeadAfter, sequence);
-  rig.port.emit(pipeline::ReferenceTaken{1, false});
+  rig.port.emit(pipeline::ReferenceTaken{true, {}});
   EXPECT_THAT(rig.log(), Not(HasSubstr("disconnected")));
   EXPECT_EQ(stopped.frame().sequence(), 1U);
   EXPECT_GT(encoded(stopped), 60U);
