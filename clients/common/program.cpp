@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <ostream>
+#include <utility>
 
 #include "clients/common/exit_codes.hpp"
 #include "version.hpp"
@@ -17,6 +18,19 @@ int parse(CLI::App& app, std::vector<std::string> arguments, std::ostream& out,
     app.parse(std::move(arguments));
     out.flush();
     return kOk;
+  } catch (const CLI::RequiredError& e) {
+    const std::vector<std::string> left = app.remaining();
+    if (left.empty() || !app.get_subcommands().empty()) {
+      (void)app.exit(e, out, error);
+      return kUsage;
+    }
+    error << app.get_name() << ": \"" << left.front() << "\" is no command; known are ";
+    const char* between = "";
+    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+      error << std::exchange(between, ", ") << command->get_name();
+    }
+    error << '\n';
+    return kUsage;
   } catch (const CLI::ParseError& e) {
     // Also --help and --version, with exit code 0.
     return app.exit(e, out, error) == 0 ? kOk : kUsage;
