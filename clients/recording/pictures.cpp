@@ -3,9 +3,14 @@
 #include <google/protobuf/descriptor.pb.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
 #include <set>
 #include <vector>
 
+#include "clients/cpp/errors.hpp"
 #include "clients/cpp/maps.hpp"
 
 namespace dtact::recording {
@@ -13,6 +18,9 @@ namespace {
 
 /// Of the camera's own image.
 constexpr const char* kCameraFrame = "dtact_camera";
+
+constexpr std::array<const char*, 6> kPointParts{"x", "y", "z", "normal_x", "normal_y", "normal_z"};
+static_assert(std::endian::native == std::endian::little);
 
 /// A file and all that it imports, those first, as protoc --include_imports writes them.
 void add_files(const google::protobuf::FileDescriptor& file,
@@ -72,6 +80,38 @@ foxglove::CompressedImage jpeg_picture(const v1::Frame& frame, std::uint64_t tim
   image.set_format("jpeg");
   image.set_data(frame.jpeg().data());
   return image;
+}
+
+foxglove::PointCloud point_cloud(const v1::Frame& frame, std::uint64_t time_ns) {
+  const v1::PointCloud& cloud = frame.cloud();
+  const std::size_t size = std::size_t{cloud.width()} * cloud.height();
+  if (cloud.encoding() != v1::CLOUD_FLOAT32 ||
+      cloud.data().size() != kPointParts.size() * size * sizeof(float)) {
+    throw client::ProtocolError("a cloud of points is damaged: update dtact-perceive or dtact-web");
+  }
+  foxglove::PointCloud out;
+  stamp(out, time_ns, frame.frame_id());
+  out.mutable_pose()->mutable_orientation()->set_w(1);
+  out.set_point_stride(kPointParts.size() * sizeof(float));
+  for (std::size_t part = 0; part < kPointParts.size(); ++part) {
+    foxglove::PackedElementField& field = *out.add_fields();
+    field.set_name(kPointParts[part]);
+    field.set_offset(static_cast<std::uint32_t>(part * sizeof(float)));
+    field.set_type(foxglove::PackedElementField::FLOAT32);
+  }
+  // The wire has one array after the other; Foxglove wants one point after the other.
+  std::vector<float> values(kPointParts.size() * size);
+  std::memcpy(values.data(), cloud.data().data(), cloud.data().size());
+  std::string& data = *out.mutable_data();
+  data.reserve(std::size_t{cloud.points()} * out.point_stride());
+  for (std::size_t i = 0; i < size; ++i) {
+    if (std::isnan(values[i])) continue;
+    for (std::size_t part = 0; part < kPointParts.size(); ++part) {
+      const float value = values[part * size + i];
+      data.append(reinterpret_cast<const char*>(&value), sizeof value);
+    }
+  }
+  return out;
 }
 
 foxglove::RawImage luma_picture(const v1::Frame& frame, std::uint64_t time_ns) {

@@ -24,4 +24,9 @@ namespace dtact::recording {
 /// The luma as mono8.
 [[nodiscard]] foxglove::RawImage luma_picture(const v1::Frame& frame, std::uint64_t time_ns);
 
+/// The points that are there, metres in the surface frame, with their normals: float32 x, y, z,
+/// normal_x, normal_y, normal_z. Of a cloud in CLOUD_FLOAT32; throws client::ProtocolError for any
+/// other and for a damaged one.
+[[nodiscard]] foxglove::PointCloud point_cloud(const v1::Frame& frame, std::uint64_t time_ns);
+
 }  // namespace dtact::recording

@@ -36,7 +36,7 @@ void FoxgloveClient::start() {
   prefixes.reserve(places_.size());
   for (const Place& place : places_) prefixes.push_back(place.prefix);
   send(server_info(program_));
-  send(advertise(prefixes));
+  tell_channels();
   send(advertise_services(prefixes));
   for (const Place& place : places_) {
     const Source& source = place.station->source();
@@ -45,6 +45,24 @@ void FoxgloveClient::start() {
     }
   }
   read();
+}
+
+/// Those that it does not know yet, and takes back those that are there no more: behind an address
+/// there may be dtactd, and later dtact-perceive.
+void FoxgloveClient::tell_channels() {
+  std::vector<Channels> come;
+  std::vector<Channels> gone;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    Place& place = places_[i];
+    const Topics served = served_by(place.station->source().daemon());
+    if (served == place.told) continue;
+    come.push_back({i, place.prefix, served & ~place.told});
+    gone.push_back({i, place.prefix, place.told & ~served});
+    place.told = served;
+  }
+  const auto any = [](const Channels& of) { return of.topics.any(); };
+  if (std::ranges::any_of(gone, any)) send(unadvertise(gone));
+  if (std::ranges::any_of(come, any)) send(advertise(come));
 }
 
 void FoxgloveClient::close(const std::string& reason) {
@@ -91,7 +109,8 @@ void FoxgloveClient::take(bool text) {
 
 void FoxgloveClient::subscribe(const Wish& wish) {
   const std::size_t number = std::size_t{wish.channel} - 1;
-  if (wish.channel == 0 || number / kTopics >= places_.size()) {
+  if (wish.channel == 0 || number / kTopics >= places_.size() ||
+      !places_[number / kTopics].told.test(number % kTopics)) {
     return send(status(kError, fmt::format("there is no channel {}", wish.channel)));
   }
   if (subscriptions_.contains(wish.subscription)) {
@@ -158,6 +177,7 @@ void FoxgloveClient::on_message(const Station& station, Topic topic,
 }
 
 void FoxgloveClient::on_state(bool well, const std::string& sentence) {
+  tell_channels();
   send(status(well ? kInfo : kWarning, sentence));
 }
 

@@ -22,6 +22,7 @@ namespace dtact::web::foxglove {
 struct Place {
   std::shared_ptr<Station> station;
   std::string prefix;  ///< "" or "/left"
+  Topics told = {};    ///< The client knows these channels.
 };
 
 /// One client of the Foxglove protocol. On the thread that runs the gateway's `io`.
@@ -59,6 +60,7 @@ class FoxgloveClient : public Station::Listener,
 
   void read();
   void take(bool text);
+  void tell_channels();
   void subscribe(const Wish& wish);
   void update_want();
   void call(const Call& call);

@@ -111,19 +111,30 @@ std::string server_info(std::string_view program) {
       json_string(program));
 }
 
-std::string advertise(const std::vector<std::string>& prefixes) {
+std::string advertise(const std::vector<Channels>& all) {
   std::string channels;
-  for (std::size_t sensor = 0; sensor < prefixes.size(); ++sensor) {
+  for (const Channels& of : all) {
     for (const TopicInfo& info : topics()) {
+      if (!of.topics.test(index(info.topic))) continue;
       if (!channels.empty()) channels += ',';
-      channels += fmt::format(
-          R"({{"id":{},"topic":{},"encoding":"protobuf","schemaName":{},)"
-          R"("schemaEncoding":"protobuf","schema":"{}"}})",
-          channel_id(sensor, info.topic), json_string(prefixes[sensor] + info.name),
-          json_string(info.type->full_name()), base64(recording::schema_of(*info.type)));
+      channels += fmt::format(R"({{"id":{},"topic":{},"encoding":"protobuf","schemaName":{},)"
+                              R"("schemaEncoding":"protobuf","schema":"{}"}})",
+                              channel_id(of.sensor, info.topic), json_string(of.prefix + info.name),
+                              json_string(info.type->full_name()),
+                              base64(recording::schema_of(*info.type)));
     }
   }
   return fmt::format(R"({{"op":"advertise","channels":[{}]}})", channels);
+}
+
+std::string unadvertise(const std::vector<Channels>& all) {
+  std::vector<std::uint32_t> ids;
+  for (const Channels& of : all) {
+    for (const TopicInfo& info : topics()) {
+      if (of.topics.test(index(info.topic))) ids.push_back(channel_id(of.sensor, info.topic));
+    }
+  }
+  return fmt::format(R"({{"op":"unadvertise","channelIds":[{}]}})", fmt::join(ids, ","));
 }
 
 std::string advertise_services(const std::vector<std::string>& prefixes) {

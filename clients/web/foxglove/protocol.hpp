@@ -31,10 +31,18 @@ inline constexpr std::size_t kServices = 2;
   return static_cast<std::uint32_t>(sensor * kServices + static_cast<std::size_t>(service) + 1);
 }
 
-// Of the server's. `prefixes`: what stands before the topics of each sensor.
+/// A sensor's channels.
+struct Channels {
+  std::size_t sensor = 0;
+  std::string prefix;  ///< Stands before the topics.
+  Topics topics;
+};
+
+// Of the server's. `prefixes`: what stands before the services of each sensor.
 
 [[nodiscard]] std::string server_info(std::string_view program);
-[[nodiscard]] std::string advertise(const std::vector<std::string>& prefixes);
+[[nodiscard]] std::string advertise(const std::vector<Channels>& all);
+[[nodiscard]] std::string unadvertise(const std::vector<Channels>& all);
 [[nodiscard]] std::string advertise_services(const std::vector<std::string>& prefixes);
 /// `level`: 0 information, 1 warning, 2 error.
 [[nodiscard]] std::string status(int level, std::string_view sentence);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "clients/cpp/features.hpp"
 #include "clients/recording/channels.hpp"
 #include "clients/recording/pictures.hpp"
 
@@ -20,6 +21,7 @@ std::shared_ptr<const Message> without_pictures(const v1::Frame& frame, bool dep
   v1::Frame plain = frame;
   plain.clear_luma();
   plain.clear_jpeg();
+  plain.clear_cloud();
   if (!depth) plain.clear_depth();
   return made(frame, plain);
 }
@@ -36,8 +38,20 @@ const std::array<TopicInfo, kTopics>& topics() {
       {Topic::depth, recording::kDepthTopic, ::foxglove::RawImage::descriptor()},
       {Topic::luma, "/camera/luma", ::foxglove::RawImage::descriptor()},
       {Topic::jpeg, recording::kCameraTopic, ::foxglove::CompressedImage::descriptor()},
+      {Topic::points, "/dtact/points", ::foxglove::PointCloud::descriptor()},
   }};
   return all;
+}
+
+Topics served_by(const std::optional<v1::HelloReply>& daemon) {
+  Topics served;
+  if (daemon && client::lists_feature(*daemon, "cloud")) {
+    for (const Topic topic : {Topic::summary, Topic::contact, Topic::points}) {
+      served.set(index(topic));
+    }
+    return served;
+  }
+  return served.set().reset(index(Topic::points));
 }
 
 v1::Subscribe subscription_for(Topics wanted) {
@@ -57,6 +71,12 @@ v1::Subscribe subscription_for(Topics wanted) {
   if (wants(Topic::jpeg)) {
     request.set_jpeg(true);
     request.set_jpeg_hz(kMostHz);
+  }
+  if (wants(Topic::points)) {
+    request.set_cloud(v1::CLOUD_FLOAT32);
+    request.set_cloud_hz(kMostHz);
+    request.set_contact_box(true);
+    request.set_decimation(2);
   }
   if (wants(Topic::frame) || wants(Topic::summary) || wants(Topic::contact) ||
       wants(Topic::light)) {
@@ -81,6 +101,8 @@ std::shared_ptr<const Message> message_of(Topic topic, const v1::Frame& frame) {
       return frame.has_luma() ? made(frame, recording::luma_picture(frame, time_ns)) : nullptr;
     case Topic::jpeg:
       return frame.has_jpeg() ? made(frame, recording::jpeg_picture(frame, time_ns)) : nullptr;
+    case Topic::points:
+      return frame.has_cloud() ? made(frame, recording::point_cloud(frame, time_ns)) : nullptr;
     case Topic::light:
       return frame.has_light() ? made(frame, frame.light()) : nullptr;
     case Topic::event:

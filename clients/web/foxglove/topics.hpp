@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "proto/dtact.pb.h"
@@ -15,8 +16,18 @@
 // live.
 namespace dtact::web::foxglove {
 
-enum class Topic : std::uint8_t { frame, summary, contact, light, event, depth, luma, jpeg };
-inline constexpr std::size_t kTopics = 8;
+enum class Topic : std::uint8_t {
+  frame,
+  summary,
+  contact,
+  light,
+  event,
+  depth,
+  luma,
+  jpeg,
+  points
+};
+inline constexpr std::size_t kTopics = 9;
 using Topics = std::bitset<kTopics>;
 
 struct TopicInfo {
@@ -31,6 +42,10 @@ inline constexpr std::size_t index(Topic topic) { return static_cast<std::size_t
 
 /// Frames a second of each channel, at most.
 inline constexpr double kMostHz = 60;
+
+/// What a daemon has messages of: dtactd maps and pictures, dtact-perceive points. None: one that
+/// was never there, which is taken for dtactd.
+[[nodiscard]] Topics served_by(const std::optional<v1::HelloReply>& daemon);
 
 /// What the daemon has to send for these; nothing at all where events are enough.
 [[nodiscard]] v1::Subscribe subscription_for(Topics wanted);

@@ -15,7 +15,7 @@ import time
 import unittest
 from typing import Any
 
-from programs import Daemon, Gateway, calibrate
+from programs import Daemon, Gateway, Perceive, calibrate
 from viewer import Client, E, M
 from web_socket import Closed, Refused, WebSocket, request
 
@@ -30,7 +30,10 @@ TOPICS = {"/dtact/frame": "dtact.v1.Frame", "/dtact/summary": "dtact.v1.Frame",
           "/dtact/contact": "dtact.v1.Contact", "/dtact/light": "dtact.v1.LightState",
           "/dtact/event": "dtact.v1.Event", "/dtact/depth": "foxglove.RawImage",
           "/camera/luma": "foxglove.RawImage", "/camera/jpeg": "foxglove.CompressedImage"}
+POINTS = {"/dtact/summary": "dtact.v1.Frame", "/dtact/contact": "dtact.v1.Contact",
+          "/dtact/points": "foxglove.PointCloud"}
 daemon: Daemon
+perceive: Perceive
 gateway: Gateway
 
 
@@ -57,16 +60,22 @@ def install() -> None:
 
 
 def setUpModule() -> None:
-    global daemon, gateway
+    global daemon, perceive, gateway
     folder = pathlib.Path(FOLDER.name)
     daemon = Daemon(folder, "left", f"calibration={calibrate(folder)}")
-    gateway = Gateway(folder, "--daemon", f"left=127.0.0.1:{daemon.port}", "--daemon", "gone=127.0.0.1:1")
+    perceive = Perceive(folder, daemon)
+    gateway = Gateway(folder, "--daemon", f"left=127.0.0.1:{daemon.port}", "--daemon", "gone=127.0.0.1:1",
+                      "--daemon", f"touch=127.0.0.1:{perceive.port}")
+    # Which channels there are is known once it has greeted.
+    while not all(one["connected"] for one in json.loads(request(gateway.port, "/sensors")[2])
+                  if one["name"] != "gone"):
+        time.sleep(0.05)
 
 
 def tearDownModule() -> None:
-    ended = [program.stop() for program in (gateway, daemon)]
+    ended = [program.stop() for program in (gateway, perceive, daemon)]
     FOLDER.cleanup()
-    assert ended == [0, 0], ended
+    assert ended == [0, 0, 0], ended
 
 
 def told(path: str, subprotocol: str, count: int) -> dict[str, list[Any]]:
@@ -187,11 +196,34 @@ class FoxglovesClient(unittest.TestCase):
         self.assertIn("brightness: 300", failures[0] + failures[1])
         self.assertIn("brightnes", failures[0] + failures[1])
 
+    def test_points_are_as_deep_as_the_contact(self) -> None:
+        node = told("/sensors/touch/foxglove", V1, 40)
+        channels = [entry["channel"] for entry in node["channel"]]
+        self.assertEqual({one["topic"]: one["schemaName"] for one in channels}, POINTS)
+        types = classes(channels)
+        came: dict[str, dict[int, Any]] = {topic: {} for topic in POINTS}
+        for entry in node["message"]:
+            message = types[entry["topic"]].FromString(base64.b64decode(entry["data"]))
+            came[entry["topic"]][int(entry["time"])] = message
+        compared = 0
+        for time_ns, cloud in came["/dtact/points"].items():
+            self.assertEqual(cloud.point_stride, 24)
+            self.assertEqual([field.name for field in cloud.fields][:3], ["x", "y", "z"])
+            points = numpy.frombuffer(cloud.data, "<f4").reshape(-1, 6)
+            self.assertTrue(numpy.isfinite(points).all())
+            if time_ns in came["/dtact/contact"]:
+                deepest_mm = came["/dtact/contact"][time_ns].deepest_mm
+                # Every other pixel of the map, z towards the object.
+                self.assertAlmostEqual(-1000 * points[:, 2].min(), deepest_mm, delta=0.02)
+                compared += 1
+        self.assertGreater(compared, 0)
+
     def test_all_sensors_under_the_sdks_name(self) -> None:
         node = told("/foxglove", SDK, 0)
         topics = [entry["channel"]["topic"] for entry in node["channel"]]
         self.assertEqual(topics[:8], ["/left" + topic for topic in TOPICS])
-        self.assertEqual(topics[8:], ["/gone" + topic for topic in TOPICS])
+        self.assertEqual(topics[8:16], ["/gone" + topic for topic in TOPICS])
+        self.assertEqual(topics[16:], ["/touch" + topic for topic in POINTS])
         self.assertIn("the daemon of gone is away", node["status"][0]["status"]["message"])
 
 

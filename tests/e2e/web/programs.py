@@ -1,5 +1,5 @@
-"""The programs under test, named by the environment: DTACTD, DTACT_WEB, DTACTCTL, CALIBRATE,
-SIM_RENDER."""
+"""The programs under test, named by the environment: DTACTD, DTACT_WEB, DTACT_PERCEIVE, DTACTCTL,
+CALIBRATE, SIM_RENDER."""
 import os
 import pathlib
 import re
@@ -13,7 +13,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 from page_client_test import SCENE, calibrate  # noqa: E402
 
-__all__ = ["Daemon", "Gateway", "calibrate"]
+__all__ = ["Daemon", "Gateway", "Perceive", "calibrate"]
 
 
 class Program:
@@ -62,6 +62,14 @@ class Daemon(Program):
         if "net.port=0" in self.command:
             self.command[self.command.index("net.port=0")] = f"net.port={self.port}"
         self.start()
+
+
+class Perceive(Program):
+    """dtact-perceive beside a daemon."""
+
+    def __init__(self, folder: pathlib.Path, daemon: Daemon) -> None:
+        super().__init__([os.environ["DTACT_PERCEIVE"], "--port", str(daemon.port), "serve", "--listen-port", "0"],
+                         folder / "perceive.log", r"listening on 127\.0\.0\.1:(\d+)")
 
 
 class Gateway(Program):

@@ -2,8 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cstring>
+#include <limits>
+#include <optional>
 #include <stdexcept>
 
+#include "clients/cpp/errors.hpp"
 #include "clients/recording/foxglove.pb.h"
 #include "clients/web/foxglove/door.hpp"
 #include "clients/web/foxglove/protocol.hpp"
@@ -26,7 +31,7 @@ TEST(FoxgloveProtocol, Heads) {
 TEST(FoxgloveProtocol, IdsAreAlikeForNoTwo) {
   EXPECT_EQ(channel_id(0, Topic::frame), 1U);
   EXPECT_EQ(channel_id(0, Topic::jpeg), 8U);
-  EXPECT_EQ(channel_id(1, Topic::frame), 9U);
+  EXPECT_EQ(channel_id(1, Topic::frame), 10U);
   EXPECT_EQ(service_id(0, Service::rezero), 2U);
   EXPECT_EQ(service_id(1, Service::set_light), 3U);
   for (std::size_t i = 0; i < kTopics; ++i) EXPECT_EQ(index(topics()[i].topic), i);
@@ -106,6 +111,48 @@ TEST(FoxgloveTopics, APictureOfDepth) {
   EXPECT_EQ(image.timestamp().nanos(), 2);
   EXPECT_EQ(message_of(Topic::luma, frame), nullptr);
   EXPECT_EQ(message_of(Topic::contact, frame), nullptr);
+}
+
+TEST(FoxgloveTopics, ACloudOfThePointsThatAreThere) {
+  v1::Frame frame;
+  frame.set_frame_id("dtact_surface");
+  auto& cloud = *frame.mutable_cloud();
+  cloud.set_encoding(v1::CLOUD_FLOAT32);
+  cloud.set_width(2);
+  cloud.set_height(1);
+  cloud.set_points(1);
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
+  const std::array<float, 12> values{kNone, 1, kNone, 2, kNone, 3, kNone, 0, kNone, 0, kNone, -1};
+  cloud.set_data(values.data(), sizeof values);
+  const auto message = message_of(Topic::points, frame);
+  ASSERT_NE(message, nullptr);
+  ::foxglove::PointCloud points;
+  ASSERT_TRUE(points.ParseFromString(message->payload));
+  EXPECT_EQ(points.frame_id(), "dtact_surface");
+  EXPECT_EQ(points.point_stride(), 24U);
+  ASSERT_EQ(points.fields_size(), 6);
+  EXPECT_EQ(points.fields(5).name(), "normal_z");
+  EXPECT_EQ(points.fields(5).offset(), 20U);
+  std::array<float, 6> point{};
+  ASSERT_EQ(points.data().size(), sizeof point);
+  std::memcpy(point.data(), points.data().data(), sizeof point);
+  EXPECT_THAT(point, testing::ElementsAre(1, 2, 3, 0, 0, -1));
+  cloud.mutable_data()->pop_back();
+  EXPECT_THROW((void)message_of(Topic::points, frame), client::ProtocolError);
+}
+
+TEST(FoxgloveTopics, AreThoseThatTheDaemonServes) {
+  EXPECT_EQ(served_by(std::nullopt).count(), kTopics - 1);
+  EXPECT_FALSE(served_by(v1::HelloReply()).test(index(Topic::points)));
+  v1::HelloReply perceive;
+  perceive.add_features("cloud");
+  EXPECT_EQ(served_by(perceive).count(), 3U);
+  EXPECT_TRUE(served_by(perceive).test(index(Topic::points)));
+  Topics wanted;
+  wanted.set(index(Topic::points));
+  EXPECT_EQ(subscription_for(wanted).ShortDebugString(),
+            "decimation: 2 contact_box: true cloud: CLOUD_FLOAT32 cloud_hz: 60");
+  EXPECT_EQ(unadvertise({{1, "/left", wanted}}), R"({"op":"unadvertise","channelIds":[18]})");
 }
 
 TEST(FoxgloveDoor, ATokenInTheAddress) {
