@@ -63,6 +63,13 @@ void Client::rezero(bool force) {
   (void)session_->request(message, session_->options().timeout);
 }
 
+v1::Reconstruction Client::set_reconstruction(const v1::SetReconstruction& change) {
+  require_feature(server(), "reconstruction");
+  v1::ClientMessage message;
+  *message.mutable_set_reconstruction() = change;
+  return session_->request(message, session_->options().timeout).reconstruction();
+}
+
 v1::Status Client::status() {
   v1::ClientMessage message;
   message.mutable_get_status();

@@ -78,6 +78,8 @@ class DTACT_EXPORT Client {
   v1::LightState set_light(const v1::SetLight& change);
   /// Takes the present image as untouched; `force`: although something touches.
   void rezero(bool force = false);
+  /// How depth is made from now on; returns it once frames are made so.
+  v1::Reconstruction set_reconstruction(const v1::SetReconstruction& change);
   [[nodiscard]] v1::Status status();
   /// The untouched image that depth is measured against: a 16-bit grey PNG of the camera's size,
   /// 256 units a grey level.

@@ -17,6 +17,7 @@ void set_up(CLI::App& app, cli::Context& context, const std::vector<std::string>
   add_find(app, context);
   add_led(app, context);
   add_rezero(app, context);
+  add_reconstruction(app, context);
   add_calibration(app, context);
   add_snapshot(app, context);
   add_record(app, context);

@@ -160,6 +160,11 @@ std::string line_of(const v1::Event& event, std::uint64_t time) {
       what = "calibration";
       detail = event.calibration().name();
       break;
+    case v1::Event::kReconstruction:
+      what = "reconstruction";
+      detail = fmt::format("method={} sharpen={} max_error_um={}", event.reconstruction().method(),
+                           event.reconstruction().sharpen(), event.reconstruction().max_error_um());
+      break;
     case v1::Event::WHAT_NOT_SET:
       break;
   }

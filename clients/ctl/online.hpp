@@ -14,6 +14,7 @@ void add_bench(CLI::App& app, Context& context);
 void add_find(CLI::App& app, Context& context);
 void add_led(CLI::App& app, Context& context);
 void add_rezero(CLI::App& app, Context& context);
+void add_reconstruction(CLI::App& app, Context& context);
 void add_snapshot(CLI::App& app, Context& context);
 void add_calibration(CLI::App& app, Context& context);
 void add_record(CLI::App& app, Context& context);

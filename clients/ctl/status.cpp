@@ -9,6 +9,7 @@
 #include "clients/ctl/calibration_text.hpp"
 #include "clients/ctl/light_text.hpp"
 #include "clients/ctl/online.hpp"
+#include "clients/ctl/reconstruction_text.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -77,6 +78,9 @@ void print(const v1::Status& status, std::ostream& out) {
     fmt::print(out, "             {}\n", status.ring().message());
   fmt::print(out, "light        {}\n", text_of(status.light()));
   print_calibration(status, out);
+  if (status.has_reconstruction()) {
+    fmt::print(out, "depth        {}\n", text_of(status.reconstruction()));
+  }
   if (status.light_followed() != 0) {
     fmt::print(out, "reference    follows the light by {:+.2f} %\n", 100 * status.light_followed());
   }

@@ -116,9 +116,9 @@ std::vector<Key> bind_keys(Config& c) {
       boolean("capture.lock_memory", p.lock_memory),
 
       named("reconstruction.method", p.reconstruction.decimation,
-            {{"full", 1}, {"half", 2}, {"quarter", 4}, {"auto", 0}}),
+            {pipeline::kMethodNames.begin(), pipeline::kMethodNames.end()}),
       named_or("reconstruction.sharpen", p.reconstruction.sharpen,
-               {{"off", 0}, {"auto", pipeline::ReconstructionRules::kAutoSharpen}}, {1, 2}),
+               {pipeline::kSharpenNames.begin(), pipeline::kSharpenNames.end()}, {1, 2}),
       real("reconstruction.max_error_um", p.reconstruction.max_error_um, 1, 10000, "(micrometres)"),
 
       integer("reference.frames", p.reference.frames, 1, 256, "(frames)"),

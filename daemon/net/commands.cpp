@@ -8,6 +8,7 @@
 #include "daemon/net/hub.hpp"
 #include "daemon/net/light_schemes.hpp"
 #include "daemon/net/messages.hpp"
+#include "daemon/net/reconstruction_words.hpp"
 #include "daemon/serve/who.hpp"
 #include "hal/base/clock.hpp"
 #include "proto/dtact.pb.h"
@@ -109,6 +110,8 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
       return get_reference(who);
     case v1::ClientMessage::kPing:
       return ping(who);
+    case v1::ClientMessage::kSetReconstruction:
+      return set_reconstruction(who, message.set_reconstruction());
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::REQUEST_NOT_SET:
       return;  // The session's business.
@@ -162,6 +165,29 @@ void Commands::rezero(const Who& who, bool force) {
   (void)submit(who, pipeline::Rezero{force}, Pending::Rezero{});
 }
 
+void Commands::set_reconstruction(const Who& who, const v1::SetReconstruction& request) {
+  // One at a time: each makes the calibration ready anew.
+  const auto changes = [](const auto& entry) {
+    return std::holds_alternative<pipeline::ReconstructionRules>(entry.second.what);
+  };
+  if (std::ranges::any_of(pending_, changes)) {
+    return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+  }
+  pipeline::ReconstructionRules rules = port_.status().reconstruction;
+  const std::string wrong = change(request, rules);
+  if (!wrong.empty()) return who.first->reply_error(who.second, v1::ERROR_INVALID, wrong);
+  (void)submit(who, pipeline::SetReconstruction{rules}, rules);
+}
+
+void Commands::tell_reconstruction(const pipeline::ReconstructionRules& rules,
+                                   const pipeline::Stamp& at) {
+  v1::ServerMessage message;
+  auto& event = *message.mutable_event();
+  fill(at, event);
+  fill(rules, *event.mutable_reconstruction());
+  hub_.broadcast(message);
+}
+
 void Commands::on_done(const pipeline::CommandDone& done) {
   const auto entry = pending_.extract(done.ticket);
   if (entry.empty()) return;
@@ -180,6 +206,8 @@ void Commands::on_done(const pipeline::CommandDone& done) {
     return keep_calibration(pending, *change);
   }
   if (change != nullptr) changing_ = false;
+  const auto* rules = std::get_if<pipeline::ReconstructionRules>(&pending.what);
+  if (rules != nullptr && ok) tell_reconstruction(*rules, done.at);
   const bool reference = std::holds_alternative<Pending::Reference>(pending.what);
   if (reference) --reading_;
 
@@ -190,6 +218,8 @@ void Commands::on_done(const pipeline::CommandDone& done) {
   auto message = reply_to(pending.id);
   if (light != nullptr) {
     fill(*light, done.light_since_ns, *message.mutable_reply()->mutable_light());
+  } else if (rules != nullptr) {
+    fill(*rules, *message.mutable_reply()->mutable_reconstruction());
   } else {
     message.mutable_reply()->mutable_done();
   }

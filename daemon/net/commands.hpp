@@ -20,6 +20,7 @@ namespace dtact::v1 {
 class ActivateCalibration;
 class GetCalibration;
 class SetLight;
+class SetReconstruction;
 class Subscribe;
 class UploadCalibration;
 }  // namespace dtact::v1
@@ -59,7 +60,8 @@ class Commands : public std::enable_shared_from_this<Commands> {
     std::uint64_t id = 0;
     struct Rezero {};
     struct Reference {};
-    std::variant<Rezero, hal::Light, CalibrationChange, Reference> what;
+    std::variant<Rezero, hal::Light, CalibrationChange, Reference, pipeline::ReconstructionRules>
+        what;
   };
   using Who = std::pair<std::shared_ptr<Session>, std::uint64_t>;
 
@@ -70,6 +72,8 @@ class Commands : public std::enable_shared_from_this<Commands> {
   void rezero(const Who& who, bool force);
   void get_status(const Who& who);
   void ping(const Who& who);
+  void set_reconstruction(const Who& who, const v1::SetReconstruction& request);
+  void tell_reconstruction(const pipeline::ReconstructionRules& rules, const pipeline::Stamp& at);
   /// False, with the answer sent, when the pipeline cannot take another command.
   [[nodiscard]] bool submit(const Who& who, decltype(pipeline::Command::what) command,
                             decltype(Pending::what) what);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "daemon/net/advice.hpp"
+#include "daemon/net/reconstruction_words.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -218,6 +219,7 @@ void fill(const pipeline::Status& status, v1::Status& out) {
   if (status.calibration != nullptr) {
     fill(summarise(*status.calibration), *out.mutable_calibration());
   }
+  fill(status.reconstruction, *out.mutable_reconstruction());
   out.set_frames(status.frames);
   out.set_skipped(status.skipped);
   out.set_fps(status.fps);

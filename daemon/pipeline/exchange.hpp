@@ -22,6 +22,8 @@ struct RezeroOrder {
 struct CalibrationOrder {
   std::uint64_t ticket = 0;
   std::unique_ptr<ActiveCalibration> next;
+  /// It is the calibration in use, with other maps: what is known of the untouched image stays.
+  bool same_image = false;
 };
 struct ReferenceOrder {
   std::uint64_t ticket = 0;

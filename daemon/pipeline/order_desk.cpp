@@ -54,8 +54,15 @@ void OrderDesk::execute(const RezeroOrder& order, bool camera_away) noexcept {
 }
 
 void OrderDesk::execute(CalibrationOrder& order, const Stamp& now) noexcept {
+  const bool same_image = order.same_image && active_ != nullptr;
+  if (same_image) std::swap(active_->image, order.next->image);
   std::swap(active_, order.next);
-  use();
+  if (same_image) {
+    untouched_.lies_at(&active_->image);
+    use_maps();
+  } else {
+    use();
+  }
   exchange_.camera_mismatch.store(active_->camera_mismatch, std::memory_order_relaxed);
   exchange_.generation.store(active_->generation, std::memory_order_release);
   if (order.next) (void)exchange_.retired.push(std::move(order.next));  // room was made sure of
@@ -78,8 +85,14 @@ void OrderDesk::execute(const ReferenceOrder& order) noexcept {
 
 void OrderDesk::use() noexcept {
   untouched_.use(&active_->image);
+  use_maps();
+}
+
+void OrderDesk::use_maps() noexcept {
   depth_.use(&active_->maps, active_->generation);
-  if (untouched_.ready()) depth_.set_reference(untouched_.reference());
+  if (!untouched_.ready()) return;
+  depth_.set_reference(untouched_.reference());
+  depth_.set_light(untouched_.light());
 }
 
 void OrderDesk::answer(RezeroResult result) noexcept {

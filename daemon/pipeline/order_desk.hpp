@@ -37,6 +37,7 @@ class OrderDesk {
   void execute(CalibrationOrder& order, const Stamp& now) noexcept;
   void execute(const ReferenceOrder& order) noexcept;
   void use() noexcept;
+  void use_maps() noexcept;
   void answer(Outcome outcome, const char* sentence) noexcept;
 
   Exchange& exchange_;

@@ -51,15 +51,16 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
       light_(std::move(ring), config_.light, clock, exchange_),
       writer_(info_.width, info_.height, config_.state_folder),
       place_(info_.width, info_.height, config_.reference.frames),
-      depth_capacity_(exchange_.slot.back().depth_um.capacity()) {
+      depth_capacity_(exchange_.slot.back().depth_um.capacity()),
+      rules_(config_.reconstruction) {
   std::unique_ptr<ActiveCalibration> active;
   bool unusable = false;
   if (calibration) {
     try {
-      active = activate(calibration, info_, config_.reconstruction);
+      active = activate(calibration, info_, rules_);
       active->generation = ++generations_;
       exchange_.generation = generations_;
-      calibrations_.push_back({generations_, calibration});
+      calibrations_.push_back({generations_, calibration, 0});
     } catch (const std::invalid_argument& e) {
       const recon::RectifyTable& table = calibration->model->rectify;
       unusable = table.frame_width != info_.width || table.frame_height != info_.height;
@@ -157,6 +158,9 @@ bool Pipeline::submit(Command command) {
     return exchange_.orders.push(RezeroOrder{command.ticket, rezero->force});
   }
   if (std::holds_alternative<CopyReference>(command.what)) return copy_reference(command.ticket);
+  if (const auto* how = std::get_if<SetReconstruction>(&command.what)) {
+    return reconstruct(command.ticket, how->rules);
+  }
   return use(command.ticket, std::get<UseCalibration>(command.what));
 }
 
@@ -176,7 +180,6 @@ bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
   if (exchange_.orders.room() == 0) return false;
   try {
     if (!command.calibration) throw std::invalid_argument("no calibration was given");
-    auto active = activate(command.calibration, camera_->info(), config_.reconstruction);
     const recon::RectifyTable& table = command.calibration->model->rectify;
     if (pixels(table.width, table.height) > depth_capacity_) {
       throw std::invalid_argument(
@@ -184,15 +187,45 @@ bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
                       "restart dtactd with this calibration",
                       table.width, table.height));
     }
-    active->generation = ++generations_;
-    active->key = command.key;
-    calibrations_.push_back({generations_, command.calibration});
-    return exchange_.orders.push(CalibrationOrder{ticket, std::move(active)});
+    return order(ticket, {0, command.calibration, command.key}, rules_, false);
   } catch (const std::invalid_argument& e) {
-    own_events_.emplace_back(CommandDone{ticket, Outcome::invalid, e.what()});
+    return refuse(ticket, e.what());
+  }
+}
+
+bool Pipeline::reconstruct(std::uint64_t ticket, const ReconstructionRules& rules) {
+  if (exchange_.orders.room() == 0) return false;
+  if (calibrations_.empty()) {
+    rules_ = rules;
+    const Stamp now{exchange_.sequence.load(std::memory_order_relaxed), clock_.monotonic_ns(),
+                    clock_.wall_ns()};
+    own_events_.emplace_back(CommandDone{ticket, Outcome::done, "", now});
     exchange_.wake.signal();
     return true;
   }
+  try {
+    const Known same = calibrations_.back();
+    if (!order(ticket, same, rules, true)) return false;
+    rules_ = rules;
+    return true;
+  } catch (const std::invalid_argument& e) {
+    return refuse(ticket, e.what());
+  }
+}
+
+bool Pipeline::order(std::uint64_t ticket, const Known& next, const ReconstructionRules& rules,
+                     bool same_image) {
+  auto active = activate(next.calibration, camera_->info(), rules);
+  active->generation = ++generations_;
+  active->key = next.key;
+  calibrations_.push_back({generations_, next.calibration, next.key});
+  return exchange_.orders.push(CalibrationOrder{ticket, std::move(active), same_image});
+}
+
+bool Pipeline::refuse(std::uint64_t ticket, const char* sentence) {
+  own_events_.emplace_back(CommandDone{ticket, Outcome::invalid, sentence});
+  exchange_.wake.signal();
+  return true;
 }
 
 // A camera may come up after the daemon, or as another one after a plug.
@@ -233,6 +266,7 @@ Status Pipeline::status() const {
   for (const Known& known : calibrations_) {
     if (known.generation == in_use) status.calibration = known.calibration;
   }
+  status.reconstruction = rules_;
   status.frames = exchange_.frames.load(std::memory_order_relaxed);
   status.skipped = exchange_.slot.replaced();
   status.fps = exchange_.statistics.fps(clock_.monotonic_ns());

@@ -55,9 +55,15 @@ class Pipeline final : public Port {
   struct Known {
     std::uint64_t generation = 0;
     std::shared_ptr<const calibration::Calibration> calibration;
+    std::uint64_t key = 0;  ///< UseCalibration::key.
   };
   [[nodiscard]] DepthFrame prototype(const calibration::Calibration* calibration) const;
   [[nodiscard]] bool use(std::uint64_t ticket, const UseCalibration& command);
+  [[nodiscard]] bool reconstruct(std::uint64_t ticket, const ReconstructionRules& rules);
+  /// Has the capture thread measure by this from now on. Throws std::invalid_argument.
+  [[nodiscard]] bool order(std::uint64_t ticket, const Known& next,
+                           const ReconstructionRules& rules, bool same_image);
+  [[nodiscard]] bool refuse(std::uint64_t ticket, const char* sentence);
   [[nodiscard]] bool copy_reference(std::uint64_t ticket);
   void compare_camera();
   void free_retired();
@@ -75,6 +81,7 @@ class Pipeline final : public Port {
   std::string restore_failure_;
   std::vector<std::string> realtime_;  // settings refused, one sentence each
   // Network thread only.
+  ReconstructionRules rules_;  ///< As asked for last.
   std::deque<Event> own_events_;
   std::deque<Known> calibrations_;  // in use, and on their way to be
   std::map<std::uint64_t, std::shared_ptr<ReferenceCopy>> copies_;  // being made, by ticket

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "hal/light_ring.hpp"
 
@@ -26,7 +28,15 @@ struct ReconstructionRules {
   /// kAutoSharpen: for every frame the fewest whose expected error stays within max_error_um.
   int sharpen = 0;
   double max_error_um = 50;
+
+  bool operator==(const ReconstructionRules&) const = default;
 };
+
+/// What ReconstructionRules::decimation and sharpen are called, but for 1 and 2 steps.
+inline constexpr std::array<std::pair<const char*, int>, 4> kMethodNames{
+    {{"full", 1}, {"half", 2}, {"quarter", 4}, {"auto", 0}}};
+inline constexpr std::array<std::pair<const char*, int>, 2> kSharpenNames{
+    {{"off", 0}, {"auto", ReconstructionRules::kAutoSharpen}}};
 
 /// How far the reference follows the light as a whole (light_follower.hpp).
 struct DriftRules {

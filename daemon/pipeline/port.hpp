@@ -10,6 +10,7 @@
 
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/pipeline/depth_frame.hpp"
+#include "daemon/pipeline/pipeline_config.hpp"
 #include "hal/camera.hpp"
 #include "hal/light_ring.hpp"
 
@@ -28,9 +29,13 @@ struct UseCalibration {
   std::uint64_t key = 0;
 };
 struct CopyReference {};
+/// How depth is made from now on; the untouched image stays.
+struct SetReconstruction {
+  ReconstructionRules rules;
+};
 struct Command {
   std::uint64_t ticket = 0;  ///< Comes back in CommandDone.
-  std::variant<SetLight, Rezero, UseCalibration, CopyReference> what;
+  std::variant<SetLight, Rezero, UseCalibration, CopyReference, SetReconstruction> what;
 };
 
 /// When something happened.
@@ -66,7 +71,7 @@ struct CommandDone {
   std::uint64_t ticket = 0;
   Outcome outcome = Outcome::done;
   std::string message = {};  ///< Empty when done; else what happened and what to do.
-  Stamp at = {};             ///< Of UseCalibration, when it was done.
+  Stamp at = {};             ///< Of UseCalibration and SetReconstruction, when it was done.
   std::optional<std::int64_t> light_since_ns = {};      ///< Of SetLight, as DepthFrame's.
   std::shared_ptr<const ReferenceCopy> reference = {};  ///< Of CopyReference, when done.
 };
@@ -128,6 +133,7 @@ struct Status {
   hal::Light light = {};
   std::optional<std::int64_t> light_since_ns;                   ///< As DepthFrame::light_since_ns.
   std::shared_ptr<const calibration::Calibration> calibration;  ///< Null when uncalibrated.
+  ReconstructionRules reconstruction;                           ///< As asked for last.
   std::uint64_t frames = 0;                                     ///< Published since start.
   std::uint64_t skipped = 0;          ///< Published but replaced before the network fetched them.
   double fps = 0;                     ///< Over the last second.

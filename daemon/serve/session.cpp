@@ -40,6 +40,7 @@ bool is_for_viewers(v1::ClientMessage::RequestCase request) {
     case v1::ClientMessage::kRezero:
     case v1::ClientMessage::kUploadCalibration:
     case v1::ClientMessage::kActivateCalibration:
+    case v1::ClientMessage::kSetReconstruction:
       return false;
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::kSubscribe:

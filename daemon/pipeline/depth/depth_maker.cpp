@@ -7,14 +7,11 @@
 namespace dtact::pipeline {
 
 DepthMaker::DepthMaker(const PipelineConfig& config, base::Clock& clock)
-    : config_(config),
-      clock_(clock),
-      contact_(config.contact),
-      chooser_(config.reconstruction.max_error_um) {}
+    : config_(config), clock_(clock), contact_(config.contact) {}
 
 void DepthMaker::use(Resolutions* maps, std::uint64_t generation) noexcept {
   maps_ = maps;
-  chooser_.restart();
+  if (maps_ != nullptr) chooser_ = RungChooser(maps_->max_error_um());
   generation_ = generation;
 }
 

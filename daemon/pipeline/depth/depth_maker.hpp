@@ -49,7 +49,7 @@ class DepthMaker {
   Resolutions* maps_ = nullptr;
   std::uint64_t generation_ = 0;
   ContactDetector contact_;
-  RungChooser chooser_;
+  RungChooser chooser_{0};  ///< Of maps_.
   bool beyond_ = false;
 };
 

@@ -31,6 +31,7 @@ void require_sharpening(const recon::Model& model, int steps) {
 Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
                          const recon::CellLattice& lattice, const ReconstructionRules& rules)
     : model_(model),
+      max_error_um_(rules.max_error_um),
       mean_grey_(std::accumulate(model->reference_q8.begin(), model->reference_q8.end(), 0.0) /
                  256 / static_cast<double>(model->reference_q8.size())) {
   // Where nothing else is asked for a sharpened map stays as coarse as it is made.

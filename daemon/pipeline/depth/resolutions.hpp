@@ -54,6 +54,8 @@ class Resolutions {
   Resolutions(const std::shared_ptr<const recon::Model>& model, const recon::CellLattice& lattice,
               const ReconstructionRules& rules);
 
+  /// ReconstructionRules::max_error_um.
+  [[nodiscard]] double max_error_um() const noexcept { return max_error_um_; }
   /// The one that works on the next frame.
   [[nodiscard]] Resolution& in_use() noexcept { return all_[in_use_]; }
   [[nodiscard]] std::size_t rung() const noexcept { return in_use_; }
@@ -80,6 +82,7 @@ class Resolutions {
   void add(const recon::CellLattice& lattice, int decimation, int steps, int map_decimation);
 
   std::shared_ptr<const recon::Model> model_;
+  double max_error_um_;
   double mean_grey_;             // of the calibration's reference
   std::vector<Resolution> all_;  // the cheaper before the more accurate
   std::size_t in_use_ = 0;

@@ -57,11 +57,6 @@ double plain_bend_um(double bend_um, int steps) noexcept {
   return bend_um / kSharpened[static_cast<std::size_t>(steps)].bend;
 }
 
-void RungChooser::restart() noexcept {
-  rung_ = 0;
-  patient_ = 0;
-}
-
 std::size_t RungChooser::next(std::span<const double> expected_um) noexcept {
   const std::size_t before = rung_;
   const auto outside = [this](double um) { return um > max_error_um_; };

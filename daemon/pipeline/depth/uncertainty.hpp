@@ -57,8 +57,6 @@ class RungChooser {
 
   /// `expected_um`: of the frame just done, on each rung. Returns the rung for the next.
   std::size_t next(std::span<const double> expected_um) noexcept;
-  /// Another ladder: from its first rung on.
-  void restart() noexcept;
 
   static constexpr int kPatience = 15;
   static constexpr double kMargin = 0.9;

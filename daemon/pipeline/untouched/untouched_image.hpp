@@ -59,6 +59,8 @@ class UntouchedImage {
   void restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light);
   /// From now on this calibration; null: none. A fresh reference stays.
   void use(CalibratedImage* image) noexcept;
+  /// The image in use has moved to another place.
+  void lies_at(CalibratedImage* image) noexcept { image_ = image; }
   /// The camera has begun anew: what was known of its image is in doubt.
   void camera_began() noexcept;
   /// The ring is about to show this, or shows it since just now.

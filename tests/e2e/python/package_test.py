@@ -149,6 +149,24 @@ class Commands(unittest.TestCase):
             events = [e for e in s.events(timeout=1) if isinstance(e, dtact.CalibrationEvent)]
             self.assertEqual([e.name for e in events], ["again", "calibration"])
 
+    def test_how_depth_is_made_is_changed(self):
+        with dtact.connect(daemon.address) as s:
+            if "reconstruction" not in s.server.features:
+                self.skipTest("this daemon is older")
+            before = s.status().reconstruction
+            s.subscribe()
+            try:
+                how = s.set_reconstruction(method="quarter")
+                self.assertEqual((how.method, how.sharpen), ("quarter", before.sharpen))
+                f = next(f for f in s.frames() if f.has_depth and f.message.depth.decimation == 4)
+                self.assertEqual(f.depth_mm.shape, (145, 145))
+                with self.assertRaisesRegex(dtact.Invalid, "max_error_um: 0; allowed are 1 to 10000"):
+                    s.set_reconstruction(max_error_um=0)
+            finally:
+                s.set_reconstruction(method=before.method)
+            events = [e for e in s.events(timeout=1) if isinstance(e, dtact.ReconstructionEvent)]
+            self.assertEqual([e.reconstruction.method for e in events], ["quarter", before.method])
+
     def test_clocks_and_reference(self):
         with dtact.connect(daemon.address) as s:
             if not {"ping", "reference"} <= s.server.features:

@@ -37,6 +37,12 @@ TEST(CaptureLoop, FollowsTheLightBesideAPressThatLasts) {
   EXPECT_NEAR(loop.frame->contact.deepest_mm, before_mm, 0.010);
   EXPECT_NEAR(loop.exchange.light_followed, -0.006, 0.001);
   EXPECT_TRUE(loop.frame->health.empty());
+  // Other maps of the same calibration know what is known of the light.
+  ASSERT_TRUE(
+      loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration()), true}));
+  loop.step(2);
+  EXPECT_NEAR(loop.frame->contact.deepest_mm, before_mm, 0.010);
+  EXPECT_NEAR(loop.exchange.light_followed, -0.006, 0.001);
 }
 
 TEST(CaptureLoop, ACameraThatHalvesItsRateIsNamedWithoutLosses) {

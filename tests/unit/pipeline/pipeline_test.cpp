@@ -322,6 +322,37 @@ TEST_F(PipelineTest, ACalibrationCanComeLaterAndBeReplaced) {
   EXPECT_EQ(all<ReferenceTaken>().size(), 1U);
 }
 
+TEST_F(PipelineTest, DepthIsMadeInAnotherWayAgainstTheSameReference) {
+  start(fakes::toy_calibration());
+  ASSERT_TRUE(until_fresh());
+  const int full = frame->width;
+  EXPECT_EQ(ask(SetReconstruction{{.decimation = 4}}).outcome, Outcome::done);
+  EXPECT_TRUE(until_frame([](const DepthFrame& f) { return f.decimation == 4; }));
+  EXPECT_EQ(frame->width, full / 4);
+  EXPECT_TRUE(frame->health.empty());
+  EXPECT_EQ(pipeline->status().reconstruction.decimation, 4);
+  // Also of calibrations to come.
+  EXPECT_EQ(ask(UseCalibration{fakes::toy_calibration()}).outcome, Outcome::done);
+  EXPECT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth; }));
+  EXPECT_EQ(frame->decimation, 4);
+  const CommandDone refused = ask(SetReconstruction{{.decimation = 1, .sharpen = 2}});
+  EXPECT_EQ(refused.outcome, Outcome::invalid);
+  EXPECT_NE(refused.message.find("no list"), std::string::npos) << refused.message;
+  EXPECT_EQ(pipeline->status().reconstruction.decimation, 4);
+  EXPECT_EQ(all<ReferenceTaken>().size(), 1U);
+}
+
+TEST_F(PipelineTest, AWayToMakeDepthWaitsForACalibration) {
+  start(nullptr);
+  ASSERT_TRUE(until_state(State::uncalibrated));
+  const CommandDone done = ask(SetReconstruction{{.decimation = 2}});
+  EXPECT_EQ(done.outcome, Outcome::done);
+  EXPECT_GT(done.at.monotonic_ns, 0);
+  EXPECT_EQ(ask(UseCalibration{fakes::toy_calibration()}).outcome, Outcome::done);
+  ASSERT_TRUE(until_fresh());
+  EXPECT_EQ(frame->decimation, 2);
+}
+
 TEST_F(PipelineTest, ACalibrationOfAnotherModeIsRefused) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());

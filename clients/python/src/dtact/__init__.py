@@ -34,6 +34,7 @@ from .event import (
     Event,
     LightEvent,
     Reconnected,
+    ReconstructionEvent,
     ReferenceEvent,
     StateEvent,
 )
@@ -48,6 +49,7 @@ from .values import (
     Contact,
     Light,
     Pong,
+    Reconstruction,
     ReferenceImage,
     Server,
     Status,
@@ -61,8 +63,8 @@ __all__ = [
     "Busy", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Camera", "Client",
     "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "EndedByDaemon",
     "Error", "Event", "Frame", "IdentityError", "Invalid", "Light", "LightEvent", "NoFrame",
-    "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Reconnected", "Recording", "ReferenceEvent",
-    "ReferenceImage", "Refused", "Server", "StateEvent", "Status", "StorageFailed",
+    "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Reconnected", "Reconstruction",
+    "ReconstructionEvent", "Recording", "ReferenceEvent", "ReferenceImage", "Refused", "Server", "StateEvent", "Status", "StorageFailed",
     "StoredCalibration", "Subscription", "TimeoutError", "Touched", "Uncalibrated", "Unsupported",
     "aio", "connect", "read",
 ]

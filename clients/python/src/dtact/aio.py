@@ -25,7 +25,15 @@ from .requests import Request, T
 from .session import BackOff, Session
 from .subscription import Subscription
 from .transport import is_local, tune
-from .values import CalibrationFiles, Light, Pong, ReferenceImage, Status, StoredCalibration
+from .values import (
+    CalibrationFiles,
+    Light,
+    Pong,
+    Reconstruction,
+    ReferenceImage,
+    Status,
+    StoredCalibration,
+)
 
 _Item = TypeVar("_Item")
 
@@ -143,6 +151,10 @@ class Client(Session):
     async def set_light(self, brightness: int | None = None, scheme: str | None = None,
                         leds: Sequence[tuple[int, int, int]] | None = None) -> Light:
         return await self._ask(requests.set_light(brightness, scheme, leds))
+
+    async def set_reconstruction(self, method: str | None = None, sharpen: str | None = None,
+                                 max_error_um: float | None = None) -> Reconstruction:
+        return await self._ask(requests.set_reconstruction(method, sharpen, max_error_um))
 
     async def rezero(self, force: bool = False) -> None:
         await self._ask(requests.rezero(force))

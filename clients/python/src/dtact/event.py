@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from .messages import Message, name_of
-from .values import Contact, Light, condition_names, wall_time
+from .values import Contact, Light, Reconstruction, condition_names, wall_time
 
 
 @dataclass(frozen=True)
@@ -48,6 +48,13 @@ class StateEvent(Event):
 
 
 @dataclass(frozen=True)
+class ReconstructionEvent(Event):
+    """Depth is made in another way."""
+
+    reconstruction: Reconstruction
+
+
+@dataclass(frozen=True)
 class CalibrationEvent(Event):
     """Another calibration is in use."""
 
@@ -85,5 +92,7 @@ def event_of(message: Message) -> Event | None:
     if kind == "state":
         return StateEvent(sequence, time, monotonic_s, name_of("State", m.state),
                           condition_names(m.health))
+    if kind == "reconstruction":
+        return ReconstructionEvent(sequence, time, monotonic_s, Reconstruction.of(m))
     number = m.number if m.HasField("number") else None
     return CalibrationEvent(sequence, time, monotonic_s, m.name, number)

@@ -11,6 +11,7 @@ from .values import (
     CalibrationFiles,
     Light,
     Pong,
+    Reconstruction,
     ReferenceImage,
     Server,
     Status,
@@ -79,6 +80,21 @@ def set_light(brightness: int | None, scheme: str | None,
     for r, g, b in leds or ():
         request.leds.add(r=r, g=g, b=b)
     return Request(message, lambda reply: Light.of(reply.light))
+
+
+def set_reconstruction(method: str | None, sharpen: str | None,
+                       max_error_um: float | None) -> Request[Reconstruction]:
+    message = ClientMessage()
+    request = message.set_reconstruction
+    request.SetInParent()
+    if method is not None:
+        request.method = method
+    if sharpen is not None:
+        request.sharpen = sharpen
+    if max_error_um is not None:
+        request.max_error_um = max_error_um
+    return Request(message, lambda reply: Reconstruction.of(reply.reconstruction),
+                   needs=frozenset({"reconstruction"}))
 
 
 def rezero(force: bool) -> Request[None]:

@@ -62,6 +62,19 @@ class Light:
 
 
 @dataclass(frozen=True)
+class Reconstruction:
+    """How depth is made; dtactd.toml explains the words under [reconstruction]."""
+
+    method: str  #: "full", "half", "quarter", "auto"
+    sharpen: str  #: "off", "1", "2", "auto"
+    max_error_um: float  #: 1 … 10000, for "auto"
+
+    @classmethod
+    def of(cls, m: Message) -> Reconstruction:
+        return cls(m.method, m.sharpen, m.max_error_um)
+
+
+@dataclass(frozen=True)
 class CalibrationSummary:
     """What a calibration is made for."""
 
@@ -157,12 +170,14 @@ class Status:
     calibration: CalibrationSummary | None
     version: str
     message: Message
+    reconstruction: Reconstruction | None  #: None from daemons that do not tell
 
     @classmethod
     def of(cls, m: Message) -> Status:
         calibration = CalibrationSummary.of(m.calibration) if m.HasField("calibration") else None
         return cls(name_of("State", m.state), condition_names(m.health), m.advice, m.fps,
-                   Light.of(m.light), calibration, m.version, m)
+                   Light.of(m.light), calibration, m.version, m,
+                   Reconstruction.of(m.reconstruction) if m.HasField("reconstruction") else None)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,68 @@
+#include <fmt/format.h>
+
+#include <memory>
+#include <optional>
+#include <ostream>
+#include <string>
+
+#include "clients/common/json.hpp"
+#include "clients/ctl/online.hpp"
+#include "clients/ctl/reconstruction_text.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+struct ReconstructionOptions {
+  std::optional<std::string> method;
+  std::optional<std::string> sharpen;
+  std::optional<double> max_error_um;
+};
+
+v1::Reconstruction run(const Context& context, const ReconstructionOptions& options) {
+  client::Client client(context.target);
+  if (!options.method && !options.sharpen && !options.max_error_um) {
+    const v1::Status status = client.status();
+    if (status.has_reconstruction()) return status.reconstruction();
+    throw client::Refused(v1::ERROR_UNSUPPORTED,
+                          "this daemon does not tell how it makes depth: update dtactd");
+  }
+  v1::SetReconstruction change;
+  if (options.method) change.set_method(*options.method);
+  if (options.sharpen) change.set_sharpen(*options.sharpen);
+  if (options.max_error_um) change.set_max_error_um(*options.max_error_um);
+  return client.set_reconstruction(change);
+}
+
+}  // namespace
+
+std::string text_of(const v1::Reconstruction& how) {
+  std::string text = fmt::format("method {}, sharpen {}", how.method(), how.sharpen());
+  if (how.method() == "auto" || how.sharpen() == "auto") {
+    text += fmt::format(", within {:g} um where that can be had", how.max_error_um());
+  }
+  return text;
+}
+
+void add_reconstruction(CLI::App& app, Context& context) {
+  auto* command = app.add_subcommand(
+      "reconstruction",
+      "Change how depth is made, speed against accuracy, until the daemon ends; without options, "
+      "show it");
+  const auto options = std::make_shared<ReconstructionOptions>();
+  command->add_option("--method", options->method,
+                      "The map's share of the calibration's resolution: full, half, quarter, or "
+                      "auto: the coarsest within --max-error-um, for each frame");
+  command->add_option("--sharpen", options->sharpen,
+                      "Steps of the filter that undoes the layer's blur: off, 1, 2, or auto: the "
+                      "fewest within --max-error-um, for each frame");
+  command
+      ->add_option("--max-error-um", options->max_error_um,
+                   "What auto keeps to: expected error inside the contact, micrometres")
+      ->check(CLI::Range(1.0, 10000.0));
+  command->callback([&context, options] {
+    const v1::Reconstruction how = run(context, *options);
+    context.out << (context.json ? cli::json_line(how) : text_of(how) + '\n');
+  });
+}
+
+}  // namespace dtact::ctl

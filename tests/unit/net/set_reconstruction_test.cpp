@@ -1,0 +1,111 @@
+// How clients change the way depth is made, and what they are told of it.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <variant>
+
+#include "tests/unit/net/raw_client.hpp"
+#include "tests/unit/net/requests.hpp"
+#include "tests/unit/net/rig.hpp"
+
+namespace dtact::net::test {
+namespace {
+
+using pipeline::CommandDone;
+using pipeline::Outcome;
+using pipeline::ReconstructionRules;
+
+template <typename Change>
+v1::ClientMessage asking(Change change) {
+  v1::ClientMessage message;
+  change(*message.mutable_set_reconstruction());
+  return message;
+}
+
+TEST(SetReconstruction, ChangesOnlyWhatIsSetAndTellsEveryone) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([](const pipeline::Command& command) {
+      return CommandDone{command.ticket, Outcome::done, "", {4, 5, 6}};
+    });
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  RawClient other(rig.tcp_port());
+  other.hello();
+  const auto reply = client.request(asking([](auto& change) { change.set_method("auto"); }));
+  EXPECT_EQ(reply.reconstruction().method(), "auto");
+  EXPECT_EQ(reply.reconstruction().sharpen(), "off");
+  EXPECT_EQ(reply.reconstruction().max_error_um(), 50);
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  EXPECT_EQ(std::get<pipeline::SetReconstruction>(command->what).rules,
+            (ReconstructionRules{.decimation = 0}));
+  const auto event = other.event();
+  EXPECT_EQ(event.reconstruction().method(), "auto");
+  EXPECT_EQ(event.sequence(), 4U);
+  EXPECT_EQ(event.monotonic_ns(), 5);
+  EXPECT_EQ(event.wall_ns(), 6);
+}
+
+TEST(SetReconstruction, TakesEveryWord) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  for (const char* method : {"full", "half", "quarter", "auto"}) {
+    const auto reply =
+        client.request(asking([&](auto& change) { change.set_method(method); })).reconstruction();
+    EXPECT_EQ(reply.method(), method);
+  }
+  for (const char* sharpen : {"off", "1", "2", "auto"}) {
+    const auto reply =
+        client.request(asking([&](auto& change) { change.set_sharpen(sharpen); })).reconstruction();
+    EXPECT_EQ(reply.sharpen(), sharpen);
+  }
+}
+
+TEST(SetReconstruction, NamesTheFieldThatIsWrong) {
+  Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  expect_invalid(client, asking([](auto& change) { change.set_method("best"); }),
+                 "set_reconstruction.method: \"best\" is unknown; known are full, half, quarter");
+  expect_invalid(client, asking([](auto& change) { change.set_sharpen("3"); }),
+                 "set_reconstruction.sharpen: \"3\" is unknown; known are off, auto, 1, 2");
+  for (const double bound : {0.0, -5.0, 10001.0, std::numeric_limits<double>::quiet_NaN()}) {
+    expect_invalid(client, asking([&](auto& change) { change.set_max_error_um(bound); }),
+                   "allowed are 1 to 10000");
+  }
+}
+
+TEST(SetReconstruction, IsDoneOneAtATime) {
+  Rig rig({});
+  RawClient client(rig.tcp_port());
+  client.hello();
+  auto message = asking([](auto& change) { change.set_method("half"); });
+  message.set_id(77);
+  client.send(message);
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  RawClient other(rig.tcp_port());
+  other.hello();
+  const auto again = asking([](auto& change) { change.set_method("quarter"); });
+  EXPECT_EQ(other.request(again).error().code(), v1::ERROR_BUSY);
+  rig.port.emit(CommandDone{command->ticket, Outcome::done, ""});
+  EXPECT_EQ(other.event().reconstruction().method(), "half");
+}
+
+TEST(SetReconstruction, WhatThePipelineRefusesIsToldToNobodyElse) {
+  Rig rig({}, [](FakePort& port) {
+    port.answer([](const pipeline::Command& command) {
+      return CommandDone{command.ticket, Outcome::invalid, "no list"};
+    });
+  });
+  RawClient client(rig.tcp_port());
+  client.hello();
+  expect_invalid(client, asking([](auto& change) { change.set_sharpen("2"); }), "no list");
+  rig.port.emit(pipeline::LightChanged{{}, {4, 5, 6}, 7});
+  EXPECT_TRUE(client.event().has_light());
+}
+
+}  // namespace
+}  // namespace dtact::net::test
