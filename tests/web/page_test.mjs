@@ -3,16 +3,7 @@ import assert from "node:assert/strict";
 import path from "node:path";
 import { after, before, beforeEach, test } from "node:test";
 import { canvas, fact, numberOf, open, pause, PHONE, resume, until } from "./browser.mjs";
-import {
-  beyond,
-  calibration,
-  startDaemon,
-  startGateway,
-  status,
-  stopAll,
-  tokenFile,
-  work,
-} from "./programs.mjs";
+import { beyond, startDaemon, startGateway, stopAll, work } from "./programs.mjs";
 import { Tap } from "./tap.mjs";
 
 const { colourMap } = await import(path.resolve(process.env.PAGE_NODE, "colour_map.mjs"));
@@ -201,51 +192,6 @@ test("a line tells its length and the difference of its ends", async () => {
   await resume(pane);
 });
 
-test("a re-zero while something touches is refused in words, and offered anyway", async () => {
-  await until(
-    () => fact(pane, "touching").textContent(),
-    (text) => text === "touching",
-  );
-  await pane.getByRole("button", { name: "Re-zero", exact: true }).click();
-  const answer = pane.getByLabel("Light", { exact: true }).locator(".answer");
-  await until(
-    () => answer.textContent(),
-    (text) => text !== "" && text !== "Taking a new reference.",
-    10_000,
-  );
-  assert.match(await answer.textContent(), /touches|still/);
-  assert.ok(await pane.getByRole("button", { name: "Re-zero anyway" }).isVisible());
-});
-
-test("slider, scheme and colour change the simulated light", async () => {
-  await pane.getByLabel("Brightness").fill("128");
-  await until(
-    () => status(left).light.brightness,
-    (brightness) => brightness === 128,
-    10_000,
-  );
-  await pane.getByRole("button", { name: "Scheme 1" }).click();
-  const lit = () =>
-    status(left)
-      .light.leds.map((led) => ((led.r ?? 0) > 0 ? 1 : 0))
-      .join("");
-  await until(lit, (leds) => leds === "11001100", 10_000);
-  await pane.getByRole("button", { name: "LED 2" }).click();
-  await pane.getByLabel("Colour of the LED").fill("#ff8000");
-  await until(
-    () => status(left).light.leds[2],
-    (led) => led.r === 255 && led.g === 128 && (led.b ?? 0) === 0,
-    10_000,
-  );
-  await pane.getByRole("button", { name: "All LEDs" }).click();
-  await pane.getByLabel("Brightness").fill("255");
-  await until(
-    () => status(left).light.brightness,
-    (brightness) => brightness === 255,
-    10_000,
-  );
-});
-
 test("the camera's picture and its grey values", async () => {
   await pane.getByRole("radio", { name: "Camera" }).click();
   await until(
@@ -268,53 +214,6 @@ test("a snapshot is a PNG with its time in its name", async () => {
     pane.getByRole("button", { name: "Snapshot" }).click(),
   ]);
   assert.match(download.suggestedFilename(), /^left-\d{4}-\d\d-\d\dT\d{6}\.\d{3}Z\.png$/);
-});
-
-test("a calibration is uploaded, used and left again; a bad one is refused in words", async () => {
-  const panel = pane.getByLabel("Calibrations");
-  await until(
-    () => panel.locator("li").count(),
-    (count) => count === 1,
-    10_000,
-  );
-  const picker = panel.locator("input[type=file]");
-  const folder = calibration();
-  await picker.setInputFiles([
-    path.join(folder, "calibration.toml"),
-    path.join(folder, "reference.png"),
-  ]);
-  await until(
-    () => panel.locator("li").count(),
-    (count) => count === 2,
-    30_000,
-  );
-  await until(
-    () => panel.locator("li", { hasText: "in use" }).textContent(),
-    (text) => /^1 web-/.test(text),
-    10_000,
-  );
-  await panel.getByRole("button", { name: /configured/ }).click();
-  await until(
-    () => panel.locator("li", { hasText: "in use" }).textContent(),
-    (text) => /configured/.test(text),
-    10_000,
-  );
-  await picker.setInputFiles([
-    { name: "calibration.toml", mimeType: "text/plain", buffer: Buffer.from("nonsense") },
-    { name: "reference.png", mimeType: "image/png", buffer: Buffer.from("no picture") },
-  ]);
-  await until(
-    () => panel.locator(".answer").textContent(),
-    (text) => text !== "" && text !== "Uploading.",
-    10_000,
-  );
-  await picker.setInputFiles([
-    { name: "other.toml", mimeType: "text/plain", buffer: Buffer.from("") },
-  ]);
-  assert.match(
-    await panel.locator(".answer").textContent(),
-    /Choose both calibration\.toml and reference\.png/,
-  );
 });
 
 test("the surface is loaded when it is looked at", async () => {
@@ -440,35 +339,6 @@ test("on a desktop picture, numbers and plots are seen at once", async () => {
     assert.ok(box.y >= 0 && box.y + box.height <= 900, `${part} ends at ${box.y + box.height}`);
   }
   await view.page.screenshot({ path: path.join(work, "desktop.png") });
-});
-
-test("a token that may watch sees no control that would fail", async () => {
-  const { file, token } = tokenFile("view");
-  const guarded = await startGateway({ left: left.port }, ["--tokens", file]);
-  const watching = await open(guarded);
-  try {
-    const form = watching.page.locator("form.token");
-    await form.waitFor();
-    await form.getByLabel("Token").fill("wrong");
-    await form.getByRole("button").click();
-    await form.waitFor({ state: "hidden" });
-    await form.waitFor();
-    await form.getByLabel("Token").fill(token);
-    await form.getByRole("button").click();
-    await until(
-      () => watching.page.locator("[data-sensor]").getAttribute("data-sequence"),
-      (sequence) => Number(sequence) > 0,
-      20_000,
-    );
-    const light = watching.page.getByLabel("Light", { exact: true });
-    assert.equal(await light.getByRole("button", { name: "Re-zero" }).isVisible(), false);
-    assert.equal(await light.getByLabel("Brightness").isDisabled(), true);
-    assert.equal(await watching.page.getByRole("button", { name: "Upload…" }).isVisible(), false);
-    assert.match(await light.textContent(), /may watch/);
-  } finally {
-    await watching.close();
-    await guarded.stop();
-  }
 });
 
 test("a browser without WebGL 2 is told so", async () => {

@@ -104,7 +104,14 @@ test("what is recorded is what the daemon sent", async () => {
 test("depth can be made anew from it", async () => {
   const { file } = await record(() => pane.getByRole("button", { name: "Stop" }).click());
   const anew = `${file}-anew.mcap`;
-  execFileSync(process.env.CALIBRATE, ["reprocess", file, "--calibration", calibration(), "-o", anew]);
+  execFileSync(process.env.CALIBRATE, [
+    "reprocess",
+    file,
+    "--calibration",
+    calibration(),
+    "-o",
+    anew,
+  ]);
   const [recorded, remade] = [framesOf(file), framesOf(anew)];
   assert.equal(remade.length, recorded.length);
   const remadeMaps = remade.filter(({ map }) => map !== "");

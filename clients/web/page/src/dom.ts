@@ -60,7 +60,7 @@ export class Choice<T extends string> {
       this.buttons.set(value, made);
       this.element.append(made);
     }
-    this.mark();
+    this.mark(held);
   }
 
   get value(): T {
@@ -69,12 +69,13 @@ export class Choice<T extends string> {
 
   choose(value: T): void {
     if (value === this.held) return;
-    this.held = value;
-    this.mark();
+    this.mark(value);
     this.chosen(value);
   }
 
-  private mark(): void {
+  /** It holds already. */
+  mark(value: T): void {
+    this.held = value;
     for (const [value, made] of this.buttons) {
       made.setAttribute("aria-checked", String(value === this.held));
     }

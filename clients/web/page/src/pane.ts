@@ -7,6 +7,7 @@ import { ContactPanel } from "./panels/contact";
 import { LightPanel } from "./panels/light";
 import { Plots, ProfilePlot } from "./panels/plots";
 import { QualityPanel } from "./panels/quality";
+import { ReconstructionPanel } from "./panels/reconstruction";
 import { RecordButton } from "./record_button";
 import type { Frame, Link, Wants } from "./session/messages";
 import { Sensor } from "./session/sensor";
@@ -34,6 +35,7 @@ export class Pane {
   private readonly quality = new QualityPanel();
   private readonly light: LightPanel;
   private readonly calibrations: CalibrationsPanel;
+  private readonly reconstruction: ReconstructionPanel;
   private readonly recording: RecordButton;
   private readonly plots = new Plots();
   private readonly profile = new ProfilePlot();
@@ -85,6 +87,7 @@ export class Pane {
     });
     this.light = new LightPanel(this.sensor);
     this.calibrations = new CalibrationsPanel(this.sensor);
+    this.reconstruction = new ReconstructionPanel(this.sensor);
     this.recording = new RecordButton(this.sensor);
     this.steps.append(
       button("◂", () => this.sensor.step(-1), { "aria-label": "One frame back" }),
@@ -176,7 +179,13 @@ export class Pane {
           el("div", { class: "main" }, tools, this.stage.element),
           this.profile.element,
           el("div", { class: "side" }, this.contact.element, this.quality.element),
-          el("div", { class: "side commands" }, this.light.element, this.calibrations.element),
+          el(
+            "div",
+            { class: "side commands" },
+            this.light.element,
+            this.reconstruction.element,
+            this.calibrations.element,
+          ),
         ),
         this.plots.element,
       ),
@@ -260,6 +269,7 @@ export class Pane {
       .join(" · ");
     this.state.title = title;
     this.light.allow(this.sensor.mayControl);
+    this.reconstruction.allow(this.sensor.mayControl);
     this.pause(false);
     this.servesPoints = hello.features.includes("cloud");
     if (this.servesPoints) return void this.lookAtPoints();
@@ -274,12 +284,14 @@ export class Pane {
       void this.quality.ask(this.sensor);
     }
     if (event.what.case === "light") this.light.show(event.what.value);
+    if (event.what.case === "reconstruction") this.reconstruction.show(event.what.value);
   }
 
   private status(status: Status): void {
     this.lastStatus = status;
     this.quality.status(status);
     if (status.light) this.light.show(status.light);
+    if (status.reconstruction) this.reconstruction.show(status.reconstruction);
   }
 
   private show(frame: Frame): boolean {
@@ -292,6 +304,7 @@ export class Pane {
     if (this.views.value === "surface" && frame.depth)
       this.surface?.show(frame.depth, this.stage.range);
     this.cloud?.show(frame);
+    if (!this.paused) this.reconstruction.frame(frame);
     if (!this.paused) this.plots.add(frame, this.meter.latencyMs);
     const now = performance.now();
     if (now - this.toldAt < TELL_MS && !this.paused) return true;

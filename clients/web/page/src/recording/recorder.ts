@@ -1,11 +1,7 @@
 // Records what a session receives: subscribes to what a recording needs, fetches what depth is made
 // by, and tells how far it is.
 import { create } from "@bufbuild/protobuf";
-import {
-  GetCalibrationSchema,
-  GetReferenceSchema,
-  GetStatusSchema,
-} from "../../gen/dtact_pb";
+import { GetCalibrationSchema, GetReferenceSchema, GetStatusSchema } from "../../gen/dtact_pb";
 import type { Event, Frame, Reply } from "../../gen/dtact_pb";
 import type { Request } from "../session/messages";
 import { Recording } from "./recording";
@@ -52,7 +48,9 @@ export class Recorder {
     this.recording.addFrame(frame);
     const now = performance.now();
     if (this.recording.bytes > MOST_BYTES) {
-      void this.finish("1 GB is recorded, which is all that a browser is asked to keep; dtactctl record has no limit.");
+      void this.finish(
+        "1 GB is recorded, which is all that a browser is asked to keep; dtactctl record has no limit.",
+      );
     } else if (now - this.toldAt > TELL_MS) {
       this.toldAt = now;
       this.source.tell(this.state());

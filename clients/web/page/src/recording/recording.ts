@@ -133,7 +133,9 @@ export class Recording {
 
   private put(attachment: Attachment): void {
     const { logTime } = this.now;
-    void this.queue(() => this.writer.addAttachment({ logTime, createTime: logTime, ...attachment }));
+    void this.queue(() =>
+      this.writer.addAttachment({ logTime, createTime: logTime, ...attachment }),
+    );
   }
 
   private add<D extends DescMessage>(topic: string, schema: D, message: MessageShape<D>): void {
@@ -153,7 +155,12 @@ export class Recording {
     const made = this.writer
       .registerSchema({ name: type.typeName, encoding: "protobuf", data })
       .then((schemaId) =>
-        this.writer.registerChannel({ schemaId, topic, messageEncoding: "protobuf", metadata: new Map() }),
+        this.writer.registerChannel({
+          schemaId,
+          topic,
+          messageEncoding: "protobuf",
+          metadata: new Map(),
+        }),
       );
     this.channels.set(topic, made);
     return made;

@@ -67,6 +67,9 @@ export interface Frame {
   /** Of dtact-perceive alone, as is the cloud. */
   pose: ObjectPose | undefined;
   cloud: Cloud | undefined;
+  /** What making the depth took, milliseconds, and at which share of the resolution: 1, 2 or 4. */
+  madeMs: number;
+  madeDecimation: number;
   /** Root mean square of trusted depth, micrometres, while nothing touches; not of every frame. */
   untouchedRmsUm: number | undefined;
   /** Frames that were missed since the connection was made: by the daemon's count, and here. */

@@ -109,6 +109,10 @@ export function unpack(
     luma: frame.luma && unpackLuma(frame.luma, spare),
     pose: frame.pose,
     cloud: frame.cloud && unpackCloud(frame.cloud),
+    madeMs: frame.times
+      ? (frame.times.rectifyNs + frame.times.smoothNs + frame.times.listNs) / 1e6
+      : 0,
+    madeDecimation: frame.depth?.madeDecimation || frame.depth?.decimation || 1,
     untouchedRmsUm: untouched && depth ? rootMeanSquareUm(depth) : undefined,
     dropped,
     behind,

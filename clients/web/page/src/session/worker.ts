@@ -2,7 +2,13 @@
 // At most one frame is on its way to the page; of those that come meanwhile the newest one waits.
 import { create } from "@bufbuild/protobuf";
 import type { MessageInitShape } from "@bufbuild/protobuf";
-import { CloudEncoding, DepthEncoding, LumaEncoding, PingSchema, SubscribeSchema } from "../../gen/dtact_pb";
+import {
+  CloudEncoding,
+  DepthEncoding,
+  LumaEncoding,
+  PingSchema,
+  SubscribeSchema,
+} from "../../gen/dtact_pb";
 import type { Frame as WireFrame, HelloReply, Reply } from "../../gen/dtact_pb";
 import { Recorder } from "../recording/recorder";
 import { ClockOffset, nowMs } from "./clock";
@@ -175,7 +181,10 @@ class Session {
 
   private subscribe(): void {
     // dtact-perceive has points in place of maps.
-    const value = create(SubscribeSchema, this.features.includes("cloud") ? this.points() : this.maps());
+    const value = create(
+      SubscribeSchema,
+      this.features.includes("cloud") ? this.points() : this.maps(),
+    );
     void this.ask({ case: "subscribe", value });
   }
 

@@ -1,0 +1,196 @@
+// What the page commands: light, re-zero, calibrations, how depth is made, and for whom it does not.
+import assert from "node:assert/strict";
+import path from "node:path";
+import { after, before, test } from "node:test";
+import { fact, numberOf, open, until } from "./browser.mjs";
+import { calibration, startDaemon, startGateway, status, stopAll, tokenFile } from "./programs.mjs";
+
+let left;
+let view;
+let pane;
+
+before(async () => {
+  left = await startDaemon("left");
+  view = await open(await startGateway({ left: left.port }));
+  pane = view.page.locator('[data-sensor="left"]');
+});
+
+after(async () => {
+  await view?.close();
+  await stopAll();
+});
+
+test("a re-zero while something touches is refused in words, and offered anyway", async () => {
+  await until(
+    () => fact(pane, "touching").textContent(),
+    (text) => text === "touching",
+  );
+  await pane.getByRole("button", { name: "Re-zero", exact: true }).click();
+  const answer = pane.getByLabel("Light", { exact: true }).locator(".answer");
+  await until(
+    () => answer.textContent(),
+    (text) => text !== "" && text !== "Taking a new reference.",
+    10_000,
+  );
+  assert.match(await answer.textContent(), /touches|still/);
+  assert.ok(await pane.getByRole("button", { name: "Re-zero anyway" }).isVisible());
+});
+
+test("slider, scheme and colour change the simulated light", async () => {
+  await pane.getByLabel("Brightness").fill("128");
+  await until(
+    () => status(left).light.brightness,
+    (brightness) => brightness === 128,
+    10_000,
+  );
+  await pane.getByRole("button", { name: "Scheme 1" }).click();
+  const lit = () =>
+    status(left)
+      .light.leds.map((led) => ((led.r ?? 0) > 0 ? 1 : 0))
+      .join("");
+  await until(lit, (leds) => leds === "11001100", 10_000);
+  await pane.getByRole("button", { name: "LED 2" }).click();
+  await pane.getByLabel("Colour of the LED").fill("#ff8000");
+  await until(
+    () => status(left).light.leds[2],
+    (led) => led.r === 255 && led.g === 128 && (led.b ?? 0) === 0,
+    10_000,
+  );
+  await pane.getByRole("button", { name: "All LEDs" }).click();
+  await pane.getByLabel("Brightness").fill("255");
+  await until(
+    () => status(left).light.brightness,
+    (brightness) => brightness === 255,
+    10_000,
+  );
+});
+
+test("depth is made as the panel says, and its worth and time are on the chart", async () => {
+  const panel = pane.getByLabel("Speed and accuracy");
+  const told = () => panel.locator("[data-fact=worth]").textContent();
+  await until(told, (text) => /^full: [\d.]+ ms, ± \d+ µm$/.test(text));
+  await panel.locator("summary").click();
+  await panel.getByRole("radio", { name: "Quarter" }).click();
+  await until(
+    () => status(left).reconstruction.method,
+    (method) => method === "quarter",
+    10_000,
+  );
+  await until(
+    () => fact(pane, "map").textContent(),
+    (text) => text === "145 × 145, quarter",
+  );
+  await until(told, (text) => text.startsWith("quarter: "));
+  assert.equal(await panel.locator("circle.seen").count(), 2);
+  // Cheaper, by the daemon's own clock: a sixteenth of the pixels.
+  const places = await panel
+    .locator("circle.seen")
+    .evaluateAll((circles) =>
+      circles.map((circle) => [
+        Number(circle.getAttribute("cx")),
+        circle.classList.contains("current"),
+      ]),
+    );
+  const [[full], [quarter]] = [places.find(([, now]) => !now), places.find(([, now]) => now)];
+  assert.ok(quarter < full, `quarter at ${quarter}, full at ${full}`);
+  await panel
+    .getByRole("radiogroup", { name: "Resolution" })
+    .getByRole("radio", { name: "Auto" })
+    .click();
+  await panel.getByLabel("Error bound").fill("200");
+  await panel.getByLabel("Error bound").press("Enter");
+  await until(
+    () => status(left).reconstruction,
+    ({ method, max_error_um: bound }) => method === "auto" && bound === 200,
+    10_000,
+  );
+  assert.equal(await panel.locator("line.bound").count(), 1);
+  // Made by one press, this calibration's list for sharpened levels is there or is not: either is told.
+  await panel
+    .getByRole("radiogroup", { name: "Sharpen" })
+    .getByRole("radio", { name: "2" })
+    .click();
+  await until(
+    async () =>
+      (await panel.locator(".answer").textContent()) || status(left).reconstruction.sharpen,
+    (text) => /no list for levels sharpened/.test(text) || text === "2",
+    10_000,
+  );
+  await panel.getByRole("radio", { name: "Full" }).click();
+});
+
+test("a calibration is uploaded, used and left again; a bad one is refused in words", async () => {
+  const panel = pane.getByLabel("Calibrations");
+  await until(
+    () => panel.locator("li").count(),
+    (count) => count === 1,
+    10_000,
+  );
+  const picker = panel.locator("input[type=file]");
+  const folder = calibration();
+  await picker.setInputFiles([
+    path.join(folder, "calibration.toml"),
+    path.join(folder, "reference.png"),
+  ]);
+  await until(
+    () => panel.locator("li").count(),
+    (count) => count === 2,
+    30_000,
+  );
+  await until(
+    () => panel.locator("li", { hasText: "in use" }).textContent(),
+    (text) => /^1 web-/.test(text),
+    10_000,
+  );
+  await panel.getByRole("button", { name: /configured/ }).click();
+  await until(
+    () => panel.locator("li", { hasText: "in use" }).textContent(),
+    (text) => /configured/.test(text),
+    10_000,
+  );
+  await picker.setInputFiles([
+    { name: "calibration.toml", mimeType: "text/plain", buffer: Buffer.from("nonsense") },
+    { name: "reference.png", mimeType: "image/png", buffer: Buffer.from("no picture") },
+  ]);
+  await until(
+    () => panel.locator(".answer").textContent(),
+    (text) => text !== "" && text !== "Uploading.",
+    10_000,
+  );
+  await picker.setInputFiles([
+    { name: "other.toml", mimeType: "text/plain", buffer: Buffer.from("") },
+  ]);
+  assert.match(
+    await panel.locator(".answer").textContent(),
+    /Choose both calibration\.toml and reference\.png/,
+  );
+});
+
+test("a token that may watch sees no control that would fail", async () => {
+  const { file, token } = tokenFile("view");
+  const guarded = await startGateway({ left: left.port }, ["--tokens", file]);
+  const watching = await open(guarded);
+  try {
+    const form = watching.page.locator("form.token");
+    await form.waitFor();
+    await form.getByLabel("Token").fill("wrong");
+    await form.getByRole("button").click();
+    await form.waitFor({ state: "hidden" });
+    await form.waitFor();
+    await form.getByLabel("Token").fill(token);
+    await form.getByRole("button").click();
+    await until(
+      () => watching.page.locator("[data-sensor]").getAttribute("data-sequence"),
+      (sequence) => Number(sequence) > 0,
+      20_000,
+    );
+    const light = watching.page.getByLabel("Light", { exact: true });
+    assert.equal(await light.getByRole("button", { name: "Re-zero" }).isVisible(), false);
+    assert.equal(await light.getByLabel("Brightness").isDisabled(), true);
+    assert.equal(await watching.page.getByRole("button", { name: "Upload…" }).isVisible(), false);
+    assert.match(await light.textContent(), /may watch/);
+  } finally {
+    await watching.close();
+    await guarded.stop();
+  }
+});
