@@ -189,11 +189,11 @@ def main():
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "build" / "mutants")
     options = parser.parse_args()
     mutants = chosen(load(), options.names)
+    check(mutants)
     if options.list:
         for m in mutants:
             print(f"{m.area:12} {m.name:34} {m.file}: {m.harm}")
         return 0
-    check(mutants)
     tree = Tree(options.work.resolve())
     results = []
     for _, of_area in itertools.groupby(mutants, key=lambda m: m.area):
