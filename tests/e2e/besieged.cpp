@@ -19,7 +19,12 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+// They keep what was freed for a while, to see who still uses it.
+constexpr std::int64_t kMemorySlackKib = 512 * 1024;
+#else
 constexpr std::int64_t kMemorySlackKib = 8 * 1024;
+#endif
 constexpr std::chrono::seconds kPatience{60};
 
 /// "VmRSS:    1234 kB" of /proc/PID/status.
