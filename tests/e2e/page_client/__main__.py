@@ -39,6 +39,7 @@ def main():
                    "without a Hello within 5 s the connection ends, with no word", f"{message}")
             passed(f"no Hello: the end {time.monotonic() - began:.1f} s later")
             answers.check_reference(c, status)
+            answers.check_reconstruction(c)
             maps.check_maps()
             maps.check_borders(c)
             stream.check_rates(c, status.camera.fps)

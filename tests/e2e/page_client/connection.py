@@ -127,7 +127,7 @@ class Connection:
         expected = {"subscribe": "done", "set_light": "light", "rezero": "done",
                     "get_status": "status", "get_calibration": "calibration",
                     "list_calibrations": "calibrations", "get_reference": "reference",
-                    "ping": "pong"}[kind]
+                    "set_reconstruction": "reconstruction", "ping": "pong"}[kind]
         result = reply.WhichOneof("result")
         demand(result == expected, f"the answer to {kind} is {expected}", f"{reply}")
         return getattr(reply, result)

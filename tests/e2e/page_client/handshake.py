@@ -6,8 +6,8 @@ from messages import E, M
 from outcome import demand, passed
 
 HELLO_LIMIT = 1024
-FEATURES = """contact_absence decimation events force jpeg ping predict_zstd rates reference region rvl
-              stamps units""".split()
+FEATURES = """contact_absence decimation events force jpeg ping predict_zstd rates reconstruction
+              reference region rvl stamps units""".split()
 HELLO_EXAMPLE = bytes.fromhex("0000000b 0801 1207 08011001 1a0178")
 
 
