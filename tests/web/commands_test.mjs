@@ -104,7 +104,11 @@ test("depth is made as the panel says, and its worth and time are on the chart",
     ({ method, max_error_um: bound }) => method === "auto" && bound === 200,
     10_000,
   );
-  assert.equal(await panel.locator("line.bound").count(), 1);
+  await until(
+    () => panel.locator("line.bound").count(),
+    (count) => count === 1,
+    10_000,
+  );
   // Made by one press, this calibration's list for sharpened levels is there or is not: either is told.
   await panel
     .getByRole("radiogroup", { name: "Sharpen" })

@@ -84,6 +84,7 @@ export class ReconstructionPanel {
 
   constructor(private readonly sensor: Sensor) {
     this.element.hidden = true;
+    this.element.addEventListener("toggle", () => this.draw());
     this.bound.addEventListener("change", () => {
       const maxErrorUm = this.bound.valueAsNumber;
       if (maxErrorUm >= 1 && maxErrorUm <= 10000) void this.set({ maxErrorUm });
@@ -103,6 +104,7 @@ export class ReconstructionPanel {
     const steps = (Object.keys(STEPS) as Sharpen[]).find((key) => STEPS[key] === how.sharpen);
     if (steps) this.sharpening.mark(steps);
     if (document.activeElement !== this.bound) this.bound.value = String(how.maxErrorUm);
+    this.draw();
   }
 
   /** Of frames in which something touches: elsewhere there is little to make. */
@@ -118,7 +120,7 @@ export class ReconstructionPanel {
     if (this.element.hidden || performance.now() - this.drawnAt < REDRAW_MS) return;
     this.drawnAt = performance.now();
     say(this.now, `${way}: ${fixed(seen.ms, 2)} ms, ± ${um(seen.errorUm)}`);
-    if (this.element.open) this.draw();
+    this.draw();
   }
 
   private async set(change: {
@@ -138,6 +140,7 @@ export class ReconstructionPanel {
   }
 
   private draw(): void {
+    if (!this.element.open) return;
     const all = [...this.seen.values()];
     const automatic = this.how?.method === "auto" || this.how?.sharpen === "auto";
     const bound = automatic ? this.how?.maxErrorUm : undefined;
