@@ -78,7 +78,7 @@ TEST(SetReconstruction, NamesTheFieldThatIsWrong) {
 }
 
 TEST(SetReconstruction, IsDoneOneAtATime) {
-  Rig rig({});
+  Rig rig;
   RawClient client(rig.tcp_port());
   client.hello();
   auto message = asking([](auto& change) { change.set_method("half"); });
