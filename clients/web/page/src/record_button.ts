@@ -10,10 +10,12 @@ export class RecordButton {
   private readonly press = button("Record", () => this.toggle(), {
     title: "An MCAP file of frames, the camera's pictures and events (R)",
     "aria-pressed": "false",
+    disabled: "",
   });
   private readonly told = el("span", { class: "quiet", role: "status", "data-fact": "recording" });
   readonly element = el("span", { class: "row" }, this.press, this.told);
   private recording = false;
+  private allowed = false;
 
   constructor(private readonly sensor: Sensor) {
     addEventListener("beforeunload", (event) => {
@@ -24,7 +26,8 @@ export class RecordButton {
 
   /** Recording is for as long as there are frames. */
   allow(allowed: boolean): void {
-    this.press.disabled = !allowed && !this.recording;
+    this.allowed = allowed;
+    this.show(this.recording);
   }
 
   toggle(): void {
@@ -41,10 +44,8 @@ export class RecordButton {
     if (!file && !why) return;
     this.show(false);
     const reason = why ? `${why} ` : "";
-    if (!file || frames === 0) {
-      say(this.told, `${reason}Nothing is recorded: no frame came.`);
-      return;
-    }
+    if (!file) return say(this.told, why ?? "");
+    if (frames === 0) return say(this.told, `${reason}Nothing is recorded: no frame came.`);
     const time = new Date(Date.now() - 1000 * seconds).toISOString().slice(0, 19);
     const url = URL.createObjectURL(file);
     const name = `${this.sensor.name}-${time.replaceAll(":", "")}Z.mcap`;
@@ -57,5 +58,7 @@ export class RecordButton {
     this.recording = recording;
     say(this.press, recording ? "Stop" : "Record");
     this.press.setAttribute("aria-pressed", String(recording));
+    // One that runs can be ended, whatever the link.
+    this.press.disabled = !this.allowed && !recording;
   }
 }
