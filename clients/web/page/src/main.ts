@@ -89,7 +89,7 @@ class Page {
     const shown = this.shown.get(name);
     if (shown) {
       if (this.shown.size === 1) return;
-      shown.close();
+      void shown.close();
       this.shown.delete(name);
     } else {
       try {

@@ -106,9 +106,11 @@ export class Pane {
     this.stage.drawBar();
   }
 
-  close(): void {
-    this.sensor.close();
+  /** What is recorded comes from the worker, which therefore ends last. */
+  async close(): Promise<void> {
     this.element.remove();
+    await this.recording.close();
+    this.sensor.close();
   }
 
   /** Colours that canvases have from the theme. */

@@ -6,6 +6,10 @@ import { fixed, span } from "./words";
 
 const MB = 1e6;
 
+function missedOf({ missed }: Recorded): string {
+  return missed === 0 ? "none missed" : `${missed} missed`;
+}
+
 export class RecordButton {
   private readonly press = button("Record", () => this.toggle(), {
     title: "An MCAP file of frames, the camera's pictures and events (R)",
@@ -14,35 +18,52 @@ export class RecordButton {
   });
   private readonly told = el("span", { class: "quiet", role: "status", "data-fact": "recording" });
   readonly element = el("span", { class: "row" }, this.press, this.told);
-  private recording = false;
+  /** Ending: its file is still to come. */
+  private state: "idle" | "recording" | "ending" = "idle";
   private allowed = false;
+  private ended = (): void => {};
+  private readonly keep = (event: BeforeUnloadEvent): void => {
+    // Asks whether the file is to be lost.
+    if (this.state !== "idle") event.preventDefault();
+  };
 
   constructor(private readonly sensor: Sensor) {
-    addEventListener("beforeunload", (event) => {
-      // Asks whether the file is to be lost.
-      if (this.recording) event.preventDefault();
-    });
+    addEventListener("beforeunload", this.keep);
   }
 
   /** Recording is for as long as there are frames. */
   allow(allowed: boolean): void {
     this.allowed = allowed;
-    this.show(this.recording);
+    this.show(this.state);
   }
 
   toggle(): void {
     if (this.press.disabled) return;
-    this.show(!this.recording);
-    if (this.recording) say(this.told, "");
-    this.sensor.record(this.recording);
+    const begins = this.state === "idle";
+    this.show(begins ? "recording" : "ending");
+    if (begins) say(this.told, "");
+    this.sensor.record(begins);
+  }
+
+  /** Ends what is recorded; done when that is handed over. */
+  async close(): Promise<void> {
+    const over = new Promise<void>((done) => (this.ended = done));
+    if (this.state === "recording") this.toggle();
+    if (this.state !== "idle") await over;
+    removeEventListener("beforeunload", this.keep);
   }
 
   tell(recorded: Recorded): void {
-    const { frames, missed, bytes, seconds, file, why } = recorded;
-    const lost = missed === 0 ? "none missed" : `${missed} missed`;
-    say(this.told, `${span(seconds)} · ${fixed(bytes / MB, 1)} MB · ${lost}`);
+    const { bytes, seconds, file, why } = recorded;
+    say(this.told, `${span(seconds)} · ${fixed(bytes / MB, 1)} MB · ${missedOf(recorded)}`);
     if (!file && !why) return;
-    this.show(false);
+    this.show("idle");
+    this.handOver(recorded);
+    this.ended();
+  }
+
+  private handOver(recorded: Recorded): void {
+    const { frames, bytes, seconds, file, why } = recorded;
     const reason = why ? `${why} ` : "";
     if (!file) return say(this.told, why ?? "");
     if (frames === 0) return say(this.told, `${reason}Nothing is recorded: no frame came.`);
@@ -51,14 +72,18 @@ export class RecordButton {
     const name = `${this.sensor.name}-${time.replaceAll(":", "")}Z.mcap`;
     el("a", { href: url, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(url), 60_000);
-    say(this.told, `${reason}${name}: ${frames} frames, ${lost}, ${fixed(bytes / MB, 1)} MB`);
+    say(
+      this.told,
+      `${reason}${name}: ${frames} frames, ${missedOf(recorded)}, ${fixed(bytes / MB, 1)} MB`,
+    );
   }
 
-  private show(recording: boolean): void {
-    this.recording = recording;
+  private show(state: typeof this.state): void {
+    this.state = state;
+    const recording = state === "recording";
     say(this.press, recording ? "Stop" : "Record");
     this.press.setAttribute("aria-pressed", String(recording));
-    // One that runs can be ended, whatever the link.
-    this.press.disabled = !this.allowed && !recording;
+    // What runs can be ended whatever the link; another one begins once its file has come.
+    this.press.disabled = state === "ending" || (state === "idle" && !this.allowed);
   }
 }
