@@ -30,7 +30,7 @@ export interface Source {
 
 export class Recorder {
   private readonly recording: Recording;
-  private readonly began = performance.now();
+  private began: number | undefined;
   private toldAt = 0;
   private over = false;
 
@@ -43,8 +43,13 @@ export class Recorder {
     void this.fetchFiles();
   }
 
+  /** Frames count from here on: what came before was asked for otherwise. */
+  start(): void {
+    this.began = performance.now();
+  }
+
   addFrame(frame: Frame): void {
-    if (this.over) return;
+    if (this.over || this.began === undefined) return;
     this.recording.addFrame(frame);
     const now = performance.now();
     if (this.recording.bytes > MOST_BYTES) {
@@ -78,7 +83,8 @@ export class Recorder {
 
   private state(): Recorded {
     const { frames, missed, bytes } = this.recording;
-    return { frames, missed, bytes, seconds: (performance.now() - this.began) / 1000 };
+    const now = performance.now();
+    return { frames, missed, bytes, seconds: (now - (this.began ?? now)) / 1000 };
   }
 
   private async fetchStatus(): Promise<void> {

@@ -158,11 +158,10 @@ export class Connection {
       this.lastWord = `The stream is broken: ${(error as Error).message}.`;
       return this.lost();
     }
+    // Answers and events stay between the frames that they came between.
+    if (this.every) this.takePending();
     if (message[0] !== FRAME_TAG) return this.takeWord(message);
-    if (this.every) {
-      this.takePending();
-      return this.deliver(message);
-    }
+    if (this.every) return this.deliver(message);
     if (this.pending) ++this.gaveWay;
     // Behind what has come meanwhile, so that of several frames that wait the newest is decoded.
     else this.later.port2.postMessage(null);

@@ -22,6 +22,7 @@ const LUMA_HZ = { nearby: 20, afar: 5 };
 const CLOUD_HZ = { nearby: 30, afar: 10 };
 /** What is asked from here must not be mistaken for a request of the page, whose ids count up from 1. */
 const OWN_IDS = 2 ** 41;
+const LOST = "The connection was lost.";
 
 class Session {
   private wants: Wants;
@@ -34,6 +35,7 @@ class Session {
   private readonly asked = new Map<number, (reply: Reply | undefined) => void>();
   private nextId = OWN_IDS;
   private features: string[] = [];
+  private subscribed: Promise<Reply | undefined> | undefined;
   /** The page has not taken the last frame yet. */
   private underWay = false;
   private waiting: WireFrame | undefined;
@@ -73,7 +75,7 @@ class Session {
         break;
       case "wants":
         this.wants = message.wants;
-        this.subscribe();
+        void this.subscribe();
         break;
       case "request":
         if (!this.connection.request(message.id, message.request)) {
@@ -99,7 +101,7 @@ class Session {
   }
 
   private tellLink(link: Link): void {
-    if (link.state !== "live") this.stopRecording("The connection was lost.");
+    if (link.state !== "live") this.stopRecording(LOST);
     post({ kind: "link", link });
   }
 
@@ -115,7 +117,7 @@ class Session {
     this.history.clear();
     this.waiting = undefined;
     for (let count = 0; count < 10; ++count) this.ping();
-    this.subscribe();
+    void this.subscribe();
   }
 
   private ping(): void {
@@ -157,7 +159,12 @@ class Session {
     });
     this.recorder = recorder;
     this.connection.every = true;
-    this.subscribe();
+    void this.subscribe().then((reply) => {
+      if (reply?.result.case === "done") return recorder.start();
+      // Its frames would lack depth or the camera's picture.
+      const refused = reply?.result.case === "error" && `${reply.result.value.message}.`;
+      void recorder.finish(refused || LOST);
+    });
   }
 
   private stopRecording(why?: string): void {
@@ -169,7 +176,7 @@ class Session {
     if (!this.recorder) return;
     this.recorder = undefined;
     this.connection.every = false;
-    this.subscribe();
+    void this.subscribe();
   }
 
   /** The cheapest encoding: of bytes from another machine, of work on the same. */
@@ -179,13 +186,18 @@ class Session {
     return DepthEncoding.DEPTH_DELTA_ZSTD;
   }
 
-  private subscribe(): void {
+  /** The answer to the newest: frames are those of an older one until that has come. */
+  private subscribe(): Promise<Reply | undefined> {
     // dtact-perceive has points in place of maps.
     const value = create(
       SubscribeSchema,
       this.features.includes("cloud") ? this.points() : this.maps(),
     );
-    void this.ask({ case: "subscribe", value });
+    const answer: Promise<Reply | undefined> = this.ask({ case: "subscribe", value }).then(
+      (reply) => (this.subscribed === answer ? reply : this.subscribed),
+    );
+    this.subscribed = answer;
+    return answer;
   }
 
   private maps(): MessageInitShape<typeof SubscribeSchema> {
