@@ -43,7 +43,7 @@ export class Recording {
   private readonly file = new GrowingFile();
   private readonly writer = new McapWriter({ writable: this.file, chunkSize: CHUNK_BYTES });
   /** The writer does one thing after another. */
-  private last: Promise<unknown>;
+  private last: Promise<unknown> = Promise.resolve();
   private readonly channels = new Map<string, Promise<number>>();
   /** Wall time of the monotonic clock's zero, at what came first. */
   private epochNs: bigint | undefined;
@@ -56,7 +56,7 @@ export class Recording {
   private attachments: Attachment[] = [];
 
   constructor(program: string) {
-    this.last = this.writer.start({ profile: "", library: program });
+    void this.queue(() => this.writer.start({ profile: "", library: program }));
   }
 
   get bytes(): number {
@@ -127,6 +127,8 @@ export class Recording {
 
   private queue<T>(step: () => Promise<T>): Promise<T> {
     const done = this.last.then(step);
+    // What fails fails all that waits behind it, and is told by finish().
+    done.catch(() => {});
     this.last = done;
     return done;
   }

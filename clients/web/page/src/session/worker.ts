@@ -153,7 +153,8 @@ class Session {
       features: () => this.features,
       tell: (recorded) => {
         // Over by itself.
-        if (recorded.file && this.recorder === recorder) this.forgetRecorder();
+        const over = recorded.file !== undefined || recorded.why !== undefined;
+        if (over && this.recorder === recorder) this.forgetRecorder();
         post({ kind: "recorded", recorded });
       },
     });
