@@ -96,6 +96,10 @@ export class ReconstructionPanel {
     this.element.hidden = !this.sensor.features.includes("reconstruction");
     for (const input of this.controls.querySelectorAll<HTMLInputElement>("input, button"))
       input.disabled = !control;
+    // What the daemon before took says nothing of this one.
+    this.seen.clear();
+    say(this.now, "–");
+    this.draw();
   }
 
   show(how: Reconstruction): void {
