@@ -62,11 +62,12 @@ function toScene(vector: { x: number; y: number; z: number } | undefined): Vecto
 
 export class CloudView {
   private readonly space: Space;
+  private readonly uniforms = { mmPerUnit: { value: 0.001 }, pixels: { value: 1 } };
   private readonly material = new RawShaderMaterial({
     glslVersion: GLSL3,
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
-    uniforms: { mmPerUnit: { value: 0.001 }, pixels: { value: 1 } },
+    uniforms: this.uniforms,
   });
   private readonly points = new Points(new BufferGeometry(), this.material);
   private readonly axes = new AxesHelper(AXES_MM);
@@ -106,8 +107,8 @@ export class CloudView {
     this.points.geometry = geometry;
     this.points.visible = true;
     const apartMm = this.apartMm(cloud);
-    this.material.uniforms["mmPerUnit"] = { value: cloud.mmPerUnit };
-    this.material.uniforms["pixels"] = { value: 1.5 * apartMm * this.space.pixelsPerMm };
+    this.uniforms.mmPerUnit.value = cloud.mmPerUnit;
+    this.uniforms.pixels.value = 1.5 * apartMm * this.space.pixelsPerMm;
     say(this.told, `${cloud.points} points, ${apartMm.toFixed(3)} mm apart`);
   }
 
