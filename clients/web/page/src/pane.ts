@@ -222,6 +222,7 @@ export class Pane {
     if (view !== "surface") return;
     if (!this.surface) {
       const { SurfaceView } = await import("./surface/surface");
+      if (this.servesPoints) return;
       this.surface ??= new SurfaceView(this.stage.surfaceHost);
     }
     if (this.stage.depth) this.surface.show(this.stage.depth, this.stage.range);
@@ -231,10 +232,23 @@ export class Pane {
   private async lookAtPoints(): Promise<void> {
     this.element.dataset["kind"] = "points";
     this.snapshotButton.hidden = this.recording.element.hidden = true;
+    this.surface?.close();
+    this.surface = undefined;
     this.stage.look("surface");
     if (this.cloud) return;
     const { CloudView } = await import("./surface/cloud");
-    this.cloud ??= new CloudView(this.stage.surfaceHost);
+    if (this.servesPoints) this.cloud ??= new CloudView(this.stage.surfaceHost);
+  }
+
+  /** Another daemon may serve maps where one of points was. */
+  private lookAtMaps(): void {
+    if (this.element.dataset["kind"] === undefined) return;
+    delete this.element.dataset["kind"];
+    this.snapshotButton.hidden = this.recording.element.hidden = false;
+    this.cloud?.close();
+    this.cloud = undefined;
+    this.contact.hideMotion();
+    void this.look(this.views.value);
   }
 
   private link(link: Link): void {
@@ -275,6 +289,7 @@ export class Pane {
     this.pause(false);
     this.servesPoints = hello.features.includes("cloud");
     if (this.servesPoints) return void this.lookAtPoints();
+    this.lookAtMaps();
     void this.quality.ask(this.sensor);
     void this.calibrations.refresh();
   }

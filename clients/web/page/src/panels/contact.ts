@@ -49,6 +49,11 @@ export class ContactPanel {
   readonly element = panel("Contact", this.facts.element, this.motion.element);
 
   constructor() {
+    this.hideMotion();
+  }
+
+  /** Of a sensor that does not tell how what is touched moves. */
+  hideMotion(): void {
     this.motion.element.hidden = true;
   }
 

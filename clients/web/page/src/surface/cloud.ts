@@ -89,6 +89,10 @@ export class CloudView {
     this.space.render();
   }
 
+  close(): void {
+    this.space.close();
+  }
+
   private clear(): void {
     this.points.visible = this.axes.visible = false;
     say(this.told, "Nothing touches: there are no points.");

@@ -9,6 +9,7 @@ export class Space {
   private readonly camera = new PerspectiveCamera(35, 1, 0.1, 500);
   private readonly controls: OrbitControls;
   private readonly pixel = new Uint8Array(4);
+  private readonly observer = new ResizeObserver(() => this.fit());
 
   /** Fills `host`, whatever size it has. */
   constructor(
@@ -28,8 +29,16 @@ export class Space {
     this.controls.minDistance = 4;
     this.controls.maxDistance = 120;
     this.controls.addEventListener("change", () => this.render());
-    new ResizeObserver(() => this.fit()).observe(host);
+    this.observer.observe(host);
     this.fit();
+  }
+
+  /** Leaves the host empty. */
+  close(): void {
+    this.observer.disconnect();
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.host.replaceChildren();
   }
 
   render(): void {

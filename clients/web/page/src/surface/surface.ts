@@ -176,6 +176,10 @@ export class SurfaceView {
     }
   }
 
+  close(): void {
+    this.space.close();
+  }
+
   private uniform(name: string, value: unknown): void {
     const uniform = this.material.uniforms[name];
     if (uniform) uniform.value = value;
