@@ -162,6 +162,12 @@ export class ReconstructionPanel {
       const [x1, y1, x2, y2] = [...from, ...to].map(String) as [string, string, string, string];
       parts.push(svg("line", { x1, y1, x2, y2, class: kind }));
     };
+    const dot = ({ ms, errorUm }: Seen, name: string, r: string, kind: string): void => {
+      const told = svg("title", {}, `${name}: ${fixed(ms, 2)} ms, ${fixed(errorUm, 0)} µm`);
+      parts.push(
+        svg("circle", { cx: String(x(ms)), cy: String(y(errorUm)), r, class: kind }, told),
+      );
+    };
     line([LEFT, HEIGHT - BOTTOM], [WIDTH - 8, HEIGHT - BOTTOM], "axis");
     line([LEFT, 8], [LEFT, HEIGHT - BOTTOM], "axis");
     text([(LEFT + WIDTH) / 2, HEIGHT - 2], "ms a frame, on the daemon's machine", "middle");
@@ -172,22 +178,13 @@ export class ReconstructionPanel {
       text([x(share * topMs), HEIGHT - BOTTOM + 12], fixed(share * topMs, 2), anchor);
     }
     if (bound) line([LEFT, y(bound)], [WIDTH - 8, y(bound)], "bound");
-    for (const { ms, errorUm, name } of MEASURED) {
-      if (ms > topMs || errorUm > topUm) continue;
-      const dot = svg("circle", {
-        cx: String(x(ms)),
-        cy: String(y(errorUm)),
-        r: "3",
-        class: "measured",
-      });
-      dot.append(svg("title", {}, `${name}: ${fixed(ms, 2)} ms, ${fixed(errorUm, 0)} µm`));
-      parts.push(dot);
+    for (const measured of MEASURED) {
+      if (measured.ms > topMs || measured.errorUm > topUm) continue;
+      dot(measured, measured.name, "3", "measured");
     }
-    for (const [way, { ms, errorUm }] of this.seen) {
-      const kind = way === this.way ? "seen current" : "seen";
-      parts.push(
-        svg("circle", { cx: String(x(ms)), cy: String(y(errorUm)), r: "4.5", class: kind }),
-      );
+    for (const [way, seen] of this.seen) {
+      dot(seen, way, "4.5", way === this.way ? "seen current" : "seen");
+      const { ms, errorUm } = seen;
       text(
         [x(ms) + (x(ms) > WIDTH / 2 ? -8 : 8), y(errorUm) + 4],
         way,
