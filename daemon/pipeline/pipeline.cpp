@@ -180,13 +180,6 @@ bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
   if (exchange_.orders.room() == 0) return false;
   try {
     if (!command.calibration) throw std::invalid_argument("no calibration was given");
-    const recon::RectifyTable& table = command.calibration->model->rectify;
-    if (pixels(table.width, table.height) > depth_capacity_) {
-      throw std::invalid_argument(
-          fmt::format("a depth map of {}x{} pixels needs more memory than was taken at start: "
-                      "restart dtactd with this calibration",
-                      table.width, table.height));
-    }
     return order(ticket, {0, command.calibration, command.key}, rules_, false);
   } catch (const std::invalid_argument& e) {
     return refuse(ticket, e.what());
@@ -215,7 +208,15 @@ bool Pipeline::reconstruct(std::uint64_t ticket, const ReconstructionRules& rule
 
 bool Pipeline::order(std::uint64_t ticket, const Known& next, const ReconstructionRules& rules,
                      bool same_image) {
+  // First: that it is for other frames says more than that it has no room.
   auto active = activate(next.calibration, camera_->info(), rules);
+  const recon::RectifyTable& table = next.calibration->model->rectify;
+  if (pixels(table.width, table.height) > depth_capacity_) {
+    throw std::invalid_argument(
+        fmt::format("a depth map of {}x{} pixels needs more memory than was taken at start: "
+                    "restart dtactd with this calibration",
+                    table.width, table.height));
+  }
   active->generation = ++generations_;
   active->key = next.key;
   calibrations_.push_back({generations_, next.calibration, next.key});

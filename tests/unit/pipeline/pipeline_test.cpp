@@ -363,7 +363,8 @@ TEST_F(PipelineTest, ACalibrationOfAnotherModeIsRefused) {
   other->model = model;
   const CommandDone refused = ask(UseCalibration{other});
   EXPECT_EQ(refused.outcome, Outcome::invalid);
-  EXPECT_NE(refused.message.find("320x240"), std::string::npos) << refused.message;
+  EXPECT_NE(refused.message.find("is for frames of 320x240 pixels"), std::string::npos)
+      << refused.message;
   EXPECT_EQ(ask(UseCalibration{nullptr}).outcome, Outcome::invalid);
   ASSERT_TRUE(until_fresh());
   EXPECT_EQ(pipeline->status().calibration->name, "toy");
