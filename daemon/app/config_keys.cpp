@@ -15,6 +15,7 @@ namespace dtact::app {
 namespace {
 
 namespace fs = std::filesystem;
+using Rules = pipeline::ReconstructionRules;
 
 constexpr const char* kPwmUnit = "(Hz, 0 = not known)";
 constexpr const char* kExposureUnit = "(microseconds, 0 = the camera's default)";
@@ -119,7 +120,8 @@ std::vector<Key> bind_keys(Config& c) {
             {pipeline::kMethodNames.begin(), pipeline::kMethodNames.end()}),
       named_or("reconstruction.sharpen", p.reconstruction.sharpen,
                {pipeline::kSharpenNames.begin(), pipeline::kSharpenNames.end()}, {1, 2}),
-      real("reconstruction.max_error_um", p.reconstruction.max_error_um, 1, 10000, "(micrometres)"),
+      real("reconstruction.max_error_um", p.reconstruction.max_error_um, Rules::kLeastErrorUm,
+           Rules::kMostErrorUm, "(micrometres)"),
 
       integer("reference.frames", p.reference.frames, 1, 256, "(frames)"),
       integer("reference.settle_frames", p.reference.settle_frames, 2, 64, "(frames)"),

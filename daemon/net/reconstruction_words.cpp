@@ -16,9 +16,6 @@ namespace {
 using Words = std::vector<std::pair<std::string, int>>;
 using pipeline::ReconstructionRules;
 
-constexpr double kLeastErrorUm = 1;
-constexpr double kMostErrorUm = 10000;
-
 const Words& methods() {
   static const Words words(pipeline::kMethodNames.begin(), pipeline::kMethodNames.end());
   return words;
@@ -65,9 +62,11 @@ std::string change(const v1::SetReconstruction& request, ReconstructionRules& ru
   if (wrong.empty() && request.has_max_error_um()) {
     changed.max_error_um = request.max_error_um();
     // NaN is neither.
-    if (!(changed.max_error_um >= kLeastErrorUm && changed.max_error_um <= kMostErrorUm)) {
+    if (!(changed.max_error_um >= ReconstructionRules::kLeastErrorUm &&
+          changed.max_error_um <= ReconstructionRules::kMostErrorUm)) {
       wrong = fmt::format("set_reconstruction.max_error_um: {}; allowed are {} to {}",
-                          changed.max_error_um, kLeastErrorUm, kMostErrorUm);
+                          changed.max_error_um, ReconstructionRules::kLeastErrorUm,
+                          ReconstructionRules::kMostErrorUm);
     }
   }
   if (wrong.empty()) rules = changed;

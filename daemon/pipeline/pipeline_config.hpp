@@ -20,6 +20,8 @@ struct ContactRules {
 /// At which share of the calibration's resolution depth is reconstructed.
 struct ReconstructionRules {
   static constexpr int kAutoSharpen = -1;
+  static constexpr double kLeastErrorUm = 1;
+  static constexpr double kMostErrorUm = 10000;
 
   /// 1, 2 or 4: a pixel of the map is the mean over so many of the calibration's in each direction.
   /// 0: chosen for every frame, the coarsest whose expected error stays within max_error_um.
@@ -27,7 +29,7 @@ struct ReconstructionRules {
   /// Steps of the filter that undoes the layer's scattering (recon/sharpener.hpp): 0 … 2, or
   /// kAutoSharpen: for every frame the fewest whose expected error stays within max_error_um.
   int sharpen = 0;
-  double max_error_um = 50;
+  double max_error_um = 50;  ///< kLeastErrorUm … kMostErrorUm, micrometres.
 
   bool operator==(const ReconstructionRules&) const = default;
 };
