@@ -35,14 +35,6 @@ v1::Reconstruction run(const Context& context, const ReconstructionOptions& opti
 
 }  // namespace
 
-std::string text_of(const v1::Reconstruction& how) {
-  std::string text = fmt::format("method {}, sharpen {}", how.method(), how.sharpen());
-  if (how.method() == "auto" || how.sharpen() == "auto") {
-    text += fmt::format(", within {:g} um where that can be had", how.max_error_um());
-  }
-  return text;
-}
-
 void add_reconstruction(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand(
       "reconstruction",

@@ -1,0 +1,15 @@
+#include "clients/ctl/reconstruction_text.hpp"
+
+#include <fmt/format.h>
+
+namespace dtact::ctl {
+
+std::string text_of(const v1::Reconstruction& how) {
+  std::string text = fmt::format("method {}, sharpen {}", how.method(), how.sharpen());
+  if (how.method() == "auto" || how.sharpen() == "auto") {
+    text += fmt::format(", within {:g} um where that can be had", how.max_error_um());
+  }
+  return text;
+}
+
+}  // namespace dtact::ctl
