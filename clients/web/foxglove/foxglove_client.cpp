@@ -38,6 +38,7 @@ void FoxgloveClient::start() {
   send(server_info(program_));
   tell_channels();
   send(advertise_services(prefixes));
+  update_want();
   for (const Place& place : places_) {
     const Source& source = place.station->source();
     if (!source.connected()) {
@@ -69,7 +70,7 @@ void FoxgloveClient::close(const std::string& reason) {
   if (std::exchange(closed_, true)) return;
   socket_->close();
   subscriptions_.clear();
-  for (const Place& place : places_) place.station->want(*this, {});
+  for (const Place& place : places_) place.station->forget(*this);
   ended_(reason);
 }
 

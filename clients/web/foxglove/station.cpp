@@ -24,11 +24,12 @@ void Station::stop() {
 }
 
 void Station::want(Listener& listener, Topics wanted) {
-  if (wanted.none()) {
-    listeners_.erase(&listener);
-  } else {
-    listeners_[&listener] = wanted;
-  }
+  listeners_[&listener] = wanted;
+  update();
+}
+
+void Station::forget(Listener& listener) {
+  listeners_.erase(&listener);
   update();
 }
 

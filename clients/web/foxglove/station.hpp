@@ -31,8 +31,10 @@ class Station {
 
   void start();
   void stop();
-  /// What a listener wants from now on; nothing: it is forgotten.
+  /// What a listener wants from now on. It is told how the daemon is from its first call, also when
+  /// it wants nothing.
   void want(Listener& listener, Topics wanted);
+  void forget(Listener& listener);
   [[nodiscard]] Source& source() const noexcept { return *source_; }
   /// The light as it is, for who has just asked; null while it is not known.
   [[nodiscard]] const std::shared_ptr<const Message>& light() const noexcept { return light_; }
