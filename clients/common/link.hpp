@@ -18,7 +18,7 @@ namespace dtact::cli {
 /// again whenever it is lost.
 class Link {
  public:
-  /// All on the link's own thread.
+  /// All on the link's own thread. What one throws ends the connection, and the next one begins.
   struct Handlers {
     /// The daemon greeted; whether it is on this machine.
     std::function<void(v1::HelloReply, bool)> up;

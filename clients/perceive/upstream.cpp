@@ -1,10 +1,16 @@
 #include "clients/perceive/upstream.hpp"
 
+#include <stdexcept>
 #include <utility>
 
 #include "clients/cpp/features.hpp"
 
 namespace dtact::perceive {
+namespace {
+
+constexpr std::uint64_t kSubscribeId = 2;  // Hello's is 1
+
+}  // namespace
 
 Upstream::Upstream(client::Options options, Handlers handlers)
     : handlers_(std::move(handlers)),
@@ -46,7 +52,7 @@ void Upstream::on_up(const v1::HelloReply& daemon, bool same_machine) {
 /// on_up() says it again.
 void Upstream::subscribe() {
   v1::ClientMessage message;
-  message.set_id(2);
+  message.set_id(kSubscribeId);
   *message.mutable_subscribe() = wanted_;
   if (compressed_ && wanted_.depth() != v1::DEPTH_NONE) {
     message.mutable_subscribe()->set_depth(v1::DEPTH_PREDICT_ZSTD);
@@ -57,7 +63,7 @@ void Upstream::subscribe() {
 void Upstream::on_message(const std::string& bytes) {
   v1::ServerMessage message;
   if (!message.ParseFromString(bytes)) {
-    return handlers_.notice(host_ + " sends what is no message of the wire");
+    throw std::runtime_error(host_ + " sends what is no message of the wire");
   }
   if (message.reply().has_error()) return handlers_.notice(message.reply().error().message());
   if (!message.has_frame()) return;
