@@ -20,8 +20,8 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-// They keep what was freed for a while, to see who still uses it.
-constexpr std::int64_t kMemorySlackKib = 512 * 1024;
+// They keep up to 256 MiB of what was freed, to see who still uses it (quarantine_size_mb).
+constexpr std::int64_t kMemorySlackKib = (256 + 8) * 1024;
 #else
 constexpr std::int64_t kMemorySlackKib = 8 * 1024;
 #endif
