@@ -11,10 +11,6 @@ namespace {
 /// All resolutions: the recorded map says which.
 constexpr pipeline::ReconstructionRules kEveryResolution{.decimation = 0};
 
-bool has(const v1::Frame& frame, v1::Health condition) {
-  return std::ranges::find(frame.health(), condition) != frame.health().end();
-}
-
 void set(v1::Frame& frame, v1::Health condition, bool on) {
   auto& health = *frame.mutable_health();
   health.erase(std::remove(health.begin(), health.end(), condition), health.end());
@@ -22,6 +18,10 @@ void set(v1::Frame& frame, v1::Health condition, bool on) {
 }
 
 }  // namespace
+
+bool has(const v1::Frame& frame, v1::Health condition) {
+  return std::ranges::find(frame.health(), condition) != frame.health().end();
+}
 
 DepthRemaker::DepthRemaker(std::shared_ptr<const calibration::Calibration> calibration)
     : calibration_(std::move(calibration)),

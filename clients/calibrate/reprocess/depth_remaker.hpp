@@ -16,6 +16,9 @@
 
 namespace dtact::reprocess {
 
+/// Whether the frame was recorded under that condition.
+[[nodiscard]] bool has(const v1::Frame& frame, v1::Health condition);
+
 /// Makes the depth of recorded frames anew, by the parts that make it in the daemon with its
 /// default settings: where the image differs from the untouched one, the light followed, the
 /// reconstruction, the contact. Frames come in their order.

@@ -40,10 +40,6 @@ std::span<const std::uint8_t> payload_of(const v1::Frame& frame) {
   return {reinterpret_cast<const std::uint8_t*>(data.data()), data.size()};
 }
 
-bool has(const v1::Frame& frame, v1::Health condition) {
-  return std::ranges::find(frame.health(), condition) != frame.health().end();
-}
-
 /// The daemon would have measured depth in it, given a calibration. While the light is another than
 /// the reference's the daemon makes do with a scaled one, which no recording holds.
 bool measurable(const v1::Frame& frame) {

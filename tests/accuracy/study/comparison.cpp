@@ -24,13 +24,6 @@ bool within(Value value, const figures::Spread& spread) {
   return value && std::abs(*value - spread.median) <= 2 * spread.sd;
 }
 
-Value median(std::vector<double> values) {
-  if (values.empty()) return std::nullopt;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 Comparison::Comparison(const std::vector<Result>& results) : results_(results) {
   for (const Result& r : results) {
     if (std::ranges::find(laws_, r.law) == laws_.end()) laws_.push_back(r.law);

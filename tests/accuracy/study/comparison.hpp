@@ -18,7 +18,6 @@ using Value = std::optional<double>;
 [[nodiscard]] bool within(Value value, const figures::Range& range);
 /// Within two standard deviations of the units.
 [[nodiscard]] bool within(Value value, const figures::Spread& spread);
-[[nodiscard]] Value median(std::vector<double> values);
 
 /// Rows as they are made, by whoever knows a subject of the study: it knows which results belong to
 /// which law and layer. `results` must outlive it.

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tests/accuracy/study/comparison.hpp"
+#include "tests/accuracy/study/median.hpp"
 
 namespace dtact::study {
 namespace {

@@ -8,6 +8,8 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "tests/accuracy/study/median.hpp"
+
 namespace dtact::study {
 namespace {
 
@@ -53,13 +55,6 @@ FlatReading measured_patch(const cv::Mat1f& depth, double half, double mm_per_px
   return reading;
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 struct Bin {
   double at_mm = 0;
   double mean = 0;
@@ -71,7 +66,7 @@ double noise_of(const std::vector<Bin>& profile) {
   for (std::size_t i = 1; i < profile.size(); ++i) {
     steps.push_back(std::abs(profile[i].mean - profile[i - 1].mean));
   }
-  return median(steps) / 0.6745 / std::numbers::sqrt2;
+  return median(steps).value_or(0) / 0.6745 / std::numbers::sqrt2;
 }
 
 /// The darkening along the axis of the darkest, empty where nothing is dark.
@@ -194,7 +189,7 @@ FlatReading read_flat(const Darkening& image, const StudyList& list) {
     }
     ++i;
   });
-  const double centre = median(middle);
+  const double centre = median(middle).value_or(0);
   FlatReading reading = measured_patch(depth, centre / 2, image.mm_per_px);
   reading.depth_mm = centre;
   return reading;

@@ -9,16 +9,13 @@
 #include <stdexcept>
 
 #include "tests/unit/calibration/ball.hpp"
+#include "tests/unit/calibration/list_reading.hpp"
 
 namespace dtact::calibration {
 namespace {
 
 using testing::HasSubstr;
 using testing::ThrowsMessage;
-
-double um_at(const recon::DepthList& list, double level) {
-  return list.um[static_cast<std::size_t>(std::lround(level * 64) - list.first_q6)];
-}
 
 recon::DepthList fit(const DifferenceMap& map) { return fit_list(map, find_contact(map, 4)); }
 

@@ -11,6 +11,7 @@
 #include "clients/calibrate/fit/chain_fit.hpp"
 #include "clients/calibrate/fit/press_chain.hpp"
 #include "tests/unit/calibration/ball.hpp"
+#include "tests/unit/calibration/list_reading.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -26,10 +27,6 @@ SagProfile rings(double depth_mm, double reach_mm) {
     profile.rings.push_back({30 * (depth_mm - sag), sag, 10 + r});
   }
   return profile;
-}
-
-double um_at(const recon::DepthList& list, double level) {
-  return list.um[static_cast<std::size_t>(std::lround(level * 64) - list.first_q6)];
 }
 
 TEST(FitChain, FindsDepthsThatNobodyMeasured) {

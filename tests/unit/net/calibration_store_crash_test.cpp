@@ -12,9 +12,9 @@
 #include <optional>
 #include <string>
 
-#include "daemon/calibration/text.hpp"
 #include "daemon/net/calibration_store.hpp"
 #include "tests/unit/calibration/sample.hpp"
+#include "tests/unit/net/sample_files.hpp"
 
 namespace dtact::net {
 namespace {
@@ -43,11 +43,6 @@ std::optional<bool> run_until(int n, const std::function<void()>& work) {
   ::kill(child, SIGKILL);
   ::waitpid(child, &status, 0);
   return false;
-}
-
-CalibrationFiles whole(const std::string& name) {
-  const calibration::Files files = calibration::format(calibration::sample());
-  return {name, files.toml, files.reference_png};
 }
 
 class Crash : public testing::Test {

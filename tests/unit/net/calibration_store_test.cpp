@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <string>
 
-#include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/fakes/file_log.hpp"
 #include "tests/unit/calibration/sample.hpp"
+#include "tests/unit/net/sample_files.hpp"
 
 namespace dtact::net {
 namespace {
@@ -21,11 +21,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 /// A calibration that can be read.
-CalibrationFiles whole(const std::string& name) {
-  const calibration::Files files = calibration::format(calibration::sample());
-  return {name, files.toml, files.reference_png};
-}
-
 std::vector<std::uint64_t> numbers(const std::vector<StoredCalibration>& all) {
   std::vector<std::uint64_t> found;
   for (const auto& stored : all) found.push_back(stored.number);

@@ -35,7 +35,7 @@ Options options(const Rig& rig) {
   return o;
 }
 
-v1::UploadCalibration upload(const std::string& name, const std::string& toml) {
+v1::UploadCalibration files_of(const std::string& name, const std::string& toml) {
   v1::UploadCalibration files;
   files.set_name(name);
   files.set_calibration_toml(toml);
@@ -194,7 +194,7 @@ TEST(ClientLibrary, CommandsAndRefusals) {
   }
   change.set_brightness(256);
   EXPECT_THROW((void)client.set_light(change), client::Refused);
-  EXPECT_EQ(client.upload_calibration(upload("ball", "good")), 4U);
+  EXPECT_EQ(client.upload_calibration(files_of("ball", "good")), 4U);
   EXPECT_EQ(next<v1::Event>(client).calibration().name(), "ball");
   EXPECT_THROW((void)client.calibration(), client::Refused);
   EXPECT_EQ(client.status().clients_size(), 1);
@@ -233,7 +233,7 @@ TEST(ClientLibrary, ListsReadsAndActivatesCalibrations) {
 TEST(ClientLibrary, RefusesToSendWhatIsTooLarge) {
   Rig rig;
   Client client(options(rig));
-  EXPECT_THROW(client.upload_calibration(upload("ball", std::string(17U << 20U, 'x'))),
+  EXPECT_THROW(client.upload_calibration(files_of("ball", std::string(17U << 20U, 'x'))),
                client::Refused);
   EXPECT_EQ(client.status().version(), "9.8.7");  // and the connection goes on
 }

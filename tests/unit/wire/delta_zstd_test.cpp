@@ -8,14 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "tests/unit/wire/sample_map.hpp"
+
 namespace dtact::wire {
 namespace {
 
 using testing::ElementsAreArray;
 using namespace std::string_literals;
 
-// Two rows of four pixels, with steps that wrap around in both directions.
-const std::vector<std::int16_t> kMap = {0, 1, 3, -2, 1000, 1000, -32768, 7};
 // By hand: 0 1 2 −5 | 1000 0 31768 (−33768 + 65536) 32775, little-endian.
 const std::string kDifferences =
     "\x00\x00\x01\x00\x02\x00\xfb\xff\xe8\x03\x00\x00\x18\x7c\x07\x80"s;

@@ -6,13 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "tests/unit/wire/sample_map.hpp"
+
 namespace dtact::wire {
 namespace {
 
 using testing::ElementsAreArray;
 using namespace std::string_literals;
 
-const std::vector<std::int16_t> kMap = {0, 1, 3, -2, 1000, 1000, -32768, 7};
 const std::string kMapBytes = "\x00\x00\x01\x00\x03\x00\xfe\xff\xe8\x03\xe8\x03\x00\x80\x07\x00"s;
 
 TEST(Int16, IsLittleEndian) {

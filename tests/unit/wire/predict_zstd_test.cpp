@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/unit/wire/sample_map.hpp"
+
 namespace dtact::wire {
 namespace {
 
@@ -18,7 +20,6 @@ using namespace std::string_literals;
 
 // Residuals by hand: 0 1 2 −5 | 1000 −1 −33770 (+ 65536) 32780 (− 65536), as zigzag 0 2 4 9 | 2000
 // 1 63532 65511: four nibbles, 15, 1, 15, 15, and what the three 15 stand for.
-const std::vector<std::int16_t> kMap = {0, 1, 3, -2, 1000, 1000, -32768, 7};
 const std::string kContent = "\x20\x94\x1f\xff\xff\xd0\x07\xff\x2c\xf8\xff\xe7\xff"s;
 
 std::string content_of(const std::string& frame) {
@@ -42,7 +43,7 @@ std::string encoded_content(const std::vector<std::int16_t>& map, std::size_t wi
   return content_of(bytes);
 }
 
-bool decodes(std::string_view content, std::size_t width, std::size_t height) {
+bool decodes_content(std::string_view content, std::size_t width, std::size_t height) {
   std::vector<std::int16_t> map;
   return decode_predict_zstd(frame_of(content), width, height, map);
 }
@@ -143,12 +144,12 @@ TEST(PredictZstd, EncodesOnlyWholeRows) {
 }
 
 TEST(PredictZstd, RefusesOtherSizes) {
-  EXPECT_TRUE(decodes(kContent, 8, 1));
-  EXPECT_FALSE(decodes(kContent, 4, 1));
-  EXPECT_FALSE(decodes(kContent, 4, 3));
-  EXPECT_FALSE(decodes(kContent, 0, 2));
-  EXPECT_FALSE(decodes(kContent, 1U << 31U, 1U << 31U));
-  EXPECT_FALSE(decodes("", 1, 1));
+  EXPECT_TRUE(decodes_content(kContent, 8, 1));
+  EXPECT_FALSE(decodes_content(kContent, 4, 1));
+  EXPECT_FALSE(decodes_content(kContent, 4, 3));
+  EXPECT_FALSE(decodes_content(kContent, 0, 2));
+  EXPECT_FALSE(decodes_content(kContent, 1U << 31U, 1U << 31U));
+  EXPECT_FALSE(decodes_content("", 1, 1));
 }
 
 TEST(PredictZstd, RefusesDamage) {
@@ -173,14 +174,14 @@ TEST(PredictZstd, DoesNotBelieveAnySizeThatAFrameStates) {
 }
 
 TEST(PredictZstd, RefusesWhatNoEncoderWrites) {
-  EXPECT_TRUE(decodes("\x12"s, 2, 1));
-  EXPECT_TRUE(decodes("\x02"s, 1, 1));
-  EXPECT_FALSE(decodes("\x12"s, 1, 1));          // something beside an odd last nibble
-  EXPECT_FALSE(decodes("\x12\x00"s, 2, 1));      // more than the nibbles ask for
-  EXPECT_FALSE(decodes("\xf2"s, 2, 1));          // less
-  EXPECT_FALSE(decodes("\xf2\xff\x0e"s, 2, 1));  // cut off
-  EXPECT_TRUE(decodes("\xf2\xff\x0e\x01"s, 2, 1));
-  EXPECT_FALSE(decodes("\xf2\xff\x0d\x01"s, 2, 1));  // 269 in three bytes
+  EXPECT_TRUE(decodes_content("\x12"s, 2, 1));
+  EXPECT_TRUE(decodes_content("\x02"s, 1, 1));
+  EXPECT_FALSE(decodes_content("\x12"s, 1, 1));          // something beside an odd last nibble
+  EXPECT_FALSE(decodes_content("\x12\x00"s, 2, 1));      // more than the nibbles ask for
+  EXPECT_FALSE(decodes_content("\xf2"s, 2, 1));          // less
+  EXPECT_FALSE(decodes_content("\xf2\xff\x0e"s, 2, 1));  // cut off
+  EXPECT_TRUE(decodes_content("\xf2\xff\x0e\x01"s, 2, 1));
+  EXPECT_FALSE(decodes_content("\xf2\xff\x0d\x01"s, 2, 1));  // 269 in three bytes
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "proto/encodings/map_size.hpp"
+#include "tests/unit/wire/sample_map.hpp"
 
 namespace dtact::wire {
 namespace {
@@ -17,7 +18,6 @@ using namespace std::string_literals;
 
 // By hand, from the paper's listing: 1 zero, 7 others; their differences 1 2 −5 1002 0 −33768 32775
 // as zigzag 2 4 9 2004 0 67535 65550; nibbles 1 7 2 4 91 CAF3 0 F9FB82 E98882, filled up with 0.
-const std::vector<std::int16_t> kMap = {0, 1, 3, -2, 1000, 1000, -32768, 7};
 const std::string kBytes = "\xca\x91\x24\x17\xb8\x9f\x0f\xf3\x20\x88\x98\x2e"s;
 
 std::string encoded(const std::vector<std::int16_t>& map) {
