@@ -16,9 +16,9 @@ using tomlfile::KeyReader;
 using Uncertainty = recon::Model::Uncertainty;
 
 void read_list(KeyReader& reader, bool monotone, recon::DepthList& out) {
-  constexpr int kReach = 255 * recon::kEntriesPerLevel;
+  constexpr int kFarthestQ6 = 255 * recon::kEntriesPerLevel;
   const auto level = [&reader](const char* key) {
-    return static_cast<int>(reader.integer(key, -kReach, kReach));
+    return static_cast<int>(reader.integer(key, -kFarthestQ6, kFarthestQ6));
   };
   out.first_q6 = level("first_q6");
   out.covered_from_q6 = level("covered_from_q6");

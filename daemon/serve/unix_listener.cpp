@@ -22,7 +22,7 @@ namespace asio = boost::asio;
 namespace fs = std::filesystem;
 using Unix = asio::local::stream_protocol;
 
-[[noreturn]] void fail(const fs::path& path, const std::string& why) {
+[[noreturn]] void refuse_path(const fs::path& path, const std::string& why) {
   throw std::runtime_error(fmt::format("cannot listen on {}: {}", path.string(), why));
 }
 
@@ -31,9 +31,10 @@ sockaddr_un address_of(const fs::path& path) {
   address.sun_family = AF_UNIX;
   const std::string& text = path.native();
   if (text.size() >= sizeof address.sun_path) {
-    fail(path, fmt::format("{} bytes are more than a socket's path may have, {}: choose a shorter "
-                           "net.unix_socket",
-                           text.size(), sizeof address.sun_path - 1));
+    refuse_path(path,
+                fmt::format("{} bytes are more than a socket's path may have, {}: choose a shorter "
+                            "net.unix_socket",
+                            text.size(), sizeof address.sun_path - 1));
   }
   text.copy(static_cast<char*>(address.sun_path), text.size());
   return address;
@@ -49,14 +50,15 @@ void remove_stale(const fs::path& path, const sockaddr_un& address) {
   struct stat status{};
   if (::lstat(path.c_str(), &status) != 0) return;
   if (!S_ISSOCK(status.st_mode)) {
-    fail(path, "there is something that is no socket: remove it or choose another net.unix_socket");
+    refuse_path(
+        path, "there is something that is no socket: remove it or choose another net.unix_socket");
   }
   const base::UniqueFd probe = make_socket();
   if (::connect(probe.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
       errno != ECONNREFUSED) {
-    fail(path,
-         "another program listens there, perhaps another dtactd (systemctl status dtactd): "
-         "stop it or choose another net.unix_socket");
+    refuse_path(path,
+                "another program listens there, perhaps another dtactd (systemctl status dtactd): "
+                "stop it or choose another net.unix_socket");
   }
   ::unlink(path.c_str());
 }
@@ -70,15 +72,15 @@ class SocketFile {
     fd_ = make_socket();
     if (::bind(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
       const int error = errno;
-      fail(path, fmt::format("{}; net.unix_socket needs a folder that this user may write",
-                             std::strerror(error)));
+      refuse_path(path, fmt::format("{}; net.unix_socket needs a folder that this user may write",
+                                    std::strerror(error)));
     }
     // Everybody may connect; who the peer is decides what it may do.
     if (::chmod(path.c_str(), 0666) != 0 || ::listen(fd_.get(), SOMAXCONN) != 0 ||
         ::stat(path.c_str(), &status_) != 0) {
       const int error = errno;
       ::unlink(path.c_str());
-      fail(path, std::strerror(error));
+      refuse_path(path, std::strerror(error));
     }
   }
   ~SocketFile() {

@@ -10,7 +10,6 @@
 namespace dtact::calibration {
 namespace {
 
-constexpr double kSure = 0.9;        // of the contact radius
 constexpr double kBinsPerLevel = 2;  // of the monotone fit
 constexpr int kFewest = 4;           // pixels that make a grey level's vote
 constexpr std::size_t kRange = 256;  // grey levels
@@ -101,12 +100,12 @@ double hand_over(std::vector<Knot>& knots, double sure_level, double line_slope)
 }  // namespace
 
 SagLine fit_sag_line(const DifferenceMap& map, const Contact& contact, const PixelFilter& use) {
-  return fit_line(sag_by_level(map, contact, use, kSure * contact.radius_mm, 1));
+  return fit_line(sag_by_level(map, contact, use, kSureOfContact * contact.radius_mm, 1));
 }
 
 recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
                           const PixelFilter& use) {
-  const double sure_mm = kSure * contact.radius_mm;
+  const double sure_mm = kSureOfContact * contact.radius_mm;
   const SagLine line = fit_sag_line(map, contact, use);
   std::vector<Knot> knots = sag_by_level(map, contact, use, contact.radius_mm, kBinsPerLevel);
   for (Knot& knot : knots) knot.depth_mm = line.depth_mm - knot.depth_mm;

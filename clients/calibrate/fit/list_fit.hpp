@@ -10,6 +10,10 @@ namespace dtact::calibration {
 /// Which pixels of the depth map a fit may use; empty: all.
 using PixelFilter = std::function<bool(int x, int y)>;
 
+/// The sure part of a contact, in shares of its radius: beyond it the bright ring's scattered light
+/// tells.
+inline constexpr double kSureOfContact = 0.9;
+
 /// What the sure part of a press's contact says: sag = depth − slope · darkening.
 struct SagLine {
   double depth_mm = 0;  ///< Of the lowest point, if no darkening is no depth.

@@ -8,15 +8,15 @@
 namespace dtact::calibration {
 namespace {
 
-constexpr double kSure = 0.6;
-constexpr int kRounds = 4;  // until the contacts' radii have followed the depths
+constexpr double kSureOfSeen = 0.6;
+constexpr int kChainRounds = 4;  // until the contacts' radii have followed the depths
 
 /// The sure contact's radius for a depth. One that is far off in the first rounds must not empty or
 /// flood the contact.
 double reach_mm(const PressRings& press, double depth_mm) {
   const double g = std::clamp(depth_mm, 0.0, press.ball_radius_mm);
   const double cut = std::sqrt(g * (2 * press.ball_radius_mm - g));
-  return kSure * std::clamp(kContactOfCut * cut, 0.5 * press.seen_mm, press.seen_mm);
+  return kSureOfSeen * std::clamp(kContactOfCut * cut, 0.5 * press.seen_mm, press.seen_mm);
 }
 
 SagProfile within(const PressRings& press, double reach) {
@@ -64,11 +64,11 @@ PressRings rings_of(const SettledPress& press, std::optional<double> depth_mm, i
 PressChain chain_presses(const std::vector<PressRings>& presses) {
   PressChain chain;
   for (const PressRings& press : presses) {
-    chain.sure.push_back(within(press, kSure * press.seen_mm));
+    chain.sure.push_back(within(press, kSureOfSeen * press.seen_mm));
   }
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kChainRounds; ++round) {
     chain.fit = fit_chain(chain.sure);
-    if (round + 1 == kRounds) break;
+    if (round + 1 == kChainRounds) break;
     for (std::size_t p = 0; p < presses.size(); ++p) {
       chain.sure[p] = within(presses[p], reach_mm(presses[p], chain.fit.depth_mm[p]));
     }
@@ -89,8 +89,8 @@ double MetPress::mean_error_mm() const {
 MetPress meet(const PressRings& press, const ChainFit& list) {
   const double gain = gain_at(list.gain, press.all.place);
   MetPress met;
-  double reach = kSure * press.seen_mm;
-  for (int round = 0; round < kRounds; ++round) {
+  double reach = kSureOfSeen * press.seen_mm;
+  for (int round = 0; round < kChainRounds; ++round) {
     met.rings.clear();
     double depth_mm = 0;
     double weight = 0;

@@ -10,7 +10,6 @@
 namespace dtact::calibration {
 namespace {
 
-constexpr double kSure = 0.9;         // of the contact radius, as fit_list() has it
 constexpr double kApartMm = 0.1;      // what the map is smoothed by
 constexpr double kKnotLevels = 3;     // grey levels from knot to knot
 constexpr double kStraight = 0.3;     // weight of a knot's bend, in shares of all samples
@@ -178,7 +177,7 @@ std::vector<PressSample> sure_samples(const DifferenceMap& map, const Contact& c
   std::vector<PressSample> samples;
   for (int y = 0; y < map.height; y += step) {
     for (int x = 0; x < map.width; x += step) {
-      if (distance_mm(map, contact, x, y) >= kSure * contact.radius_mm) continue;
+      if (distance_mm(map, contact, x, y) >= kSureOfContact * contact.radius_mm) continue;
       if (std::isnan(map.at(x, y)) || (use && !use(x, y))) continue;
       samples.push_back(
           {(x - contact.col) * map.mm_per_px, (y - contact.row) * map.mm_per_px, map.at(x, y)});

@@ -12,7 +12,7 @@
 namespace dtact::ctl {
 namespace {
 
-struct Options {
+struct DepthOptions {
   std::vector<std::string> reference;
   std::vector<std::string> ball;
   std::vector<std::string> presses;
@@ -31,7 +31,7 @@ struct Made {
 };
 
 /// By the paper's list of one press.
-Made make_published(const Options& options) {
+Made make_published(const DepthOptions& options) {
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet ball = load_images(options.ball, "--ball");
   require_same_size(reference, "--reference", ball, "--ball");
@@ -54,7 +54,7 @@ Made make_published(const Options& options) {
 }
 
 /// From one press or several.
-Made make_list(const Options& options) {
+Made make_list(const DepthOptions& options) {
   PressImages images = begin_presses(options.reference, options.radius_mm, options.map);
   if (!options.ball.empty()) add_press(images, options.ball, "--ball");
   for (const std::string& press : options.presses) add_press(images, press);
@@ -74,7 +74,7 @@ Made make_list(const Options& options) {
   return {std::move(made), std::move(doubts)};
 }
 
-void check(const Options& options) {
+void check(const DepthOptions& options) {
   const bool many = !options.presses.empty();
   if (many == !options.ball.empty()) {
     throw std::runtime_error("either --ball (one press) or --press for each of several is needed");
@@ -85,7 +85,7 @@ void check(const Options& options) {
   }
 }
 
-void run(const Options& options) {
+void run(const DepthOptions& options) {
   check(options);
   const auto [made, doubts] =
       options.method == "published" ? make_published(options) : make_list(options);
@@ -107,7 +107,7 @@ void run(const Options& options) {
 void add_calibrate(CLI::App& app) {
   CLI::App* depth = app.add_subcommand(
       "depth", "Make a calibration from images: the press of a ball, or several presses");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<DepthOptions>();
   depth
       ->add_option("--reference", options->reference,
                    "Untouched surface: PNG files, or a folder of them (averaged); camera and light "

@@ -17,7 +17,7 @@
 namespace dtact::ctl {
 namespace {
 
-struct Options {
+struct LensOptions {
   std::vector<std::string> reference;
   std::vector<std::string> board;
   std::string pins = "7x9";
@@ -42,7 +42,7 @@ std::pair<int, int> pair_of(const std::string& text, const char* option) {
   return {first, second};
 }
 
-void write(const Options& options, const ImageSet& images, const ChosenLens& chosen,
+void write(const LensOptions& options, const ImageSet& images, const ChosenLens& chosen,
            const recon::SpatialGain& gain, const std::vector<std::string>& what) {
   calibration::LensFile file{images.width(), images.height(), chosen.lens, gain, what};
   recon::check(file.lens, file.frame_width, file.frame_height);
@@ -57,7 +57,7 @@ void write(const Options& options, const ImageSet& images, const ChosenLens& cho
   fmt::print("centre of the map: {:.5f} mm per pixel\n", recon::central_mm_per_px(file.lens));
 }
 
-void run_board(const Options& options) {
+void run_board(const LensOptions& options) {
   const ImageSet reference = load_images(options.reference, "--board-reference");
   const ImageSet pressed = load_images(options.board, "--board");
   require_same_size(reference, "--board-reference", pressed, "--board");
@@ -76,7 +76,7 @@ void run_board(const Options& options) {
   write(options, reference, press.lens, gain.gain, {what, gain.describe()});
 }
 
-void run_chessboard(const Options& options) {
+void run_chessboard(const LensOptions& options) {
   const ImageSet images = load_images(options.chessboard, "--chessboard");
   const auto [cols, rows] = pair_of(options.squares, "--squares");
   std::vector<std::string> names;
@@ -89,7 +89,7 @@ void run_chessboard(const Options& options) {
                      options.square_mm, images.images.size())});
 }
 
-void run(const Options& options) {
+void run(const LensOptions& options) {
   if (!options.chessboard.empty()) {
     run_chessboard(options);
   } else if (!options.board.empty() && !options.reference.empty()) {
@@ -105,7 +105,7 @@ void run(const Options& options) {
 void add_calibrate_lens(CLI::App& app) {
   CLI::App* lens = app.add_subcommand(
       "lens", "Measure where the camera shows the surface, from a board of pins or chessboards");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<LensOptions>();
   CLI::Option* reference =
       lens->add_option("--board-reference", options->reference,
                        "Untouched surface: PNG files, or a folder of them (averaged)")

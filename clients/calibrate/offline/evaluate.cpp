@@ -16,7 +16,7 @@
 namespace dtact::ctl {
 namespace {
 
-struct Options {
+struct EvaluationOptions {
   std::string calibration;
   std::vector<std::string> reference;
   std::vector<std::string> ball;
@@ -117,7 +117,7 @@ void print_text(const calibration::Evaluation& e) {
   for (const std::string& doubt : calibration::doubts_about(e)) fmt::print("doubtful: {}\n", doubt);
 }
 
-void run_folder(const Options& options, bool json) {
+void run_folder(const EvaluationOptions& options, bool json) {
   constexpr double kUsualRadius = 4.0;  // mm, of the ball that this kind of sensor comes with
   const std::filesystem::path folder = std::filesystem::weakly_canonical(options.folder);
   const FolderEvaluation e = evaluate_folder(
@@ -129,7 +129,7 @@ void run_folder(const Options& options, bool json) {
   fmt::print("page: {}\n", (std::filesystem::path(options.page) / "index.html").string());
 }
 
-void run(const Options& options, bool json) {
+void run(const EvaluationOptions& options, bool json) {
   if (!options.folder.empty()) return run_folder(options, json);
   if (options.calibration.empty() || options.reference.empty() || options.ball.empty() ||
       options.radius_mm == 0) {
@@ -150,7 +150,7 @@ void run(const Options& options, bool json) {
 void add_evaluate(CLI::App& app, const bool& json) {
   CLI::App* evaluate =
       app.add_subcommand("evaluate", "Compare a calibration with the press of a ball");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<EvaluationOptions>();
   evaluate->add_option("--calibration", options->calibration, "Calibration folder")
       ->type_name("FOLDER");
   evaluate

@@ -14,14 +14,14 @@
 namespace dtact::ctl {
 namespace {
 
-struct Options {
+struct ReconstructionOptions {
   std::string calibration;
   std::vector<std::string> reference;
   std::string frame;
   std::string output;
 };
 
-void run(const Options& options) {
+void run(const ReconstructionOptions& options) {
   const cli::DepthEncoder encode = cli::encoder_for(options.output, encode_colour_png);
   const calibration::Calibration calibration = calibration::load(options.calibration);
   const ImageSet reference = load_images(options.reference, "--reference");
@@ -57,7 +57,7 @@ void run(const Options& options) {
 void add_reconstruct(CLI::App& app) {
   CLI::App* reconstruct =
       app.add_subcommand("reconstruct", "Reconstruct the depth of an image, as the daemon does");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<ReconstructionOptions>();
   reconstruct->add_option("--calibration", options->calibration, "Calibration folder")
       ->type_name("FOLDER")
       ->required();

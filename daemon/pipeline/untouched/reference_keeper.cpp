@@ -8,7 +8,7 @@ namespace dtact::pipeline {
 namespace {
 
 /// Too dark to be a reference, grey levels; reconstruction trusts nothing below that either.
-constexpr float kDarkGrey = 8;
+constexpr float kUnlitGrey = 8;
 /// While a reference is averaged no cell may move more than this, grey levels (0.03 mm).
 constexpr float kStillGrey = 1;
 /// Local darkening that is a touch. Between two references of one sensor: at most 0.006; the
@@ -134,7 +134,7 @@ void ReferenceKeeper::start_average() noexcept {
 
 KeeperStep ReferenceKeeper::settle(const hal::LumaView& luma) noexcept {
   measure(luma, now_);
-  if (now_.mean < kDarkGrey) {
+  if (now_.mean < kUnlitGrey) {
     settle_.reset();
     waited_ = 0;
     if (!std::exchange(request_, std::nullopt)) return {};
@@ -155,7 +155,7 @@ KeeperStep ReferenceKeeper::gather(const hal::LumaView& luma) noexcept {
   if (!average_.add(luma)) return {};
   average_.write(candidate_);
   measure(candidate_, width_, height_, candidate_grid_);
-  if (candidate_grid_.mean < kDarkGrey) return decide(RezeroResult::dark);
+  if (candidate_grid_.mean < kUnlitGrey) return decide(RezeroResult::dark);
   if (request_ && request_->force) return take();
   now_ = candidate_grid_;
   return touched(candidate_grid_) ? decide(RezeroResult::touched) : take();
@@ -165,7 +165,7 @@ void ReferenceKeeper::watch(const hal::LumaView& luma) noexcept {
   if (++watched_ < kFramesBetweenLooks) return;
   watched_ = 0;
   measure(luma, now_);
-  clear_ = now_.mean >= kDarkGrey && !touched(now_) ? clear_ + 1 : 0;
+  clear_ = now_.mean >= kUnlitGrey && !touched(now_) ? clear_ + 1 : 0;
   if (clear_ < kClearLooks) return;
   clear_ = 0;
   start_average();

@@ -91,7 +91,7 @@ TEST(Doubts, ASlopeThatNoSensorHas) {
   EXPECT_THAT(doubts_about(list_of(121)), ElementsAre(HasSubstr("a grey level is 121.0 um")));
 }
 
-BallPress press_of(const Ball& ball, double mm_per_px = 0.05, double radius_mm = 4) {
+BallPress scaled_press_of(const Ball& ball, double mm_per_px = 0.05, double radius_mm = 4) {
   BallPress press;
   press.reference_q8 = ball.untouched_q8();
   press.frames = {ball.frame()};
@@ -106,20 +106,22 @@ std::vector<std::string> doubts_of(const BallPress& press) {
 
 TEST(Doubts, OfBuiltCalibrations) {
   for (const double depth_mm : {0.4, 0.7, 1.0, 1.5, 1.9}) {
-    EXPECT_THAT(doubts_of(press_of(Ball{.depth_mm = depth_mm})), IsEmpty()) << depth_mm;
+    EXPECT_THAT(doubts_of(scaled_press_of(Ball{.depth_mm = depth_mm})), IsEmpty()) << depth_mm;
   }
   // A decimal point off.
-  EXPECT_THAT(doubts_of(press_of(Ball{}, 0.005)), Contains(HasSubstr("a grey level is 0.3 um")));
-  EXPECT_THAT(doubts_of(press_of(Ball{}, 0.05, 40)), Contains(HasSubstr("a grey level is 2.9 um")));
+  EXPECT_THAT(doubts_of(scaled_press_of(Ball{}, 0.005)),
+              Contains(HasSubstr("a grey level is 0.3 um")));
+  EXPECT_THAT(doubts_of(scaled_press_of(Ball{}, 0.05, 40)),
+              Contains(HasSubstr("a grey level is 2.9 um")));
   // 1.9 mm deep the contact is 3.4 mm wide of which a ball of 3.2 mm has not as much.
-  EXPECT_THAT(doubts_of(press_of(Ball{.depth_mm = 1.9}, 0.05, 3.2)),
+  EXPECT_THAT(doubts_of(scaled_press_of(Ball{.depth_mm = 1.9}, 0.05, 3.2)),
               Contains(HasSubstr("list and sphere disagree")));
-  EXPECT_THAT(doubts_of(press_of(Ball{.depth_mm = 1.9}, 0.0552)),
+  EXPECT_THAT(doubts_of(scaled_press_of(Ball{.depth_mm = 1.9}, 0.0552)),
               Contains(HasSubstr("list and sphere disagree")));
 }
 
 TEST(Doubts, OfAPublishedList) {
-  BallPress press = press_of(Ball{});
+  BallPress press = scaled_press_of(Ball{});
   press.method = recon::Method::published;
   EXPECT_THAT(doubts_of(press), IsEmpty());
   press.mm_per_px = 0.005;
@@ -128,7 +130,7 @@ TEST(Doubts, OfAPublishedList) {
 
 TEST(Doubts, OfAPressHalfInTheDark) {
   // To the right of the middle nothing is lit, in neither of the images.
-  BallPress press = press_of(Ball{});
+  BallPress press = scaled_press_of(Ball{});
   for (int y = 0; y < 240; ++y) {
     for (int x = 130; x < 260; ++x) {
       const auto at = static_cast<std::size_t>(y) * 260 + static_cast<std::size_t>(x);

@@ -19,13 +19,13 @@ constexpr double kPxPerMm = 16;
 
 /// Two images on which each of 7×9 pins darkens by `levels` of its place in millimetres, scattered
 /// by 5 %, under `light`.
-struct Scene {
+struct GainScene {
   cv::Mat1f reference = cv::Mat1f(300, 400);
   cv::Mat1f frame;
   std::vector<Mark> marks;
 
   using OfPlace = std::function<double(double x, double y)>;
-  Scene(const OfPlace& light, const OfPlace& levels) {
+  GainScene(const OfPlace& light, const OfPlace& levels) {
     for (int y = 0; y < reference.rows; ++y) {
       for (int x = 0; x < reference.cols; ++x) {
         reference(y, x) = static_cast<float>(light((x - 200) / kPxPerMm, (y - 150) / kPxPerMm));
@@ -54,7 +54,7 @@ double even(double, double) { return 150; }
 double vignette(double x, double y) { return 180 * (1 - (x * x + y * y) / 270); }
 
 TEST(PinGain, IsNoneWherePinsDarkenAlike) {
-  const PinGain found = Scene(vignette, [](double, double) { return 20; }).choose();
+  const PinGain found = GainScene(vignette, [](double, double) { return 20; }).choose();
   EXPECT_EQ(found.gain.shape, recon::GainShape::none);
   EXPECT_TRUE(found.gain.polynomial.empty());
   EXPECT_NEAR(found.left_out_of_each[0], 0.05, 0.015);
@@ -63,14 +63,15 @@ TEST(PinGain, IsNoneWherePinsDarkenAlike) {
 }
 
 TEST(PinGain, IgnoresABoardPressedInAslant) {
-  const PinGain found = Scene(even, [](double x, double y) { return 20 + x - 0.5 * y; }).choose();
+  const PinGain found =
+      GainScene(even, [](double x, double y) { return 20 + x - 0.5 * y; }).choose();
   EXPECT_EQ(found.gain.shape, recon::GainShape::none);
   EXPECT_TRUE(found.gain.polynomial.empty());
 }
 
 TEST(PinGain, IsTheShareOfTheLightUnderAVignette) {
   const PinGain found =
-      Scene(vignette, [](double x, double y) { return vignette(x, y) / 9; }).choose();
+      GainScene(vignette, [](double x, double y) { return vignette(x, y) / 9; }).choose();
   EXPECT_EQ(found.gain.shape, recon::GainShape::uniform);
   EXPECT_TRUE(found.gain.polynomial.empty());
   EXPECT_GT(found.left_out_of_each[0], 0.12);
@@ -79,7 +80,8 @@ TEST(PinGain, IsTheShareOfTheLightUnderAVignette) {
 
 TEST(PinGain, IsAQuadraticWhereTheLayerIsThickerInTheMiddle) {
   const auto gain = [](double x, double y) { return 1 + 0.004 * x * x + 0.002 * y * y; };
-  const PinGain found = Scene(even, [&](double x, double y) { return 20 / gain(x, y); }).choose();
+  const PinGain found =
+      GainScene(even, [&](double x, double y) { return 20 / gain(x, y); }).choose();
   ASSERT_EQ(found.gain.polynomial.size(), 5U);
   for (const auto& [x, y] : {std::pair{10., 0.}, {0., 7.5}, {10., -7.5}}) {
     EXPECT_NEAR(found.gain.polynomial_at(x, y), gain(x, y), 0.06);
@@ -89,7 +91,7 @@ TEST(PinGain, IsAQuadraticWhereTheLayerIsThickerInTheMiddle) {
 }
 
 TEST(PinGain, NeedsTwelvePins) {
-  Scene scene(even, even);
+  GainScene scene(even, even);
   scene.marks.resize(11);
   EXPECT_THROW((void)scene.choose(), std::runtime_error);
 }

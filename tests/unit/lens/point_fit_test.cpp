@@ -27,7 +27,7 @@ std::vector<Mark> marks_of(const BoardCamera& camera, double noise_px) {
   return marks;
 }
 
-double worst_px(const recon::Lens& lens, const BoardCamera& camera) {
+double worst_on_board_px(const recon::Lens& lens, const BoardCamera& camera) {
   double worst = 0;
   for (double y = -7; y <= 7; y += 1.75) {
     for (double x = -9; x <= 9; x += 2.25) {
@@ -50,14 +50,14 @@ BoardCamera tilted_barrel() {
 
 TEST(PointFit, FindsALensThatIsInItsFamily) {
   const BoardCamera camera = tilted_barrel();
-  EXPECT_LT(worst_px(fit_lens(marks_of(camera, 0), LensModel::radial1), camera), 0.01);
-  EXPECT_GT(worst_px(fit_lens(marks_of(camera, 0), LensModel::projective), camera), 1);
+  EXPECT_LT(worst_on_board_px(fit_lens(marks_of(camera, 0), LensModel::radial1), camera), 0.01);
+  EXPECT_GT(worst_on_board_px(fit_lens(marks_of(camera, 0), LensModel::projective), camera), 1);
 }
 
 TEST(PointFit, ChoosesNoMoreThanTheMarksPayFor) {
   const ChosenLens barrel = choose_lens(marks_of(tilted_barrel(), 0.2));
   EXPECT_EQ(barrel.model, LensModel::radial1);
-  EXPECT_LT(worst_px(barrel.lens, tilted_barrel()), 0.5);
+  EXPECT_LT(worst_on_board_px(barrel.lens, tilted_barrel()), 0.5);
 
   BoardCamera straight;
   EXPECT_EQ(choose_lens(marks_of(straight, 0.2)).model, LensModel::affine);

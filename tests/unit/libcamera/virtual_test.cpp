@@ -37,7 +37,7 @@ namespace {
 
 namespace lc = libcamera;
 
-constexpr std::array kNodes{"/dev/null"};
+constexpr std::array kNoHeap{"/dev/null"};
 
 /// PipelineHandlerVirtual::match() reads it (pipeline_handler.cpp: configurationFile()).
 bool describe_camera() {
@@ -87,7 +87,7 @@ class VirtualCamera : public testing::Test {
     return c;
   }
   [[nodiscard]] std::shared_ptr<Session> open(double fps) {
-    const DmaHeap heap(kNodes);
+    const DmaHeap heap(kNoHeap);
     return std::make_shared<Session>(camera_, config(fps), PhotometricLock({}, fps), &heap);
   }
 

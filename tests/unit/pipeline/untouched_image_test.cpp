@@ -14,12 +14,12 @@
 namespace dtact::pipeline {
 namespace {
 
-constexpr int kFrames = 16;
+constexpr int kReferenceFrames = 16;
 constexpr Moment kUnsettled{.settled = false, .whole = true};
 
 PipelineConfig config() {
   PipelineConfig made;
-  made.reference.frames = kFrames;
+  made.reference.frames = kReferenceFrames;
   return made;
 }
 
@@ -52,7 +52,7 @@ class UntouchedImageTest : public ::testing::Test {
   }
   /// Whether depth can be measured after so many frames, and with nothing to complain of.
   bool settles() {
-    show(3 * kFrames);
+    show(3 * kReferenceFrames);
     return image_.footing() == Footing::fresh && image_.conditions().empty();
   }
   fakes::ToyFrame next() { return fakes::ToyFrame(scene_, sequence_++); }
@@ -63,7 +63,7 @@ class UntouchedImageTest : public ::testing::Test {
   CalibratedImage calibrated_{fakes::toy_calibration(scene_)};
   std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) / "dtact_untouched";
   ReferenceWriter writer_{fakes::kToyWidth, fakes::kToyHeight, folder_};
-  PlaceWatch place_{fakes::kToyWidth, fakes::kToyHeight, kFrames};
+  PlaceWatch place_{fakes::kToyWidth, fakes::kToyHeight, kReferenceFrames};
   UntouchedImage image_{fakes::kToyWidth, fakes::kToyHeight, config_.light,
                         config_,          writer_,           place_};
   std::uint64_t sequence_ = 0;
@@ -85,10 +85,10 @@ TEST_F(UntouchedImageTest, TheCamerasPlaceIsNotJudgedByALayerThatIsTouched) {
   now_ns_ += PlaceWatch::kPauseNs;
   scene_.marks_px = 4;
   image_.touched(true);
-  show(2 * kFrames);
+  show(2 * kReferenceFrames);
   EXPECT_FALSE(has(Health::camera_moved));
   image_.touched(false);
-  show(2 * kFrames);
+  show(2 * kReferenceFrames);
   EXPECT_TRUE(has(Health::camera_moved));
 }
 
@@ -99,7 +99,7 @@ TEST_F(UntouchedImageTest, AFrameReadInPartIsNoPartOfAReference) {
   std::fill_n(part.pixels.begin(), std::ptrdiff_t{8} * fakes::kToyWidth, std::uint8_t{0});
   EXPECT_EQ(look(part, {.settled = true, .whole = false}).rezeroed, std::nullopt);
   std::optional<RezeroResult> answer;
-  for (int i = 0; i < kFrames; ++i) answer = look(next()).rezeroed;
+  for (int i = 0; i < kReferenceFrames; ++i) answer = look(next()).rezeroed;
   EXPECT_EQ(answer, RezeroResult::taken);
   // 103 levels; with a sixteenth of nothing in it, 97.
   EXPECT_NEAR(image_.reference()[0], fakes::toy_reference_q8(scene_)[0], 256);
@@ -109,7 +109,7 @@ TEST_F(UntouchedImageTest, AReferenceForcedUnderATouchIsNotKeptForTheNextStart) 
   ASSERT_TRUE(settles());
   scene_.press_mm = 1;
   ASSERT_EQ(image_.rezero(true), std::nullopt);
-  show(3 * kFrames);
+  show(3 * kReferenceFrames);
   constexpr std::size_t kMiddle = 60 * fakes::kToyWidth + 80;
   EXPECT_NEAR(image_.reference()[kMiddle], 119 * 256, 3 * 256);
   writer_.stop();

@@ -14,7 +14,7 @@ namespace dtact::recon {
 namespace {
 
 /// 16×12 pixels of the frame from column 2, row 3; 32 µm a level; no smoothing.
-Model make_model() {
+Model straight_model() {
   Model model;
   model.rectify = make_crop_table(24, 20, 2, 3, 16, 12);
   model.mm_per_px = 0.05;
@@ -40,7 +40,7 @@ std::vector<std::int16_t> run(const Model& model, int (*grey)(int, int)) {
 }
 
 TEST(Decimate, KeepsMillimetresAndDropsWhatFillsNoPixel) {
-  Model model = make_model();
+  Model model = straight_model();
   model.rectify = make_crop_table(24, 20, 2, 3, 15, 11);
   model.smoothing_px = 2;
   const Model half = decimate(model, 2);
@@ -53,7 +53,7 @@ TEST(Decimate, KeepsMillimetresAndDropsWhatFillsNoPixel) {
 }
 
 TEST(Decimate, WhatFillsNoPixelIsDroppedOnBothSides) {
-  Model model = make_model();
+  Model model = straight_model();
   model.rectify = make_crop_table(24, 20, 2, 3, 15, 11);
   // Of 15 columns 12 stay and of 11 rows 8: one is dropped before them and two after.
   const RectifyTable quarter = decimate(model, 4).rectify;
@@ -66,10 +66,10 @@ TEST(Decimate, WhatFillsNoPixelIsDroppedOnBothSides) {
 TEST(Decimate, APixelIsTheMeanOfItsArea) {
   // One dark pixel of 120 levels below the reference, alone in its area.
   const auto dark = [](int x, int y) { return x == 2 + 5 && y == 3 + 6 ? 70 : 150; };
-  const std::vector<std::int16_t> half = run(decimate(make_model(), 2), dark);
+  const std::vector<std::int16_t> half = run(decimate(straight_model(), 2), dark);
   EXPECT_EQ(half[3 * 8 + 2], 640);  // 80 levels / 4 · 32 µm
   EXPECT_EQ(half[3 * 8 + 3], 0);
-  const std::vector<std::int16_t> quarter = run(decimate(make_model(), 4), dark);
+  const std::vector<std::int16_t> quarter = run(decimate(straight_model(), 4), dark);
   EXPECT_EQ(quarter[1 * 4 + 1], 160);  // 80 levels / 16 · 32 µm
 }
 
@@ -77,12 +77,12 @@ TEST(Decimate, NothingAliases) {
   // The finest stripes there are, in either direction: a coarse map that picked pixels would show
   // all of them or none.
   for (const int factor : {2, 4}) {
-    for (const std::int16_t um :
-         run(decimate(make_model(), factor), [](int x, int) { return x % 2 == 0 ? 110 : 150; })) {
+    for (const std::int16_t um : run(decimate(straight_model(), factor),
+                                     [](int x, int) { return x % 2 == 0 ? 110 : 150; })) {
       EXPECT_EQ(um, 640);  // 20 levels
     }
-    for (const std::int16_t um :
-         run(decimate(make_model(), factor), [](int, int y) { return y % 2 == 0 ? 110 : 150; })) {
+    for (const std::int16_t um : run(decimate(straight_model(), factor),
+                                     [](int, int y) { return y % 2 == 0 ? 110 : 150; })) {
       EXPECT_EQ(um, 640);
     }
   }
@@ -90,7 +90,7 @@ TEST(Decimate, NothingAliases) {
 
 TEST(Decimate, AnUntrustedPixelMarksItsArea) {
   for (const unsigned pixel : {4U * 16 + 6, 4U * 16 + 7, 5U * 16 + 6, 5U * 16 + 7}) {
-    Model model = make_model();
+    Model model = straight_model();
     model.untrusted.assign(std::size_t{16} * 12, 0);
     model.untrusted[pixel] = 1;
     const std::vector<std::int16_t> half = run(decimate(model, 2), [](int, int) { return 150; });
@@ -101,7 +101,7 @@ TEST(Decimate, AnUntrustedPixelMarksItsArea) {
 }
 
 TEST(Decimate, RefusesWhatItCannotDo) {
-  const Model model = make_model();
+  const Model model = straight_model();
   EXPECT_THROW((void)decimate(model, 3), std::invalid_argument);
   EXPECT_THROW((void)decimate(decimate(model, 2), 2), std::invalid_argument);
   Model thin = model;

@@ -18,14 +18,14 @@ using testing::ThrowsMessage;
 
 constexpr int kFrameWidth = 40;
 constexpr int kFrameHeight = 30;
-constexpr int kWidth = 21;
-constexpr int kHeight = 17;
+constexpr int kMapWidth = 21;
+constexpr int kMapHeight = 17;
 
 /// Half a micrometre a Q6 unit, 32 µm a level, from −40 to +60 levels; reference 160 everywhere.
 Model model_of(Method method) {
   Model model;
   model.method = method;
-  model.rectify = make_crop_table(kFrameWidth, kFrameHeight, 5, 4, kWidth, kHeight);
+  model.rectify = make_crop_table(kFrameWidth, kFrameHeight, 5, 4, kMapWidth, kMapHeight);
   model.mm_per_px = 0.05;
   model.smoothing_px = 1;
   model.list.first_q6 = -40 * 64;
@@ -42,7 +42,7 @@ struct Bench {
   explicit Bench(Model model)
       : reconstructor(std::make_shared<Model>(std::move(model))),
         luma(static_cast<std::size_t>(kFrameWidth) * kFrameHeight + 64),
-        depth(static_cast<std::size_t>(kWidth) * kHeight) {}
+        depth(static_cast<std::size_t>(kMapWidth) * kMapHeight) {}
   const std::vector<std::int16_t>& run(int grey) {
     std::ranges::fill(luma, static_cast<std::uint8_t>(grey));
     reconstructor.run(luma.data(), kFrameWidth, depth);
@@ -71,7 +71,7 @@ TEST(ReconstructorList, BulgeSideHoldsDeepSideIsUntrusted) {
   EXPECT_EQ(bench.reconstructor.beyond_pixels(), 0);
   EXPECT_THAT(bench.run(110), Each(1600));
   EXPECT_THAT(bench.run(109), Each(kUntrusted));
-  EXPECT_EQ(bench.reconstructor.beyond_pixels(), kWidth * kHeight);
+  EXPECT_EQ(bench.reconstructor.beyond_pixels(), kMapWidth * kMapHeight);
 }
 
 TEST(ReconstructorList, HalfTheLightReadsTheSameDepth) {
@@ -111,12 +111,13 @@ TEST(ReconstructorList, TooLittleLightIsUntrusted) {
 
 TEST(ReconstructorList, TheMaskIsAppliedLast) {
   Model model = model_of(Method::list);
-  model.untrusted.assign(static_cast<std::size_t>(kWidth) * kHeight, 0);
-  model.untrusted[3 * kWidth + 2] = 1;
+  model.untrusted.assign(static_cast<std::size_t>(kMapWidth) * kMapHeight, 0);
+  model.untrusted[3 * kMapWidth + 2] = 1;
   Bench bench(std::move(model));
   bench.run(130);
-  EXPECT_EQ(bench.depth[3 * kWidth + 2], kUntrusted);
-  EXPECT_EQ(std::ranges::count(bench.depth, 960), kWidth * kHeight - 1) << "no neighbour smeared";
+  EXPECT_EQ(bench.depth[3 * kMapWidth + 2], kUntrusted);
+  EXPECT_EQ(std::ranges::count(bench.depth, 960), kMapWidth * kMapHeight - 1)
+      << "no neighbour smeared";
 }
 
 TEST(ReconstructorList, OneDarkPixelSpreadsAsTheKernel) {
@@ -125,11 +126,11 @@ TEST(ReconstructorList, OneDarkPixelSpreadsAsTheKernel) {
   bench.luma[(4 + 8) * kFrameWidth + 5 + 10] = 60;  // the pixel at row 8, column 10 of the map
   bench.reconstructor.run(bench.luma.data(), kFrameWidth, bench.depth);
   // 6400 · 6536/16384 = 2553.1 → 2553; · 6536/16384 = 1018.5 → 1018 Q6; half of it is 509 µm.
-  EXPECT_EQ(bench.depth[8 * kWidth + 10], 509);
+  EXPECT_EQ(bench.depth[8 * kMapWidth + 10], 509);
   // 6400 · 3966/16384 = 1549.2 → 1549; · 6536/16384 = 617.9 → 618; 309 µm.
-  EXPECT_EQ(bench.depth[8 * kWidth + 11], 309);
-  EXPECT_EQ(bench.depth[7 * kWidth + 10], 309);
-  EXPECT_EQ(bench.depth[8 * kWidth + 14], 0) << "beyond the kernel";
+  EXPECT_EQ(bench.depth[8 * kMapWidth + 11], 309);
+  EXPECT_EQ(bench.depth[7 * kMapWidth + 10], 309);
+  EXPECT_EQ(bench.depth[8 * kMapWidth + 14], 0) << "beyond the kernel";
 }
 
 TEST(ReconstructorList, TheSameFrameGivesTheSameDepth) {
@@ -162,17 +163,17 @@ TEST(ReconstructorList, TimesAreReportedWhenAskedFor) {
 
 TEST(ReconstructorList, RowsMayBePaddedAndTheLastPixelIsReached) {
   Model model = model_of(Method::list);
-  model.rectify = make_crop_table(kFrameWidth, kFrameHeight, kFrameWidth - kWidth,
-                                  kFrameHeight - kHeight, kWidth, kHeight);
+  model.rectify = make_crop_table(kFrameWidth, kFrameHeight, kFrameWidth - kMapWidth,
+                                  kFrameHeight - kMapHeight, kMapWidth, kMapHeight);
   model.smoothing_px = 0;
   Reconstructor reconstructor(std::make_shared<Model>(std::move(model)));
   constexpr int kStride = 48;
   std::vector<std::uint8_t> luma(std::size_t{kStride} * kFrameHeight + kLumaPadding, 160);
   luma[kStride * (kFrameHeight - 1) + kFrameWidth - 1] = 150;
-  std::vector<std::int16_t> depth(static_cast<std::size_t>(kWidth) * kHeight);
+  std::vector<std::int16_t> depth(static_cast<std::size_t>(kMapWidth) * kMapHeight);
   reconstructor.run(luma.data(), kStride, depth);
   EXPECT_EQ(depth.back(), 320);
-  EXPECT_EQ(std::ranges::count(depth, 0), kWidth * kHeight - 1);
+  EXPECT_EQ(std::ranges::count(depth, 0), kMapWidth * kMapHeight - 1);
 }
 
 TEST(ReconstructorPublished, HoldsBothEndsAndIgnoresTheLight) {
@@ -187,7 +188,7 @@ TEST(ReconstructorPublished, HoldsBothEndsAndIgnoresTheLight) {
   EXPECT_THAT(bench.run(200), Each(0)) << "the unsigned difference knows no bulge";
   EXPECT_THAT(bench.run(150), Each(160));
   EXPECT_THAT(bench.run(60), Each(1120));
-  EXPECT_EQ(bench.reconstructor.beyond_pixels(), kWidth * kHeight);
+  EXPECT_EQ(bench.reconstructor.beyond_pixels(), kMapWidth * kMapHeight);
   bench.reference(80);
   EXPECT_THAT(bench.run(70), Each(160));
 }
@@ -200,18 +201,18 @@ TEST(ReconstructorPublished, SmoothsDepthTwiceWithSevenTaps) {
   bench.reconstructor.run(bench.luma.data(), kFrameWidth, bench.depth);
   // (1 3.5 7 9 7 3.5 1)/32 with itself has 205.5/1024 in its middle; 1600 · 0.20068² = 64.4, give
   // or take the roundings of four passes.
-  EXPECT_NEAR(bench.depth[8 * kWidth + 10], 64, 1);
-  EXPECT_EQ(bench.depth[8 * kWidth + 10 + 7], 0);
+  EXPECT_NEAR(bench.depth[8 * kMapWidth + 10], 64, 1);
+  EXPECT_EQ(bench.depth[8 * kMapWidth + 10 + 7], 0);
 }
 
 TEST(ReconstructorPublished, TheMaskDoesNotSmear) {
   Model model = model_of(Method::published);
-  model.untrusted.assign(static_cast<std::size_t>(kWidth) * kHeight, 0);
+  model.untrusted.assign(static_cast<std::size_t>(kMapWidth) * kMapHeight, 0);
   model.untrusted[0] = 1;
   Bench bench(std::move(model));
   bench.run(150);
   EXPECT_EQ(bench.depth[0], kUntrusted);
-  EXPECT_EQ(std::ranges::count(bench.depth, 320), kWidth * kHeight - 1);
+  EXPECT_EQ(std::ranges::count(bench.depth, 320), kMapWidth * kMapHeight - 1);
 }
 
 TEST(Reconstructor, MovesAndKeepsItsModel) {
@@ -220,7 +221,7 @@ TEST(Reconstructor, MovesAndKeepsItsModel) {
   std::vector<std::uint8_t> luma(static_cast<std::size_t>(kFrameWidth) * kFrameHeight + 64, 130);
   moved.run(luma.data(), kFrameWidth, bench.depth);
   EXPECT_THAT(bench.depth, Each(960));
-  EXPECT_EQ(moved.model().rectify.width, kWidth);
+  EXPECT_EQ(moved.model().rectify.width, kMapWidth);
 }
 
 void expect_refused(const std::function<void(Model&)>& spoil, const char* what) {

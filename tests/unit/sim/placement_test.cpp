@@ -13,7 +13,7 @@ namespace {
 constexpr double kDegree = 3.14159265358979 / 180;
 
 // 161 points each way, 0.125 mm apart, the origin in the middle.
-const Grid kGrid{161, 161, 0.125, -10, -10};
+const Grid kPlate{161, 161, 0.125, -10, -10};
 
 PressKey key_of(double depth_mm, double tilt_x_deg, double tilt_y_deg, double rotation_deg = 0) {
   PressKey key;
@@ -25,8 +25,8 @@ PressKey key_of(double depth_mm, double tilt_x_deg, double tilt_y_deg, double ro
 }
 
 cv::Mat1d target_of(const Object& object, const PressKey& key) {
-  cv::Mat1d target(kGrid.height, kGrid.width, -kNoSurface);
-  lower_object({}, object, key, 2, kGrid, target);
+  cv::Mat1d target(kPlate.height, kPlate.width, -kNoSurface);
+  lower_object({}, object, key, 2, kPlate, target);
   return target;
 }
 
@@ -73,8 +73,8 @@ TEST(Placement, ATiltedBallIsABall) {
   for (const double tilt : {15.0, 45.0, -60.0}) {
     const cv::Mat1d tilted = target_of(ball(2), key_of(1.1, tilt, 0));
     const double centre = -2 * std::sin(tilt * kDegree);
-    for (int i = 0; i < kGrid.height; ++i) {
-      for (int j = 0; j < kGrid.width; ++j) {
+    for (int i = 0; i < kPlate.height; ++i) {
+      for (int j = 0; j < kPlate.width; ++j) {
         const double r = std::hypot(j * 0.125 - 10, i * 0.125 - 10 - centre);
         if (r > 1.98) continue;  // the line runs along the side: a step may pass it by
         ASSERT_NEAR(tilted(i, j), 1.1 - (2 - std::sqrt(4 - r * r)), 3e-6);

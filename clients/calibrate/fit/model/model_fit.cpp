@@ -30,9 +30,8 @@ constexpr std::array<double, 3> kStartThicknesses = {1.5, 2, 2.8};
 constexpr double kFirstDoubt = 1e-3;
 constexpr double kLeastDoubt = 6e-5;
 constexpr int kMostIterations = 30;
-constexpr double kFrameNoise = 1;  // grey levels a pixel
 
-LayerModel layer_of(std::span<const double> x) {
+LayerModel layer_from(std::span<const double> x) {
   LayerModel layer;
   layer.thickness_mm = std::exp(x[kThickness]);
   const double narrow = std::exp(x[kNarrow]);
@@ -58,7 +57,7 @@ class RingCost {
         to_rings_(RadialTransform::instance().back_to(press.radius_mm)) {}
 
   bool operator()(const double* const* parameters, double* residuals) const {
-    const LayerModel layer = layer_of(std::span(parameters[0], shared_));
+    const LayerModel layer = layer_from(std::span(parameters[0], shared_));
     const double* own = parameters[1];
     if (!press(std::exp(own[kRadius]), layer)) return false;
     const Eigen::VectorXd seen =
@@ -201,7 +200,7 @@ ModelFit refine(std::span<const PressProfile> presses, State best) {
   ModelFit fit;
   fit.parameters = Eigen::Map<Eigen::VectorXd>(best.shared.data(),
                                                static_cast<Eigen::Index>(best.shared.size()));
-  fit.layer = layer_of(best.shared);
+  fit.layer = layer_from(best.shared);
   double square = 0;
   for (std::size_t p = 0; p < presses.size(); ++p) {
     const double radius = std::exp(best.own[p][kRadius]);
@@ -243,7 +242,7 @@ double ModelFit::deepest_mm() const {
 }
 
 LayerModel layer_of(const Eigen::VectorXd& parameters) {
-  return layer_of(std::span(parameters.data(), static_cast<std::size_t>(parameters.size())));
+  return layer_from(std::span(parameters.data(), static_cast<std::size_t>(parameters.size())));
 }
 
 PressProfile profile_of(const SettledPress& press, double light_levels, double smoothing_mm,

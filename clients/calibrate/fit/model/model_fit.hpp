@@ -64,6 +64,9 @@ struct ModelFit {
   [[nodiscard]] double deepest_mm() const;
 };
 
+/// What a frame's pixels are off by, in grey levels.
+inline constexpr double kFrameNoise = 1;
+
 /// The layer of such parameters.
 [[nodiscard]] LayerModel layer_of(const Eigen::VectorXd& parameters);
 

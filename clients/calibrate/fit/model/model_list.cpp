@@ -23,7 +23,6 @@ constexpr double kMostOfLayer = 0.92;
 constexpr double kKnotLevels = 2;
 constexpr double kVouchedBeyond = 2;  // grey levels
 constexpr int kDraws = 20;
-constexpr double kFrameNoise = 1;  // grey levels a pixel
 constexpr double kDepthBinMm = 0.2;
 
 /// A ball as the maps of all lists show it, on RadialTransform's grid.
