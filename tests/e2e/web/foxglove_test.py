@@ -13,6 +13,7 @@ import tempfile
 import threading
 import time
 import unittest
+from socket import create_server
 from typing import Any
 
 from programs import Daemon, Gateway, Perceive, calibrate
@@ -258,6 +259,32 @@ class Protocol(unittest.TestCase):
                 self.assertEqual(json.loads(socket.receive()[1])["op"], "status", payload)
             socket.send(b"\x02" + struct.pack("<III", 7, 1, 4) + b"json{}")
             self.assertEqual(json.loads(socket.receive()[1])["op"], "serviceCallFailure")
+
+    def test_channels_are_told_when_the_daemon_comes(self) -> None:
+        folder = pathlib.Path(FOLDER.name)
+        with create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        gate = Gateway(folder, "--host", f"127.0.0.1:{port}")
+        told: dict[str, set[str]] = {"advertise": set(), "unadvertise": set()}
+        topics: dict[int, str] = {}
+        with WebSocket(gate.port, "/foxglove", Sec_WebSocket_Protocol=V1) as client:
+            # Before anybody knows what is behind the address; this client subscribes to nothing.
+            while not told["advertise"]:
+                self.collect(json.loads(client.receive()[1]), told, topics)
+            self.assertEqual(told["advertise"], set(TOPICS))
+            late = Perceive(folder, daemon, port)
+            while "/dtact/points" not in told["advertise"]:
+                self.collect(json.loads(client.receive()[1]), told, topics)
+            self.assertEqual(told["unadvertise"], set(TOPICS) - set(POINTS))
+        self.assertEqual((gate.stop(), late.stop()), (0, 0))
+
+    @staticmethod
+    def collect(message: Any, told: dict[str, set[str]], topics: dict[int, str]) -> None:
+        for channel in message.get("channels", []):
+            topics[channel["id"]] = channel["topic"]
+            told["advertise"].add(channel["topic"])
+        for number in message.get("channelIds", []):
+            told["unadvertise"].add(topics[number])
 
     def test_tokens(self) -> None:
         tokens = pathlib.Path(FOLDER.name, "tokens")

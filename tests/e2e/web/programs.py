@@ -67,9 +67,11 @@ class Daemon(Program):
 class Perceive(Program):
     """dtact-perceive beside a daemon."""
 
-    def __init__(self, folder: pathlib.Path, daemon: Daemon) -> None:
-        super().__init__([os.environ["DTACT_PERCEIVE"], "--port", str(daemon.port), "serve", "--listen-port", "0"],
-                         folder / "perceive.log", r"listening on 127\.0\.0\.1:(\d+)")
+    def __init__(self, folder: pathlib.Path, daemon: Daemon, port: int = 0) -> None:
+        number = len(list(folder.glob("perceive-*.log")))
+        super().__init__([os.environ["DTACT_PERCEIVE"], "--port", str(daemon.port), "serve", "--listen-port",
+                          str(port)],
+                         folder / f"perceive-{number}.log", r"listening on 127\.0\.0\.1:(\d+)")
 
 
 class Gateway(Program):
