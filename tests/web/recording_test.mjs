@@ -18,7 +18,9 @@ let pane;
 before(async () => {
   daemon = await startDaemon("left");
   tap = new Tap(daemon.port);
-  view = await open(await startGateway({ left: daemon.port }));
+  // Twice the same one: a page keeps one pane at least.
+  view = await open(await startGateway({ left: daemon.port, other: daemon.port }));
+  await choose("other");
   pane = view.page.locator('[data-sensor="left"]');
   await until(
     () => pane.getAttribute("data-sequence"),
@@ -78,7 +80,10 @@ function framesOf(recording) {
   });
 }
 
-/** Records for three seconds and until `ended`, which ends it, is done: the file, and what the page says. */
+/** Shows a sensor or, where it is shown, closes its pane. */
+const choose = (name) => view.page.locator(".chooser button", { hasText: name }).click();
+
+/** Records for three seconds and until `ended`, which ends it, is done. */
 async function record(ended) {
   await pane.getByRole("button", { name: "Record" }).click();
   await until(
@@ -90,12 +95,12 @@ async function record(ended) {
   const download = await coming;
   const file = path.join(work, download.suggestedFilename());
   await download.saveAs(file);
-  return { file, told: await fact(pane, "recording").textContent() };
+  return file;
 }
 
 test("what is recorded is what the daemon sent", async () => {
   let sent = [];
-  const { file, told } = await record(async () => {
+  const file = await record(async () => {
     // While the other client still has them.
     sent = tap.sequences().map((sequence) => ({ sequence, ...tap.frame(sequence) }));
     await pane.getByRole("button", { name: "Stop" }).click();
@@ -103,6 +108,7 @@ test("what is recorded is what the daemon sent", async () => {
   assert.match(path.basename(file), /^left-\d{4}-\d\d-\d\dT\d{6}Z\.mcap$/);
   const frames = framesOf(file);
   assert.ok(frames.length > 20, `${frames.length} frames`);
+  const told = await fact(pane, "recording").textContent();
   assert.ok(told.includes(`: ${frames.length} frames, `), told);
   assert.deepEqual(
     sequencesOf(file, "/camera/jpeg"),
@@ -126,7 +132,7 @@ test("what is recorded is what the daemon sent", async () => {
 });
 
 test("depth can be made anew from it", async () => {
-  const { file } = await record(() => pane.getByRole("button", { name: "Stop" }).click());
+  const file = await record(() => pane.getByRole("button", { name: "Stop" }).click());
   const anew = `${file}-anew.mcap`;
   execFileSync(process.env.CALIBRATE, [
     "reprocess",
@@ -143,8 +149,20 @@ test("depth can be made anew from it", async () => {
   assert.equal(maps(remade), maps(recorded));
 });
 
+test("a pane that is closed hands over what it has recorded", async () => {
+  await choose("other");
+  const file = await record(() => choose("left"));
+  assert.ok(framesOf(file).length > 20);
+  assert.equal(await pane.count(), 0);
+  await choose("left");
+  await until(
+    () => pane.getAttribute("data-sequence"),
+    (sequence) => sequence !== null,
+  );
+});
+
 test("a daemon that ends leaves what was recorded until then", async () => {
-  const { file, told } = await record(() => daemon.stop("SIGKILL"));
-  assert.match(told, /^The connection was lost\. left-/);
+  const file = await record(() => daemon.stop("SIGKILL"));
+  assert.match(await fact(pane, "recording").textContent(), /^The connection was lost\. left-/);
   assert.ok(framesOf(file).length > 20);
 });
