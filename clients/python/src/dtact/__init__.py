@@ -63,8 +63,9 @@ __all__ = [
     "Busy", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Camera", "Client",
     "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "EndedByDaemon",
     "Error", "Event", "Frame", "IdentityError", "Invalid", "Light", "LightEvent", "NoFrame",
-    "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Reconnected", "Reconstruction",
-    "ReconstructionEvent", "Recording", "ReferenceEvent", "ReferenceImage", "Refused", "Server", "StateEvent", "Status", "StorageFailed",
-    "StoredCalibration", "Subscription", "TimeoutError", "Touched", "Uncalibrated", "Unsupported",
-    "aio", "connect", "read",
+    "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Reconnected",
+    "Reconstruction", "ReconstructionEvent", "Recording", "ReferenceEvent", "ReferenceImage",
+    "Refused", "Server", "StateEvent", "Status", "StorageFailed", "StoredCalibration",
+    "Subscription", "TimeoutError", "Touched", "Uncalibrated", "Unsupported", "aio", "connect",
+    "read",
 ]
