@@ -44,6 +44,8 @@ class ReferenceKeeper {
   /// reference stays, whatever else is known is forgotten and the sequence begins again.
   void use_calibration(std::span<const std::uint16_t> reference_q8, const LumaGrid& grid,
                        const CellRegion& region) noexcept;
+  /// The calibration's grid, as it was given, lies at another place.
+  void grid_lies_at(const LumaGrid& grid) noexcept { calibration_.grid = &grid; }
   /// The camera has (re)started: begins the sequence.
   void begin() noexcept;
   /// The light is about to change or has just changed: no depth until the next reference.

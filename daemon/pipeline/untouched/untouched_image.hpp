@@ -60,7 +60,10 @@ class UntouchedImage {
   /// From now on this calibration; null: none. A fresh reference stays.
   void use(CalibratedImage* image) noexcept;
   /// The image in use has moved to another place.
-  void lies_at(CalibratedImage* image) noexcept { image_ = image; }
+  void lies_at(CalibratedImage* image) noexcept {
+    image_ = image;
+    keeper_.grid_lies_at(image->grid);
+  }
   /// The camera has begun anew: what was known of its image is in doubt.
   void camera_began() noexcept;
   /// The ring is about to show this, or shows it since just now.
