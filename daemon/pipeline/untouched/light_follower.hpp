@@ -33,6 +33,7 @@ class LightFollower {
   [[nodiscard]] std::optional<double> look(const LightSeen& light,
                                            std::int64_t timestamp_ns) noexcept;
 
+  [[nodiscard]] bool follows() const noexcept { return follows_; }
   /// The factor that is applied.
   [[nodiscard]] double factor() const noexcept { return applied_; }
   /// What of the light is not followed, as last seen: a share of it, positive where it is brighter.

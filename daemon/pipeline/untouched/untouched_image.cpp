@@ -32,7 +32,14 @@ void UntouchedImage::use(CalibratedImage* image) noexcept {
   keeper_.use_calibration(image->calibration->model->reference_q8, image->grid, image->region);
   place_.use_marks(image->marks);
   other_light_ = light_differs(*image->calibration, shown_);
-  if (keeper_.ready()) use_reference();
+  if (!keeper_.ready()) return;
+  // The reference stays as it was taken, and so does the light that was followed since.
+  const LightFollower before = follower_;
+  use_reference();
+  if (before.follows() && follower_.follows()) {
+    follower_ = before;
+    image_->cells.set_light(follower_.factor());
+  }
 }
 
 void UntouchedImage::camera_began() noexcept { keeper_.begin(); }

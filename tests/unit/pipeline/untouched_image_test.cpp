@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include "daemon/pipeline/untouched/reference_store.hpp"
 #include "tests/fakes/toy_sensor.hpp"
@@ -77,6 +78,38 @@ TEST_F(UntouchedImageTest, AnotherLightThanAtCalibrationIsToldFromTheStart) {
   dimmed.use(&calibrated_);
   EXPECT_TRUE(dimmed.conditions().has(Health::light_mismatch));
   EXPECT_FALSE(has(Health::light_mismatch));
+}
+
+// Other maps of the calibration in use come with another home for it.
+TEST_F(UntouchedImageTest, WhatMovedIsComparedWithWhereItLies) {
+  scene_.press_mm = 1;
+  show(6 * kReferenceFrames);
+  ASSERT_EQ(image_.footing(), Footing::stale);
+  CalibratedImage moved = std::move(calibrated_);
+  calibrated_.grid = {};  // freed in the daemon
+  image_.lies_at(&moved);
+  show(6 * kReferenceFrames);
+  EXPECT_EQ(image_.footing(), Footing::stale);
+  scene_.press_mm = 0;
+  show(6 * kReferenceFrames);
+  EXPECT_EQ(image_.footing(), Footing::fresh);
+}
+
+TEST_F(UntouchedImageTest, TheLightThatIsFollowedOutlivesTheCalibration) {
+  ASSERT_TRUE(settles());
+  CalibratedImage next{fakes::toy_calibration(scene_)};
+  constexpr int kFrames = 1200;  // half a percent in twenty seconds
+  for (int i = 1; i <= kFrames; ++i) {
+    scene_.light = 1 - 0.005 * i / kFrames;
+    show(1);
+  }
+  ASSERT_NEAR(image_.light(), 0.995, 0.001);
+  image_.use(&next);
+  EXPECT_NEAR(image_.light(), 0.995, 0.001);
+  show(2 * kReferenceFrames);
+  EXPECT_NEAR(image_.light(), 0.995, 0.001);
+  EXPECT_FALSE(has(Health::light_drifted));
+  EXPECT_FALSE(image_.anything_active());
 }
 
 // What is held drags the layer along, and its marks with it.
