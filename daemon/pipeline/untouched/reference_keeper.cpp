@@ -220,6 +220,7 @@ KeeperStep ReferenceKeeper::stand_in() noexcept {
   relight(known.reference_q8, width_, height_, field_, stand_in_);
   footing_ = same_light ? Footing::restored : Footing::stale;
   phase_ = Phase::holding;
+  untouched_before_ = false;  // something has touched, or moved, since
   watched_ = 0;
   clear_ = 0;
   return {.reference_changed = true, .answer = std::nullopt};

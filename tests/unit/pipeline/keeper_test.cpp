@@ -255,6 +255,19 @@ TEST_F(KeeperTest, ALightChangeUnderContactScalesAndWaits) {
   EXPECT_EQ(keeper.footing(), Footing::fresh);
 }
 
+TEST_F(KeeperTest, AfterATouchALighterOneIsNotTakenForNone) {
+  calibrate();
+  ASSERT_TRUE(run(40));
+  keeper.light_changed(false, true);
+  scene.light = 0.5;
+  scene.press_mm = 1;
+  ASSERT_TRUE(run(60));
+  ASSERT_EQ(keeper.footing(), Footing::stale);
+  scene.press_mm = 0.15;
+  EXPECT_FALSE(run(200));
+  EXPECT_EQ(keeper.footing(), Footing::stale);
+}
+
 TEST_F(KeeperTest, ALongPressIsNeverAbsorbed) {
   calibrate();
   ASSERT_TRUE(run(40));
