@@ -8,6 +8,8 @@ namespace {
 
 /// A sixteenth of a grey level, 2 µm: applying a factor costs as much as a frame.
 constexpr double kWorthIt = 0.0004;
+/// What is expected out of sight at most where nothing is followed: the default limit.
+constexpr double kUnfollowed = 0.02;
 
 }  // namespace
 
@@ -61,7 +63,8 @@ std::optional<double> LightFollower::look(const LightSeen& light,
 
 double LightFollower::unseen() const noexcept {
   if (unseen_ns_ <= kUnseenNs) return 0;
-  return std::min(rate_ * static_cast<double>(unseen_ns_) * 1e-9, limit_) / 2;
+  const double most = limit_ > 0 ? limit_ : kUnfollowed;
+  return std::min(rate_ * static_cast<double>(unseen_ns_) * 1e-9, most) / 2;
 }
 
 void LightFollower::tell(double left) noexcept {

@@ -169,6 +169,8 @@ TEST_F(LightFollowerTest, ALimitOfZeroOnlyTells) {
   drift(0.99, kMinute);
   EXPECT_EQ(follower_.factor(), 1);
   EXPECT_TRUE(follower_.drifted());
+  touched(1, 5 * kMinute);
+  EXPECT_NEAR(follower_.unseen(), 0.01, 1e-9) << "no less than where it is followed";
 }
 
 }  // namespace
