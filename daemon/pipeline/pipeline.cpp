@@ -180,7 +180,9 @@ bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
   if (exchange_.orders.room() == 0) return false;
   try {
     if (!command.calibration) throw std::invalid_argument("no calibration was given");
-    return order(ticket, {0, command.calibration, command.key}, rules_, false);
+    if (!order(ticket, {0, command.calibration, command.key}, rules_, false)) return false;
+    restore_failure_.clear();  // of the calibration before
+    return true;
   } catch (const std::invalid_argument& e) {
     return refuse(ticket, e.what());
   }
@@ -278,7 +280,9 @@ Status Pipeline::status() const {
   status.light_followed = exchange_.light_followed.load(std::memory_order_relaxed);
   status.place_message = place_.message();
   status.storage_message = writer_.message();
-  if (status.storage_message.empty()) status.storage_message = restore_failure_;
+  if (status.storage_message.empty() && !writer_.has_written()) {
+    status.storage_message = restore_failure_;
+  }
   return status;
 }
 

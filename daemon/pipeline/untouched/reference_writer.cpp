@@ -35,6 +35,7 @@ void ReferenceWriter::write() {
   std::string failure;
   try {
     save_reference(pending_, *calibration_, folder_);
+    has_written_.store(true, std::memory_order_relaxed);
   } catch (const std::exception& e) {
     failure = fmt::format(
         "the last good reference is not kept ({}): make the state folder writable", e.what());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -29,6 +30,10 @@ class ReferenceWriter {
 
   /// Why the last write failed and what to do; empty when it went well.
   [[nodiscard]] std::string message() const;
+  /// A reference was written: the one of an earlier run is no longer there.
+  [[nodiscard]] bool has_written() const noexcept {
+    return has_written_.load(std::memory_order_relaxed);
+  }
 
  private:
   void write();
@@ -39,6 +44,7 @@ class ReferenceWriter {
   std::shared_ptr<const calibration::Calibration> calibration_;
   mutable std::mutex mutex_;  // of message_; never taken on the capture thread
   std::string message_;
+  std::atomic<bool> has_written_{false};
   base::SideThread thread_;  // last: it uses the others
 };
 

@@ -374,6 +374,8 @@ TEST_F(PipelineTest, ACalibrationOfAnotherModeIsRefused) {
   ASSERT_TRUE(until_state(State::uncalibrated));
   EXPECT_TRUE(pipeline->status().health.has(Health::camera_mismatch));
   EXPECT_NE(pipeline->status().storage_message.find("320x240"), std::string::npos);
+  ASSERT_EQ(ask(UseCalibration{fakes::toy_calibration()}).outcome, Outcome::done);
+  EXPECT_EQ(pipeline->status().storage_message, "");
 }
 
 }  // namespace
