@@ -19,11 +19,13 @@ class SpscQueue {  // NOLINT(clang-analyzer-optin.performance.Padding): a cache 
   SpscQueue(const SpscQueue&) = delete;
   SpscQueue& operator=(const SpscQueue&) = delete;
 
-  /// Producer: false when full; `value` is moved from only when true.
-  [[nodiscard]] bool push(T&& value) noexcept(std::is_nothrow_move_assignable_v<T>) {
+  /// Producer: false when full; `value`, a T or what can be assigned to one, is moved from only
+  /// when true.
+  template <typename Value = T>
+  [[nodiscard]] bool push(Value&& value) noexcept(std::is_nothrow_assignable_v<T&, Value&&>) {
     const std::size_t tail = tail_.load(std::memory_order_relaxed);
     if (tail - head_.load(std::memory_order_acquire) == kCapacity) return false;
-    slots_[tail % kCapacity] = std::move(value);
+    slots_[tail % kCapacity] = std::forward<Value>(value);
     tail_.store(tail + 1, std::memory_order_release);
     return true;
   }
