@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <functional>
 
 #include "clients/cpp/errors.hpp"
 #include "clients/perceive/cloud_message.hpp"
@@ -45,6 +46,22 @@ TEST(DepthPart, CutsRegionsOfTheCalibrationsResolution) {
   EXPECT_EQ(cut->y, 21);
   EXPECT_THAT(cut->values, ElementsAre(11, 12, 13));
   EXPECT_FALSE(part.cut({0, 0, 10, 10}).has_value());
+}
+
+TEST(DepthPart, RefusesMapsThatContradictThemselves) {
+  const v1::DepthMap good = map_of(std::vector<std::int16_t>(12, 100));
+  const auto with = [&good](const std::function<void(v1::DepthMap&)>& change) {
+    v1::DepthMap map = good;
+    change(map);
+    return [map] { const DepthPart part(map); };
+  };
+  EXPECT_NO_THROW(with([](v1::DepthMap&) {})());
+  EXPECT_THROW(with([](v1::DepthMap& map) { map.set_x(97); })(), client::ProtocolError);
+  EXPECT_THROW(with([](v1::DepthMap& map) { map.set_y(0xFFFFFFFF); })(), client::ProtocolError);
+  EXPECT_THROW(with([](v1::DepthMap& map) { map.set_full_width(1U << 20U); })(),
+               client::ProtocolError);
+  EXPECT_THROW(with([](v1::DepthMap& map) { map.set_mm_per_px(0); })(), client::ProtocolError);
+  EXPECT_THROW(with([](v1::DepthMap& map) { map.set_um_per_unit(-1); })(), client::ProtocolError);
 }
 
 TEST(DepthPart, TheContactHasAMargin) {
