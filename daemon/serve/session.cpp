@@ -7,6 +7,7 @@
 #include <boost/asio/error.hpp>
 #include <utility>
 
+#include "daemon/serve/large_message.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -133,6 +134,12 @@ void Session::on_message() {
                     fmt::format("more than {} requests a second came, each 64 kB of one counted: "
                                 "send them more slowly or raise the daemon's max_requests_per_s",
                                 config_.max_requests_per_s));
+  }
+  if (decoder_.message().size() > kSmall && !is_plain_upload(decoder_.message())) {
+    return end_with(0, v1::ERROR_TOO_LARGE,
+                    fmt::format("a message of {} bytes came: only upload_calibration may have more "
+                                "than {}, with nothing but its id beside it",
+                                decoder_.message().size(), kSmall));
   }
   v1::ClientMessage message;
   const bool parsed = message.ParseFromString(decoder_.message());

@@ -10,6 +10,7 @@
 
 #include "daemon/serve/admission.hpp"
 #include "daemon/serve/guests.hpp"
+#include "daemon/serve/large_message.hpp"
 #include "daemon/serve/limited_log.hpp"
 #include "daemon/serve/token_bucket.hpp"
 #include "tests/unit/net/raw_client.hpp"
@@ -162,6 +163,55 @@ TEST(Requests, ALargeOneCountsAsMany) {
   EXPECT_EQ(client.request(message).error().code(), v1::ERROR_FLOOD);
 }
 
+/// What becomes of the largest messages, parsed or not.
+TEST(Incoming, OnlyAPlainUploadMayBeLarge) {
+  const std::string png(100'000, 'x');
+  v1::ClientMessage upload;
+  upload.set_id(7);
+  upload.mutable_upload_calibration()->set_name("large");
+  upload.mutable_upload_calibration()->set_reference_png(png);
+  const std::string whole = upload.SerializeAsString();
+  EXPECT_TRUE(is_plain_upload(whole));
+  EXPECT_FALSE(is_plain_upload(whole.substr(0, whole.size() - 1)));
+  // Fields of later versions: few of them.
+  const std::string unknown = "\xf8\x01\x01"s;
+  const auto times = [](int n, const std::string& text) {
+    std::string all;
+    for (int i = 0; i < n; ++i) all += text;
+    return all;
+  };
+  EXPECT_TRUE(is_plain_upload(whole + times(14, unknown)));
+  EXPECT_FALSE(is_plain_upload(whole + times(20, unknown)));
+  EXPECT_FALSE(is_plain_upload(times(40'000, unknown)));
+  EXPECT_FALSE(is_plain_upload(whole + "\xfb\x01\xfc\x01"s)) << "a group may hold any number";
+  v1::ClientMessage leds;
+  leds.set_id(8);
+  for (int i = 0; i < 40'000; ++i) leds.mutable_set_light()->add_leds();
+  EXPECT_FALSE(is_plain_upload(leds.SerializeAsString()));
+  EXPECT_FALSE(is_plain_upload(whole + leds.SerializeAsString()));
+  // Inside of the upload, too.
+  std::string inside = upload.upload_calibration().SerializeAsString() + times(20, unknown);
+  const std::size_t size = inside.size();
+  inside = "\x42"s + static_cast<char>((size & 0x7fU) | 0x80U) +
+           static_cast<char>((size >> 7U & 0x7fU) | 0x80U) + static_cast<char>(size >> 14U) +
+           inside;
+  EXPECT_FALSE(is_plain_upload(inside));
+}
+
+TEST(Incoming, ALargeRequestOfManyPartsIsNotTakenApart) {
+  const Rig rig({}, answer_done);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  for (int i = 0; i < 40'000; ++i) message.mutable_set_light()->add_leds();
+  const auto reply = client.request(message);
+  EXPECT_EQ(reply.id(), 0U);
+  EXPECT_EQ(reply.error().code(), v1::ERROR_TOO_LARGE);
+  EXPECT_THAT(reply.error().message(),
+              HasSubstr("only upload_calibration may have more than 65536"));
+  EXPECT_TRUE(client.ends());
+}
+
 TEST(Incoming, IsBoundedForAllClientsTogether) {
   const Rig rig;
   // The last byte of sixteen mebibytes is missing. Memory at most doubles, so each takes all of it.
@@ -185,12 +235,12 @@ TEST(Incoming, IsBoundedForAllClientsTogether) {
   EXPECT_TRUE(clients.back()->ends());
   // Once a message is through its room is another's.
   clients[0]->send_bytes("x");
-  EXPECT_EQ(clients[0]->reply().error().code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(clients[0]->reply().error().code(), v1::ERROR_TOO_LARGE);
   RawClient next(rig.tcp_port());
   next.hello();
   next.send_bytes(part);
   next.send_bytes("x");
-  EXPECT_EQ(next.reply().error().code(), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(next.reply().error().code(), v1::ERROR_TOO_LARGE);
 }
 
 TEST(Incoming, IsCountedOnceAndGivenBack) {
