@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "hal/base/utf8.hpp"
 #include "proto/defaults.hpp"
 
 namespace dtact::announce {
@@ -224,7 +225,7 @@ void Announcer::Impl::add_service(const char* path) {
   group = path;
   published = ask();
   const std::string number = alternative > 1 ? fmt::format(" #{}", alternative) : "";
-  const std::string name = published.name.substr(0, kMaxName - number.size()) + number;
+  const std::string name = base::first_bytes(published.name, kMaxName - number.size()) + number;
   sd_bus_message* made = nullptr;
   check(sd_bus_message_new_method_call(bus.get(), &made, kAvahi, path, kGroup, "AddService"));
   const Message message(made);

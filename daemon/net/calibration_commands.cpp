@@ -11,6 +11,7 @@
 #include "daemon/net/commands.hpp"
 #include "daemon/net/hub.hpp"
 #include "daemon/net/messages.hpp"
+#include "hal/base/utf8.hpp"
 #include "hal/image/png.hpp"
 #include "proto/dtact.pb.h"
 
@@ -132,7 +133,7 @@ void Commands::upload_calibration(const Who& who, const v1::UploadCalibration& r
         id, v1::ERROR_INVALID,
         fmt::format("upload_calibration.name: \"{}\"; allowed are 1 to {} letters, digits, '-' "
                     "and '_'",
-                    request.name().substr(0, wire::kMaxCalibrationName),
+                    base::first_bytes(request.name(), wire::kMaxCalibrationName),
                     wire::kMaxCalibrationName));
   }
   if (request.calibration_toml().empty() || request.reference_png().empty()) {
@@ -245,15 +246,19 @@ void Commands::send_reference(const Who& who,
   ++reading_;
   on_worker(
       [reference] {
-        return image::encode_png(image::Grey16{
-            .width = reference->width, .height = reference->height, .pixels = reference->image_q8});
+        return attempt<std::string>(v1::ERROR_STORAGE, [&reference] {
+          return image::encode_png(image::Grey16{.width = reference->width,
+                                                 .height = reference->height,
+                                                 .pixels = reference->image_q8});
+        });
       },
-      [who, reference, number = hub_.calibration_number(reference->calibration)](Commands& self,
-                                                                                 std::string png) {
+      [who, reference, number = hub_.calibration_number(reference->calibration)](
+          Commands& self, Outcome<std::string> png) {
         --self.reading_;
+        if (png.failed()) return who.first->reply_error(who.second, png.code, png.error);
         auto message = reply_to(who.second);
         auto& image = *message.mutable_reply()->mutable_reference();
-        image.set_png(std::move(png));
+        image.set_png(std::move(png.value));
         fill(reference->light, std::nullopt, *image.mutable_light());
         image.set_sequence(reference->sequence);
         if (number) image.set_calibration(*number);

@@ -109,6 +109,10 @@ TEST(Upload, NamesWhatIsWrong) {
   expect_invalid(client, upload("..", "good"), "upload_calibration.name");
   expect_invalid(client, upload("a.b", "good"), "upload_calibration.name");
   expect_invalid(client, upload(std::string(65, 'x'), "good"), "upload_calibration.name");
+  // Its first 64 bytes end within a character.
+  std::string accents = "a";
+  for (int i = 0; i < 40; ++i) accents += "\xc3\xa9";
+  expect_invalid(client, upload(accents, "good"), "\xc3\xa9\"; allowed are 1 to 64 letters");
   expect_invalid(client, upload("x", ""), "calibration_toml or reference_png is empty");
   expect_invalid(client, upload("x", "bad"), "calibration.toml:3: scale missing");
   EXPECT_TRUE(client.request(upload("x", "good")).has_done());  // none of them is in the way

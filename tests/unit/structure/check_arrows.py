@@ -36,7 +36,7 @@ ROOMS = {
     "daemon/net": ["daemon/serve", "hal", "hal/base", "hal/image", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
     # The text alone is made of what the network part gives; nothing includes it but the assembly.
     "daemon/metrics": ["proto", "daemon/serve", "daemon/pipeline", "daemon/net"],
-    "daemon/announce": ["proto"],
+    "daemon/announce": ["hal/base", "proto"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/v4l2", "hal/ws2812"],
     "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "hal/toml", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/serve", "daemon/net", "daemon/metrics", "daemon/announce"],
     "daemon": ["daemon/app", "daemon/app/doctor"],
