@@ -64,13 +64,14 @@ std::shared_ptr<lc::Camera> find(lc::CameraManager& manager, const std::string& 
 /// Finds the camera in libcamera's view of the machine. libcamera follows plugging by udev's
 /// events, and a manager that starts while a camera's nodes are just appearing can miss the last of
 /// them for good: after a while without the camera the search begins anew with a manager of its own
-/// (unless another camera of this process keeps the present one).
+/// (unless another camera of this process keeps the present one). Cameras go back to their manager
+/// before it ends, so the session with the lost camera ends with it.
 class Search {
  public:
   explicit Search(std::string id) : id_(std::move(id)) {}
 
-  /// Throws DeviceError as find().
-  std::shared_ptr<lc::Camera> operator()() {
+  /// Throws DeviceError as find(). `before`: the session with the camera that was lost, or null.
+  std::shared_ptr<lc::Camera> operator()(std::shared_ptr<Session>& before) {
     if (!manager_) manager_ = shared_manager();
     try {
       std::shared_ptr<lc::Camera> camera = find(*manager_, id_);
@@ -79,7 +80,9 @@ class Search {
     } catch (const DeviceError&) {
       const auto now = std::chrono::steady_clock::now();
       if (!missing_since_) missing_since_ = now;
-      if (now - *missing_since_ > kPatience) {
+      // Whoever still waits for a frame of it holds the session for a moment.
+      if (now - *missing_since_ > kPatience && before.use_count() <= 1) {
+        before.reset();
         manager_.reset();
         missing_since_.reset();
       }
@@ -99,7 +102,7 @@ live::Opener opener(const CameraConfig& config) {
   return [config, lock = PhotometricLock(config.libcamera, config.fps),
           search = Search(config.libcamera.device), heap = std::make_shared<DmaHeap>(),
           session = std::shared_ptr<Session>()]() mutable -> live::Opened {
-    const std::shared_ptr<lc::Camera> camera = search();
+    const std::shared_ptr<lc::Camera> camera = search(session);
     session.reset();  // the one before, which see
     const bool cached = driver_memory_is_cached(sensor_of(camera->properties()));
     session = std::make_shared<Session>(camera, config, lock, cached ? nullptr : heap.get());

@@ -199,7 +199,10 @@ void Session::start(const PhotometricLock& lock) {
 void Session::settle(double fps) {
   // Now, since the controls are compared with a calibration's, which has what became of them, when
   // the camera has been opened, and only then.
-  const auto patience = static_cast<std::int64_t>(1e9 + kSettlingFrames * 1e9 / fps);
+  // This may be the capture thread, for which the watchdog waits ten seconds.
+  constexpr double kMostNs = 4e9;
+  const auto patience =
+      static_cast<std::int64_t>(std::min(kMostNs, 1e9 + kSettlingFrames * 1e9 / fps));
   const bool said =
       pass_over(*this, kSettlingFrames, base::system_clock().monotonic_ns() + patience,
                 [this] { return !readings_.empty(); });
@@ -272,7 +275,9 @@ live::DequeueStatus Session::dequeue(live::Filled& out) noexcept {
   out.meaning = TimestampMeaning::arrival;
   if (exposed && *exposed <= now && *exposed > now - kPlausible) {
     out.timestamp_ns = *exposed;
-    out.meaning = TimestampMeaning::start_of_exposure;
+    // libcamera calls it the first row's exposure; its pipelines put in the driver's stamp of the
+    // buffer, which a frame's first data gets (unicam: frame start; uvcvideo: first packet).
+    out.meaning = TimestampMeaning::first_packet;
   } else if (stamp <= now && stamp > now - kPlausible) {
     out.timestamp_ns = stamp;
     out.meaning = TimestampMeaning::end_of_frame;
