@@ -196,7 +196,8 @@ std::int64_t LiveCamera::silence_ns(std::int64_t now) const noexcept {
 }
 
 std::int64_t LiveCamera::tolerated_silence_ns() const noexcept {
-  return last_buffer_ns_ == 0 ? kFirstFrame : kStallFrames * period_ns_;
+  const std::int64_t stall = kStallFrames * period_ns_;
+  return last_buffer_ns_ == 0 ? std::max(kFirstFrame, stall) : stall;
 }
 
 void LiveCamera::note_silence(std::int64_t now) noexcept {

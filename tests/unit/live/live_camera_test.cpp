@@ -265,6 +265,19 @@ TEST(LiveCamera, SilenceIsAStallAndIsRestarted) {
   EXPECT_NE(status, GrabStatus::ok);
 }
 
+TEST(LiveCamera, ASlowCamerasFirstFrameIsWaitedFor) {
+  const auto source = std::make_shared<LendingSource>();
+  CameraConfig slow = small();
+  slow.fps = 0.25;
+  LiveCamera camera{slow, "test", "nothing yet",
+                    [&source]() -> Opened { return {source, "the one", "GREY", {}}; }};
+  camera.start();
+  Frame frame;
+  EXPECT_EQ(camera.grab(frame, milliseconds(1100)), GrabStatus::timeout);
+  EXPECT_NE(camera.report().state, CameraState::stalled);
+  EXPECT_FALSE(source->stopped);
+}
+
 TEST(LiveCamera, TheFirstFrameAfterARestartSaysSo) {
   Rig rig;
   rig.camera.start();
