@@ -96,6 +96,7 @@ struct Reader::Impl {
   [[nodiscard]] std::string load(std::uint64_t offset, std::uint64_t length) const;
   /// The fields of the record at `offset`, of this kind.
   [[nodiscard]] std::string load_record(std::uint64_t offset, Op expected) const;
+  [[nodiscard]] std::string load_indexed(std::uint64_t offset, Op expected);
   [[nodiscard]] Cursor cursor(std::string_view bytes, std::uint64_t offset) const {
     return {bytes, name, offset};
   }
@@ -122,6 +123,7 @@ struct Reader::Impl {
   std::vector<Place> places;
   std::vector<AttachmentPlace> attachments;
   std::vector<Metadata> metadata;
+  std::uint64_t indexed = 0;  ///< Bytes of records that the summary's index led to.
 };
 
 std::string Reader::Impl::load(std::uint64_t offset, std::uint64_t length) const {
@@ -153,6 +155,15 @@ std::string Reader::Impl::load_record(std::uint64_t offset, Op expected) const {
   return load(offset + kRecordHead, fields.take<std::uint64_t>());
 }
 
+/// Records do not overlap: those of a whole file have no more bytes than it, however often a
+/// damaged one points at one of them.
+std::string Reader::Impl::load_indexed(std::uint64_t offset, Op expected) {
+  std::string record = load_record(offset, expected);
+  indexed += kRecordHead + record.size();
+  if (indexed > size) fail(offset, "a record is in the index more than once");
+  return record;
+}
+
 void Reader::Impl::open() {
   if (size < kMagic.size() || load(0, kMagic.size()) != kMagic) {
     throw Error(name + ": is no MCAP file");
@@ -172,6 +183,7 @@ void Reader::Impl::open() {
   channels.clear();
   attachments.clear();
   metadata.clear();
+  indexed = 0;
   scan();
   if (damage.empty()) damage = std::exchange(why, {});
 }
@@ -211,6 +223,8 @@ void Reader::Impl::read_summary(std::uint64_t footer) {
     }
   }
   std::ranges::sort(places, {}, &Place::offset);
+  const auto twice = std::ranges::adjacent_find(places, {}, &Place::offset);
+  if (twice != places.end()) fail(twice->offset, "a chunk is in the index more than once");
   std::ranges::sort(attachments, {}, &AttachmentPlace::offset);
 }
 
@@ -229,7 +243,7 @@ void Reader::Impl::add(const Cursor::Record& record) {
 }
 
 void Reader::Impl::add_attachment(std::uint64_t offset) {
-  const std::string record = load_record(offset, Op::attachment);
+  const std::string record = load_indexed(offset, Op::attachment);
   Cursor fields = cursor(record, offset + kRecordHead);
   AttachmentPlace place;
   place.log_time = fields.take<std::uint64_t>();
@@ -241,7 +255,7 @@ void Reader::Impl::add_attachment(std::uint64_t offset) {
 }
 
 void Reader::Impl::add_metadata(std::uint64_t offset) {
-  const std::string record = load_record(offset, Op::metadata);
+  const std::string record = load_indexed(offset, Op::metadata);
   Cursor fields = cursor(record, offset + kRecordHead);
   std::string key = fields.string();
   metadata.push_back({std::move(key), fields.map()});

@@ -283,6 +283,25 @@ TEST_F(Mcap, SaysWhereAFileIsDamaged) {
   EXPECT_THROW(Reader(file().string() + "x"), std::system_error);
 }
 
+TEST_F(Mcap, AnIndexThatPointsAtARecordAgainAndAgainIsLeft) {
+  MemorySink sink;
+  Writer writer(sink);
+  writer.add(Metadata{"m", {{"long", std::string(10'000, 'x')}}});
+  writer.finish();
+  // The record of the index: its kind, length, place, the other's length and name.
+  const std::size_t at = sink.bytes.find(std::string("\x0d\x15\0\0\0\0\0\0\0", 9));
+  ASSERT_NE(at, std::string::npos);
+  const std::string entry = sink.bytes.substr(at, 9 + 0x15);
+  std::string bytes = sink.bytes;
+  for (int i = 0; i < 5; ++i) bytes.insert(at, entry);
+  // The summary's CRC: none.
+  bytes.replace(bytes.size() - 12, 4, 4, '\0');
+  write(bytes);
+  const Reader reader(file());
+  EXPECT_THAT(reader.damage(), HasSubstr("in the index more than once"));
+  EXPECT_THAT(reader.metadata(), SizeIs(1));
+}
+
 TEST_F(Mcap, RefusesLz4BySayingWhatToDo) {
   std::string bytes = from_hex(kScanned);
   bytes.replace(bytes.find("zstd"), 4, "lz4x");
