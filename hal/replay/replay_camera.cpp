@@ -77,8 +77,9 @@ std::int64_t ReplayCamera::due_ns(std::uint64_t sequence) const noexcept {
 std::uint64_t ReplayCamera::newest_due(std::int64_t now_ns) const noexcept {
   const std::uint64_t count = recording_.count();
   const std::int64_t passed = std::max<std::int64_t>(0, now_ns - began_ns_);
-  // Begin where the round says, then step: offsets within a round are not evenly spaced.
-  std::uint64_t sequence = static_cast<std::uint64_t>(passed / round_ns_) * count;
+  // Begin where the round says or where it was last, then step: offsets within a round are not
+  // evenly spaced.
+  std::uint64_t sequence = std::max(next_, static_cast<std::uint64_t>(passed / round_ns_) * count);
   while (due_ns(sequence + 1) <= now_ns) ++sequence;
   return config_.replay.loop ? sequence : std::min<std::uint64_t>(sequence, count - 1);
 }
