@@ -16,7 +16,9 @@ int parse(CLI::App& app, std::vector<std::string> arguments, std::ostream& out,
     // CLI11 takes them from the back.
     std::ranges::reverse(arguments);
     app.parse(std::move(arguments));
-    out.flush();
+    if (!out.flush()) {
+      throw Failure(kFailed, "the output could not be written: is the disk full?");
+    }
     return kOk;
   } catch (const CLI::RequiredError& e) {
     const std::vector<std::string> left = app.remaining();

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <sstream>
 
 #include "clients/ctl/ctl.hpp"
@@ -27,6 +28,13 @@ TEST(Usage, NamesTheWordThatIsNoCommand) {
 
 TEST(Usage, AsksForACommandWhereThereIsNone) {
   EXPECT_THAT(told({"--port", "7400"}), HasSubstr("A subcommand is required"));
+}
+
+TEST(Usage, SaysWhenTheOutputCouldNotBeWritten) {
+  std::ofstream full("/dev/full");
+  std::ostringstream error;
+  EXPECT_EQ(run({"token", "--new", "view"}, full, error), 1);
+  EXPECT_THAT(error.str(), HasSubstr("the output could not be written: is the disk full?"));
 }
 
 }  // namespace
