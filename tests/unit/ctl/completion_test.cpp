@@ -75,6 +75,7 @@ TEST(Completion, OffersValues) {
               UnorderedElementsAre("scheme1", "scheme2", "scheme3", "scheme4"));
   EXPECT_THAT(complete("dtactctl calibrate depth --method p"), UnorderedElementsAre("published"));
   EXPECT_THAT(complete("dtact-calibrate depth --method p"), UnorderedElementsAre("published"));
+  EXPECT_THAT(complete("dtact-calibrate depth --method m"), UnorderedElementsAre("model"));
   EXPECT_THAT(complete("dtactctl led --brightness \"\""), UnorderedElementsAre());
   EXPECT_THAT(complete("dtactctl export press.mcap --to p"),
               UnorderedElementsAre("pcd", "ply", "png"));
