@@ -4,8 +4,11 @@
 
 # part NAME COMMAND...: a part of the tests, and how long it takes.
 # One that fails does not keep the others from running: end_of_parts fails for it. One that passed is
-# noted in build/passed with what the tree was, so that --resume need not repeat it.
+# noted in build/passed with what the tree was, so that --resume need not repeat it. One that cannot be
+# had on this machine ends with $skipped.
+skipped=77
 failed_parts=()
+skipped_parts=()
 resume=0
 part() {
   local name=$1 began=$SECONDS status=0 passed=build/passed/$1 tree
@@ -20,13 +23,18 @@ part() {
   (set -e; "$@")
   status=$?
   set -e
+  local verdict=''
   if ((status == 0)); then
     mkdir -p build/passed
     echo "$tree" >"$passed"
+  elif ((status == skipped)); then
+    skipped_parts+=("$name")
+    verdict=' and was skipped, see above'
   else
     failed_parts+=("$name")
+    verdict=' and FAILED'
   fi
-  echo "dev: $name took $((SECONDS - began)) s$( ((status)) && echo " and FAILED")"
+  echo "dev: $name took $((SECONDS - began)) s$verdict"
 }
 
 # Of every file of the tree as git sees it, uncommitted changes included, but for the page that says
@@ -36,6 +44,7 @@ tree_digest() {
 }
 
 end_of_parts() {
+  ((${#skipped_parts[@]} == 0)) || printf 'dev: skipped: %s\n' "${skipped_parts[@]}"
   ((${#failed_parts[@]} == 0)) && return
   printf 'dev: failed: %s\n' "${failed_parts[@]}" >&2
   exit 1
@@ -71,16 +80,12 @@ test_compiled_packages() {
 }
 
 test_platform() {
-  local ended=0
-  "tests/platform/$1.sh" "${build_packages[@]}" "${test_packages[@]}" "${package_packages[@]}" || ended=$?
-  ((ended == 0)) || { ((ended == 77)) && echo "dev: $1 skipped, see above"; }
+  "tests/platform/$1.sh" "${build_packages[@]}" "${test_packages[@]}" "${package_packages[@]}"
 }
 
 # test_installed OPTION...: packages in a Debian that boots with systemd.
 test_installed() {
-  local ended=0
-  tests/install/run.py "$@" || ended=$?
-  ((ended == 0)) || { ((ended == 77)) && echo "dev: skipped, see above"; }
+  tests/install/run.py "$@"
 }
 
 run_tests() {
@@ -117,5 +122,5 @@ run_tests() {
   part 'installation on Debian 13' test_installed --suite trixie \
     --packages "build/dev/packages-debian13-$(dpkg --print-architecture)"
   end_of_parts
-  echo "dev: all passed in $SECONDS s"
+  echo "dev: all$( ((${#skipped_parts[@]})) && echo ' others') passed in $SECONDS s"
 }
