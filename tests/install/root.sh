@@ -6,11 +6,14 @@
 #
 # Exit code: 0 the image is there; 77 it cannot be had here (the reason is printed); else failed.
 set -euo pipefail
-suite=$1 packages=$(cd "$2" && pwd) image=$3
+suite=$1 packages=$2 image=$3
 here=$(cd "$(dirname "$0")" && pwd)
 root=${CHROOT_CACHE:-$HOME/.cache/dtactd-chroots}/$suite-systemd
 # shellcheck source=tests/platform/chroot.sh
 . "$here/../platform/chroot.sh"
+
+[ -d "$packages" ] || { echo "root.sh: there is no folder $packages: ./dev package makes packages" >&2; exit 1; }
+packages=$(cd "$packages" && pwd)
 
 # What the packages want from Debian: their dependencies, but not on each other.
 wanted() {
