@@ -1,7 +1,9 @@
 """The asyncio client, against a daemon that does as a test says."""
 import asyncio
+import builtins
 import socket
 import tempfile
+import threading
 import time
 import unittest
 from unittest import mock
@@ -15,6 +17,11 @@ class Aio(unittest.IsolatedAsyncioTestCase):
     async def first(self, iterator):
         async for item in iterator:
             return item
+
+    async def until(self, holds):
+        async with asyncio.timeout(10):
+            while not holds():
+                await asyncio.sleep(0.01)
 
     async def test_frames_events_and_requests(self):
         with FakeDaemon(features=["ping"]) as daemon:
@@ -86,6 +93,80 @@ class Aio(unittest.IsolatedAsyncioTestCase):
                 await s.close()
                 with self.assertRaisesRegex(dtact.ConnectionError, "was closed"):
                     await s.status()
+
+    async def test_several_tasks_share_one_new_connection(self):
+        with FakeDaemon() as daemon:
+            daemon.pushed = [frame(1), event(2)]
+            async with dtact.aio.connect(daemon.address, reconnect=True) as s:
+                await s.subscribe()
+                self.assertEqual((await s.next(5)).sequence, 1)
+                self.assertEqual((await s.next(5)).light.brightness, 2)
+                waiting = [asyncio.create_task(self.first(s.frames(timeout=10))),
+                           asyncio.create_task(self.first(s.events(timeout=10)))]
+                await asyncio.sleep(0.05)
+                daemon.drop()
+                f, e = await asyncio.gather(*waiting)
+                self.assertEqual(f.sequence, 1)
+                self.assertIsInstance(e, dtact.Event | dtact.Reconnected)
+                lights = await asyncio.gather(*(s.set_light(brightness=b) for b in range(5)))
+                self.assertEqual([light.brightness for light in lights], list(range(5)))
+                self.assertEqual(daemon.connections, 2)
+
+    async def test_giving_up_while_it_connects_again(self):
+        with FakeDaemon() as daemon:
+            async with dtact.aio.connect(daemon.address, reconnect=True) as s:
+                await s.subscribe()
+                answer = threading.Event()
+                # A daemon that takes longer than those who wait.
+                def late(request, reply):
+                    answer.wait(10)
+                    reply.hello.major, reply.hello.program = 1, "late"
+                daemon.answers["hello"] = late
+                daemon.pushed = [frame(7)]
+                daemon.drop()
+                for _ in range(3):
+                    self.assertIsNone(await s.next(0.05))
+                given_up = asyncio.create_task(s.status())
+                await asyncio.sleep(0.05)
+                given_up.cancel()
+                with self.assertRaises(asyncio.CancelledError):
+                    await given_up
+                answer.set()
+                self.assertEqual((await self.first(s.frames(timeout=10))).sequence, 7)
+                self.assertEqual((await s.status()).state, "serving")
+                self.assertEqual(daemon.connections, 2)
+
+    async def test_closing_while_it_connects_again(self):
+        with FakeDaemon() as daemon:
+            async with dtact.aio.connect(daemon.address, reconnect=True) as s:
+                daemon.answers["hello"] = False
+                daemon.drop()
+                waiting = asyncio.create_task(s.next(10))
+                await self.until(lambda: daemon.connections == 2 and len(daemon.requests) == 2)
+                await s.close()
+                with self.assertRaisesRegex(dtact.ConnectionError, "given up"):
+                    await waiting
+                with self.assertRaisesRegex(dtact.ConnectionError, "was closed"):
+                    await s.next(1)
+                await self.until(lambda: daemon.ended == 2)
+
+    async def test_giving_up_the_first_connection(self):
+        with FakeDaemon() as daemon:
+            daemon.answers["hello"] = False
+            with self.assertRaises(builtins.TimeoutError):
+                async with asyncio.timeout(0.1):
+                    async with dtact.aio.connect(daemon.address):
+                        pass
+            await self.until(lambda: daemon.ended == 1)
+
+    async def test_who_polls_does_not_crowd_a_daemon_that_is_away(self):
+        with FakeDaemon() as daemon:
+            s = await dtact.aio.connect(daemon.address, reconnect=True).__aenter__()
+        with mock.patch.object(s, "_connected", side_effect=ConnectionRefusedError) as attempts:
+            for _ in range(50):
+                self.assertIsNone(await s.next(0.01))
+        self.assertLess(attempts.call_count, 8)
+        await s.close()
 
     async def test_unix_socket(self):
         with tempfile.TemporaryDirectory() as folder, FakeDaemon(path=f"{folder}/socket") as daemon:

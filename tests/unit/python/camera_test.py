@@ -164,6 +164,31 @@ class Reading(unittest.TestCase):
             camera.async_read(10_000)
         self.assertFalse(camera.is_connected)
 
+    def test_connects_again_after_a_connection_that_broke(self):
+        camera = self.camera()
+        self.daemon.drop()
+        with self.assertRaisesRegex(ConnectionError, "ended the connection"):
+            camera.read()
+        with self.assertRaisesRegex(ConnectionError, "ended the connection"):
+            camera.read_latest(max_age_ms=0)
+        camera.read_latest(max_age_ms=60_000)
+        self.daemon.pushed = [frame(9)]
+        camera.connect()
+        self.assertTrue(camera.is_connected)
+        self.assertEqual(camera._newest.sequence, 9)
+        camera.read_latest(max_age_ms=60_000)
+
+    def test_the_reason_where_no_frame_came(self):
+        self.daemon.pushed = []
+        camera = dtact.Camera(self.daemon.address)
+        camera.connect(warmup=False)
+        self.daemon.drop()
+        with self.assertRaisesRegex(ConnectionError, "ended the connection"):
+            camera.read()
+        with self.assertRaisesRegex(ConnectionError, "ended the connection"):
+            camera.read_latest()
+        camera.disconnect()
+
     def test_find_cameras(self):
         here = {"name": "dtact", "type": "dtact", "id": "127.0.0.1", "serial": "",
                 "default_stream_profile": {"width": 2, "height": 2, "fps": 0.0}}

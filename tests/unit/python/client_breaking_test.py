@@ -3,6 +3,7 @@ import os
 import tempfile
 import time
 import unittest
+from unittest import mock
 
 import dtact
 from dtact.messages import ServerMessage
@@ -75,6 +76,32 @@ class Breaking(unittest.TestCase):
                 self.assertIn("ended the connection", back.reason)
                 self.assertGreater(back.away_s, 0.3)
                 s.close()
+
+    def test_who_polls_is_connected_again(self):
+        def late(request, reply):
+            time.sleep(0.1)
+            reply.hello.major, reply.hello.program = 1, "late"
+        for timeout in (0, 0.01):
+            with FakeDaemon() as daemon, dtact.connect(daemon.address, reconnect=True) as s:
+                s.subscribe()
+                daemon.answers["hello"] = late
+                daemon.pushed = [frame(3)]
+                daemon.drop()
+                until = time.monotonic() + 5
+                found = None
+                while not isinstance(found, dtact.Frame) and time.monotonic() < until:
+                    found = s.next(timeout)
+                self.assertIsInstance(found, dtact.Frame, timeout)
+                self.assertEqual(daemon.connections, 2)
+
+    def test_who_polls_does_not_crowd_a_daemon_that_is_away(self):
+        with FakeDaemon() as daemon:
+            s = dtact.connect(daemon.address, reconnect=True)
+        with mock.patch("dtact.client.Link", side_effect=ConnectionRefusedError) as attempts:
+            for _ in range(50):
+                self.assertIsNone(s.next(0.01))
+        self.assertTrue(2 < attempts.call_count < 8, attempts.call_count)
+        s.close()
 
     def test_no_use_after_close(self):
         with FakeDaemon() as daemon:

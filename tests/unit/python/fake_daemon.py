@@ -39,6 +39,7 @@ class FakeDaemon:
         self.pushed = []
         self.answers = {}  # request kind → function (request, Reply message); False: no answer
         self.connections = 0
+        self.ended = 0  # Of the connections.
         self._connection = None
         if path:
             self._socket = socket.socket(socket.AF_UNIX)
@@ -91,6 +92,7 @@ class FakeDaemon:
                 self._talk(connection)
         except (OSError, EOFError):
             connection.close()
+            self.ended += 1
 
     def _talk(self, connection):
         while True:

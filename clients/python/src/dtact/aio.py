@@ -22,7 +22,7 @@ from .event import Event
 from .frame import Frame
 from .protocol import Conversation
 from .requests import Request, T
-from .session import BackOff, Session
+from .session import Session
 from .subscription import Subscription
 from .transport import is_local, tune
 from .values import (
@@ -96,9 +96,15 @@ class Client(Session):
     __doc__ = (Session.__doc__ or "").replace("A connection", "An asyncio connection", 1)
 
     _link: _Link | None = None
+    #: Connects and subscribes, while that is under way.
+    _opening: asyncio.Task[None] | None = None
 
     async def __aenter__(self) -> Client:
-        await self._open()
+        try:
+            await self._ensure_open()
+        except asyncio.CancelledError:
+            await self.close()  # There will be no __aexit__.
+            raise
         return self
 
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None,
@@ -107,8 +113,11 @@ class Client(Session):
 
     async def close(self) -> None:
         """Ends the connection."""
-        self._lost(ConnectionError(f"the connection to {self._address} was closed"))
         self._reconnect = False
+        if self._opening is not None:
+            self._opening.cancel()
+            await asyncio.wait([self._opening])
+        self._lost(ConnectionError(f"the connection to {self._address} was closed"))
         await asyncio.sleep(0)  # The transport closes its socket in the loop's next turn.
 
     # ------------------------------------------------------------ frames and events
@@ -180,48 +189,54 @@ class Client(Session):
     # ------------------------------------------------------------ the connection
 
     async def _ask(self, request: Request[T]) -> T:
-        if self._link is None:
-            self._check_usable()
-            await self._open()
+        while self._link is None or self._opening is not None:
+            if self._opening is None:
+                self._check_usable()
+            await self._ensure_open()
         return await self._exchange(request)
 
     async def _exchange(self, request: Request[T]) -> T:
         number, data = self._prepare(request)
-        link = self._link
+        # Another task may have both replaced while this one waits.
+        link, conversation = self._link, self._conversation
         assert link is not None and link.transport is not None
         link.transport.write(data)
         try:
             async with asyncio.timeout(self._patience(request)):
-                while not self._has_answer(number):
+                while number not in conversation.answers:
                     if not link.open:
-                        self._lost(link.reason() or self._ended())
+                        if self._link is link:
+                            self._lost(link.reason() or self._ended())
                         raise self._broken
                     await link.changed()
         except builtins.TimeoutError as e:
             if isinstance(e, Error):
                 raise
-            self._conversation.forget(number)
+            conversation.forget(number)
             raise TimeoutError("the daemon gave no answer in time: look at journalctl -u dtactd") from e
-        return self._answer(number, request)
+        return self._answer(conversation.answers.pop(number), request)
 
     async def _wait(self, take: Callable[[Conversation], _Item | None],
                     limit: float | None) -> _Item | None:
         """What `take` finds once it finds something; None when that takes longer than `limit`."""
-        back_off = BackOff()
         try:
             async with asyncio.timeout(limit):
                 while (item := take(self._conversation)) is None:
-                    if self._link is not None and self._link.open:
-                        await self._link.changed()
-                        continue
-                    if self._link is not None:
-                        self._lost(self._link.reason() or self._ended())
-                    self._check_usable()
+                    if self._opening is None:
+                        if self._link is not None and self._link.open:
+                            await self._link.changed()
+                            continue
+                        if self._link is not None:
+                            self._lost(self._link.reason() or self._ended())
+                        self._check_usable()
+                        left = self._next_attempt - time.monotonic()
+                        if left > 0:
+                            await asyncio.sleep(left)
+                            continue
                     try:
-                        await self._open()
-                    except ConnectionError as e:
-                        self._lost(e)
-                        await asyncio.sleep(back_off.next())
+                        await self._ensure_open()
+                    except ConnectionError:
+                        pass  # Until the next attempt is due.
                 return item
         except builtins.TimeoutError as e:
             if isinstance(e, Error):
@@ -234,32 +249,54 @@ class Client(Session):
             self._link.close()
         self._link = None
 
+    async def _ensure_open(self) -> None:
+        """Opens a connection unless there is one. One opening serves all tasks, and goes on when
+        they give up waiting for it."""
+        if self._opening is None:
+            if self._link is not None:
+                return
+            self._opening = asyncio.create_task(self._open())
+            self._opening.add_done_callback(self._opened)
+        opening = self._opening
+        # As asyncio.shield(), but close(), which cancels the opening, does not cancel who waits.
+        await asyncio.wait([opening])
+        if opening.cancelled():
+            raise self._broken
+        opening.result()
+
+    def _opened(self, opening: asyncio.Task[None]) -> None:
+        self._opening = None
+        if not opening.cancelled():
+            opening.exception()  # Else asyncio complains where nobody waited any more.
+
     async def _open(self) -> None:
         """Connects and subscribes as before."""
         self._conversation = self._conversation.successor()
         try:
-            async with asyncio.timeout(self._timeout):
-                self._link = await self._connected()
-        except ConnectionError:
-            raise
-        except OSError as e:
-            raise self._cannot_connect(e) from e
-        try:
+            try:
+                async with asyncio.timeout(self._timeout):
+                    self._link = await self._connected()
+            except ConnectionError:
+                raise
+            except OSError as e:
+                raise self._cannot_connect(e) from e
             server = await self._exchange(self._hello())
             self._server = server
             if self._subscription is not None:
                 await self._exchange(self._subscribe_request(self._subscription))
-        except Error as e:
-            self._lost(e)
+        except BaseException as e:  # A cancellation too: nobody would close the link.
+            self._lost(e if isinstance(e, Error) else ConnectionError(
+                f"connecting to {self._address} was given up"))
+            self._note_failure()
             raise
         self._note_return()
 
     async def _connected(self) -> _Link:
         loop = asyncio.get_running_loop()
-        address = self._address
+        address, conversation = self._address, self._conversation
 
         def make() -> _Link:
-            return _Link(self._conversation)
+            return _Link(conversation)
 
         if address.path:
             transport, link = await loop.create_unix_connection(make, address.path)

@@ -120,7 +120,7 @@ class Camera:
     @property
     def is_connected(self) -> bool:
         """Whether frames are being read."""
-        return self._thread is not None and self._thread.is_alive()
+        return self._thread is not None and self._thread.is_alive() and self._error is None
 
     @staticmethod
     def find_cameras() -> list[dict[str, Any]]:
@@ -141,11 +141,13 @@ class Camera:
         return found
 
     def connect(self, warmup: bool = True) -> None:
-        """Connects and starts to read. `warmup`: returns once the first depth is there. Sets fps,
-        width and height where they were left out. ConnectionError; ValueError for a size or rate
-        that the daemon cannot give."""
-        if self._thread is not None:
+        """Connects and starts to read, also after the connection broke. `warmup`: returns once the
+        first depth is there. Sets fps, width and height where they were left out. ConnectionError;
+        ValueError for a size or rate that the daemon cannot give."""
+        if self.is_connected:
             raise ConnectionError(f"{self} is already connected")
+        if self._thread is not None:
+            self.disconnect()  # What is left of a connection that broke.
         client = Client(self._address, program="dtact camera", kept_frames=1, **self._identity)
         try:
             client.subscribe(self._subscription(client))
@@ -188,7 +190,8 @@ class Camera:
 
     def read_latest(self, max_age_ms: int = 500) -> NDArray[np.uint8]:
         """The newest frame's, without waiting. TimeoutError when it came longer than `max_age_ms`
-        ago, RuntimeError when none came yet."""
+        ago, RuntimeError when none came yet; where the connection broke, instead of both what
+        broke it."""
         self._checked("rgb")
         return self._picture(self._latest(max_age_ms))
 
@@ -283,6 +286,9 @@ class Camera:
     def _latest(self, max_age_ms: float) -> Frame:
         with self._changed:
             frame, age_ms = self._newest, (time.perf_counter() - self._came_at) * 1e3
+            error = self._error
+        if error is not None and (frame is None or age_ms > max_age_ms):
+            raise error
         if frame is None:
             raise RuntimeError(f"{self}: no depth has come yet")
         if age_ms > max_age_ms:

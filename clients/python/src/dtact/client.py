@@ -13,7 +13,7 @@ from .event import Event
 from .frame import Frame
 from .protocol import Conversation
 from .requests import Request, T
-from .session import BackOff, Session
+from .session import Session
 from .spaces import depth_box
 from .subscription import Subscription
 from .transport import Link
@@ -35,7 +35,8 @@ _MOST_AT_ONCE = 64
 
 class Client(Session):
     __doc__ = (Session.__doc__ or "") + """
-    Calls wait; one thread at a time. With `with`, or close() at the end."""
+    Calls wait; one thread at a time. With `with`, or close() at the end. With `reconnect`, the last
+    attempt to connect again may last for the client's `timeout` beyond the one given to a call."""
 
     _link: Link | None = None
 
@@ -159,19 +160,18 @@ class Client(Session):
             self._link.send(data, deadline)
         except OSError as e:
             self._lost(self._broke(e))
-        while not self._has_answer(number):
+        while number not in self._conversation.answers:
             if self._link is None:
                 raise self._broken
             if not self._read(deadline):
                 self._conversation.forget(number)
                 raise TimeoutError("the daemon gave no answer in time: look at journalctl -u dtactd")
-        return self._answer(number, request)
+        return self._answer(self._conversation.answers.pop(number), request)
 
     def _wait(self, take: Callable[[Conversation], _Item | None],
               limit: float | None) -> _Item | None:
         """What `take` finds once it finds something; None when that takes longer than `limit`."""
         deadline = math.inf if limit is None else time.monotonic() + limit
-        back_off = BackOff()
         while True:
             # The newest frames count: what lies ready comes first.
             for _ in range(_MOST_AT_ONCE):
@@ -182,14 +182,17 @@ class Client(Session):
                 return item
             if self._link is None:
                 self._check_usable()
-                try:
-                    self._open(min(deadline, time.monotonic() + self._timeout))
-                except ConnectionError as e:
-                    self._lost(e)
-                    left = deadline - time.monotonic()
-                    if left <= 0:
+                now = time.monotonic()
+                if now < self._next_attempt:
+                    if now >= deadline:
                         return None
-                    time.sleep(min(back_off.next(), left))
+                    time.sleep(min(deadline, self._next_attempt) - now)
+                    continue
+                try:
+                    # Not only what is left of `limit`: who polls would never be connected again.
+                    self._open(now + self._timeout)
+                except ConnectionError:
+                    pass  # Until the next attempt is due.
             elif not self._read(deadline):
                 return None
 
@@ -220,18 +223,19 @@ class Client(Session):
         """Connects and subscribes as before."""
         self._conversation = self._conversation.successor()
         try:
-            self._link = Link(self._address, deadline, self._tls, self._check_pin)
-        except ConnectionError:
-            raise
-        except OSError as e:
-            raise self._cannot_connect(e) from e
-        self._local = self._link.local
-        try:
+            try:
+                self._link = Link(self._address, deadline, self._tls, self._check_pin)
+            except ConnectionError:
+                raise
+            except OSError as e:
+                raise self._cannot_connect(e) from e
+            self._local = self._link.local
             server = self._exchange(self._hello(), deadline)
             self._server = server
             if self._subscription is not None:
                 self._exchange(self._subscribe_request(self._subscription), deadline)
         except Error as e:
             self._lost(e)
+            self._note_failure()
             raise
         self._note_return()

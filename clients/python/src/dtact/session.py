@@ -22,6 +22,7 @@ from .errors import (
     refusal,
 )
 from .event import Reconnected
+from .messages import Message
 from .protocol import Conversation
 from .recording import Recording
 from .requests import Request, T
@@ -107,6 +108,9 @@ class Session:
         self._broken: Error = ConnectionError(f"not connected to {self._address}")
         self._lost_at: float | None = None
         self._lost_because = ""
+        # Of all calls and tasks together: who polls with short time-outs waits as long as others.
+        self._back_off = BackOff()
+        self._next_attempt = 0.0  # time.monotonic()
         self._begin()
 
     def _begin(self) -> None:
@@ -157,12 +161,8 @@ class Session:
                                   f"know {', '.join(missing)}: update dtactd")
         return self._conversation.request(request.message)
 
-    def _has_answer(self, number: int) -> bool:
-        return number in self._conversation.answers
-
-    def _answer(self, number: int, request: Request[T]) -> T:
-        """The answer, which is there. The daemon's refusal is raised."""
-        reply = self._conversation.answers.pop(number)
+    def _answer(self, reply: Message, request: Request[T]) -> T:
+        """What the answer says. The daemon's refusal is raised."""
         if reply.HasField("error"):
             raise refusal(reply.error.code, reply.error.message)
         return request.answer(reply)
@@ -177,8 +177,14 @@ class Session:
         if self._server is not None and self._lost_at is None:
             self._lost_at, self._lost_because = time.monotonic(), str(error)
 
+    def _note_failure(self) -> None:
+        """An attempt to connect came to nothing."""
+        self._next_attempt = time.monotonic() + self._back_off.next()
+
     def _note_return(self) -> None:
         """Tells of it where there was a connection before."""
+        self._back_off = BackOff()
+        self._next_attempt = 0.0
         if self._lost_at is not None:
             self._conversation.tell(Reconnected(
                 self._conversation.last_sequence, None, None, self._lost_because,
