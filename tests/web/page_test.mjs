@@ -208,6 +208,29 @@ test("the camera's picture and its grey values", async () => {
   await pane.getByRole("radio", { name: "Depth" }).click();
 });
 
+test("a place on the map is none on the camera's picture", async () => {
+  const box = await pane.locator("canvas.marks").boundingBox();
+  const readout = pane.locator("output.readout");
+  await view.page.mouse.move(box.x + 0.6 * box.width, box.y + 0.4 * box.height);
+  await until(
+    () => readout.textContent(),
+    (text) => text.includes("row"),
+    5000,
+  );
+  await view.page.keyboard.press("2");
+  await until(
+    () => pane.locator("canvas.map").getAttribute("width"),
+    (width) => width === "800",
+    10_000,
+  );
+  assert.equal(await readout.textContent(), "Point at the map for its values.");
+  const camera = await pane.locator("canvas.marks").boundingBox();
+  await view.page.mouse.move(camera.x + 0.5 * camera.width, camera.y + 0.5 * camera.height);
+  assert.match(await readout.textContent(), /^grey \d+ of 255 · row \d+, column \d+$/);
+  await view.page.keyboard.press("1");
+  assert.equal(await readout.textContent(), "Point at the map for its values.");
+});
+
 test("a snapshot is a PNG with its time in its name", async () => {
   const [download] = await Promise.all([
     view.page.waitForEvent("download"),
@@ -239,6 +262,15 @@ test("a daemon that dies is told at once, and the page goes on when it is back",
   );
   assert.match(await pane.locator(".notice").textContent(), /away|Trying again/);
   const before = Number(await pane.getAttribute("data-sequence"));
+  // One that is opened meanwhile finds no list of calibrations.
+  const early = await open(gateway);
+  const earlyPane = early.page.locator('[data-sensor="left"]');
+  const calibrations = earlyPane.locator('[aria-label="Calibrations"]');
+  await until(
+    () => calibrations.locator(".answer").textContent(),
+    (text) => text.includes("away"),
+    15_000,
+  );
   left = await startDaemon("left", port);
   await until(
     () => pane.getAttribute("data-link"),
@@ -251,6 +283,14 @@ test("a daemon that dies is told at once, and the page goes on when it is back",
     30_000,
   );
   assert.equal(await pane.locator(".notice").isVisible(), false);
+  await until(
+    () => earlyPane.getAttribute("data-sequence"),
+    (sequence) => Number(sequence) > 0,
+    30_000,
+  );
+  await calibrations.getByText("in use").waitFor();
+  assert.equal(await calibrations.locator(".answer").textContent(), "");
+  await early.close();
 });
 
 test("two sensors beside each other", async () => {

@@ -85,7 +85,7 @@ export class Stage {
     });
     target.addEventListener("pointerdown", (event) => {
       this.point(event);
-      if (this.tool !== "line" || !this.cursor) return;
+      if (this.tool !== "line" || this.view !== "depth" || !this.cursor) return;
       target.setPointerCapture(event.pointerId);
       this.drawing = true;
       this.line = { from: this.cursor, to: this.cursor };
@@ -123,6 +123,9 @@ export class Stage {
   }
 
   look(view: View): void {
+    // A place is in millimetres on the map, in pixels on the camera's picture.
+    if ((view === "camera") !== (this.view === "camera")) this.cursor = undefined;
+    this.drawing = false;
     this.view = view;
     this.element.dataset["view"] = view;
     if (view === "depth" && this.depth) this.map.drawDepth(this.depth);
@@ -130,6 +133,8 @@ export class Stage {
     this.shape();
     this.drawOver();
     this.drawBar();
+    this.tellValue();
+    this.tellProfile();
   }
 
   use(tool: Tool): void {
