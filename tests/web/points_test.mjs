@@ -5,13 +5,18 @@ import { after, before, test } from "node:test";
 import { fact, numberOf, open, until } from "./browser.mjs";
 import { startDaemon, startGateway, startPerceive, stopAll, work } from "./programs.mjs";
 
+let daemon;
+let port;
 let view;
 let pane;
 
 before(async () => {
-  const daemon = await startDaemon("left");
+  daemon = await startDaemon("left");
+  // Only for a port that is free.
   const perceive = await startPerceive(daemon.port);
-  view = await open(await startGateway({ touch: perceive.port }));
+  port = perceive.port;
+  await perceive.stop();
+  view = await open(await startGateway({ touch: port }));
   pane = view.page.locator('[data-sensor="touch"]');
 });
 
@@ -42,6 +47,23 @@ const drawn = () =>
       }),
     );
   });
+
+test("a page that was there first takes a later dtact-perceive for what it is", async () => {
+  await until(
+    () => pane.getAttribute("data-link"),
+    (link) => link === "away",
+  );
+  assert.equal(await pane.getAttribute("data-kind"), null);
+  await startPerceive(daemon.port, port);
+  await until(
+    () => pane.getAttribute("data-kind"),
+    (kind) => kind === "points",
+  );
+  await until(
+    () => pane.getAttribute("data-sequence"),
+    (sequence) => Number(sequence) > 0,
+  );
+});
 
 test("points are drawn while something touches, and none else", async () => {
   await until(

@@ -119,9 +119,9 @@ export async function startGateway(daemons, words = []) {
   return gateway;
 }
 
-/** dtact-perceive beside a daemon of this machine. */
-export async function startPerceive(port) {
-  const words = ["--port", String(port), "serve", "--listen-port", "0"];
+/** dtact-perceive beside a daemon of this machine. It listens on any free port unless told which. */
+export async function startPerceive(port, listenPort = 0) {
+  const words = ["--port", String(port), "serve", "--listen-port", String(listenPort)];
   const perceive = new Program(DTACT_PERCEIVE, words);
   perceive.port = await perceive.listening();
   return perceive;

@@ -30,6 +30,9 @@ export class CalibrationsPanel {
   );
   readonly element = panel("Calibrations", this.list, this.upload, this.answer);
 
+  /** What is told is that the list did not come. */
+  private lacking = false;
+
   constructor(private readonly sensor: Sensor) {
     this.picker.addEventListener("change", () => void this.send());
   }
@@ -43,9 +46,16 @@ export class CalibrationsPanel {
       });
       if (result.case !== "calibrations") return;
       this.list.replaceChildren(...result.value.calibrations.map((stored) => this.item(stored)));
+      if (this.lacking) this.tell("");
     } catch (error) {
-      say(this.answer, (error as Error).message);
+      this.tell((error as Error).message);
+      this.lacking = true;
     }
+  }
+
+  private tell(sentence: string): void {
+    say(this.answer, sentence);
+    this.lacking = false;
   }
 
   private item(stored: StoredCalibration): HTMLElement {
@@ -78,7 +88,7 @@ export class CalibrationsPanel {
     const files = [...(this.picker.files ?? [])];
     const [toml, png] = FILES.map((name) => files.find((file) => file.name === name));
     this.picker.value = "";
-    if (!toml || !png) return say(this.answer, `Choose both ${FILES.join(" and ")} of the folder.`);
+    if (!toml || !png) return this.tell(`Choose both ${FILES.join(" and ")} of the folder.`);
     // The browser does not tell the folder's name; the moment names it as well.
     const name = `web-${new Date().toISOString().slice(0, 19).replaceAll(":", "")}`;
     const [calibrationToml, referencePng] = await Promise.all(
@@ -94,12 +104,12 @@ export class CalibrationsPanel {
   }
 
   private async change(doing: string, ask: () => Promise<unknown>): Promise<void> {
-    say(this.answer, doing);
+    this.tell(doing);
     try {
       await ask();
-      say(this.answer, "");
+      this.tell("");
     } catch (error) {
-      say(this.answer, (error as Error).message);
+      this.tell((error as Error).message);
     }
     await this.refresh();
   }

@@ -8,8 +8,6 @@ import type { Link, Request } from "./messages";
 export interface Listener {
   link(link: Link): void;
   hello(hello: HelloReply): void;
-  /** The sensor is back behind the same connection: nothing is subscribed to any more. */
-  again(): void;
   reply(id: number, reply: Reply): void;
   unanswered(id: number): void;
   event(event: Event): void;
@@ -137,8 +135,9 @@ export class Connection {
     const back = connected && !this.reached;
     this.reached = connected;
     this.why = error ?? "";
+    // What it can and lets one do may differ from what the greeting on this connection told.
+    if (back) return this.connect();
     this.tell();
-    if (back && this.greeted) this.listener.again();
   }
 
   private tell(): void {

@@ -50,7 +50,6 @@ class Session {
     this.connection = new Connection(open.url, open.program, open.token, {
       link: (link) => this.tellLink(link),
       hello: (hello) => this.greet(hello),
-      again: () => this.begin(),
       reply: (id, reply) => {
         if (!this.answered(id, reply)) post({ kind: "reply", id, reply });
       },
@@ -108,11 +107,7 @@ class Session {
   private greet(hello: HelloReply): void {
     this.features = hello.features;
     post({ kind: "hello", hello });
-    this.begin();
-  }
-
-  /** Another connection, or another run of the daemon: clock and frames may begin anew. */
-  private begin(): void {
+    // Perhaps another run of the daemon: clock and frames may begin anew.
     this.clock.clear();
     this.history.clear();
     this.waiting = undefined;
