@@ -98,9 +98,9 @@ TEST_F(UntouchedImageTest, WhatMovedIsComparedWithWhereItLies) {
 TEST_F(UntouchedImageTest, TheLightThatIsFollowedOutlivesTheCalibration) {
   ASSERT_TRUE(settles());
   CalibratedImage next{fakes::toy_calibration(scene_)};
-  constexpr int kFrames = 1200;  // half a percent in twenty seconds
-  for (int i = 1; i <= kFrames; ++i) {
-    scene_.light = 1 - 0.005 * i / kFrames;
+  constexpr int kDriftFrames = 1200;  // half a percent in twenty seconds
+  for (int i = 1; i <= kDriftFrames; ++i) {
+    scene_.light = 1 - 0.005 * i / kDriftFrames;
     show(1);
   }
   ASSERT_NEAR(image_.light(), 0.995, 0.001);
