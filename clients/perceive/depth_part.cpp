@@ -16,15 +16,18 @@ namespace {
 /// As many pixels as a calibration's map may have (daemon/calibration/parse.cpp).
 constexpr std::uint64_t kMostPixels = std::uint64_t{1} << 23U;
 
-/// Throws client::ProtocolError where a map contradicts itself.
-const v1::DepthMap& checked(const v1::DepthMap& map) {
+/// As client::values_of(), which looks at no more than the values; throws client::ProtocolError
+/// also where the map contradicts itself.
+std::vector<std::int16_t> values_of(const v1::DepthMap& map) {
   const std::uint64_t full_width = std::max(map.full_width(), map.width());
   const std::uint64_t full_height = std::max(map.full_height(), map.height());
   const bool inside = std::uint64_t{map.x()} + map.width() <= full_width &&
                       std::uint64_t{map.y()} + map.height() <= full_height;
   const bool scaled = map.mm_per_px() > 0 && std::isfinite(map.mm_per_px()) &&
                       map.um_per_unit() > 0 && std::isfinite(map.um_per_unit());
-  if (inside && scaled && full_width * full_height <= kMostPixels) return map;
+  if (inside && scaled && full_width * full_height <= kMostPixels) {
+    return client::values_of(map);
+  }
   throw client::ProtocolError(fmt::format(
       "a depth map of {}x{} pixels at {}, {} of {}x{}, {} mm a pixel and {} um a unit contradicts "
       "itself: check the daemon's version",
@@ -48,7 +51,7 @@ recon::Surface surface_of(const v1::Surface& surface) {
 }
 
 DepthPart::DepthPart(const v1::DepthMap& map)
-    : values_(client::values_of(checked(map))),
+    : values_(values_of(map)),
       whole_{.x = static_cast<int>(map.x()),
              .y = static_cast<int>(map.y()),
              .width = static_cast<int>(map.width()),
