@@ -98,6 +98,7 @@ std::vector<Bin> profile_along_axis(const Darkening& image) {
   const double c = std::cos(angle);
   const double s = std::sin(angle);
 
+  // std::lround is no constant expression. NOLINTNEXTLINE(bugprone-incorrect-roundings)
   constexpr auto kBins = static_cast<std::size_t>(2 * kHalfLength_mm / kBin_mm + 0.5);
   // A bin needs as much of the band as eight of the study's pixels.
   const double least = 8 * (kMmPerPx / image.mm_per_px) * (kMmPerPx / image.mm_per_px);
