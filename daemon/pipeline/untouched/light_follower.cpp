@@ -9,7 +9,7 @@ namespace {
 /// A sixteenth of a grey level, 2 µm: applying a factor costs as much as a frame.
 constexpr double kWorthIt = 0.0004;
 /// What is expected out of sight at most where nothing is followed: the default limit.
-constexpr double kUnfollowed = 0.02;
+constexpr double kUnfollowed = DriftRules{}.limit_percent / 100;
 
 }  // namespace
 
