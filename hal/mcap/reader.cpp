@@ -1,17 +1,11 @@
 #include "hal/mcap/reader.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/stat.h>
-#include <unistd.h>
-#include <zstd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <system_error>
 #include <utility>
 
-#include "hal/base/unique_fd.hpp"
+#include "hal/mcap/record_file.hpp"
 
 namespace dtact::mcap {
 namespace {
@@ -54,55 +48,12 @@ Message take_message(Cursor fields) {
   return message;
 }
 
-/// The bytes of a zstd stream, which must be `size`. Grows as they come: what is announced costs
-/// nothing.
-std::string decompress(std::string_view bytes, std::uint64_t size, const Cursor& where) {
-  constexpr std::size_t kStep = std::size_t{1} << 20U;
-  const std::unique_ptr<ZSTD_DCtx, std::size_t (*)(ZSTD_DCtx*)> context(ZSTD_createDCtx(),
-                                                                        ZSTD_freeDCtx);
-  std::string out;
-  ZSTD_inBuffer in{bytes.data(), bytes.size(), 0};
-  for (;;) {
-    const std::size_t begin = out.size();
-    out.resize(static_cast<std::size_t>(std::min<std::uint64_t>(size, begin + kStep)));
-    ZSTD_outBuffer buffer{out.data(), out.size(), begin};
-    const std::size_t left = ZSTD_decompressStream(context.get(), &buffer, &in);
-    if (ZSTD_isError(left) != 0U) {
-      where.fail(fmt::format("a chunk does not decompress: {}", ZSTD_getErrorName(left)));
-    }
-    const bool stuck = buffer.pos == begin && in.pos == in.size;
-    out.resize(buffer.pos);
-    if (in.pos == in.size && (left == 0 || stuck || out.size() == size)) break;
-    if (out.size() == size && buffer.pos == begin) break;
-  }
-  if (out.size() != size || in.pos != in.size) {
-    where.fail(fmt::format("a chunk announces {} bytes and holds {}", size, out.size()));
-  }
-  return out;
-}
-
 }  // namespace
 
 struct Reader::Impl {
-  explicit Impl(const std::filesystem::path& path)
-      : name(path.string()), fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
-    struct stat status{};
-    if (!fd || ::fstat(fd.get(), &status) != 0) {
-      throw std::system_error(errno, std::generic_category(), name);
-    }
-    size = status.st_size > 0 ? static_cast<std::uint64_t>(status.st_size) : 0;
-  }
+  explicit Impl(const std::filesystem::path& path) : file(path) {}
 
-  [[nodiscard]] std::string load(std::uint64_t offset, std::uint64_t length) const;
-  /// The fields of the record at `offset`, of this kind.
-  [[nodiscard]] std::string load_record(std::uint64_t offset, Op expected) const;
   [[nodiscard]] std::string load_indexed(std::uint64_t offset, Op expected);
-  [[nodiscard]] Cursor cursor(std::string_view bytes, std::uint64_t offset) const {
-    return {bytes, name, offset};
-  }
-  [[noreturn]] void fail(std::uint64_t offset, std::string_view what) const {
-    cursor({}, offset).fail(what);
-  }
 
   void open();
   void read_summary(std::uint64_t footer);
@@ -111,12 +62,8 @@ struct Reader::Impl {
   void add(const Cursor::Record& record);
   void add_attachment(std::uint64_t offset);
   void add_metadata(std::uint64_t offset);
-  /// The records of the chunk at `offset`, decompressed and checked.
-  [[nodiscard]] std::string load_chunk(std::uint64_t offset) const;
 
-  std::string name;
-  base::UniqueFd fd;
-  std::uint64_t size = 0;
+  RecordFile file;
   std::string damage;
   std::map<std::uint16_t, Schema> schemas;
   std::map<std::uint16_t, Channel> channels;
@@ -126,53 +73,25 @@ struct Reader::Impl {
   std::uint64_t indexed = 0;  ///< Bytes of records that the summary's index led to.
 };
 
-std::string Reader::Impl::load(std::uint64_t offset, std::uint64_t length) const {
-  if (offset > size || length > size - offset) {
-    fail(offset, fmt::format("{} bytes are announced, the file ends at {}", length, size));
-  }
-  if (length > kMostRecord) {
-    fail(offset, fmt::format("a record of {} bytes, at most {} are read", length, kMostRecord));
-  }
-  std::string bytes(static_cast<std::size_t>(length), '\0');
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t got = ::pread(fd.get(), bytes.data() + done, bytes.size() - done,
-                                static_cast<off_t>(offset + done));
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) throw std::system_error(errno, std::generic_category(), name);
-    if (got == 0) fail(offset + done, "the file became shorter");
-    done += static_cast<std::size_t>(got);
-  }
-  return bytes;
-}
-
-std::string Reader::Impl::load_record(std::uint64_t offset, Op expected) const {
-  const std::string head = load(offset, kRecordHead);
-  Cursor fields = cursor(head, offset);
-  if (static_cast<Op>(fields.take<std::uint8_t>()) != expected) {
-    fail(offset, "here should be a record of another kind");
-  }
-  return load(offset + kRecordHead, fields.take<std::uint64_t>());
-}
-
 /// Records do not overlap: those of a whole file have no more bytes than it, however often a
 /// damaged one points at one of them.
 std::string Reader::Impl::load_indexed(std::uint64_t offset, Op expected) {
-  std::string record = load_record(offset, expected);
+  std::string record = file.load_record(offset, expected);
   indexed += kRecordHead + record.size();
-  if (indexed > size) fail(offset, "a record is in the index more than once");
+  if (indexed > file.size()) file.fail(offset, "a record is in the index more than once");
   return record;
 }
 
 void Reader::Impl::open() {
-  if (size < kMagic.size() || load(0, kMagic.size()) != kMagic) {
-    throw Error(name + ": is no MCAP file");
+  if (file.size() < kMagic.size() || file.load(0, kMagic.size()) != kMagic) {
+    throw Error(file.name() + ": is no MCAP file");
   }
   const std::uint64_t tail = kRecordHead + kFooterLength + kMagic.size();
   std::string why = "ends without a summary";
-  if (size >= kMagic.size() + tail && load(size - kMagic.size(), kMagic.size()) == kMagic) {
+  if (file.size() >= kMagic.size() + tail &&
+      file.load(file.size() - kMagic.size(), kMagic.size()) == kMagic) {
     try {
-      read_summary(size - tail);
+      read_summary(file.size() - tail);
       if (!places.empty()) return;
       why.clear();  // whole, but nothing in it is indexed
     } catch (const Error& e) {
@@ -189,21 +108,21 @@ void Reader::Impl::open() {
 }
 
 void Reader::Impl::read_summary(std::uint64_t footer) {
-  const std::string fields = load_record(footer, Op::footer);
-  Cursor end = cursor(fields, footer + kRecordHead);
+  const std::string fields = file.load_record(footer, Op::footer);
+  Cursor end = file.cursor(fields, footer + kRecordHead);
   const auto begin = end.take<std::uint64_t>();
   (void)end.take<std::uint64_t>();
   const auto expected = end.take<std::uint32_t>();
   if (begin == 0) return;
-  if (begin > footer) fail(footer, "the summary begins behind its end");
+  if (begin > footer) file.fail(footer, "the summary begins behind its end");
   const std::uint64_t counted = footer + kRecordHead + 16;  // up to the CRC
-  const std::string summary = load(begin, counted - begin);
-  if (expected != 0 && crc32(summary) != expected) fail(begin, "the summary's CRC is wrong");
+  const std::string summary = file.load(begin, counted - begin);
+  if (expected != 0 && crc32(summary) != expected) file.fail(begin, "the summary's CRC is wrong");
   Cursor records =
-      cursor(std::string_view(summary).substr(0, summary.size() - kRecordHead - 16), begin);
+      file.cursor(std::string_view(summary).substr(0, summary.size() - kRecordHead - 16), begin);
   while (records.left() > 0) {
     const auto record = records.record();
-    Cursor entry = cursor(record.fields, record.offset + kRecordHead);
+    Cursor entry = file.cursor(record.fields, record.offset + kRecordHead);
     switch (record.op) {
       case Op::chunk_index: {
         (void)entry.bytes(16);
@@ -224,12 +143,12 @@ void Reader::Impl::read_summary(std::uint64_t footer) {
   }
   std::ranges::sort(places, {}, &Place::offset);
   const auto twice = std::ranges::adjacent_find(places, {}, &Place::offset);
-  if (twice != places.end()) fail(twice->offset, "a chunk is in the index more than once");
+  if (twice != places.end()) file.fail(twice->offset, "a chunk is in the index more than once");
   std::ranges::sort(attachments, {}, &AttachmentPlace::offset);
 }
 
 void Reader::Impl::add(const Cursor::Record& record) {
-  const Cursor fields = cursor(record.fields, record.offset + kRecordHead);
+  const Cursor fields = file.cursor(record.fields, record.offset + kRecordHead);
   if (record.op == Op::schema) {
     Schema schema = take_schema(fields);
     if (schema.id == 0) return;  // invalid, and to be ignored
@@ -244,7 +163,7 @@ void Reader::Impl::add(const Cursor::Record& record) {
 
 void Reader::Impl::add_attachment(std::uint64_t offset) {
   const std::string record = load_indexed(offset, Op::attachment);
-  Cursor fields = cursor(record, offset + kRecordHead);
+  Cursor fields = file.cursor(record, offset + kRecordHead);
   AttachmentPlace place;
   place.log_time = fields.take<std::uint64_t>();
   place.create_time = fields.take<std::uint64_t>();
@@ -256,7 +175,7 @@ void Reader::Impl::add_attachment(std::uint64_t offset) {
 
 void Reader::Impl::add_metadata(std::uint64_t offset) {
   const std::string record = load_indexed(offset, Op::metadata);
-  Cursor fields = cursor(record, offset + kRecordHead);
+  Cursor fields = file.cursor(record, offset + kRecordHead);
   std::string key = fields.string();
   metadata.push_back({std::move(key), fields.map()});
 }
@@ -266,14 +185,14 @@ void Reader::Impl::scan() {
   std::uint64_t offset = kMagic.size();
   try {
     for (;;) {
-      if (offset == size) fail(offset, "the file ends without a summary");
-      const std::string head = load(offset, kRecordHead);
-      Cursor fields = cursor(head, offset);
+      if (offset == file.size()) file.fail(offset, "the file ends without a summary");
+      const std::string head = file.load(offset, kRecordHead);
+      Cursor fields = file.cursor(head, offset);
       const auto op = static_cast<Op>(fields.take<std::uint8_t>());
       const auto length = fields.take<std::uint64_t>();
       if (op == Op::data_end || op == Op::footer) return;
-      if (length > size - offset - kRecordHead) {
-        fail(offset, fmt::format("the file ends at {} within a record", size));
+      if (length > file.size() - offset - kRecordHead) {
+        file.fail(offset, fmt::format("the file ends at {} within a record", file.size()));
       }
       add_scanned(op, offset, length);
       offset += kRecordHead + length;
@@ -287,17 +206,17 @@ void Reader::Impl::add_scanned(Op op, std::uint64_t offset, std::uint64_t length
   switch (op) {
     case Op::schema:
     case Op::channel: {
-      const std::string fields = load(offset + kRecordHead, length);
+      const std::string fields = file.load(offset + kRecordHead, length);
       add({op, fields, offset});
       break;
     }
     case Op::message:
-      if (length < kMessageHead) fail(offset, "a message without its head");
+      if (length < kMessageHead) file.fail(offset, "a message without its head");
       places.push_back({offset, false});
       break;
     case Op::chunk: {
-      const std::string records = load_chunk(offset);
-      Cursor inside = cursor(records, offset);
+      const std::string records = file.load_chunk(offset);
+      Cursor inside = file.cursor(records, offset);
       while (inside.left() > 0) add(inside.record());
       places.push_back({offset, true});
       break;
@@ -310,35 +229,8 @@ void Reader::Impl::add_scanned(Op op, std::uint64_t offset, std::uint64_t length
       break;
     default:
       // Indexes of what is read anyway, and what a later version of the format knows.
-      if (static_cast<int>(op) == 0) fail(offset, "no record begins with 0");
+      if (static_cast<int>(op) == 0) file.fail(offset, "no record begins with 0");
   }
-}
-
-std::string Reader::Impl::load_chunk(std::uint64_t offset) const {
-  const std::string record = load_record(offset, Op::chunk);
-  Cursor fields = cursor(record, offset + kRecordHead);
-  (void)fields.bytes(16);  // first and last time
-  const auto length = fields.take<std::uint64_t>();
-  const auto expected = fields.take<std::uint32_t>();
-  const std::string compression = fields.string();
-  const std::string_view bytes = fields.bytes(fields.take<std::uint64_t>());
-  if (length > kMostRecord) {
-    fields.fail(fmt::format("a chunk of {} bytes, at most {} are read", length, kMostRecord));
-  }
-  std::string records;
-  if (compression == "zstd") {
-    records = decompress(bytes, length, fields);
-  } else if (compression.empty()) {
-    if (bytes.size() != length) fields.fail("a chunk's two sizes differ");
-    records = bytes;
-  } else {
-    fields.fail(
-        fmt::format("a chunk is compressed by \"{}\": only zstd is read; `mcap compress "
-                    "--compression zstd` makes it so",
-                    compression.substr(0, 16)));
-  }
-  if (expected != 0 && crc32(records) != expected) fields.fail("a chunk's CRC is wrong");
-  return records;
 }
 
 Reader::Reader(const std::filesystem::path& path) : impl_(std::make_unique<Impl>(path)) {
@@ -358,8 +250,8 @@ const std::vector<AttachmentPlace>& Reader::attachments() const noexcept {
 const std::vector<Metadata>& Reader::metadata() const noexcept { return impl_->metadata; }
 
 Attachment Reader::attachment(const AttachmentPlace& place) const {
-  const std::string record = impl_->load_record(place.offset, Op::attachment);
-  Cursor fields = impl_->cursor(record, place.offset + kRecordHead);
+  const std::string record = impl_->file.load_record(place.offset, Op::attachment);
+  Cursor fields = impl_->file.cursor(record, place.offset + kRecordHead);
   Attachment attachment;
   attachment.log_time = fields.take<std::uint64_t>();
   attachment.create_time = fields.take<std::uint64_t>();
@@ -377,7 +269,7 @@ void Reader::read(const std::set<std::string>& topics,
                   const std::function<bool(const Channel&, const Message&)>& take) const {
   // False: enough.
   const auto offer = [&](const Cursor::Record& record) {
-    const Cursor fields = impl_->cursor(record.fields, record.offset + kRecordHead);
+    const Cursor fields = impl_->file.cursor(record.fields, record.offset + kRecordHead);
     const Message message = take_message(fields);
     const auto channel = impl_->channels.find(message.channel);
     if (channel == impl_->channels.end()) {
@@ -388,14 +280,14 @@ void Reader::read(const std::set<std::string>& topics,
   };
   for (const Place& place : impl_->places) {
     if (place.chunk) {
-      const std::string records = impl_->load_chunk(place.offset);
-      Cursor inside = impl_->cursor(records, place.offset);
+      const std::string records = impl_->file.load_chunk(place.offset);
+      Cursor inside = impl_->file.cursor(records, place.offset);
       while (inside.left() > 0) {
         const auto record = inside.record();
         if (record.op == Op::message && !offer(record)) return;
       }
     } else {
-      const std::string fields = impl_->load_record(place.offset, Op::message);
+      const std::string fields = impl_->file.load_record(place.offset, Op::message);
       if (!offer({Op::message, fields, place.offset})) return;
     }
   }
