@@ -177,11 +177,13 @@ TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) {
   std::size_t made = 0;  // in both
   std::size_t made_equal = 0;
   int worst = 0;
+  std::vector<double> apart;  // stated uncertainties
   for (const auto& [sequence, frame] : recorded) {
     const v1::Frame& other = remade.at(sequence);
     ASSERT_EQ(frame.has_depth(), other.has_depth()) << sequence;
     EXPECT_EQ(frame.jpeg().data(), other.jpeg().data());
     if (!frame.has_depth()) continue;
+    apart.push_back(other.depth().uncertainty_um() / frame.depth().uncertainty_um());
     const auto was = client::values_of(frame.depth());
     const auto is = client::values_of(other.depth());
     ASSERT_EQ(was.size(), is.size());
@@ -206,6 +208,10 @@ TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) {
   EXPECT_GE(percent(equal, pixels), 97);
   EXPECT_GE(percent(made_equal, made), 99);
   EXPECT_LE(worst, 60);
+  const auto [least, most] = std::ranges::minmax(apart);
+  std::printf("stated uncertainty: %.3f to %.3f of the recorded\n", least, most);
+  EXPECT_GE(least, 0.9);
+  EXPECT_LE(most, 1.1);
 }
 
 TEST_F(Record, WithoutJpegsDepthCannotBeMadeAnew) {

@@ -1,7 +1,6 @@
 #include "clients/calibrate/reprocess/depth_remaker.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "daemon/pipeline/depth/uncertainty.hpp"
@@ -88,11 +87,10 @@ void DepthRemaker::remake(const hal::LumaView& luma, v1::Frame& frame) {
 }
 
 void DepthRemaker::describe(const recon::DepthSums& sums, bool beyond, v1::Frame& frame) const {
-  double list_um = maps_.list_um(0.5 * summary_.deepest_mm, 0);
-  list_um = std::hypot(list_um, maps_.light_um(follower_.left()));
-  list_um = std::hypot(list_um, maps_.light_um(follower_.unseen()));
+  const pipeline::Trust trust{.light_left = follower_.left(), .light_unseen = follower_.unseen()};
   frame.mutable_depth()->set_uncertainty_um(
-      pipeline::uncertainty_at_um(list_um, pipeline::bend_um(sums, frame.depth().mm_per_px()),
+      pipeline::uncertainty_at_um(maps_.contact_um(summary_.deepest_mm, 0, trust),
+                                  pipeline::bend_um(sums, frame.depth().mm_per_px()),
                                   static_cast<int>(frame.depth().decimation())));
   auto& contact = *frame.mutable_contact();
   contact.set_touching(summary_.touching);

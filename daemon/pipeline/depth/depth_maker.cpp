@@ -1,7 +1,6 @@
 #include "daemon/pipeline/depth/depth_maker.hpp"
 
 #include <array>
-#include <cmath>
 #include <cstddef>
 
 namespace dtact::pipeline {
@@ -83,12 +82,8 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
 void DepthMaker::judge(const Trust& trust, double bend, DepthFrame& out) noexcept {
   const double plain_um = plain_bend_um(bend, out.sharpen_steps);
   const auto expected_um = [&](int decimation, int steps) {
-    // Half of the deepest is about the mean over a contact.
-    double list_um = maps_->list_um(0.5 * out.contact.deepest_mm, steps);
-    if (trust.stale) list_um = std::hypot(list_um, kStaleReferenceUm);
-    list_um = std::hypot(list_um, maps_->light_um(trust.light_left));
-    list_um = std::hypot(list_um, maps_->light_um(trust.light_unseen));
-    return uncertainty_at_um(list_um, plain_um, decimation, steps);
+    return uncertainty_at_um(maps_->contact_um(out.contact.deepest_mm, steps, trust), plain_um,
+                             decimation, steps);
   };
   out.uncertainty_um = expected_um(out.made_decimation, out.sharpen_steps);
   if (!chooses()) return;

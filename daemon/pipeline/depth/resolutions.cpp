@@ -118,6 +118,13 @@ double Resolutions::list_um(double depth_mm, int steps) const noexcept {
                    (depth_mm - below->depth_mm) / (above->depth_mm - below->depth_mm));
 }
 
+double Resolutions::contact_um(double deepest_mm, int steps, const Trust& trust) const noexcept {
+  double um = list_um(0.5 * deepest_mm, steps);
+  if (trust.stale) um = std::hypot(um, kStaleReferenceUm);
+  um = std::hypot(um, light_um(trust.light_left));
+  return std::hypot(um, light_um(trust.light_unseen));
+}
+
 double Resolutions::light_um(double share) const noexcept {
   const recon::DepthList& list = model_->list;
   // The list's slope over the darkening of a light press; 20 grey levels are about 0.6 mm.

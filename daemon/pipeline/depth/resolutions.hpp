@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/pipeline/untouched/untouched_image.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
 #include "daemon/recon/upsampler.hpp"
@@ -74,11 +75,14 @@ class Resolutions {
   /// What the list for so many steps is uncertain by at an indentation, micrometres: as the
   /// calibration says, else kUnstatedListUm or, of a published method, kUnstatedPublishedUm.
   [[nodiscard]] double list_um(double depth_mm, int steps) const noexcept;
+  /// The same with what the untouched image is trusted to, in squares: of a contact that is
+  /// `deepest_mm` deep, half of which is about its mean.
+  [[nodiscard]] double contact_um(double deepest_mm, int steps, const Trust& trust) const noexcept;
+
+ private:
   /// What a light that differs from the reference's by `share` adds to or takes off every
   /// indentation, micrometres.
   [[nodiscard]] double light_um(double share) const noexcept;
-
- private:
   void add(const recon::CellLattice& lattice, int decimation, int steps, int map_decimation);
 
   std::shared_ptr<const recon::Model> model_;
