@@ -7,14 +7,12 @@
 
 #include "clients/cpp/errors.hpp"
 #include "clients/cpp/maps.hpp"
+#include "daemon/recon/rectify.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::perceive {
 
 namespace {
-
-/// As many pixels as a calibration's map may have (daemon/calibration/parse.cpp).
-constexpr std::uint64_t kMostPixels = std::uint64_t{1} << 23U;
 
 /// As client::values_of(), which looks at no more than the values; throws client::ProtocolError
 /// also where the map contradicts itself.
@@ -25,7 +23,7 @@ std::vector<std::int16_t> values_of(const v1::DepthMap& map) {
                       std::uint64_t{map.y()} + map.height() <= full_height;
   const bool scaled = map.mm_per_px() > 0 && std::isfinite(map.mm_per_px()) &&
                       map.um_per_unit() > 0 && std::isfinite(map.um_per_unit());
-  if (inside && scaled && full_width * full_height <= kMostPixels) {
+  if (inside && scaled && full_width * full_height <= std::uint64_t{recon::kMostMapPixels}) {
     return client::values_of(map);
   }
   throw client::ProtocolError(fmt::format(

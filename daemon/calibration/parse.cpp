@@ -14,6 +14,7 @@
 #include "daemon/calibration/sha256.hpp"
 #include "daemon/calibration/surface_table.hpp"
 #include "daemon/calibration/text.hpp"
+#include "daemon/recon/rectify.hpp"
 #include "hal/image/png.hpp"
 #include "hal/toml/key_reader.hpp"
 
@@ -21,7 +22,6 @@ namespace dtact::calibration {
 namespace {
 
 constexpr std::int64_t kMostFramePixels = std::int64_t{1} << 26U;  // 8192×8192, any camera's mode
-constexpr std::int64_t kMostMapPixels = std::int64_t{1} << 23U;    // what a message can carry
 
 std::vector<std::uint8_t> mask_of(tomlfile::KeyReader& reader, std::size_t pixels) {
   const auto limit = static_cast<std::int64_t>(pixels);
@@ -119,7 +119,7 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   const int width = small(crop, "width", 1, frame_width - calibration.crop_col);
   const int height = small(crop, "height", 1, frame_height - calibration.crop_row);
   crop.finish();
-  check_area(crop, width, height, kMostMapPixels);
+  check_area(crop, width, height, recon::kMostMapPixels);
   if (top.has("lens")) {
     calibration.lens = read_lens(top.table("lens"), frame_width, frame_height);
   }
