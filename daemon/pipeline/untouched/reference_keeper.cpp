@@ -56,11 +56,16 @@ void ReferenceKeeper::restore(std::span<const std::uint16_t> reference_q8, bool 
 }
 
 void ReferenceKeeper::use_calibration(std::span<const std::uint16_t> reference_q8,
-                                      const LumaGrid& grid, const CellRegion& region) noexcept {
+                                      const LumaGrid& grid, const CellRegion& region,
+                                      bool same_light) noexcept {
   calibration_ = {reference_q8, &grid};
   region_ = region;
   if (ready() && footing_ == Footing::fresh) return;
   if (footing_ != Footing::none) have_good_ = false;
+  if (!have_good_) {
+    other_light_ = !same_light;
+    same_shape_ = same_light;  // of another light it is not known
+  }
   begin();
 }
 

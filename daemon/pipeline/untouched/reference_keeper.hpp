@@ -40,10 +40,11 @@ class ReferenceKeeper {
   /// The last good reference of an earlier run (Q8, frame sized). `same_light`: made under the
   /// light of now; `same_shape`: under the same colours, whatever the brightness.
   void restore(std::span<const std::uint16_t> reference_q8, bool same_light, bool same_shape);
-  /// What the calibration knows; the span and the grid must outlive their use here. A fresh
-  /// reference stays, whatever else is known is forgotten and the sequence begins again.
+  /// What the calibration knows; the span and the grid must outlive their use here. `same_light`:
+  /// as restore()'s. A fresh reference stays, whatever else is known is forgotten and the sequence
+  /// begins again.
   void use_calibration(std::span<const std::uint16_t> reference_q8, const LumaGrid& grid,
-                       const CellRegion& region) noexcept;
+                       const CellRegion& region, bool same_light) noexcept;
   /// The calibration's grid, as it was given, lies at another place.
   void grid_lies_at(const LumaGrid& grid) noexcept { calibration_.grid = &grid; }
   /// The camera has (re)started: begins the sequence.

@@ -29,9 +29,10 @@ void UntouchedImage::restore(std::span<const std::uint16_t> reference_q8, const 
 void UntouchedImage::use(CalibratedImage* image) noexcept {
   image_ = image;
   if (image == nullptr) return;
-  keeper_.use_calibration(image->calibration->model->reference_q8, image->grid, image->region);
-  place_.use_marks(image->marks);
   other_light_ = light_differs(*image->calibration, shown_);
+  keeper_.use_calibration(image->calibration->model->reference_q8, image->grid, image->region,
+                          !other_light_);
+  place_.use_marks(image->marks);
   if (!keeper_.ready()) return;
   // The reference stays as it was taken, and so does the light that was followed since.
   const LightFollower before = follower_;

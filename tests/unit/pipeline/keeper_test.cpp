@@ -22,7 +22,9 @@ class KeeperTest : public ::testing::Test {
   KeeperTest() {
     measure(calibration->model->reference_q8, fakes::kToyWidth, fakes::kToyHeight, grid);
   }
-  void calibrate() { keeper.use_calibration(calibration->model->reference_q8, grid, region); }
+  void calibrate(bool same_light = true) {
+    keeper.use_calibration(calibration->model->reference_q8, grid, region, same_light);
+  }
 
   /// Steps until something happens, at most `most` frames; what happened last stays in `last`.
   bool run(int most) {
@@ -108,6 +110,21 @@ TEST_F(KeeperTest, TouchedAtStartWithoutOneScalesTheCalibrations) {
   ASSERT_TRUE(run(40));
   EXPECT_EQ(keeper.footing(), Footing::stale);
   EXPECT_LT(worst_error(), 1.0);
+}
+
+// 0.016 of the field's light: other LEDs leave as much of their shape, a touch of 0.1 mm takes it.
+TEST_F(KeeperTest, UnderAnotherLightThanTheCalibrationsALittleShapeIsNoTouch) {
+  scene.press_mm = 0.1;
+  calibrate(false);
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::fresh);
+}
+
+TEST_F(KeeperTest, UnderTheCalibrationsLightTheSameIsATouch) {
+  scene.press_mm = 0.1;
+  calibrate();
+  ASSERT_TRUE(run(40));
+  EXPECT_EQ(keeper.footing(), Footing::stale);
 }
 
 TEST_F(KeeperTest, ALastGoodOneFromAnotherLightIsStale) {
