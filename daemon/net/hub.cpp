@@ -100,9 +100,9 @@ void Hub::on_event(const pipeline::Event& event) {
 
 void Hub::on_frame(const pipeline::DepthFrame& frame) {
   handover_.add(base::system_clock().monotonic_ns() - frame.done_ns);
-  const std::uint64_t missed = seen_frame_ ? frame.skipped - skipped_ : 0;
-  skipped_ = frame.skipped;
-  seen_frame_ = true;
+  const std::uint64_t missed =
+      number_ > 0 && frame.number > number_ ? frame.number - number_ - 1 : 0;
+  number_ = frame.number;
   encoder_.begin(frame, calibration_number(frame.calibration));
   // Calibrations come into use in the order of their keys.
   if (frame.calibration) numbers_.erase(numbers_.begin(), numbers_.lower_bound(*frame.calibration));

@@ -93,8 +93,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   Guests guests_;
   std::vector<EndpointInfo> endpoints_;
   std::map<std::uint64_t, std::uint64_t> numbers_;  ///< By key, of those still in use.
-  bool seen_frame_ = false;
-  std::uint64_t skipped_ = 0;  ///< DepthFrame::skipped of the last frame.
+  std::uint64_t number_ = 0;  ///< DepthFrame::number of the last frame; 0: none came yet.
   bool told_too_large_ = false;
   Traffic gone_;  ///< Of the clients that left, and all connections.
   std::optional<std::int64_t> reference_taken_ns_;

@@ -191,13 +191,12 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
     out.jpeg_height = frame_.luma().height;
     out.jpeg.assign(frame_.jpeg().begin(), frame_.jpeg().end());
   }
-  out.skipped = exchange_.slot.replaced();
   out.done_ns = clock_.monotonic_ns();
   out.times.publish_ns = out.done_ns - began_ns;
   exchange_.statistics.add(out.times, made, out.camera.ready_ns, out.done_ns);
   if (!want_depth_ && !out.has_luma && !want_jpeg) return;
+  out.number = exchange_.frames.fetch_add(1, std::memory_order_relaxed) + 1;
   exchange_.slot.publish();
-  exchange_.frames.fetch_add(1, std::memory_order_relaxed);
   exchange_.wake.signal();
 }
 

@@ -170,11 +170,11 @@ TEST(Stream, CountsWhatThePipelineSkippedAsMissed) {
   client.hello();
   client.subscribe(v1::DEPTH_INT16);
   auto frame = make_frame(1);
-  frame.skipped = 40;  // before this client was there
+  frame.number = 41;  // the others before this client was there
   rig.port.publish(frame);
   EXPECT_EQ(client.frame().dropped(), 0U);
   frame = make_frame(5);
-  frame.skipped = 43;
+  frame.number = 45;
   rig.port.publish(frame);
   EXPECT_EQ(client.frame().dropped(), 3U);
 }
@@ -187,10 +187,10 @@ TEST(Stream, OfEveryNthFrameOnlyThoseWantedAreMissed) {
   third.hello();
   all.subscribe(v1::DEPTH_INT16);
   third.subscribe(v1::DEPTH_INT16, v1::LUMA_NONE, 3);
-  std::uint64_t skipped = 0;
+  std::uint64_t number = 0;
   const auto publish = [&](std::uint64_t sequence, std::uint64_t missed) {
     auto frame = make_frame(sequence);
-    frame.skipped = skipped += missed;
+    frame.number = number += missed + 1;
     rig.port.publish(frame);
     ASSERT_EQ(all.frame().sequence(), sequence);
   };
