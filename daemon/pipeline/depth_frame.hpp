@@ -50,10 +50,10 @@ enum class ContactAbsence : std::uint8_t {
 /// One frame's result, in buffers that are allocated once and used again.
 struct DepthFrame {
   hal::FrameInfo camera;
-  std::int64_t wall_ns = 0;   ///< CLOCK_REALTIME at camera.timestamp_ns, nanoseconds since 1970.
-  std::int64_t done_ns = 0;   ///< CLOCK_MONOTONIC when the result was published.
-  std::uint64_t number = 0;   ///< Of the results since start, from 1, fetched or not.
-  hal::Light light;           ///< What the ring showed when the frame was exposed.
+  std::int64_t wall_ns = 0;  ///< CLOCK_REALTIME at camera.timestamp_ns, nanoseconds since 1970.
+  std::int64_t done_ns = 0;  ///< CLOCK_MONOTONIC when the result was published.
+  std::uint64_t number = 0;  ///< Of the results since start, from 1, fetched or not.
+  hal::Light light;          ///< What the ring showed when the frame was exposed.
   /// Frames whose timestamp is not before it are exposed under `light` alone; none: not known.
   std::optional<std::int64_t> light_since_ns;
   /// UseCalibration::key of what the frame was measured by; none: uncalibrated.
