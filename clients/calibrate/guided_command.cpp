@@ -7,6 +7,7 @@
 #include <iostream>
 #include <memory>
 
+#include "clients/calibrate/guided/json_console.hpp"
 #include "clients/calibrate/guided/session.hpp"
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/interruptible.hpp"
@@ -36,9 +37,16 @@ void run_guided(const cli::Context& context, guided::Plan plan) {
       &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1 && ::isatty(STDIN_FILENO) == 1;
   const cli::Interruptible while_guiding;
   guided::LiveSensor sensor(context.target);
-  guided::StreamConsole console(STDIN_FILENO, context.out, terminal, cli::Interruptible::happened);
+  const std::unique_ptr<guided::Console> console = [&]() -> std::unique_ptr<guided::Console> {
+    if (context.json) {
+      return std::make_unique<guided::JsonConsole>(STDIN_FILENO, context.out,
+                                                   cli::Interruptible::happened);
+    }
+    return std::make_unique<guided::StreamConsole>(STDIN_FILENO, context.out, terminal,
+                                                   cli::Interruptible::happened);
+  }();
   try {
-    if (guided::Session(sensor, console, plan).run() == guided::Outcome::unfinished) {
+    if (guided::Session(sensor, *console, plan).run() == guided::Outcome::unfinished) {
       throw cli::Failure(cli::kNotMet, "there is no calibration yet");
     }
   } catch (const guided::NotTaken& e) {

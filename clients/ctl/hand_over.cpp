@@ -7,10 +7,10 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <string_view>
 
 #include "clients/common/exit_codes.hpp"
+#include "clients/common/sibling.hpp"
 
 namespace dtact::ctl {
 namespace {
@@ -37,16 +37,13 @@ Arguments::iterator word_from(Arguments& arguments, Arguments::iterator place) {
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
   argv.push_back(nullptr);
-  std::error_code unknown;
-  const auto folder = std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path();
-  if (!unknown) ::execv((folder / kProgram).c_str(), argv.data());
-  ::execvp(kProgram, argv.data());
+  ::execvp(cli::sibling(kProgram).c_str(), argv.data());
   const int error = errno;
   throw cli::Failure(
       cli::kFailed,
-      fmt::format("cannot start {}, which makes calibrations: {}. It belongs beside dtactctl ({}) "
-                  "or into PATH: install it from the same release",
-                  kProgram, std::strerror(error), folder.string()));
+      fmt::format("cannot start {}, which makes calibrations: {}. It belongs beside dtactctl or "
+                  "into PATH: install it from the same release",
+                  kProgram, std::strerror(error)));
 }
 
 }  // namespace

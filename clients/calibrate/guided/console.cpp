@@ -1,26 +1,29 @@
 #include "clients/calibrate/guided/console.hpp"
 
-#include <poll.h>
-#include <unistd.h>
+#include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-#include <cerrno>
 #include <ostream>
-#include <string_view>
+#include <sstream>
 #include <utility>
+
+#include "clients/calibrate/guided/preview.hpp"
 
 namespace dtact::ctl::guided {
 namespace {
 
-std::string trimmed(const std::string& text) {
-  constexpr const char* kBlanks = " \t\r";
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  if (first == std::string::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
+/// Of a picture in the terminal.
+constexpr int kColumns = 44;
 
 }  // namespace
+
+std::string text_of(const Prompt& prompt) {
+  std::string text = prompt.text;
+  for (const Answer& answer : prompt.answers) {
+    if (!text.empty()) text += &answer == &prompt.answers.front() ? "\n" : "  ";
+    text += fmt::format("[{}] {}", answer.key.empty() ? "Enter" : answer.key, answer.words);
+  }
+  return text;
+}
 
 StreamConsole::StreamConsole(int in, std::ostream& out, bool interactive,
                              std::function<bool()> interrupted)
@@ -32,35 +35,15 @@ StreamConsole::~StreamConsole() {
 }
 
 void StreamConsole::fetch() {
-  pollfd waiting{in_, POLLIN, 0};
-  if (ended_ || ::poll(&waiting, 1, 0) <= 0) return;
-  std::array<char, 4096> chunk{};
-  const ssize_t count = ::read(in_, chunk.data(), chunk.size());
-  if (count < 0) {
-    ended_ = errno != EINTR && errno != EAGAIN;
-    return;
-  }
-  ended_ = count == 0;
-  const std::string_view text(chunk.data(), static_cast<std::size_t>(count));
-  buffer_ += text;
+  const std::size_t lines = in_.fetch();
   // The terminal has echoed them: the cursor stands so much below the live lines.
-  if (live_lines_ > 0) {
-    live_lines_ += static_cast<std::size_t>(std::ranges::count(text, '\n'));
-  }
+  if (live_lines_ > 0) live_lines_ += lines;
 }
 
 Typed StreamConsole::typed() {
   if (interrupted_()) return {Typed::Kind::interrupted, {}};
   fetch();
-  if (const std::size_t end = buffer_.find('\n'); end != std::string::npos) {
-    Typed line{Typed::Kind::line, trimmed(buffer_.substr(0, end))};
-    buffer_.erase(0, end + 1);
-    return line;
-  }
-  if (!ended_) return {};
-  // A last line need not end in a newline.
-  if (!buffer_.empty()) return {Typed::Kind::line, trimmed(std::exchange(buffer_, {}))};
-  return {Typed::Kind::end, {}};
+  return in_.take();
 }
 
 void StreamConsole::say(const std::string& text) {
@@ -70,8 +53,23 @@ void StreamConsole::say(const std::string& text) {
   out_.flush();
 }
 
-void StreamConsole::live(const std::vector<std::string>& lines) {
+void StreamConsole::keep(const image::Grey8& picture) {
   if (!interactive_) return;
+  std::string text;
+  for (const std::string& line : half_blocks(picture, kColumns)) text += line + "\n";
+  say(text);
+}
+
+void StreamConsole::live(const Scene& scene) {
+  if (!interactive_) return;
+  std::vector<std::string> lines;
+  if (scene.picture != nullptr) lines = half_blocks(*scene.picture, kColumns);
+  if (!scene.words.empty()) lines.push_back(scene.words);
+  if (!scene.prompt.answers.empty()) {
+    std::istringstream prompt(text_of(scene.prompt) + " > ");
+    for (std::string line; std::getline(prompt, line);) lines.push_back(line);
+  }
+  if (lines.empty()) return;
   clear_live();
   // A line that is too long for the terminal must not become two.
   out_ << "\x1b[?7l";

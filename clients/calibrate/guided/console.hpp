@@ -5,13 +5,38 @@
 #include <string>
 #include <vector>
 
+#include "clients/calibrate/guided/line_input.hpp"
+#include "clients/calibrate/guided/taken_press.hpp"
+#include "hal/image/png.hpp"
+
 namespace dtact::ctl::guided {
 
-/// What the user typed since it was last asked.
-struct Typed {
-  enum class Kind { nothing, line, end, interrupted };
-  Kind kind = Kind::nothing;
-  std::string line;  ///< Without blanks around it.
+/// What the user may type.
+struct Answer {
+  std::string key;    ///< A letter; empty: Enter alone.
+  std::string words;  ///< What it does.
+};
+
+inline const Answer kQuit{"q", "quit"};
+
+/// What the user is asked.
+struct Prompt {
+  std::string text;  ///< Empty: nothing but the answers.
+  std::vector<Answer> answers;
+};
+
+/// The prompt as lines: the text, and below it each answer behind its key in brackets.
+[[nodiscard]] std::string text_of(const Prompt& prompt);
+
+/// What stands before the user until the next takes its place.
+struct Scene {
+  const image::Grey8* picture = nullptr;  ///< The sensor now, the map's part; null: as before.
+  double mm_per_px = 0;                   ///< Of the picture.
+  std::string words;                      ///< About the picture.
+  Prompt prompt;
+  std::vector<TakenPress> presses;
+  double covered_mm = 0;   ///< How deep the list of these presses reaches; 0: there is none.
+  int presses_wanted = 0;  ///< After so many the calibration is made.
 };
 
 /// Where the session speaks with its user; the tests play one.
@@ -22,8 +47,8 @@ class Console {
   Console& operator=(const Console&) = delete;
   virtual ~Console() = default;
 
-  /// A person at a terminal: live pictures are drawn, and a line may come at any time. Else lines
-  /// lie ready, each for one prompt.
+  /// A person watches: live pictures are drawn, and a line may come at any time. Else lines lie
+  /// ready, each for one prompt.
   [[nodiscard]] virtual bool interactive() const = 0;
   /// Does not wait.
   [[nodiscard]] virtual Typed typed() = 0;
@@ -31,8 +56,10 @@ class Console {
   [[nodiscard]] virtual bool interrupted() const = 0;
   /// One or several lines, to stay.
   virtual void say(const std::string& text) = 0;
-  /// Lines that stand until the next call takes their place. Nothing where no person watches.
-  virtual void live(const std::vector<std::string>& lines) = 0;
+  /// A picture of a press, to stay.
+  virtual void keep(const image::Grey8& picture) = 0;
+  /// Nothing where no person watches.
+  virtual void live(const Scene& scene) = 0;
 };
 
 /// Standard input and output, or what a test puts in their places.
@@ -46,19 +73,18 @@ class StreamConsole : public Console {
   [[nodiscard]] Typed typed() override;
   [[nodiscard]] bool interrupted() const override { return interrupted_(); }
   void say(const std::string& text) override;
-  void live(const std::vector<std::string>& lines) override;
+  void keep(const image::Grey8& picture) override;
+  void live(const Scene& scene) override;
 
  private:
   /// Reads what lies ready.
   void fetch();
   void clear_live();
 
-  int in_;
+  LineInput in_;
   std::ostream& out_;
   bool interactive_;
   std::function<bool()> interrupted_;
-  std::string buffer_;
-  bool ended_ = false;
   std::size_t live_lines_ = 0;
 };
 

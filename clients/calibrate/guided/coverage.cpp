@@ -16,19 +16,22 @@ namespace {
 constexpr double kContactOfCut = 0.97;
 constexpr double kFirstOfRadius = 0.3;
 
-std::vector<double> rough_depths_mm(const PressImages& images,
+std::vector<TakenPress> contacts_of(const PressImages& images,
                                     const calibration::Calibration& empty) {
-  std::vector<double> depths;
+  std::vector<TakenPress> taken;
   for (const auto& press : images.set.presses) {
     try {
       const calibration::SettledPress settled = calibration::settle(
           *empty.model, images.set.reference_q8.pixels, press.frames, images.set.ball_radius_mm);
-      depths.push_back(depth_of_width_mm(2 * settled.contact.radius_mm, images.set.ball_radius_mm));
+      const calibration::Contact& contact = settled.contact;
+      taken.push_back({press.name, contact.col, contact.row,
+                       contact.radius_mm / empty.model->mm_per_px,
+                       depth_of_width_mm(2 * contact.radius_mm, images.set.ball_radius_mm)});
     } catch (const std::runtime_error&) {
       continue;  // what shows no contact shows no depth either
     }
   }
-  return depths;
+  return taken;
 }
 
 }  // namespace
@@ -51,11 +54,16 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty,
       coverage.missing = e.what();
     }
   }
-  if (coverage.made) {
-    for (const auto& press : coverage.report.presses) coverage.depths_mm.push_back(press.depth_mm);
-  } else {
-    coverage.depths_mm = rough_depths_mm(images, empty);
-  }
+  coverage.presses = contacts_of(images, empty);
+  if (!coverage.made) return coverage;
+  // As fitted; what was left out does not count.
+  std::erase_if(coverage.presses, [&](TakenPress& press) {
+    const auto used = std::ranges::find(coverage.report.presses, press.name,
+                                        &calibration::PressReport::Depth::name);
+    if (used == coverage.report.presses.end()) return true;
+    press.depth_mm = used->depth_mm;
+    return false;
+  });
   return coverage;
 }
 

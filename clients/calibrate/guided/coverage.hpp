@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/calibrate/guided/taken_press.hpp"
 #include "clients/calibrate/offline/depth_build.hpp"
 
 namespace dtact::ctl::guided {
@@ -15,7 +16,7 @@ struct Coverage {
   calibration::PressReport report;  ///< Of `made`.
   std::string missing;              ///< Where they do not: why, and what to press.
   std::vector<std::string> doubts;  ///< What speaks against a list, a sentence each.
-  std::vector<double> depths_mm;    ///< Of the presses: as fitted, else by their contacts' width.
+  std::vector<TakenPress> presses;  ///< Those that show a contact.
 };
 
 /// `empty`: the map and the reference of these images, without a list. `force`: a list is made

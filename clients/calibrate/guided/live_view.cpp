@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <numbers>
-#include <sstream>
 #include <utility>
 
 #include "clients/calibrate/fit/build.hpp"
@@ -14,12 +13,12 @@ namespace dtact::ctl::guided {
 namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
-constexpr int kColumns = 44;
 
 }  // namespace
 
 void LiveView::use(const calibration::Calibration& empty, CellMeans untouched, double cell_mm) {
   model_ = empty.model;
+  scene_.mm_per_px = model_->mm_per_px;
   untouched_.reset();
   if (!untouched.empty()) {
     untouched_ = calibration::rectified_reference(
@@ -30,11 +29,15 @@ void LiveView::use(const calibration::Calibration& empty, CellMeans untouched, d
   cell_mm_ = cell_mm;
 }
 
-void LiveView::set_prompt(const std::string& prompt) {
-  prompt_.clear();
-  std::istringstream lines(prompt);
-  for (std::string line; std::getline(lines, line);) prompt_.push_back(line);
-  if (!prompt_.empty()) console_.live(prompt_);
+void LiveView::set_prompt(const Prompt& prompt) {
+  scene_.prompt = prompt;
+  scene_.words.clear();
+  console_.live(scene_);
+}
+
+void LiveView::set_presses(std::vector<TakenPress> presses, double covered_mm) {
+  scene_.presses = std::move(presses);
+  scene_.covered_mm = covered_mm;
 }
 
 image::Grey8 LiveView::picture(const image::Grey8& frame) const {
@@ -57,10 +60,10 @@ void LiveView::show(const Look& look, const std::string& words) {
   if (now_ns - drawn_ns_ < kSecond / 4) return;
   drawn_ns_ = now_ns;
   const image::Grey8 shown = picture(look.image);
-  std::vector<std::string> lines = half_blocks(shown, kColumns);
-  lines.push_back(words_on(look, words));
-  lines.insert(lines.end(), prompt_.begin(), prompt_.end());
-  console_.live(lines);
+  Scene scene = scene_;
+  scene.picture = &shown;
+  scene.words = words_on(look, words);
+  console_.live(scene);
   if (now_ns - saved_ns_ < kSecond) return;
   saved_ns_ = now_ns;
   folder_.save_preview(annotated(shown, model_->mm_per_px, std::nullopt));
@@ -70,10 +73,7 @@ void LiveView::still(const image::Grey8& frame, const std::optional<calibration:
                      bool touched) {
   const image::Grey8 shown = picture(frame);
   folder_.save_preview(annotated(shown, model_->mm_per_px, contact));
-  if (!touched || !console_.interactive()) return;
-  std::string text;
-  for (const std::string& line : half_blocks(shown, kColumns)) text += line + "\n";
-  console_.say(text);
+  if (touched) console_.keep(shown);
 }
 
 }  // namespace dtact::ctl::guided

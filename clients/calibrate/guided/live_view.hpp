@@ -12,16 +12,23 @@
 
 namespace dtact::ctl::guided {
 
-/// Shows frames: in the terminal where there is one, and as preview.png in the work folder.
+/// Shows frames: to the person who watches where there is one, and as preview.png in the work
+/// folder.
 class LiveView {
  public:
-  LiveView(Console& console, WorkFolder& folder) : console_(console), folder_(folder) {}
+  /// `presses_wanted`: after so many the calibration is made.
+  LiveView(Console& console, WorkFolder& folder, int presses_wanted)
+      : console_(console), folder_(folder) {
+    scene_.presses_wanted = presses_wanted;
+  }
 
   /// The depth map's place and, once there is a reference, its image and cells (empty before).
   /// `cell_mm`: side of a look's cells.
   void use(const calibration::Calibration& empty, CellMeans untouched, double cell_mm);
-  /// The lines under the live picture, drawn at once, even while no frame comes.
-  void set_prompt(const std::string& prompt);
+  /// What is asked under the live picture, drawn at once, even while no frame comes.
+  void set_prompt(const Prompt& prompt);
+  /// What has been taken, and how deep its list reaches (0: there is none).
+  void set_presses(std::vector<TakenPress> presses, double covered_mm);
 
   /// Draws at most four times a second of the frames' time, and saves once a second; only where a
   /// person watches.
@@ -40,7 +47,7 @@ class LiveView {
   std::shared_ptr<const recon::Model> model_;
   std::optional<image::Grey8> untouched_;
   CellMeans untouched_cells_;
-  std::vector<std::string> prompt_;
+  Scene scene_;  ///< Without the picture.
   double cell_mm_ = 0;
   std::int64_t drawn_ns_ = 0;
   std::int64_t saved_ns_ = 0;

@@ -26,7 +26,7 @@ Session::Session(Sensor& sensor, Console& console, Plan plan)
       console_(console),
       plan_(std::move(plan)),
       folder_(plan_.folder),
-      view_(console, folder_) {}
+      view_(console, folder_, plan_.presses) {}
 
 Outcome Session::run() {
   const auto kept = [this] {
@@ -115,7 +115,7 @@ void Session::resume() {
                   "still the same",
                   plan_.folder.string(), images_.set.presses.size()));
   judge();
-  (void)ask("[Enter] go on   [q] quit");
+  (void)ask({"", {{"", "go on"}, kQuit}});
 }
 
 v1::Status Session::steady_status() {
@@ -145,9 +145,9 @@ void Session::require_same_sensor() {
       plan_.folder.string(), fmt::join(found, "; ")));
 }
 
-std::string Session::ask(const std::string& prompt) {
-  if (!console_.interactive()) console_.say(prompt);
-  view_.set_prompt(prompt + " > ");
+std::string Session::ask(const Prompt& prompt) {
+  if (!console_.interactive()) console_.say(text_of(prompt));
+  view_.set_prompt(prompt);
   for (;;) {
     const Typed typed = console_.typed();
     switch (typed.kind) {
@@ -157,7 +157,7 @@ std::string Session::ask(const std::string& prompt) {
         throw Ended{Ended::Why::input};
       case Typed::Kind::line:
         if (typed.line == "q") throw Ended{Ended::Why::quit};
-        view_.set_prompt("");
+        view_.set_prompt({});
         return typed.line;
       case Typed::Kind::nothing:
         break;
@@ -169,7 +169,7 @@ std::string Session::ask(const std::string& prompt) {
 void Session::reference_step() {
   capture_->expect_light({});
   for (;;) {
-    (void)ask("Take your hands off: nothing may touch the surface.   [Enter] take   [q] quit");
+    (void)ask({"Take your hands off: nothing may touch the surface.", {{"", "take"}, kQuit}});
     try {
       const Still still = capture_->untouched(plan_.reference_frames);
       const std::string fault = fault_of(still, empty_.model->rectify);
@@ -198,8 +198,9 @@ Outcome Session::finish() {
   calibration::save(*coverage_.made, folder_.path() / kCalibration);
   console_.say(report_text(coverage_.report) + list_text(*coverage_.made->model) + "saved in " +
                folder_.at(kCalibration));
-  const std::string line = ask(fmt::format(
-      "Upload it to the daemon as {}?   [Enter] yes   [n] not now", folder_.calibration_name()));
+  const std::string line =
+      ask({fmt::format("Upload it to the daemon as {}?", folder_.calibration_name()),
+           {{"", "yes"}, {"n", "not now"}}});
   if (line.empty() || line == "y") {
     upload();
     return Outcome::uploaded;

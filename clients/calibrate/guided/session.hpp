@@ -54,12 +54,12 @@ class Session {
   /// Throws unless camera and light are those of the reference.
   void require_same_sensor();
   void load();
-  [[nodiscard]] std::string ask(const std::string& prompt);
+  [[nodiscard]] std::string ask(const Prompt& prompt);
 
   void reference_step();
   /// Until there is a list and the user, or the number of presses, says that it is enough.
   void press_steps();
-  [[nodiscard]] std::string press_prompt() const;
+  [[nodiscard]] Prompt press_prompt() const;
   void take_press(const std::string& name);
   void judge();
   [[nodiscard]] Outcome finish();

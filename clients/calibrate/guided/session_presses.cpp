@@ -3,12 +3,13 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "clients/calibrate/guided/session.hpp"
 
 namespace dtact::ctl::guided {
 
-std::string Session::press_prompt() const {
+Prompt Session::press_prompt() const {
   const std::size_t taken = images_.set.presses.size();
   std::string text =
       fmt::format("Press {} of {}: ", taken + 1,
@@ -16,14 +17,16 @@ std::string Session::press_prompt() const {
   if (taken >= 2 && !coverage_.made && coverage_.doubts.empty()) {
     text += "the one that is missing";
   } else {
-    const double depth = next_depth_mm(coverage_.depths_mm, plan_.ball_radius_mm);
+    std::vector<double> depths;
+    depths.reserve(coverage_.presses.size());
+    for (const TakenPress& press : coverage_.presses) depths.push_back(press.depth_mm);
+    const double depth = next_depth_mm(std::move(depths), plan_.ball_radius_mm);
     text += fmt::format("about {:.1f} mm deep (contact {:.1f} mm wide)", depth,
                         contact_width_mm(depth, plan_.ball_radius_mm));
   }
-  text += taken == 0 ? ", anywhere; hold still\n" : ", elsewhere; hold still\n";
-  text += fmt::format("[Enter] take  [r] retake {}  [p] preview  [s] finish  [q] quit",
-                      taken == 0 ? std::string(WorkFolder::kReference) : folder_.presses().back());
-  return text;
+  text += taken == 0 ? ", anywhere; hold still" : ", elsewhere; hold still";
+  const std::string last = taken == 0 ? WorkFolder::kReference : folder_.presses().back();
+  return {text, {{"", "take"}, {"r", "retake " + last}, {"p", "preview"}, {"s", "finish"}, kQuit}};
 }
 
 void Session::press_steps() {
@@ -65,9 +68,15 @@ void Session::press_steps() {
 
 void Session::take_press(const std::string& name) {
   require_same_sensor();
-  console_.say(fmt::format("waiting up to {:g} s for a press that holds still{}", plan_.patience_s,
-                           console_.interactive() ? "; [Enter] takes it as it is" : ""));
+  const std::string waiting =
+      fmt::format("waiting up to {:g} s for a press that holds still", plan_.patience_s);
+  if (console_.interactive()) {
+    view_.set_prompt({waiting, {{"", "take it as it is"}, kQuit}});
+  } else {
+    console_.say(waiting);
+  }
   const Still still = capture_->press(plan_.press_frames, untouched_, last_);
+  view_.set_prompt({});
   last_ = still.cells;
   calibration::Contact contact;
   try {
@@ -97,6 +106,7 @@ void Session::take_press(const std::string& name) {
 
 void Session::judge() {
   coverage_ = cover(images_, empty_, plan_.force);
+  view_.set_presses(coverage_.presses, coverage_.made ? covered_mm(*coverage_.made) : 0);
   if (!coverage_.made) {
     if (!images_.set.presses.empty()) console_.say("not yet a list: " + coverage_.missing);
     return;
@@ -104,8 +114,10 @@ void Session::judge() {
   for (const std::string& press : coverage_.report.left_out) console_.say("left out: " + press);
   for (const std::string& doubt : coverage_.doubts) console_.say("doubtful: " + doubt);
   std::vector<std::string> depths;
-  depths.reserve(coverage_.depths_mm.size());
-  for (const double depth : coverage_.depths_mm) depths.push_back(fmt::format("{:.2f}", depth));
+  depths.reserve(coverage_.report.presses.size());
+  for (const auto& press : coverage_.report.presses) {
+    depths.push_back(fmt::format("{:.2f}", press.depth_mm));
+  }
   console_.say(fmt::format("the list covers 0 to {:.2f} mm; presses of {} mm",
                            covered_mm(*coverage_.made), fmt::join(depths, ", ")));
 }

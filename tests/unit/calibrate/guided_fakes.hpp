@@ -138,10 +138,15 @@ class FakeConsole : public Console {
   }
   [[nodiscard]] bool interrupted() const override { return ctrl_c; }
   void say(const std::string& text) override { said += text + "\n"; }
-  void live(const std::vector<std::string>& lines) override { drawn = lines; }
+  void keep(const image::Grey8&) override {}
+  void live(const guided::Scene& scene) override {
+    drew = drew || scene.picture != nullptr;
+    drawn = scene;
+  }
 
   std::string said;
-  std::vector<std::string> drawn;
+  guided::Scene drawn;
+  bool drew = false;  ///< A picture at least once.
   bool person = false;
   bool ctrl_c = false;
 

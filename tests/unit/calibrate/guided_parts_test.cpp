@@ -1,4 +1,5 @@
 #include <gmock/gmock.h>
+#include <google/protobuf/util/json_util.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -12,7 +13,9 @@
 #include "clients/calibrate/guided/console.hpp"
 #include "clients/calibrate/guided/coverage.hpp"
 #include "clients/calibrate/guided/fitness.hpp"
+#include "clients/calibrate/guided/json_console.hpp"
 #include "clients/calibrate/guided/preview.hpp"
+#include "clients/common/guided.pb.h"
 
 namespace dtact::ctl::guided {
 namespace {
@@ -214,18 +217,59 @@ TEST_F(Piped, GivesLinesOneByOneAndThenTheEnd) {
   EXPECT_EQ(console.typed().kind, Typed::Kind::interrupted);
 }
 
+TEST_F(Piped, TellsAnotherProgramInJson) {
+  JsonConsole console(ends_[0], out_, [] { return false; });
+  EXPECT_TRUE(console.interactive());
+  console.say("first\nsecond");
+  const image::Grey8 picture{16, 12, std::vector<std::uint8_t>(192, 200)};
+  Scene scene;
+  scene.picture = &picture;
+  scene.mm_per_px = 0.05;
+  scene.words = "untouched";
+  scene.prompt = {"Press", {{"", "take"}, kQuit}};
+  scene.presses = {{"press-01", 3, 4, 5, 1.25}};
+  scene.presses_wanted = 6;
+  console.live(scene);
+  std::istringstream lines(out_.str());
+  std::string line;
+  cli::GuidedLine told;
+  std::getline(lines, line);
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &told).ok()) << line;
+  EXPECT_EQ(told.said(), "first\nsecond");
+  std::getline(lines, line);
+  // dtact-web tells scenes, which may give way to newer ones, by how they begin.
+  EXPECT_TRUE(line.starts_with(R"({"scene":)")) << line;
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &told).ok()) << line;
+  EXPECT_EQ(image::decode_png_grey16(told.scene().picture_png(), "picture").width, 16);
+  EXPECT_EQ(told.scene().prompt(), "Press");
+  ASSERT_EQ(told.scene().answers_size(), 2);
+  EXPECT_EQ(told.scene().answers(0).key(), "");
+  EXPECT_EQ(told.scene().answers(1).words(), "quit");
+  ASSERT_EQ(told.scene().presses_size(), 1);
+  EXPECT_EQ(told.scene().presses(0).depth_mm(), 1.25);
+  EXPECT_EQ(told.scene().presses_wanted(), 6U);
+  type("q\n");
+  EXPECT_EQ(console.typed().line, "q");
+}
+
 TEST_F(Piped, LiveLinesAreForPeople) {
   StreamConsole machine(ends_[0], out_, false, [] { return false; });
-  machine.live({"picture", "> "});
+  const auto asked = [](const std::string& words) {
+    Scene scene;
+    scene.words = words;
+    scene.prompt.answers = {kQuit};
+    return scene;
+  };
+  machine.live(asked("picture"));
   EXPECT_EQ(out_.str(), "");
   StreamConsole person(ends_[0], out_, true, [] { return false; });
-  person.live({"picture", "> "});
-  EXPECT_THAT(out_.str(), HasSubstr("picture\n> "));
-  person.live({"other", "> "});
+  person.live(asked("picture"));
+  EXPECT_THAT(out_.str(), HasSubstr("picture\n[q] quit > "));
+  person.live(asked("other"));
   EXPECT_THAT(out_.str(), HasSubstr("\r\x1b[1A\x1b[J\x1b[?7lother")) << "in place of a line below";
   person.say("done");
   EXPECT_THAT(out_.str(), EndsWith("\r\x1b[1A\x1b[Jdone\n")) << "nothing live stays";
-  person.live({"picture", "> "});
+  person.live(asked("picture"));
   type("\n");  // and the terminal's echo has moved the cursor
   person.say("done");
   EXPECT_THAT(out_.str(), EndsWith("\r\x1b[2A\x1b[Jdone\n"));

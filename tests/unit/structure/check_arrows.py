@@ -51,7 +51,7 @@ ROOMS = {
     "clients/calibrate/fit/model": ["hal/image", "daemon/recon", "daemon/calibration", "clients/calibrate/fit"],
     "clients/calibrate/lens": ["daemon/recon"],
     "clients/calibrate/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/fit/model", "clients/calibrate/lens"],
-    "clients/calibrate/guided": ["hal/base", "hal/image", "hal/toml", "proto", "daemon/recon", "daemon/calibration", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
+    "clients/calibrate/guided": ["hal/base", "hal/image", "hal/toml", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
     # Depth of a recording, made by what makes it in the daemon.
     "clients/calibrate/reprocess": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mcap", "hal/mjpeg", "proto", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/cpp", "clients/recording"],
     # Contacts of pictures and of recordings.
