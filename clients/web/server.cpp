@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "clients/web/names.hpp"
+#include "clients/web/token_query.hpp"
 #include "daemon/serve/security.hpp"
 #include "proto/framing.hpp"
 
@@ -50,11 +51,16 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
       page_(page),
       tls_(net::make_tls(config_)),
       admission_(config_) {
+  std::vector<guided::Calibrated> calibrated;
   for (NamedDaemon& daemon : settings.daemons) {
+    const client::Options options = daemon.options;
     auto source = std::make_shared<Source>(io, daemon.name, std::move(daemon.options));
+    calibrated.push_back({source, options});
     sensors_.push_back(std::make_shared<Sensor>(io, std::move(source), config_, admission_));
   }
   foxglove_ = std::make_unique<foxglove::Door>(sources(), config_, admission_);
+  guided_ = std::make_unique<guided::Door>(std::move(calibrated), std::move(settings.work_folder),
+                                           config_, admission_);
   listener_ = net::listen_tcp(io, config_, [this](asio::ip::tcp::socket socket, net::Peer peer) {
     // One too many is let go of without a word, as any of HTTP would cost what there is too little
     // of.
@@ -77,6 +83,7 @@ void Server::start() {
 void Server::stop() {
   listener_->stop();
   foxglove_->stop();
+  guided_->stop();
   for (const auto& sensor : sensors_) {
     sensor->stop();
     sensor->source().stop();
@@ -118,6 +125,10 @@ Upgrade Server::upgrade(const Request& request) {
                                fmt::format("a page of {} may not look at this sensor", origin))};
   }
   if (foxglove) return foxglove_->upgrade(request);
+  if (guided_->knows(path_of(request))) {
+    const std::string target(request.target().data(), request.target().size());
+    return guided_->upgrade(path_of(request), token_of(target));
+  }
   const auto sensor = find(path_of(request));
   if (sensor == nullptr) {
     return {.refusal = refusal(http::status::not_found,

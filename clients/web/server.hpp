@@ -2,12 +2,14 @@
 
 #include <boost/asio/io_context.hpp>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "clients/cpp/options.hpp"
 #include "clients/web/foxglove/door.hpp"
+#include "clients/web/guided/door.hpp"
 #include "clients/web/http_connection.hpp"
 #include "clients/web/page.hpp"
 #include "clients/web/request.hpp"
@@ -32,6 +34,8 @@ struct Settings {
   std::vector<std::string> host_names;
   /// Whose pages may open Foxglove's WebSocket, besides our own: Foxglove's, and its programs'.
   std::vector<std::string> foxglove_origins{"https://app.foxglove.dev", "file://"};
+  /// Below it guided calibrations save what they take.
+  std::filesystem::path work_folder;
 };
 
 /// dtact-web as a whole: the page, and a WebSocket for each daemon. All but the connections to the
@@ -67,6 +71,7 @@ class Server : public Site, public std::enable_shared_from_this<Server> {
   HttpLimits limits_;
   std::vector<std::shared_ptr<Sensor>> sensors_;
   std::unique_ptr<foxglove::Door> foxglove_;
+  std::unique_ptr<guided::Door> guided_;
   std::shared_ptr<net::Listener> listener_;
 };
 

@@ -75,6 +75,7 @@ void add_serve(CLI::App& app, cli::Context& context) {
   net.port = wire::kWebPort;
   net.max_clients = 64;
   net.max_clients_per_address = 48;
+  arguments->settings.work_folder = "dtact-calibrations";
   command
       ->add_option("--daemon", arguments->daemons,
                    "A daemon and its name on the page; behind the address, each after a comma, "
@@ -98,6 +99,12 @@ void add_serve(CLI::App& app, cli::Context& context) {
                    "An address whose pages may open /foxglove; in place of Foxglove's own")
       ->type_name("ORIGIN")
       ->take_all();
+  command
+      ->add_option("--work-folder", arguments->settings.work_folder,
+                   "Below it guided calibrations save what they take")
+      ->type_name("FOLDER")
+      ->envname("STATE_DIRECTORY")
+      ->capture_default_str();
   command
       ->add_option("--page", arguments->page,
                    "Serve the files of this folder in place of the page that is built in")

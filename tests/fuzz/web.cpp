@@ -2,9 +2,9 @@
 // that was sent, and no text or bytes of a client's break anything.
 #include <stdexcept>
 
-#include "clients/web/foxglove/door.hpp"
 #include "clients/web/foxglove/protocol.hpp"
 #include "clients/web/relayed_frame.hpp"
+#include "clients/web/token_query.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 namespace dtact::fuzz {
@@ -26,7 +26,7 @@ void try_relay(const std::string& bytes) {
 void try_foxglove(const std::string& text) {
   using namespace web::foxglove;
   (void)parse_operation(text);
-  (void)token_of(text);
+  (void)web::token_of(text);
   const auto call = parse_call(text);
   for (const Service service : {Service::set_light, Service::rezero}) {
     try {

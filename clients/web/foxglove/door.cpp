@@ -7,9 +7,10 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/http/rfc7230.hpp>
-#include <charconv>
 #include <chrono>
 #include <utility>
+
+#include "clients/web/token_query.hpp"
 
 namespace dtact::web::foxglove {
 
@@ -41,28 +42,6 @@ void refuse(const std::shared_ptr<WebSocket>& socket, const std::string& sentenc
 }
 
 }  // namespace
-
-std::string token_of(std::string_view target) {
-  const auto question = target.find('?');
-  std::string_view rest = question == std::string_view::npos ? "" : target.substr(question + 1);
-  while (!rest.empty()) {
-    std::string_view part = rest.substr(0, rest.find('&'));
-    rest.remove_prefix(std::min(rest.size(), part.size() + 1));
-    if (!part.starts_with("token=")) continue;
-    part.remove_prefix(6);
-    std::string token;
-    while (!part.empty()) {
-      unsigned value = 0;
-      const bool coded =
-          part.size() >= 3 && part[0] == '%' &&
-          std::from_chars(part.data() + 1, part.data() + 3, value, 16).ptr == part.data() + 3;
-      token += coded ? static_cast<char>(value) : part[0];
-      part.remove_prefix(coded ? 3 : 1);
-    }
-    return token;
-  }
-  return "";
-}
 
 Door::Door(const std::vector<std::shared_ptr<Source>>& sources, const net::NetConfig& config,
            net::Admission& admission)

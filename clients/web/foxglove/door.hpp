@@ -37,7 +37,4 @@ class Door {
   std::vector<std::weak_ptr<FoxgloveClient>> clients_;
 };
 
-/// What "token=" is in the part of a target behind '?', its %XX read; empty where there is none.
-[[nodiscard]] std::string token_of(std::string_view target);
-
 }  // namespace dtact::web::foxglove

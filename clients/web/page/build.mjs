@@ -31,8 +31,10 @@ execFileSync(
     "--es_opt=target=ts",
     `--proto_path=${values.tree}/proto`,
     `--proto_path=${values.tree}/clients/recording`,
+    `--proto_path=${values.tree}/clients/common`,
     "dtact.proto",
     "foxglove.proto",
+    "guided.proto",
   ],
   { stdio: "inherit" },
 );

@@ -10,8 +10,8 @@
 
 #include "clients/cpp/errors.hpp"
 #include "clients/recording/foxglove.pb.h"
-#include "clients/web/foxglove/door.hpp"
 #include "clients/web/foxglove/protocol.hpp"
+#include "clients/web/token_query.hpp"
 
 namespace dtact::web::foxglove {
 namespace {

@@ -8,6 +8,8 @@ import {
 import type { StoredCalibration } from "../../gen/dtact_pb";
 import { button, el, panel, say } from "../dom";
 import type { Sensor } from "../session/sensor";
+import { Guide } from "./guide";
+import type { MapShape } from "./guide";
 
 const FILES = ["calibration.toml", "reference.png"];
 
@@ -27,11 +29,15 @@ export class CalibrationsPanel {
       title: `Choose ${FILES.join(" and ")} of a calibration's folder`,
     }),
     this.picker,
+    button("Calibrate…", () => this.guide(), {
+      title: "Makes a calibration by presses of a ball of known radius",
+    }),
   );
   readonly element = panel("Calibrations", this.list, this.upload, this.answer);
 
   /** What is told is that the list did not come. */
   private lacking = false;
+  private inUse: MapShape | undefined;
 
   constructor(private readonly sensor: Sensor) {
     this.picker.addEventListener("change", () => void this.send());
@@ -45,12 +51,20 @@ export class CalibrationsPanel {
         value: create(ListCalibrationsSchema),
       });
       if (result.case !== "calibrations") return;
+      const used = result.value.calibrations.find((stored) => stored.inUse)?.content;
+      this.inUse = used?.case === "summary" ? used.value : undefined;
       this.list.replaceChildren(...result.value.calibrations.map((stored) => this.item(stored)));
       if (this.lacking) this.tell("");
     } catch (error) {
       this.tell((error as Error).message);
       this.lacking = true;
     }
+  }
+
+  private guide(): void {
+    const guide = new Guide(this.sensor, this.inUse, () => void this.refresh());
+    this.element.append(guide.element);
+    guide.open();
   }
 
   private tell(sentence: string): void {

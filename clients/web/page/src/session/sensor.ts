@@ -44,15 +44,14 @@ export class Sensor {
 
   constructor(
     readonly name: string,
-    token: string,
+    private token: string,
     wants: Wants,
     private readonly watcher: Watcher,
   ) {
     this.worker.onmessage = (message: MessageEvent<FromWorker>) => this.take(message.data);
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
     this.send({
       kind: "open",
-      url: `${scheme}://${location.host}/sensors/${encodeURIComponent(name)}/wire`,
+      url: this.address("wire"),
       program: "dtact-web page",
       token,
       nearby: HERE.includes(location.hostname),
@@ -65,7 +64,20 @@ export class Sensor {
     return this.rights !== Rights.VIEW;
   }
 
+  /** A WebSocket that the gateway has for this sensor. */
+  private address(what: string): string {
+    const scheme = location.protocol === "https:" ? "wss" : "ws";
+    return `${scheme}://${location.host}/sensors/${encodeURIComponent(this.name)}/${what}`;
+  }
+
+  /** That of a guided calibration. */
+  get calibrateAddress(): string {
+    const token = this.token && `?token=${encodeURIComponent(this.token)}`;
+    return this.address("calibrate") + token;
+  }
+
   useToken(token: string): void {
+    this.token = token;
     this.send({ kind: "token", token });
   }
 

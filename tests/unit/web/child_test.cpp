@@ -1,0 +1,93 @@
+// Another program, spoken with in lines.
+#include "clients/web/guided/child.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <boost/asio/io_context.hpp>
+#include <csignal>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <vector>
+
+namespace dtact::web {
+namespace {
+
+using testing::ElementsAre;
+
+struct Told {
+  std::vector<std::string> lines;
+  std::optional<int> status;
+  std::string errors;
+};
+
+/// Runs a script of the shell's to its end. `with`: once it runs.
+template <typename With>
+Told run(const std::string& script, const std::string& secret, With&& with) {
+  boost::asio::io_context io;
+  Told told;
+  const auto child = std::make_shared<Child>(io.get_executor());
+  child->start({"sh", "-c", script}, secret,
+               {.line = [&](std::string line) { told.lines.push_back(std::move(line)); },
+                .ended =
+                    [&](int status, const std::string& errors) {
+                      told.status = status;
+                      told.errors = errors;
+                    }});
+  EXPECT_TRUE(child->runs());
+  with(*child);
+  io.run();
+  EXPECT_FALSE(child->runs());
+  return told;
+}
+
+TEST(Child, IsTypedLinesAndAnswersInThem) {
+  const Told told =
+      run("read a; read b; echo \"$b\"; echo \"$a\"; echo why >&2; exit 3", "", [](Child& child) {
+        child.type("first");
+        child.type("second one");
+      });
+  EXPECT_THAT(told.lines, ElementsAre("second one", "first"));
+  ASSERT_TRUE(told.status.has_value());
+  EXPECT_EQ(WEXITSTATUS(*told.status), 3);
+  EXPECT_EQ(told.errors, "why\n");
+}
+
+TEST(Child, ReadsASecretThatNobodyElseCan) {
+  const Told told =
+      run("cat /proc/self/fd/3; echo; stat -Lc %a /proc/self/fd/3", "gripper-token", [](Child&) {});
+  EXPECT_THAT(told.lines, ElementsAre("gripper-token", "600"));
+}
+
+TEST(Child, IsEndedAlsoWhereItWillNot) {
+  const Told told = run("exec sleep 60", "", [](Child& child) { child.end(); });
+  EXPECT_EQ(WTERMSIG(*told.status), SIGTERM);
+  // The trap stands once it says so.
+  boost::asio::io_context io;
+  const auto deaf = std::make_shared<Child>(io.get_executor());
+  std::optional<int> status;
+  deaf->start({"sh", "-c", "trap '' TERM; echo deaf; while :; do sleep 0.1; done"}, "",
+              {.line = [&](const std::string&) { deaf->end(); },
+               .ended = [&](int how, const std::string&) { status = how; }});
+  io.run();
+  ASSERT_TRUE(status.has_value());
+  EXPECT_EQ(WTERMSIG(*status), SIGKILL);
+}
+
+TEST(Child, KeepsTheEndOfALongComplaint) {
+  const Told told = run("seq 1 5000 >&2; echo last >&2; exit 1", "", [](Child&) {});
+  EXPECT_LE(told.errors.size(), 2000U);
+  EXPECT_TRUE(told.errors.ends_with("5000\nlast\n"));
+}
+
+TEST(Child, SaysThatAProgramIsNotThere) {
+  boost::asio::io_context io;
+  const auto child = std::make_shared<Child>(io.get_executor());
+  EXPECT_THROW(child->start({"/nowhere/dtact"}, "", {}), std::system_error);
+}
+
+}  // namespace
+}  // namespace dtact::web

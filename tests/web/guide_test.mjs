@@ -1,0 +1,131 @@
+// The guided calibration on the page: dtact-calibrate, which the gateway runs, on a sensor that a ball of 4 mm
+// is pressed into again and again.
+import assert from "node:assert/strict";
+import { readdirSync } from "node:fs";
+import path from "node:path";
+import { after, before, test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { open, until } from "./browser.mjs";
+import { startDaemon, startGateway, status, stopAll, tokenFile, work } from "./programs.mjs";
+
+const scenes = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../../config/scenes");
+const folder = path.join(work, "sessions");
+const START = { radius_mm: 4, mm_per_px: 0.0413793, crop: [580, 580] };
+
+let left;
+let view;
+let pane;
+
+before(async () => {
+  left = await startDaemon("left", 0, [
+    `camera.sim.scene=${path.join(scenes, "calibration_presses.toml")}`,
+    "camera.fps=60",
+  ]);
+  view = await open(await startGateway({ left: left.port }, ["--work-folder", folder]));
+  pane = view.page.locator('[data-sensor="left"]');
+});
+
+after(async () => {
+  await view?.close();
+  await stopAll();
+});
+
+/** What the gateway says last to one that sends this first. */
+function lastWord(page, first, token = "") {
+  return page.evaluate(
+    ([message, query]) =>
+      new Promise((done) => {
+        const socket = new WebSocket(`ws://${location.host}/sensors/left/calibrate${query}`);
+        let last = "";
+        socket.onopen = () => socket.send(message);
+        socket.onmessage = ({ data }) => (last = data);
+        socket.onclose = () => done(last);
+      }),
+    [first, token && `?token=${token}`],
+  );
+}
+
+test("presses become a calibration that the daemon uses", async () => {
+  await pane.getByRole("button", { name: "Calibrate…" }).click();
+  const guide = view.page.getByRole("dialog", { name: "Guided calibration" });
+  // As the calibration in use has them.
+  assert.equal(await guide.getByLabel("Millimetres a pixel").inputValue(), "0.0413793");
+  assert.equal(await guide.getByLabel("Map's width, pixels").inputValue(), "580");
+  await guide.getByRole("button", { name: "Begin" }).click();
+  const said = guide.getByLabel("Said", { exact: true });
+  const done = /the daemon uses calibration left-\d{8}-\d{6} from now on/;
+  let refused;
+  // Some come out too light, or their like have been taken.
+  const end = Date.now() + 300_000;
+  while (Date.now() < end && !done.test(await said.textContent())) {
+    const answer = guide.getByRole("button", { name: /^(take|yes)$/ });
+    if (await answer.isVisible()) await answer.click({ timeout: 1000 }).catch(() => {});
+    if (!refused && /press-01 taken/.test(await said.textContent())) {
+      refused = await lastWord(view.page, JSON.stringify(START));
+      await guide.screenshot({ path: path.join(work, "guide.png") });
+    }
+    await view.page.waitForTimeout(100);
+  }
+  const words = await said.textContent();
+  assert.match(words, /reference taken: 32 frames/);
+  assert.match(words, /press-06 taken/);
+  assert.match(words, done);
+  assert.match(refused, /somebody calibrates this sensor already/);
+  assert.ok((await guide.locator(".depths circle").count()) >= 6);
+  assert.match(await guide.locator(".depths").textContent(), /the list reaches [\d.]+ mm/);
+  // As large as the map, with the presses' circles on it.
+  const canvas = guide.locator("canvas");
+  assert.equal(await canvas.evaluate(({ width, height }) => `${width} ${height}`), "580 580");
+  await guide.screenshot({ path: path.join(work, "guide-done.png") });
+  await until(
+    () => guide.getByRole("button", { name: "Close" }).isVisible(),
+    (visible) => visible,
+    10_000,
+  );
+  await guide.getByRole("button", { name: "Close" }).click();
+  assert.equal(await guide.count(), 0);
+  const { name } = status(left).calibration;
+  assert.deepEqual(readdirSync(folder), [name]);
+  const panel = pane.getByLabel("Calibrations");
+  await until(
+    () => panel.textContent(),
+    (text) => text.includes(name) && text.includes("in use"),
+    10_000,
+  );
+});
+
+test("what cannot be is refused in words", async () => {
+  assert.match(await lastWord(view.page, "nonsense"), /GuidedStart in JSON/);
+  assert.equal(await lastWord(view.page, "x".repeat(5000)), "");
+  assert.match(
+    await lastWord(view.page, JSON.stringify({ ...START, radius_mm: 0 })),
+    /--radius-mm/,
+  );
+});
+
+test("one that may only look may not calibrate", async () => {
+  const { file, token } = tokenFile("view");
+  const gateway = await startGateway({ left: left.port }, [
+    "--tokens",
+    file,
+    "--work-folder",
+    folder,
+  ]);
+  const viewer = await open(gateway);
+  try {
+    assert.match(await lastWord(viewer.page, JSON.stringify(START)), /token/);
+    assert.match(
+      await lastWord(viewer.page, JSON.stringify(START), token),
+      /lets you look, not calibrate/,
+    );
+    await viewer.page.getByLabel("Token").fill(token);
+    await viewer.page.getByLabel("Token").press("Enter");
+    await until(
+      () => viewer.page.locator(".calibrations li").count(),
+      (count) => count > 0,
+    );
+    assert.equal(await viewer.page.getByRole("button", { name: "Calibrate…" }).isVisible(), false);
+  } finally {
+    await viewer.close();
+  }
+});
