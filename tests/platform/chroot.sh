@@ -44,6 +44,7 @@ prepare() {
     touch "$root/ready"
   fi
   cp /etc/resolv.conf "$root/etc/resolv.conf"
+  printf '127.0.0.1 localhost\n::1 localhost\n' > "$root/etc/hosts"
   stamp=$(printf '%s\n' "$setup" "$@" | sha256sum | cut -c1-16)
   if [ "$(cat "$installed" 2> /dev/null)" != "$stamp" ]; then
     echo "$(basename "$0"): installing packages"

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Reads the daemon's metrics with Prometheus' own client, and checks what is drawn against them.
 
-check_metrics.py PROGRAM-THAT-PRINTS-THEM DASHBOARD...
+check_metrics.py DASHBOARD PROGRAM-THAT-PRINTS-THEM...
 """
 import json
 import re
@@ -80,7 +80,7 @@ def complaints_of_dashboard(path, known):
 
 
 def main():
-    text = subprocess.run(sys.argv[1:2], check=True, capture_output=True, text=True).stdout
+    text = subprocess.run(sys.argv[2:], check=True, capture_output=True, text=True).stdout
     families = list(text_string_to_metric_families(text))
     found = [complaint for family in families for complaint in complaints_of_family(family)]
     identities = [s.labels["identity"] for f in families for s in f.samples
@@ -88,8 +88,7 @@ def main():
     if identities != ['a "quoted"\\name\nof two lines']:
         found.append(f"an odd label came back as {identities}")
     known = {sample.name for family in families for sample in family.samples}
-    for dashboard in sys.argv[2:]:
-        found += complaints_of_dashboard(dashboard, known)
+    found += complaints_of_dashboard(sys.argv[1], known)
     print("\n".join(found + [f"{len(families)} metrics, {len(found)} complaints"]))
     return 1 if found or not families else 0
 

@@ -217,6 +217,9 @@ TEST_F(DeadPeer, IsLetGoInTheMiddleOfFrames) {
 }
 
 TEST_F(DeadPeer, IsLetGoAfterItStoppedReading) {
+#ifdef DTACT_EMULATED
+  GTEST_SKIP() << "the emulator does not pass on what TCP knows of a connection";
+#endif
   Rig rig(config_);
   RawClient client(rig.tcp_port(), kSmallBuffer);
   client.hello();
