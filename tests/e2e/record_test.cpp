@@ -215,6 +215,13 @@ TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) {
 }
 
 TEST_F(Record, WithoutJpegsDepthCannotBeMadeAnew) {
+  // A recording has the untouched image where there is one when it begins.
+  client::Client client = sensor.connect();
+  client.subscribe();
+  ASSERT_TRUE(read_until(client, [](const Item& i) {
+    const auto* frame = std::get_if<v1::Frame>(&i);
+    return frame != nullptr && frame->has_depth();
+  }));
   std::string said;
   ASSERT_EQ(run_program(command({"--seconds", "1", "--no-jpeg", "--pictures-hz", "0"}), &said), 0);
   const mcap::Reader reader(file);
