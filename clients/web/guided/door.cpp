@@ -125,7 +125,6 @@ void Door::admit(const Calibrated& sensor, std::shared_ptr<WebSocket> socket, co
   Relay::Handlers handlers;
   handlers.begin = [this, &sensor, log, verdict](const std::string& start, Relay& relay,
                                                  Child::Handlers of_child) {
-    if (!verdict.rights) throw std::runtime_error(verdict.sentence);
     const auto& daemon = sensor.source->daemon();
     if (*verdict.rights != net::Rights::control ||
         (daemon && daemon->rights() == v1::RIGHTS_VIEW)) {
@@ -142,6 +141,7 @@ void Door::admit(const Calibrated& sensor, std::shared_ptr<WebSocket> socket, co
   const auto relay = std::make_shared<Relay>(std::move(socket), std::move(handlers));
   std::erase_if(relays_, [](const auto& weak) { return weak.expired(); });
   relays_.push_back(relay);
+  if (!verdict.rights) return relay->refuse(verdict.sentence);
   relay->start();
 }
 

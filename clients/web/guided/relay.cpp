@@ -1,6 +1,7 @@
 #include "clients/web/guided/relay.hpp"
 
 #include <boost/asio/buffer.hpp>
+#include <chrono>
 #include <exception>
 #include <string_view>
 #include <utility>
@@ -17,15 +18,22 @@ namespace {
 
 /// How dtact-calibrate begins a line that holds a scene.
 constexpr std::string_view kScene = R"({"scene":)";
+/// How long one that was told why may take to read it.
+constexpr std::chrono::seconds kLinger{10};
 /// Sentences that wait for a page that does not read: a session says a few a minute.
 constexpr std::size_t kMostTexts = 256;
 
 }  // namespace
 
 Relay::Relay(std::shared_ptr<WebSocket> socket, Handlers handlers)
-    : socket_(std::move(socket)), handlers_(std::move(handlers)) {}
+    : socket_(std::move(socket)), handlers_(std::move(handlers)), linger_(socket_->executor()) {}
 
 void Relay::start() { read(); }
+
+void Relay::refuse(const std::string& sentence) {
+  finish(sentence);
+  read();
+}
 
 void Relay::close() {
   finish("dtact-web ends");
@@ -108,12 +116,18 @@ void Relay::finish(const std::string& error) {
   line.mutable_ended()->set_error(error);
   finished_ = true;
   queue(cli::json_line(line));
+  linger_.expires_after(kLinger);
+  linger_.async_wait([weak = weak_from_this()](const error_code& ended) {
+    const auto self = weak.lock();
+    if (!ended && self != nullptr) self->over();
+  });
   if (child_ != nullptr) child_->end();
 }
 
 void Relay::over() {
   if (std::exchange(over_, true)) return;
   finished_ = true;
+  linger_.cancel();
   if (child_ != nullptr) child_->end();
   socket_->close();
   handlers_.ended();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <boost/asio/steady_timer.hpp>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -31,6 +32,8 @@ class Relay : public std::enable_shared_from_this<Relay> {
   Relay(std::shared_ptr<WebSocket> socket, Handlers handlers);
 
   void start();
+  /// In place of start(): says why not.
+  void refuse(const std::string& sentence);
   /// The gateway ends.
   void close();
   /// A message to the page (a GuidedLine as JSON). Of scenes that wait the newest is sent.
@@ -57,6 +60,7 @@ class Relay : public std::enable_shared_from_this<Relay> {
   bool writing_ = false;
   bool finished_ = false;  ///< Nothing comes after what waits.
   bool over_ = false;
+  boost::asio::steady_timer linger_;  ///< Until one that was told all is let go of.
 };
 
 }  // namespace dtact::web::guided
