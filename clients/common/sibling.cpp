@@ -7,11 +7,14 @@
 
 namespace dtact::cli {
 
-std::string sibling(const std::string& program) {
+std::string own_folder() {
   std::error_code unknown;
-  const auto self = std::filesystem::read_symlink("/proc/self/exe", unknown);
-  const std::string beside = (self.parent_path() / program).string();
-  return !unknown && ::access(beside.c_str(), X_OK) == 0 ? beside : program;
+  return std::filesystem::read_symlink("/proc/self/exe", unknown).parent_path().string();
+}
+
+std::string sibling(const std::string& program) {
+  const std::string beside = own_folder() + '/' + program;
+  return ::access(beside.c_str(), X_OK) == 0 ? beside : program;
 }
 
 }  // namespace dtact::cli

@@ -41,9 +41,9 @@ Arguments::iterator word_from(Arguments& arguments, Arguments::iterator place) {
   const int error = errno;
   throw cli::Failure(
       cli::kFailed,
-      fmt::format("cannot start {}, which makes calibrations: {}. It belongs beside dtactctl or "
-                  "into PATH: install it from the same release",
-                  kProgram, std::strerror(error)));
+      fmt::format("cannot start {}, which makes calibrations: {}. It belongs beside dtactctl ({}) "
+                  "or into PATH: install it from the same release",
+                  kProgram, std::strerror(error), cli::own_folder()));
 }
 
 }  // namespace
