@@ -9,6 +9,7 @@
 #include <chrono>
 #include <optional>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "clients/common/guided.pb.h"
@@ -157,7 +158,15 @@ std::shared_ptr<Child> Door::begin(const Calibrated& sensor, const std::string& 
   line.mutable_begun()->set_folder(folder.string());
   relay.tell(cli::json_line(line));
   auto child = std::make_shared<Child>(relay.executor());
-  child->start(words_for(sensor.options, wish, folder), sensor.options.token, std::move(handlers));
+  try {
+    child->start(words_for(sensor.options, wish, folder), sensor.options.token,
+                 std::move(handlers));
+  } catch (const std::system_error& e) {
+    throw std::runtime_error(
+        fmt::format("cannot start {}, which makes calibrations: {}. It belongs beside dtact-web "
+                    "({}) or into PATH: install it from the same release",
+                    kProgram, e.code().message(), cli::own_folder()));
+  }
   children_[name] = child;
   return child;
 }
