@@ -294,7 +294,7 @@ TEST_F(Hostile, ReconnectStorm) {
           client.subscribe(v1::DEPTH_INT16);
           ++greeted;
           if (i % 2 == 0) client.die();
-        } catch (const std::runtime_error&) {
+        } catch (const std::runtime_error&) {  // NOLINT(bugprone-empty-catch)
           // Refused: there may be too many.
         }
       }

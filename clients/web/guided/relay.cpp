@@ -82,19 +82,19 @@ void Relay::queue(std::string text) {
     scene_ = std::move(text);
   } else {
     // What is said belongs to the scene before it.
-    if (scene_) texts_.push_back(*std::exchange(scene_, {}));
+    if (!scene_.empty()) texts_.push_back(std::exchange(scene_, {}));
     texts_.push_back(std::move(text));
   }
   if (!writing_) write_next();
 }
 
 void Relay::write_next() {
-  if (texts_.empty() && !scene_) {
+  if (texts_.empty() && scene_.empty()) {
     if (finished_) socket_->end(shared_from_this());
     return;
   }
   writing_ = true;
-  if (texts_.empty()) texts_.push_back(*std::exchange(scene_, {}));
+  if (texts_.empty()) texts_.push_back(std::exchange(scene_, {}));
   const auto text = std::make_shared<const std::string>(std::move(texts_.front()));
   texts_.pop_front();
   socket_->write({asio::buffer(*text)}, true,

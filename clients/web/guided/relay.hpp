@@ -5,7 +5,6 @@
 #include <deque>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "clients/web/guided/child.hpp"
@@ -56,7 +55,7 @@ class Relay : public std::enable_shared_from_this<Relay> {
   std::array<char, kMaxMessage> piece_{};
   std::string received_;
   std::deque<std::string> texts_;
-  std::optional<std::string> scene_;
+  std::string scene_;  ///< The newest, waiting; empty: none is.
   bool writing_ = false;
   bool finished_ = false;  ///< Nothing comes after what waits.
   bool over_ = false;
