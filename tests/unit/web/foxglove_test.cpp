@@ -16,7 +16,6 @@
 namespace dtact::web::foxglove {
 namespace {
 
-using testing::HasSubstr;
 using namespace std::string_literals;
 
 TEST(FoxgloveProtocol, Heads) {
