@@ -59,7 +59,7 @@ test_dev() {
 
 check_format() {
   sources | xargs clang-format-19 --dry-run --Werror
-  git ls-files '*.sh' | xargs shellcheck dev .ci/run debian/dtactd.p* tests/kernel/{umlrun,selftest,guest-init} \
+  git ls-files '*.sh' | xargs shellcheck dev .ci/run debian/*.{postinst,postrm,prerm} tests/kernel/{umlrun,selftest,guest-init} \
     tests/install/guest/dtact-test
 }
 
