@@ -13,8 +13,9 @@ std::string own_folder() {
 }
 
 std::string sibling(const std::string& program) {
-  const std::string beside = own_folder() + '/' + program;
-  return ::access(beside.c_str(), X_OK) == 0 ? beside : program;
+  const std::string folder = own_folder();
+  const std::string beside = folder + '/' + program;
+  return !folder.empty() && ::access(beside.c_str(), X_OK) == 0 ? beside : program;
 }
 
 }  // namespace dtact::cli

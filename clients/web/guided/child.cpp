@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/mman.h>
+#include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -29,6 +30,8 @@ using boost::system::error_code;
 namespace {
 
 constexpr std::chrono::seconds kPatience{5};
+/// As Child::kSecretFile names it.
+constexpr int kSecret = 3;
 /// Of what is written as errors, so much is kept: the end, which says why.
 constexpr std::size_t kMostErrors = 2000;
 
@@ -45,6 +48,20 @@ struct Pipe {
   }
   base::UniqueFd read;
   base::UniqueFd write;
+};
+
+/// Both ends write and read.
+struct Pair {
+  Pair() {
+    std::array<int, 2> ends{};
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0) {
+      fail(errno, "socketpair");
+    }
+    here.reset(ends[0]);
+    there.reset(ends[1]);
+  }
+  base::UniqueFd here;
+  base::UniqueFd there;
 };
 
 /// A file without a name that nobody else can read.
@@ -82,6 +99,8 @@ class Spawning {
   void give(const base::UniqueFd& file, int as) {
     ::posix_spawn_file_actions_adddup2(&actions_, file.get(), as);
   }
+  /// Asio's sockets would live on in the other program after they were closed here.
+  void keep_all_from(int first) { ::posix_spawn_file_actions_addclosefrom_np(&actions_, first); }
   [[nodiscard]] pid_t start(std::vector<std::string>& words) const {
     std::vector<char*> argv;
     argv.reserve(words.size() + 1);
@@ -110,20 +129,21 @@ Child::~Child() {
 }
 
 void Child::start(std::vector<std::string> words, const std::string& secret, Handlers handlers) {
-  Pipe in;
+  Pair in;
   Pipe out;
   Pipe errors;
   const base::UniqueFd file = secret.empty() ? base::UniqueFd() : secret_file(secret);
   Spawning spawning;
-  spawning.give(in.read, STDIN_FILENO);
+  spawning.give(in.there, STDIN_FILENO);
   spawning.give(out.write, STDOUT_FILENO);
   spawning.give(errors.write, STDERR_FILENO);
-  if (file) spawning.give(file, 3);
+  if (file) spawning.give(file, kSecret);
+  spawning.keep_all_from(file ? kSecret + 1 : kSecret);
   pid_ = spawning.start(words);
   const auto process = static_cast<int>(::syscall(SYS_pidfd_open, pid_, 0));
   if (process < 0) fail(errno, "pidfd_open");
   handlers_ = std::move(handlers);
-  in_.assign(in.write.release());
+  in_.assign(asio::local::stream_protocol(), in.here.release());
   out_.assign(out.read.release());
   errors_.assign(errors.read.release());
   process_.assign(process);
@@ -133,9 +153,11 @@ void Child::start(std::vector<std::string> words, const std::string& secret, Han
   await_exit();
 }
 
-void Child::type(const std::string& line) {
+bool Child::type(const std::string& line) {
+  if (typed_.size() + line.size() > kMaxTyped) return false;
   typed_ += line + '\n';
   if (writing_.empty()) write_next();
+  return true;
 }
 
 void Child::write_next() {

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <cstddef>
@@ -19,6 +20,7 @@ class Child : public std::enable_shared_from_this<Child> {
  public:
   /// The longest line that is taken; one that is longer ends the program.
   static constexpr std::size_t kMaxLine = std::size_t{8} << 20U;
+  static constexpr std::size_t kMaxTyped = std::size_t{64} << 10U;
   /// The file, in the program, that holds what it is told in secret.
   static constexpr const char* kSecretFile = "/proc/self/fd/3";
 
@@ -38,8 +40,8 @@ class Child : public std::enable_shared_from_this<Child> {
   /// kSecretFile holds; empty: there is none. Throws std::system_error.
   void start(std::vector<std::string> words, const std::string& secret, Handlers handlers);
   [[nodiscard]] bool runs() const noexcept { return pid_ >= 0; }
-  /// Sends a line.
-  void type(const std::string& line);
+  /// Sends a line. False, and it is not sent, where more than kMaxTyped bytes would wait.
+  [[nodiscard]] bool type(const std::string& line);
   /// Asks it to end (SIGTERM), and ends it a few seconds later. Handlers are called all the same.
   void end();
 
@@ -53,7 +55,8 @@ class Child : public std::enable_shared_from_this<Child> {
   /// One of the three that have to be over is.
   void one_over();
 
-  Stream in_;
+  /// Not a pipe: to write into one whose reader is gone would end this program.
+  boost::asio::local::stream_protocol::socket in_;
   Stream out_;
   Stream errors_;
   Stream process_;  ///< A pidfd.

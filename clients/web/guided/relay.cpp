@@ -35,11 +35,6 @@ void Relay::refuse(const std::string& sentence) {
   read();
 }
 
-void Relay::close() {
-  finish("dtact-web ends");
-  over();
-}
-
 void Relay::read() {
   socket_->read_some(asio::buffer(piece_),
                      [self = shared_from_this()](const error_code& error, WebSocket::Received got) {
@@ -54,7 +49,8 @@ void Relay::take(const std::string& message) {
   if (finished_) return;
   if (child_ != nullptr) {
     if (message.find('\n') != std::string::npos) return finish("an answer is one line");
-    return child_->type(message);
+    if (!child_->type(message)) finish("more was answered than was asked");
+    return;
   }
   const std::weak_ptr<Relay> weak = weak_from_this();
   try {

@@ -4,7 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
+#include <array>
 #include <boost/asio/io_context.hpp>
 #include <csignal>
 #include <memory>
@@ -47,8 +49,8 @@ Told run(const std::string& script, const std::string& secret, With&& with) {
 TEST(Child, IsTypedLinesAndAnswersInThem) {
   const Told told =
       run("read a; read b; echo \"$b\"; echo \"$a\"; echo why >&2; exit 3", "", [](Child& child) {
-        child.type("first");
-        child.type("second one");
+        EXPECT_TRUE(child.type("first"));
+        EXPECT_TRUE(child.type("second one"));
       });
   EXPECT_THAT(told.lines, ElementsAre("second one", "first"));
   ASSERT_TRUE(told.status.has_value());
@@ -60,6 +62,26 @@ TEST(Child, ReadsASecretThatNobodyElseCan) {
   const Told told =
       run("cat /proc/self/fd/3; echo; stat -Lc %a /proc/self/fd/3", "gripper-token", [](Child&) {});
   EXPECT_THAT(told.lines, ElementsAre("gripper-token", "600"));
+}
+
+TEST(Child, HasNoneOfOurOtherFiles) {
+  std::array<int, 2> ours{};  // stay open over exec, as Asio's sockets do
+  ASSERT_EQ(::pipe(ours.data()), 0);
+  const std::string list = "ls /proc/$$/fd | grep -xv 10; true";  // 10: dash's own
+  EXPECT_THAT(run(list, "secret", [](Child&) {}).lines, ElementsAre("0", "1", "2", "3"));
+  EXPECT_THAT(run(list, "", [](Child&) {}).lines, ElementsAre("0", "1", "2"));
+  for (const int end : ours) ::close(end);
+}
+
+TEST(Child, TakesNoMoreThanItIsBoundTo) {
+  (void)run("exec sleep 60", "", [](Child& child) {
+    const std::string line(4096, 'x');
+    int taken = 0;
+    while (taken < 1000 && child.type(line)) ++taken;
+    EXPECT_GE(taken, 15);
+    EXPECT_LE(taken, 17) << "one on its way, 64 KiB waiting";
+    child.end();
+  });
 }
 
 TEST(Child, IsEndedAlsoWhereItWillNot) {
