@@ -29,7 +29,7 @@ export class CalibrationsPanel {
       title: `Choose ${FILES.join(" and ")} of a calibration's folder`,
     }),
     this.picker,
-    button("Calibrate…", () => this.guide(), {
+    button("Calibrate…", () => void this.guide(), {
       title: "Makes a calibration by presses of a ball of known radius",
     }),
   );
@@ -61,7 +61,9 @@ export class CalibrationsPanel {
     }
   }
 
-  private guide(): void {
+  private async guide(): Promise<void> {
+    // The list may not have come yet, and the map's shape is in it.
+    await this.refresh();
     const guide = new Guide(this.sensor, this.inUse, () => void this.refresh());
     this.element.append(guide.element);
     guide.open();
