@@ -5,18 +5,16 @@
 
 #include <chrono>
 #include <cstdlib>
-#include <cstring>
 #include <memory>
-#include <mutex>
-#include <optional>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "hal/libcamera/dma_buffer.hpp"
 #include "hal/libcamera/formats.hpp"
+#include "hal/libcamera/manager.hpp"
 #include "hal/libcamera/photometry.hpp"
+#include "hal/libcamera/search_pace.hpp"
 #include "hal/libcamera/session.hpp"
 #include "hal/live/device_error.hpp"
 #include "hal/live/live_camera.hpp"
@@ -26,21 +24,6 @@ namespace {
 
 namespace lc = libcamera;
 using live::DeviceError;
-
-/// libcamera allows one manager a process; it lives as long as a camera does.
-std::shared_ptr<lc::CameraManager> shared_manager() {
-  static std::mutex mutex;
-  static std::weak_ptr<lc::CameraManager> present;
-  const std::lock_guard guard(mutex);
-  if (auto manager = present.lock()) return manager;
-  auto manager = std::make_shared<lc::CameraManager>();
-  if (const int e = manager->start(); e != 0) {
-    throw DeviceError(CameraState::unplugged,
-                      fmt::format("libcamera does not start ({})", std::strerror(-e)));
-  }
-  present = manager;
-  return manager;
-}
 
 std::shared_ptr<lc::Camera> find(lc::CameraManager& manager, const std::string& id) {
   const std::vector<std::shared_ptr<lc::Camera>> cameras = manager.cameras();
@@ -61,52 +44,27 @@ std::shared_ptr<lc::Camera> find(lc::CameraManager& manager, const std::string& 
                                       id, names));
 }
 
-/// Finds the camera in libcamera's view of the machine. libcamera follows plugging by udev's
-/// events, and a manager that starts while a camera's nodes are just appearing can miss the last of
-/// them for good: after a while without the camera the search begins anew with a manager of its own
-/// (unless another camera of this process keeps the present one). Cameras go back to their manager
-/// before it ends, so the session with the lost camera ends with it.
-class Search {
- public:
-  explicit Search(std::string id) : id_(std::move(id)) {}
-
-  /// Throws DeviceError as find(). `before`: the session with the camera that was lost, or null.
-  std::shared_ptr<lc::Camera> operator()(std::shared_ptr<Session>& before) {
-    if (!manager_) manager_ = shared_manager();
-    try {
-      std::shared_ptr<lc::Camera> camera = find(*manager_, id_);
-      missing_since_.reset();
-      return camera;
-    } catch (const DeviceError&) {
-      const auto now = std::chrono::steady_clock::now();
-      if (!missing_since_) missing_since_ = now;
-      // Whoever still waits for a frame of it holds the session for a moment.
-      if (now - *missing_since_ > kPatience && before.use_count() <= 1) {
-        before.reset();
-        manager_.reset();
-        missing_since_.reset();
-      }
-      throw;
-    }
-  }
-
- private:
-  static constexpr std::chrono::seconds kPatience{5};
-  std::string id_;
-  std::shared_ptr<lc::CameraManager> manager_;
-  std::optional<std::chrono::steady_clock::time_point> missing_since_;
-};
-
 live::Opener opener(const CameraConfig& config) {
   check_pixel_format(config.libcamera.pixel_format);
-  return [config, lock = PhotometricLock(config.libcamera, config.fps),
-          search = Search(config.libcamera.device), heap = std::make_shared<DmaHeap>(),
-          session = std::shared_ptr<Session>()]() mutable -> live::Opened {
-    const std::shared_ptr<lc::Camera> camera = search(session);
-    session.reset();  // the one before, which see
+  return [config, lock = PhotometricLock(config.libcamera, config.fps), pace = SearchPace(),
+          heap = std::make_shared<DmaHeap>(), missing = std::string()]() mutable -> live::Opened {
+    if (!pace.due(std::chrono::steady_clock::now(), std::chrono::system_clock::now())) {
+      throw DeviceError(CameraState::unplugged, missing);
+    }
+    auto manager = std::make_unique<Manager>();
+    std::shared_ptr<lc::Camera> camera;
+    try {
+      camera = find(**manager, config.libcamera.device);
+    } catch (const DeviceError& e) {
+      missing = e.what();
+      throw;
+    }
     const bool cached = driver_memory_is_cached(sensor_of(camera->properties()));
-    session = std::make_shared<Session>(camera, config, lock, cached ? nullptr : heap.get());
-    return {session, camera->id(), session->pixel_format(), session->controls()};
+    const std::string id = camera->id();
+    // Nothing of the camera stays here: the session gives it back before the manager ends.
+    const auto session = std::make_shared<Session>(std::move(manager), std::move(camera), config,
+                                                   lock, cached ? nullptr : heap.get());
+    return {session, id, session->pixel_format(), session->controls()};
   };
 }
 

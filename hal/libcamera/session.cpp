@@ -1,6 +1,7 @@
 #include "hal/libcamera/session.hpp"
 
 #include <fmt/format.h>
+#include <libcamera/base/object.h>
 #include <libcamera/control_ids.h>
 #include <unistd.h>
 
@@ -61,6 +62,20 @@ int orientation_of(const Configuration& configuration) {
 /// the buffers of the queue are filled.
 constexpr int kSettlingFrames = 16;
 
+/// One that does nothing, on the thread that it has been moved to.
+class Last : public lc::Object {
+ public:
+  void done() {}
+};
+
+/// Returns when libcamera's thread has done all that it was told to before.
+void wait_for(lc::Thread* thread) {
+  auto last = std::make_unique<Last>();
+  last->moveToThread(thread);
+  last->invokeMethod(&Last::done, lc::ConnectionTypeBlocking);
+  last.release()->deleteLater();
+}
+
 /// Of what the pipeline answered when it was configured.
 ControlVerdict granted(bool as_asked) {
   return as_asked ? ControlVerdict::confirmed : ControlVerdict::refused;
@@ -68,9 +83,11 @@ ControlVerdict granted(bool as_asked) {
 
 }  // namespace
 
-Session::Session(std::shared_ptr<lc::Camera> camera, const CameraConfig& config,
-                 const PhotometricLock& lock, const DmaHeap* heap)
-    : camera_(std::move(camera)), sensor_(sensor_of(camera_->properties())) {
+Session::Session(std::unique_ptr<Manager> manager, std::shared_ptr<lc::Camera> camera,
+                 const CameraConfig& config, const PhotometricLock& lock, const DmaHeap* heap)
+    : manager_(std::move(manager)),
+      camera_(std::move(camera)),
+      sensor_(sensor_of(camera_->properties())) {
   if (const int e = camera_->acquire(); e != 0) fail(e, "acquire", camera_->id());
   acquired_ = true;
   try {
@@ -211,15 +228,18 @@ void Session::settle(double fps) {
 
 void Session::stop() noexcept {
   if (!std::exchange(acquired_, false)) return;
-  // Requests under way come back cancelled from within stop(); they must still be there.
+  // Requests under way come back cancelled from within stop(); they must still be there. When the
+  // camera was unplugged it returns at once, and libcamera's thread may still have a request before
+  // it that was queued just then.
   camera_->stop();
+  wait_for(camera_->thread());
   camera_->requestCompleted.disconnect(this);
   camera_->disconnected.disconnect(this);
-  if (!gone()) {
-    for (Slot& slot : slots_) slot.request.reset();
-    allocator_.reset();
-  }
+  for (Slot& slot : slots_) slot.request.reset();
+  allocator_.reset();
   camera_->release();
+  camera_.reset();
+  manager_.reset();
 }
 
 // On libcamera's thread.
@@ -235,11 +255,6 @@ void Session::on_disconnected() {
   const std::lock_guard guard(mutex_);
   gone_ = true;
   changed_.notify_one();
-}
-
-bool Session::gone() noexcept {
-  const std::lock_guard guard(mutex_);
-  return gone_;
 }
 
 void Session::wait(std::int64_t deadline_ns) noexcept {

@@ -13,6 +13,7 @@
 #include "hal/config.hpp"
 #include "hal/libcamera/dma_buffer.hpp"
 #include "hal/libcamera/formats.hpp"
+#include "hal/libcamera/manager.hpp"
 #include "hal/libcamera/photometry.hpp"
 #include "hal/live/source.hpp"
 
@@ -20,17 +21,14 @@ namespace dtact::hal::libcamera_backend {
 
 /// A camera that libcamera has given to us and that streams. Requests go round: completed, lent or
 /// decoded, queued again, never made anew.
-///
-/// When the camera was unplugged, libcamera's stop() returns at once, and its thread may still have
-/// a request before it that was queued just then: requests live on until the session ends. Keep the
-/// session until libcamera shows a camera again, which its thread does after that.
 class Session final : public live::Source {
  public:
   /// Configures the camera and starts it, with buffers from `heap` (may be null) where that has
   /// some, else with the driver's own. Throws live::ModeError when it lacks the mode asked for,
   /// live::DeviceError when it is busy or fails.
-  Session(std::shared_ptr<libcamera::Camera> camera, const CameraConfig& config,
-          const PhotometricLock& lock, const DmaHeap* heap);
+  /// `manager`: the camera's, null where the caller keeps it for longer.
+  Session(std::unique_ptr<Manager> manager, std::shared_ptr<libcamera::Camera> camera,
+          const CameraConfig& config, const PhotometricLock& lock, const DmaHeap* heap);
   ~Session() override;
 
   [[nodiscard]] const std::string& pixel_format() const noexcept { return pixel_format_; }
@@ -64,8 +62,8 @@ class Session final : public live::Source {
   void settle(double fps);
   void on_completed(libcamera::Request* request);
   void on_disconnected();
-  [[nodiscard]] bool gone() noexcept;
 
+  std::unique_ptr<Manager> manager_;  // ends after the camera that it gave
   std::shared_ptr<libcamera::Camera> camera_;
   Sensor sensor_;
   std::unique_ptr<libcamera::CameraConfiguration> configuration_;

@@ -88,7 +88,8 @@ class VirtualCamera : public testing::Test {
   }
   [[nodiscard]] std::shared_ptr<Session> open(double fps) {
     const DmaHeap heap(kNoHeap);
-    return std::make_shared<Session>(camera_, config(fps), PhotometricLock({}, fps), &heap);
+    return std::make_shared<Session>(nullptr, camera_, config(fps), PhotometricLock({}, fps),
+                                     &heap);
   }
 
   lc::CameraManager manager_;

@@ -1,0 +1,36 @@
+#include "hal/libcamera/search_pace.hpp"
+
+#include <sys/stat.h>
+
+#include <filesystem>
+#include <system_error>
+
+namespace dtact::hal::libcamera_backend {
+namespace {
+
+/// Whether a node of a camera has been made or changed within SearchPace::kPeriod. A clock that is
+/// set in the meantime costs one period at most.
+bool has_new_nodes(const std::string& devices, std::chrono::system_clock::time_point date) {
+  const std::time_t now = std::chrono::system_clock::to_time_t(date);
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(devices, error)) {
+    const std::string name = entry.path().filename();
+    if (!name.starts_with("media") && !name.starts_with("video")) continue;
+    struct stat of{};
+    if (::stat(entry.path().c_str(), &of) != 0) continue;
+    const std::chrono::seconds age{now - of.st_ctim.tv_sec};
+    if (age >= std::chrono::seconds(0) && age <= SearchPace::kPeriod) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool SearchPace::due(std::chrono::steady_clock::time_point now,
+                     std::chrono::system_clock::time_point date) {
+  if (last_ && now - *last_ < kPeriod && !has_new_nodes(devices_, date)) return false;
+  last_ = now;
+  return true;
+}
+
+}  // namespace dtact::hal::libcamera_backend

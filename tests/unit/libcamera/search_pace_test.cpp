@@ -1,0 +1,47 @@
+#include "hal/libcamera/search_pace.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace dtact::hal::libcamera_backend {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(SearchPace, LooksSeldomUnlessNodesAreNew) {
+  const std::filesystem::path devices =
+      std::filesystem::path(testing::TempDir()) / "search_pace_devices";
+  std::filesystem::remove_all(devices);
+  std::filesystem::create_directories(devices);
+  const std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
+  const auto date = [] { return std::chrono::system_clock::now(); };
+  SearchPace pace(devices);
+  EXPECT_TRUE(pace.due(begin, date()));
+  EXPECT_FALSE(pace.due(begin + 100ms, date()));
+  EXPECT_FALSE(pace.due(begin + 1999ms, date()));
+  EXPECT_TRUE(pace.due(begin + 2s, date()));
+  EXPECT_FALSE(pace.due(begin + 3s, date()));
+
+  std::ofstream(devices / "sda").close();
+  EXPECT_FALSE(pace.due(begin + 3s, date()));
+  // A change of it before the date is asked for is at most that old.
+  const std::chrono::system_clock::time_point made = date();
+  std::ofstream(devices / "media0").close();
+  EXPECT_TRUE(pace.due(begin + 3s, made + 1s));
+  EXPECT_TRUE(pace.due(begin + 3100ms, made + 1s));
+  EXPECT_FALSE(pace.due(begin + 3200ms, made + 1h));
+  EXPECT_FALSE(pace.due(begin + 3200ms, made - 1h));
+  std::filesystem::remove_all(devices);
+}
+
+TEST(SearchPace, LooksSeldomWithoutAFolderOfDevices) {
+  SearchPace pace("/nonexistent");
+  const std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
+  EXPECT_TRUE(pace.due(begin, std::chrono::system_clock::now()));
+  EXPECT_FALSE(pace.due(begin + 1s, std::chrono::system_clock::now()));
+}
+
+}  // namespace
+}  // namespace dtact::hal::libcamera_backend
