@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Makes the tables, plots and pages that lie beside this file from the simulated sensor:
-# tables.sh BIN [table|atlas|thickness|study ...], all of them without a name. BIN: where the accuracy
+# tables.sh BIN [table|atlas|thickness|study|pose ...], all of them without a name. BIN: where the accuracy
 # tests were built.
 set -euo pipefail
 here=$(dirname "$(readlink -f "$0")")
 bin=$1
 shift
-(($#)) || set -- table atlas thickness study
+(($#)) || set -- table atlas thickness study pose
 for part in "$@"; do
   case $part in
     table)
@@ -27,8 +27,14 @@ for part in "$@"; do
       "$bin/study/robot_study" --out "$here/study" >/dev/null
       echo "study: tests/accuracy/study/study.md"
       ;;
+    pose)
+      rm -rf "$bin/pose/sequences"
+      "$bin/pose/pose_sequences" --out "$bin/pose/sequences"
+      /usr/bin/python3 "$here/pose/comparison.py" "$bin/pose/sequences" "$here/pose"
+      echo "pose: tests/accuracy/pose/README.md"
+      ;;
     *)
-      echo "tables.sh: '$part' is none of table, atlas, thickness, study" >&2
+      echo "tables.sh: '$part' is none of table, atlas, thickness, study, pose" >&2
       exit 2
       ;;
   esac

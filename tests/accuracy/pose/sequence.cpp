@@ -1,0 +1,123 @@
+#include "tests/accuracy/pose/sequence.hpp"
+
+#include <fmt/format.h>
+#include <time.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "hal/sim/scene.hpp"
+
+namespace dtact::pose {
+namespace {
+
+using perceive::Motion;
+
+constexpr int kSide = 580;
+constexpr int kColumn = 110;  ///< Of the depth map in the image of 800 × 600.
+constexpr int kRow = 10;
+constexpr double kMmPerPx = 0.0413793;
+/// What is deeper belongs to the press; the map has so many pixels around it.
+constexpr int kPressedUm = 100;
+constexpr int kMargin = 16;
+/// Where the ways begin.
+constexpr double kStartDeg = 10;
+constexpr double kYMm = 0.3;
+constexpr double kDepthMm = 0.5;
+
+hal::sim::Scene scene_of(const std::string& object, const std::string& keys) {
+  hal::sim::Scene scene =
+      hal::sim::parse_scene(fmt::format("[[press]]\n{}\n{}", object, keys), "sequence");
+  scene.layer.solve_step_mm = 0.2;
+  return scene;
+}
+
+}  // namespace
+
+std::string keys_of(const Way& way) {
+  return fmt::format(
+      "keys = [\n  {{ t = 0.0, x = {}, y = {}, depth = {}, rotation = {} }},\n"
+      "  {{ t = 2.0, x = {}, y = {}, depth = {}, rotation = {}, tilt_y = {} }},\n]\n",
+      -way.slide_mm / 2, kYMm, kDepthMm, kStartDeg, way.slide_mm / 2, kYMm,
+      kDepthMm + way.deeper_mm, kStartDeg + way.twist_deg, way.roll_deg);
+}
+
+std::string keys_of_a_minute() {
+  std::string keys =
+      fmt::format("keys = [\n  {{ t = 0.0, x = 0.0, y = 0.0, depth = {} }},\n", kDepthMm);
+  for (int round = 0; round < 6; ++round) {
+    const double t = 10.0 * round;
+    keys += fmt::format(
+        "  {{ t = {}, x = 2.0 }},\n  {{ t = {}, x = 0.0, y = 2.0 }},\n"
+        "  {{ t = {}, y = 0.0, rotation = 20.0 }},\n  {{ t = {}, x = -2.0, rotation = -20.0 }},\n"
+        "  {{ t = {}, x = 0.0, rotation = 0.0 }},\n",
+        t + 2, t + 4, t + 6, t + 8, t + 10);
+  }
+  return keys + "]\n";
+}
+
+Sequence::Sequence(const std::string& object, const std::string& keys)
+    : truth_(scene_of(object, keys)) {}
+
+Map Sequence::map(std::uint64_t sequence, double noise_um) {
+  truth_.indentation_mm(sequence, mm_);
+  std::normal_distribution<double> normal;
+  std::vector<std::int16_t> all;
+  all.reserve(std::size_t{kSide} * kSide);
+  Map map;
+  map.grid.x = kSide;
+  map.grid.y = kSide;
+  int right = -1;
+  int bottom = -1;
+  for (int row = 0; row < kSide; ++row) {
+    for (int column = 0; column < kSide; ++column) {
+      const auto at = static_cast<std::size_t>((row + kRow) * 800 + column + kColumn);
+      all.push_back(static_cast<std::int16_t>(
+          std::lround(1000 * static_cast<double>(mm_[at]) + noise_um * normal(random_))));
+      if (all.back() <= kPressedUm) continue;
+      map.grid.x = std::min(map.grid.x, std::max(0, column - kMargin));
+      map.grid.y = std::min(map.grid.y, std::max(0, row - kMargin));
+      right = std::max(right, std::min(kSide - 1, column + kMargin));
+      bottom = std::max(bottom, std::min(kSide - 1, row + kMargin));
+    }
+  }
+  map.grid.width = right - map.grid.x + 1;
+  map.grid.height = bottom - map.grid.y + 1;
+  map.grid.full_width = map.grid.full_height = kSide;
+  map.grid.mm_per_px = kMmPerPx;
+  for (int row = map.grid.y; row <= bottom; ++row) {
+    const auto* from = all.data() + std::ptrdiff_t{row} * kSide + map.grid.x;
+    map.values.insert(map.values.end(), from, from + map.grid.width);
+  }
+  map.grid.values = map.values;
+  return map;
+}
+
+Motion Sequence::place(std::uint64_t sequence) const {
+  const hal::sim::Pose pose = truth_.pose(0, sequence).value();
+  const Eigen::Vector3d turn =
+      Eigen::Vector3d(pose.turn_deg[0], pose.turn_deg[1], pose.turn_deg[2]) * M_PI / 180;
+  Motion place;
+  if (turn.norm() > 0) {
+    place.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  }
+  place.translation = Eigen::Vector3d(pose.x_mm, pose.y_mm, pose.z_mm) * 1e-3;
+  return place;
+}
+
+Motion Sequence::motion(std::uint64_t sequence) const {
+  const Motion from = place(0);
+  const Motion to = place(sequence);
+  const Eigen::Matrix3d rotation = to.rotation * from.rotation.transpose();
+  return {rotation, to.translation - rotation * from.translation};
+}
+
+double cpu_us() {
+  timespec now{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
+}
+
+}  // namespace dtact::pose
