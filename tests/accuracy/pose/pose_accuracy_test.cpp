@@ -22,6 +22,9 @@ using perceive::PointCloud;
 using perceive::Tracker;
 using perceive::test::Error;
 
+constexpr int kEvery = 5;
+constexpr int kSteps = 2 * Sequence::kFps / kEvery;
+
 struct Result {
   Error last;
   Error worst;
@@ -30,13 +33,13 @@ struct Result {
 };
 
 Result follow(const std::string& object, const Way& way) {
-  Sequence frames(object, keys_of(way));
+  Sequence frames(object, keys_of(way, kSteps));
   Tracker tracker;
   CloudMaker maker;
   PointCloud cloud;
   std::vector<double> times;
   Result result;
-  for (std::uint64_t sequence = 0; sequence <= 2 * Sequence::kFps; sequence += 5) {
+  for (std::uint64_t sequence = 0; sequence <= 2 * Sequence::kFps; sequence += kEvery) {
     const Map map = frames.map(sequence);
     const double before = cpu_us();
     maker.make(map.grid, 1, cloud);
@@ -86,11 +89,11 @@ TEST(PoseOnTheSimulatedLayer, ABallShowsThreeDirections) {
 // Those that it is compared with have to be able to.
 TEST(NormalFlow, FollowsACube) {
   for (const Way& way : {kSlide, kTwist}) {
-    Sequence frames("object = \"cube\"\nside_mm = 5.0", keys_of(way));
+    Sequence frames("object = \"cube\"\nside_mm = 5.0", keys_of(way, kSteps));
     NormalFlow flow;
     CloudMaker maker;
     PointCloud cloud;
-    for (std::uint64_t sequence = 0; sequence <= 2 * Sequence::kFps; sequence += 6) {
+    for (std::uint64_t sequence = 0; sequence <= 2 * Sequence::kFps; sequence += kEvery) {
       const Map map = frames.map(sequence);
       maker.make(map.grid, 1, cloud);
       const auto& pose = flow.follow(map.grid, cloud, ContactView(map.grid, cloud, 10));

@@ -29,8 +29,8 @@ using perceive::Tracker;
 /// Of what the daemon says of a depth without a calibration's own figure.
 constexpr double kUncertaintyUm = 10;
 /// Of 60 frames a second, the minute's of 15.
-constexpr std::uint64_t kEvery = 2;
-constexpr std::uint64_t kEveryOfAMinute = 4;
+constexpr int kEvery = 2;
+constexpr int kEveryOfAMinute = 4;
 /// Points that are handed out, along both sides.
 constexpr int kStride = 2;
 
@@ -113,8 +113,9 @@ std::vector<float> points_of(const PointCloud& cloud, const ContactView& view) {
   return rows;
 }
 
-void follow(const std::string& object, const std::string& keys, std::uint64_t last,
-            std::uint64_t every, const std::filesystem::path& folder) {
+/// `steps` of `every` frames each.
+void follow(const std::string& object, const std::string& keys, int steps, int every,
+            const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   Sequence frames(object, keys);
   Tracker tracker;
@@ -124,8 +125,8 @@ void follow(const std::string& object, const std::string& keys, std::uint64_t la
   std::vector<double> truth;  // 12 of the motion, 40 of what is seen
   std::vector<double> ours;   // 12 of the motion, lost, microseconds
   std::vector<double> flows;
-  std::size_t frame = 0;
-  for (std::uint64_t sequence = 0; sequence <= last; sequence += every, ++frame) {
+  for (int step = 0; step <= steps; ++step) {
+    const auto sequence = static_cast<std::uint64_t>(step) * static_cast<std::uint64_t>(every);
     const Map clean = frames.map(sequence, 0);
     maker.make(clean.grid, 1, cloud);
     append(truth, frames.motion(sequence));
@@ -146,7 +147,7 @@ void follow(const std::string& object, const std::string& keys, std::uint64_t la
     ours.insert(ours.end(), {pose.state == Tracker::State::lost ? 1.0 : 0.0, followed - before});
     append(flows, flown.motion);
     flows.insert(flows.end(), {flown.lost ? 1.0 : 0.0, end - followed + (made - before)});
-    save(folder / fmt::format("points_{:04}.npy", frame), points_of(cloud, view),
+    save(folder / fmt::format("points_{:04}.npy", step), points_of(cloud, view),
          PointCloud::kParts);
   }
   save(folder / "truth.npy", truth, 52);
@@ -169,14 +170,16 @@ int main(int argc, char** argv) {
     for (const Thing& thing : kThings) {
       if (!only.empty() && only != thing.name) continue;
       for (const Way& way : {kSlide, kTwist, kRoll, kDeeper}) {
-        follow(thing.lines, keys_of(way), 2 * Sequence::kFps, kEvery, out / thing.name / way.name);
+        constexpr int kSteps = 2 * Sequence::kFps / kEvery;
+        follow(thing.lines, keys_of(way, kSteps), kSteps, kEvery, out / thing.name / way.name);
       }
     }
     for (const Thing& thing : kThings) {
       const std::string_view name = thing.name;
       if (name != "M4 nut" && name != "cube") continue;
       if (!only.empty() && only != name) continue;
-      follow(thing.lines, keys_of_a_minute(), 60 * Sequence::kFps, kEveryOfAMinute,
+      constexpr int kSteps = 60 * Sequence::kFps / kEveryOfAMinute;
+      follow(thing.lines, keys_of_a_minute(kSteps), kSteps, kEveryOfAMinute,
              out / thing.name / "minute");
     }
     return 0;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -27,33 +28,49 @@ constexpr double kStartDeg = 10;
 constexpr double kYMm = 0.3;
 constexpr double kDepthMm = 0.5;
 
+constexpr double kSeconds = 2;
+
+std::string key(double t, double x, double y, double depth, double rotation, double tilt_y) {
+  return fmt::format(
+      "  {{ t = {:.9f}, x = {:.9f}, y = {:.9f}, depth = {:.9f}, rotation = {:.9f}, tilt_y = {:.9f} "
+      "}},\n",
+      t, x, y, depth, rotation, tilt_y);
+}
+
 hal::sim::Scene scene_of(const std::string& object, const std::string& keys) {
-  hal::sim::Scene scene =
-      hal::sim::parse_scene(fmt::format("[[press]]\n{}\n{}", object, keys), "sequence");
-  scene.layer.solve_step_mm = 0.2;
-  return scene;
+  return hal::sim::parse_scene(fmt::format("[[press]]\n{}\n{}", object, keys), "sequence");
 }
 
 }  // namespace
 
-std::string keys_of(const Way& way) {
-  return fmt::format(
-      "keys = [\n  {{ t = 0.0, x = {}, y = {}, depth = {}, rotation = {} }},\n"
-      "  {{ t = 2.0, x = {}, y = {}, depth = {}, rotation = {}, tilt_y = {} }},\n]\n",
-      -way.slide_mm / 2, kYMm, kDepthMm, kStartDeg, way.slide_mm / 2, kYMm,
-      kDepthMm + way.deeper_mm, kStartDeg + way.twist_deg, way.roll_deg);
+std::string keys_of(const Way& way, int steps) {
+  std::string keys = "keys = [\n";
+  for (int step = 0; step <= steps; ++step) {
+    const double part = static_cast<double>(step) / steps;
+    keys += key(kSeconds * part, (part - 0.5) * way.slide_mm, kYMm, kDepthMm + part * way.deeper_mm,
+                kStartDeg + part * way.twist_deg, part * way.roll_deg);
+  }
+  return keys + "]\n";
 }
 
-std::string keys_of_a_minute() {
-  std::string keys =
-      fmt::format("keys = [\n  {{ t = 0.0, x = 0.0, y = 0.0, depth = {} }},\n", kDepthMm);
-  for (int round = 0; round < 6; ++round) {
-    const double t = 10.0 * round;
-    keys += fmt::format(
-        "  {{ t = {}, x = 2.0 }},\n  {{ t = {}, x = 0.0, y = 2.0 }},\n"
-        "  {{ t = {}, y = 0.0, rotation = 20.0 }},\n  {{ t = {}, x = -2.0, rotation = -20.0 }},\n"
-        "  {{ t = {}, x = 0.0, rotation = 0.0 }},\n",
-        t + 2, t + 4, t + 6, t + 8, t + 10);
+std::string keys_of_a_minute(int steps) {
+  struct Corner {
+    double x_mm, y_mm, rotation_deg;
+  };
+  // Two seconds from one to the next.
+  constexpr std::array kRound{Corner{0, 0, 0}, Corner{2, 0, 0}, Corner{0, 2, 0}, Corner{0, 0, 20},
+                              Corner{-2, 0, -20}};
+  std::string keys = "keys = [\n";
+  for (int step = 0; step <= steps; ++step) {
+    const double t = 60.0 * step / steps;
+    const double whole = std::floor(t / 2);
+    const double part = t / 2 - whole;
+    const auto at = static_cast<std::size_t>(whole) % kRound.size();
+    const Corner& from = kRound.at(at);
+    const Corner& to = kRound.at((at + 1) % kRound.size());
+    const auto between = [part](double a, double b) { return a + part * (b - a); };
+    keys += key(t, between(from.x_mm, to.x_mm), between(from.y_mm, to.y_mm), kDepthMm,
+                between(from.rotation_deg, to.rotation_deg), 0);
   }
   return keys + "]\n";
 }

@@ -24,10 +24,12 @@ inline constexpr Way kTwist{.name = "twist", .twist_deg = 30};
 inline constexpr Way kRoll{.name = "roll", .roll_deg = 15};
 inline constexpr Way kDeeper{.name = "deeper", .deeper_mm = 0.3};
 
-/// The keys of a press, as in a scene's file, that go this way.
-[[nodiscard]] std::string keys_of(const Way& way);
+/// The keys of a press, as in a scene's file, that go this way in so many steps. The layer is
+/// solved at keys; between them two solutions are blended, which is no shape of an object: look at
+/// the frames of the keys.
+[[nodiscard]] std::string keys_of(const Way& way, int steps);
 /// Keys of a minute: slid to and fro along a cross and twisted, again and again.
-[[nodiscard]] std::string keys_of_a_minute();
+[[nodiscard]] std::string keys_of_a_minute(int steps);
 
 /// Indentation, whole micrometres, cut out around what is pressed.
 struct Map {
@@ -42,8 +44,7 @@ class Sequence {
   static constexpr int kFps = 60;
   static constexpr double kNoiseUm = 3;
 
-  /// `object`: the lines of a scene's press that say what it is. The layer is solved as often as
-  /// the object moves by 0.2 mm.
+  /// `object`: the lines of a scene's press that say what it is.
   Sequence(const std::string& object, const std::string& keys);
 
   /// The map of a frame; `noise_um`: the deviation of its noise, another with every call.
