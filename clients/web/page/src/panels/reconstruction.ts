@@ -22,6 +22,12 @@ const REDRAW_MS = 250;
 /** What was seen of ways of making depth, at most. */
 const MOST_SEEN = 12;
 
+interface Change {
+  method?: Method;
+  sharpen?: string;
+  maxErrorUm?: number;
+}
+
 interface Seen {
   ms: number;
   errorUm: number;
@@ -81,6 +87,7 @@ export class ReconstructionPanel {
   private readonly seen = new Map<string, Seen>();
   private way = "";
   private drawnAt = 0;
+  private changing = Promise.resolve();
 
   constructor(private readonly sensor: Sensor) {
     this.element.hidden = true;
@@ -127,11 +134,13 @@ export class ReconstructionPanel {
     this.draw();
   }
 
-  private async set(change: {
-    method?: Method;
-    sharpen?: string;
-    maxErrorUm?: number;
-  }): Promise<void> {
+  /** One after the other: the daemon makes its calibration ready anew for each, and refuses another meanwhile. */
+  private set(change: Change): Promise<void> {
+    this.changing = this.changing.then(() => this.ask(change));
+    return this.changing;
+  }
+
+  private async ask(change: Change): Promise<void> {
     try {
       const value = create(SetReconstructionSchema, change);
       const result = await this.sensor.request({ case: "setReconstruction", value });
