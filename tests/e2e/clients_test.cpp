@@ -82,6 +82,34 @@ TEST(Clients, SixteenOfWhichOneNeverReads) {
   }
 }
 
+TEST(Clients, OneThatReadsLateGetsTheNewestFrames) {
+  const Sensor sensor;
+  v1::Subscribe luma;
+  luma.set_luma(v1::LUMA_GREY8);
+  client::Client late = sensor.connect("late");
+  late.subscribe(luma);
+  // Whoever reads quickly is given a larger buffer by the kernel.
+  ASSERT_EQ(count_frames(late, 120), 120);
+  client::Client prompt = sensor.connect("prompt");
+  prompt.subscribe();
+  ASSERT_EQ(count_frames(prompt, 120), 120);
+  std::uint64_t newest = 0;
+  ASSERT_TRUE(read_until(prompt, [&](const Item& item) {
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    if (frame != nullptr) newest = frame->sequence();
+    return frame != nullptr;
+  }));
+  // At most one in the socket, one that the daemon began to send, and one that it replaces.
+  constexpr int kOld = 4;
+  int old = 0;
+  ASSERT_TRUE(read_until(late, [&](const Item& item) {
+    const auto* frame = std::get_if<v1::Frame>(&item);
+    if (frame != nullptr && frame->sequence() < newest) ++old;
+    return frame != nullptr && frame->sequence() >= newest;
+  }));
+  EXPECT_LE(old, kOld);
+}
+
 TEST(Clients, OneKilledMidStreamDoesNotDisturbTheOthers) {
   const Sensor sensor;
   client::Client client = sensor.connect();

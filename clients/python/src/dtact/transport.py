@@ -22,9 +22,16 @@ def is_local(sock: socket.socket) -> bool:
     return (mapped or address).is_loopback or remote == sock.getsockname()[0].partition("%")[0]
 
 
+# What the kernel keeps of a stream for one that reads late, bytes. Left to itself it keeps megabytes: to
+# one slower than the frames every frame, and every answer, would come that much late.
+_UNREAD = 256 * 1024
+
+
 def tune(sock: socket.socket) -> None:
-    """Requests go at once, and a daemon whose machine is gone is noticed within half a minute."""
+    """Requests go at once, what comes is not kept for long, and a daemon whose machine is gone is noticed
+    within half a minute."""
     sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _UNREAD)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     if sys.platform == "linux":
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, 10)
