@@ -33,9 +33,11 @@ TEST(Exposure, ThatFollowsThePictureIsNamedThoughTheCameraCallsItLocked) {
   v1::Subscribe summary;
   summary.set_summary(true);
   client.subscribe(summary);
-  ASSERT_TRUE(read_until(client, [](const Item& item) {
+  // The status has a frame's conditions by the time of the next frame.
+  int frames = 0;
+  ASSERT_TRUE(read_until(client, [&](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
-    return frame != nullptr && has(frame->health(), v1::HEALTH_EXPOSURE_FOLLOWS);
+    return frame != nullptr && has(frame->health(), v1::HEALTH_EXPOSURE_FOLLOWS) && ++frames == 2;
   }));
   const v1::Status status = client.status();
   EXPECT_TRUE(status.camera().controls(0).locked());
