@@ -59,12 +59,14 @@ bool there(const Sensor& sensor, const std::string& name) {
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 // Programs with sanitizers that share a core keep up with no more whole pictures.
-constexpr const char* kRate = "camera.fps=20";
+constexpr unsigned kFps = 20;
 constexpr int kSlower = 5;  // as in tests/CMakeLists.txt
 #else
-constexpr const char* kRate = "camera.fps=60";
+constexpr unsigned kFps = 60;
 constexpr int kSlower = 1;
 #endif
+
+std::string rate() { return fmt::format("camera.fps={}", kFps); }
 
 /// The presses of calibration_presses.toml, each held as long as the machine needs.
 fs::path presses(const TempFolder& folder) {
@@ -87,7 +89,7 @@ fs::path presses(const TempFolder& folder) {
 
 TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
   const TempFolder folder;
-  Sensor sensor(presses(folder), false, {kRate});
+  Sensor sensor(presses(folder), false, {rate()});
   std::string output;
   // More than are needed: a press may come out too light, or its like have been taken.
   ASSERT_EQ(guide(sensor, enters(60), &output), kDone) << output;
@@ -103,7 +105,7 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
   sensor.restart();
   client::Client client = sensor.connect();
   client.subscribe();
-  const hal::sim::Truth truth(hal::sim::default_scene());
+  const hal::sim::Truth truth(hal::sim::at_mode(hal::sim::default_scene(), 800, 600, kFps));
   std::vector<double> inside;
   double worst_untouched = 0;
   int untouched = 0;
@@ -115,8 +117,9 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
         if (frame == nullptr || !frame->has_depth()) return false;
         EXPECT_FALSE(has(frame->health(), v1::HEALTH_CAMERA_MISMATCH));
         EXPECT_FALSE(has(frame->health(), v1::HEALTH_LIGHT_MISMATCH));
-        const std::uint64_t place = frame->sequence() % 720;  // of the scene's loop
-        if (place > 345 || frame->sequence() < judged + 10) return false;
+        // In the scene's loop of twelve seconds: its ball, not the nut. Six frames a second.
+        const std::uint64_t place = frame->sequence() % (12 * kFps);
+        if (4 * place > 23 * kFps || frame->sequence() < judged + kFps / 6) return false;
         judged = frame->sequence();
         const DepthError error = depth_error(*frame, truth);
         if (error.inside_pixels > 5000) {
@@ -141,7 +144,7 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
 
 TEST(Guided, QuitRetakeAndGoOn) {
   const TempFolder folder;
-  const Sensor sensor(presses(folder), false, {kRate});
+  const Sensor sensor(presses(folder), false, {rate()});
   std::string output;
   EXPECT_EQ(guide(sensor, "\n\n\nr\nq\n", &output), kNotMet) << output;
   EXPECT_THAT(output, AllOf(HasSubstr("[r] retake press-02"),
