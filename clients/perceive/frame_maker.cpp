@@ -34,13 +34,14 @@ void FrameMaker::begin(v1::Frame frame, bool pose) {
   if (frame_.has_depth()) {
     if (frame_.contact().touching()) depth_.emplace(frame_.depth());
     const recon::Surface surface = surface_of(frame_.surface());
-    if (surface != clouds_.surface()) clouds_ = CloudMaker(surface);
+    if (surface != clouds_.surface()) {
+      clouds_ = CloudMaker(surface);
+      tracker_.release();
+    }
   }
-  // Motion on a curved surface is not followed: which pixel a point lies above is not known there.
-  const bool flat = clouds_.surface().kind == recon::Surface::Kind::plane;
   const bool gone = frame_.has_contact() && !frame_.contact().touching();
-  if (!pose || !flat || gone) tracker_.release();
-  if (pose && flat && depth_) follow(*depth_, frame_.depth().uncertainty_um());
+  if (!pose || gone) tracker_.release();
+  if (pose && depth_) follow(*depth_, frame_.depth().uncertainty_um());
   frame_.clear_depth();
 }
 
@@ -49,7 +50,8 @@ void FrameMaker::follow(DepthPart& depth, double uncertainty_um) {
   if (!grid) return;
   const std::uint32_t took = timed([&] {
     clouds_.make(*grid, 1, cloud_);
-    (void)tracker_.follow(ContactView(*grid, cloud_, uncertainty_um), frame_.sequence());
+    (void)tracker_.follow(ContactView(*grid, cloud_, clouds_.table(), uncertainty_um),
+                          frame_.sequence());
   });
   if (tracker_.pose().state == Tracker::State::idle) return;
   v1::ObjectPose& pose = pose_.emplace();

@@ -56,9 +56,8 @@ void CloudMaker::read(const DepthGrid& depth) {
             static_cast<float>(depth.um_per_unit * 1e-6), depth_.data());
   if (surface_.kind == recon::Surface::Kind::plane) return;
   if (table_.width != depth.full_width || table_.height != depth.full_height ||
-      table_mm_per_px_ != depth.mm_per_px) {
+      table_.mm_per_px != depth.mm_per_px) {
     table_ = make_surface_table(surface_, depth.full_width, depth.full_height, depth.mm_per_px);
-    table_mm_per_px_ = depth.mm_per_px;
   }
   points_.resize(3 * size);
   for (std::size_t part = 0; part < 3; ++part) {

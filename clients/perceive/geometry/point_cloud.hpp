@@ -66,6 +66,10 @@ class CloudMaker {
   void make(const DepthGrid& depth, int stride, PointCloud& out);
 
   [[nodiscard]] const recon::Surface& surface() const noexcept { return surface_; }
+  /// Of the maps made last; null for a plane.
+  [[nodiscard]] const SurfaceTable* table() const noexcept {
+    return surface_.kind == recon::Surface::Kind::plane ? nullptr : &table_;
+  }
 
   /// Less lets the depth's noise into the normals, more blurs edges.
   static constexpr double kReachMm = 0.16;
@@ -85,8 +89,7 @@ class CloudMaker {
   }
 
   recon::Surface surface_;
-  SurfaceTable table_;  ///< Empty for a plane.
-  double table_mm_per_px_ = 0;
+  SurfaceTable table_;         ///< Empty for a plane.
   std::vector<float> depth_;   ///< Metres, NaN where untrusted.
   std::vector<float> points_;  ///< Of a curved surface: x, y and z of all.
   std::vector<float> row_;     ///< The row being made, of which a stride takes some.

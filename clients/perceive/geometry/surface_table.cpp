@@ -32,6 +32,35 @@ double entry_radius(const recon::Surface& surface, double radius) {
   return (low + high) / 2;
 }
 
+/// Three values of a table at a place between four pixels, and how they change along a row and
+/// along a column, per pixel.
+struct Between {
+  Vector value = {};
+  Vector along_row = {};
+  Vector along_column = {};
+};
+
+Between between(const SurfaceTable& table, const std::array<std::vector<float>, 3>& parts,
+                double column, double row) {
+  const int c = std::min(static_cast<int>(column), table.width - 2);
+  const int r = std::min(static_cast<int>(row), table.height - 2);
+  const double right = column - c;
+  const double down = row - r;
+  const auto width = static_cast<std::size_t>(table.width);
+  const std::size_t i = static_cast<std::size_t>(r) * width + static_cast<std::size_t>(c);
+  Between out;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto& part = parts[axis];
+    const double above = double{part[i + 1]} - double{part[i]};
+    const double below = double{part[i + width + 1]} - double{part[i + width]};
+    const double left_down = double{part[i + width]} - double{part[i]};
+    out.along_row[axis] = above + down * (below - above);
+    out.along_column[axis] = left_down + right * (below - above);
+    out.value[axis] = double{part[i]} + right * above + down * out.along_column[axis];
+  }
+  return out;
+}
+
 }  // namespace
 
 std::optional<SurfacePoint> cast_ray(const recon::Surface& surface, double x_mm, double y_mm) {
@@ -69,7 +98,7 @@ std::optional<SurfacePoint> cast_ray(const recon::Surface& surface, double x_mm,
 
 SurfaceTable make_surface_table(const recon::Surface& surface, int width, int height,
                                 double mm_per_px) {
-  SurfaceTable table{width, height, {}, {}};
+  SurfaceTable table{width, height, mm_per_px, {}, {}};
   const auto size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   for (auto* part : {&table.point, &table.normal}) {
     for (auto& values : *part) values.assign(size, std::numeric_limits<float>::quiet_NaN());
@@ -87,6 +116,43 @@ SurfaceTable make_surface_table(const recon::Surface& surface, int width, int he
     }
   }
   return table;
+}
+
+std::optional<Foot> foot_of(const SurfaceTable& table, const Vector& point) {
+  if (table.width < 2 || table.height < 2) return std::nullopt;
+  if (std::isnan(point[0]) || std::isnan(point[1]) || std::isnan(point[2])) return std::nullopt;
+  const double last_column = table.width - 1;
+  const double last_row = table.height - 1;
+  const double px = table.mm_per_px * kMetre;
+  // A ray spreads on its way to z = 0, so that this lies nearer to the middle than the foot.
+  double column = point[0] / px + last_column / 2;
+  double row = point[1] / px + last_row / 2;
+  // Gauss-Newton on the distance: the error of a step is that of the one before times the point's
+  // distance over the surface's radius.
+  constexpr int kMostSteps = 8;
+  constexpr double kClose = 0.02;
+  for (int step = 0; step < kMostSteps; ++step) {
+    const double c = std::clamp(column, 0.0, last_column);
+    const double r = std::clamp(row, 0.0, last_row);
+    const Between at = between(table, table.point, c, r);
+    const Vector normal = between(table, table.normal, c, r).value;
+    // What lies along the surface: the table's steps are chords, which lean.
+    Vector off = along(point, -1, at.value);
+    off = along(off, -dot(off, normal) / dot(normal, normal), normal);
+    const double cc = dot(at.along_row, at.along_row);
+    const double cr = dot(at.along_row, at.along_column);
+    const double rr = dot(at.along_column, at.along_column);
+    const double to_right = dot(at.along_row, off);
+    const double to_below = dot(at.along_column, off);
+    const double determinant = cc * rr - cr * cr;
+    if (!(determinant > 0)) return std::nullopt;  // NaN too
+    column = c + (rr * to_right - cr * to_below) / determinant;
+    row = r + (cc * to_below - cr * to_right) / determinant;
+    if (std::max(std::abs(column - c), std::abs(row - r)) >= kClose) continue;
+    if (column < 0 || row < 0 || column > last_column || row > last_row) return std::nullopt;
+    return Foot{column, row, normal};
+  }
+  return std::nullopt;
 }
 
 }  // namespace dtact::perceive

@@ -28,10 +28,21 @@ struct SurfacePoint {
 struct SurfaceTable {
   int width = 0;
   int height = 0;
+  double mm_per_px = 0;
   std::array<std::vector<float>, 3> point;  ///< x, y, z; metres.
   std::array<std::vector<float>, 3> normal;
 };
 [[nodiscard]] SurfaceTable make_surface_table(const recon::Surface& surface, int width, int height,
                                               double mm_per_px);
+
+/// The place of a depth map whose normal goes through a point, above or below the surface.
+struct Foot {
+  double column = 0;  ///< Of the whole map; between pixels.
+  double row = 0;
+  Vector normal = {};  ///< Of the untouched surface there, of length 1 but for the interpolation.
+};
+/// The inverse of a table, for points (metres) that are much nearer to the surface than its radius
+/// of curvature; to a fiftieth of a pixel. Nothing for a point beside the table.
+[[nodiscard]] std::optional<Foot> foot_of(const SurfaceTable& table, const Vector& point);
 
 }  // namespace dtact::perceive

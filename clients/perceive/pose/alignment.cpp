@@ -47,9 +47,9 @@ std::vector<Pair> associate(std::span<const Surfel> surfels, const ContactView& 
   pairs.reserve(surfels.size());
   for (const Surfel& surfel : surfels) {
     const Eigen::Vector3d moved = motion * surfel.point;
-    const auto sample = view.at(moved.x(), moved.y());
+    const auto sample = view.at(moved);
     if (!sample) continue;
-    const double distance = sample->normal.z() * (moved.z() - sample->z);
+    const double distance = sample->normal.dot(moved - sample->point);
     pairs.push_back({moved, motion.rotation * surfel.normal, *sample, distance});
   }
   return pairs;
@@ -70,7 +70,7 @@ struct Equations {
   Twist vector = Twist::Zero();
   double weight = 0;
   double squares = 0;
-  double normal_squares = 0;  ///< Of the normals' differences, x and y together.
+  double normal_squares = 0;  ///< Of the normals' differences along both axes.
   std::size_t points = 0;
 
   void add(const Twist& row, double residual, double w) {
@@ -93,9 +93,9 @@ Equations equations_of(const std::vector<Pair>& pairs, const Eigen::Vector3d& ce
     // The place moves over the view, whose normal bends; the surfel's own turns. Without the one
     // the other would say of a ball that its turning is seen, the more the smaller the contact.
     for (int axis = 0; pair.sample.bend && axis < 2; ++axis) {
-      const Eigen::Vector3d bend((*pair.sample.bend)(axis, 0), (*pair.sample.bend)(axis, 1), 0);
-      const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
-      const double difference = normal[axis] - pair.turned[axis];
+      const Eigen::Vector3d bend = pair.sample.bend->change.row(axis);
+      const Eigen::Vector3d unit = pair.sample.bend->axes.col(axis);
+      const double difference = unit.dot(normal - pair.turned);
       row << (from.cross(bend) - pair.turned.cross(unit)) / arm, bend;
       sum.add(kNormalArm * row, kNormalArm * difference, weight);
       sum.normal_squares += weight * difference * difference;

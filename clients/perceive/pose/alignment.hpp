@@ -35,10 +35,11 @@ struct Alignment {
 };
 
 /// Brings `surfels` onto what `view` shows, beginning at `start`: each is compared with the place
-/// of the view that it lies above or below (projective association), by the distance along the
-/// view's normal and by the normals themselves; Gauss–Newton on both with Tukey's weights. The
-/// spectrum of the normal equations says which directions are not seen: nothing is moved along
-/// them but what makes the rotation least, so that a sliding ball slides and does not roll.
+/// of the view that it lies above or below (projective association along the untouched surface's
+/// normal), by the distance along the view's normal and by the normals themselves; Gauss–Newton on
+/// both with Tukey's weights. The spectrum of the normal equations says which directions are not
+/// seen: nothing is moved along them but what makes the rotation least, so that a sliding ball
+/// slides and does not roll.
 [[nodiscard]] Alignment align(std::span<const Surfel> surfels, const ContactView& view,
                               const Motion& start);
 

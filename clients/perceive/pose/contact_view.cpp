@@ -1,5 +1,7 @@
 #include "clients/perceive/pose/contact_view.hpp"
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,7 +11,7 @@ namespace {
 
 /// What is shallower than this part of the deepest is taken for gel that follows the object without
 /// touching it.
-constexpr float kTouchingPart = 0.3F;
+constexpr double kTouchingPart = 0.3;
 /// And so is what noise alone may press in.
 constexpr double kUncertainties = 3;
 /// Pixels to each side that the normals' change is taken over.
@@ -19,42 +21,87 @@ constexpr int kDirections = 12;
 
 }  // namespace
 
-ContactView::ContactView(const DepthGrid& depth, const PointCloud& cloud, double uncertainty_um)
+ContactView::ContactView(const DepthGrid& depth, const PointCloud& cloud, const SurfaceTable* table,
+                         double uncertainty_um)
     : cloud_(cloud),
+      table_(table),
       touching_(cloud.size()),
       px_(depth.mm_per_px * 1e-3),
       x0_((depth.x - 0.5 * (depth.full_width - 1)) * px_),
       y0_((depth.y - 0.5 * (depth.full_height - 1)) * px_) {
-  const auto z = cloud.part(PointCloud::kZ);
-  float deepest = 0;
-  for (const float value : z) {
-    if (-value > deepest) deepest = -value;  // false for NaN
+  int deepest = 0;
+  for (const std::int16_t value : depth.values) {
+    if (value != depth.untrusted) deepest = std::max(deepest, int{value});
   }
-  const float threshold =
-      std::max(static_cast<float>(kUncertainties * uncertainty_um * 1e-6), kTouchingPart * deepest);
+  const double threshold =
+      std::max(kUncertainties * uncertainty_um / depth.um_per_unit, kTouchingPart * deepest);
   for (int row = 0; row < cloud.height; ++row) {
     for (int column = 0; column < cloud.width; ++column) {
       const std::size_t i = index(column, row);
-      if (!(-z[i] > threshold)) continue;
+      if (depth.values[i] == depth.untrusted || !(depth.values[i] > threshold) || !cloud.has(i)) {
+        continue;
+      }
       touching_[i] = 1;
       ++pixels_;
-      centre_ += Eigen::Vector3d(x0_ + column * px_, y0_ + row * px_, z[i]);
+      centre_ += point(i);
+      if (table_ != nullptr) upright_ += upright_at(column, row);
     }
   }
   if (pixels_ > 0) centre_ /= static_cast<double>(pixels_);
+  if (upright_.isZero()) upright_ = Eigen::Vector3d::UnitZ();
+  upright_.normalize();
 }
 
-std::optional<ContactView::Sample> ContactView::at(double x, double y) const {
-  const double column = (x - x0_) / px_;
-  const double row = (y - y0_) / px_;
-  if (!(column >= kBendPixels && row >= kBendPixels && column < cloud_.width - 1 - kBendPixels &&
-        row < cloud_.height - 1 - kBendPixels)) {
+Eigen::Vector3d ContactView::upright_at(int column, int row) const {
+  const std::size_t i =
+      static_cast<std::size_t>(cloud_.y + row) * static_cast<std::size_t>(table_->width) +
+      static_cast<std::size_t>(cloud_.x + column);
+  return {table_->normal[0][i], table_->normal[1][i], table_->normal[2][i]};
+}
+
+std::optional<ContactView::Place> ContactView::place_of(const Eigen::Vector3d& point) const {
+  if (table_ == nullptr) return Place{(point.x() - x0_) / px_, (point.y() - y0_) / px_};
+  const auto foot = foot_of(*table_, {point.x(), point.y(), point.z()});
+  if (!foot) return std::nullopt;
+  const Eigen::Vector3d upright(foot->normal[0], foot->normal[1], foot->normal[2]);
+  return Place{foot->column - cloud_.x, foot->row - cloud_.y, upright.normalized()};
+}
+
+std::optional<ContactView::Bend> ContactView::bend_at(int column, int row,
+                                                      const Eigen::Vector3d& upright) const {
+  const std::array<std::size_t, 4> around{
+      index(column - kBendPixels, row), index(column + kBendPixels, row),
+      index(column, row - kBendPixels), index(column, row + kBendPixels)};
+  for (const std::size_t one : around) {
+    if (touching_[one] == 0) return std::nullopt;
+  }
+  Bend bend;
+  const Eigen::Vector3d side = (Eigen::Vector3d::UnitX() - upright.x() * upright).normalized();
+  bend.axes << side, upright.cross(side);
+  const auto along = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+    return Eigen::Vector2d(bend.axes.transpose() * (to - from));
+  };
+  Eigen::Matrix2d normals;
+  normals << along(normal(around[0]), normal(around[1])),
+      along(normal(around[2]), normal(around[3]));
+  // How far apart the pixels lie at the object's depth.
+  Eigen::Matrix2d places;
+  places << along(point(around[0]), point(around[1])), along(point(around[2]), point(around[3]));
+  bend.change = normals * places.inverse() * bend.axes.transpose();
+  return bend;
+}
+
+std::optional<ContactView::Sample> ContactView::at(const Eigen::Vector3d& point_m) const {
+  const std::optional<Place> place = place_of(point_m);
+  if (!place || !(place->column >= kBendPixels && place->row >= kBendPixels &&
+                  place->column < cloud_.width - 1 - kBendPixels &&
+                  place->row < cloud_.height - 1 - kBendPixels)) {
     return std::nullopt;
   }
-  const int c = static_cast<int>(column);
-  const int r = static_cast<int>(row);
-  const double fx = column - c;
-  const double fy = row - r;
+  const int c = static_cast<int>(place->column);
+  const int r = static_cast<int>(place->row);
+  const double fx = place->column - c;
+  const double fy = place->row - r;
   const std::size_t i = index(c, r);
   const auto width = static_cast<std::size_t>(cloud_.width);
   const std::array<std::size_t, 4> corners{i, i + 1, i + width, i + width + 1};
@@ -63,19 +110,11 @@ std::optional<ContactView::Sample> ContactView::at(double x, double y) const {
   sample.normal.setZero();
   for (std::size_t k = 0; k < 4; ++k) {
     if (touching_[corners[k]] == 0) return std::nullopt;
-    sample.z += weights[k] * cloud_.part(PointCloud::kZ)[corners[k]];
+    sample.point += weights[k] * point(corners[k]);
     sample.normal += weights[k] * normal(corners[k]);
   }
   sample.normal.normalize();
-  const std::array<std::size_t, 4> around{index(c - kBendPixels, r), index(c + kBendPixels, r),
-                                          index(c, r - kBendPixels), index(c, r + kBendPixels)};
-  for (const std::size_t one : around) {
-    if (touching_[one] == 0) return sample;
-  }
-  const double span = 2 * kBendPixels * px_;
-  Eigen::Matrix2d& bend = sample.bend.emplace();
-  bend.col(0) = (normal(around[1]) - normal(around[0])).head<2>() / span;
-  bend.col(1) = (normal(around[3]) - normal(around[2])).head<2>() / span;
+  sample.bend = bend_at(c, r, place->upright);
   return sample;
 }
 
@@ -100,9 +139,7 @@ std::vector<Surfel> ContactView::choose(std::size_t most) const {
     const std::size_t count = std::min(share, pixels.size());
     for (std::size_t k = 0; k < count; ++k) {
       const std::size_t i = pixels[k * pixels.size() / count];
-      chosen.push_back({{cloud_.part(PointCloud::kX)[i], cloud_.part(PointCloud::kY)[i],
-                         cloud_.part(PointCloud::kZ)[i]},
-                        normal(i)});
+      chosen.push_back({point(i), normal(i)});
     }
   }
   return chosen;

@@ -97,8 +97,7 @@ bool Tracker::recover(const ContactView& view) {
   const std::size_t key = attempt % keyframes_.size();
   const double turn = kTurns[attempt / keyframes_.size() % kTurns.size()];
   const Keyframe& keyframe = keyframes_[key];
-  const Eigen::Matrix3d rotation =
-      Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Matrix3d rotation = Eigen::AngleAxisd(turn, view.upright()).toRotationMatrix();
   Motion start;
   start.rotation = rotation * keyframe.motion.rotation;
   start.translation = rotation * (keyframe.motion.translation - keyframe.centre) + view.centre();

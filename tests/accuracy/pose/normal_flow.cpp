@@ -54,7 +54,7 @@ NormalFlow::Reference NormalFlow::reference_of(const perceive::DepthGrid& depth,
                            cloud.part(perceive::PointCloud::kY)[i],
                            cloud.part(perceive::PointCloud::kZ)[i]);
       if (!cloud.has(i)) continue;
-      const auto sample = view.at(point.x(), point.y());
+      const auto sample = view.at(point);
       if (!sample) continue;
       reference.points.push_back(point);
       reference.normals.push_back(sample->normal);
@@ -82,18 +82,19 @@ NormalFlow::Fit NormalFlow::fit(const Reference& reference, const ContactView& v
     rise = 0;
     for (std::size_t i = 0; i < reference.points.size(); ++i) {
       const Vector3d point = fit.motion * reference.points[i];
-      const auto sample = view.at(point.x(), point.y());
+      const auto sample = view.at(point);
       if (!sample) continue;
       const Vector3d turned = fit.motion.rotation * reference.normals[i];
       const Vector3d residual = sample->normal - turned;
-      rise += sample->z - point.z();
+      rise += sample->point.z() - point.z();
       squares += residual.squaredNorm();
       ++count;
       if (!sample->bend) continue;
       // How the frame's normal changes along x and y; its third part follows from its length.
       Eigen::Matrix<double, 3, 2> bend;
-      bend.topRows<2>() = *sample->bend;
-      bend.row(2) = -(sample->normal.head<2>().transpose() * *sample->bend) / sample->normal.z();
+      bend.topRows<2>() = sample->bend->change.leftCols<2>();
+      bend.row(2) =
+          -(sample->normal.head<2>().transpose() * bend.topRows<2>()) / sample->normal.z();
       Eigen::Matrix<double, 3, 5> rows;
       rows.leftCols<3>() = -bend * cross_of(point - centre).topRows<2>() + cross_of(turned);
       rows.rightCols<2>() = bend * kLength;

@@ -32,10 +32,10 @@ struct Result {
   std::size_t hidden = 0;
 };
 
-Result follow(const std::string& object, const Way& way) {
-  Sequence frames(object, keys_of(way, kSteps));
+Result follow(const std::string& object, const Way& way, const recon::Surface& surface) {
+  Sequence frames(object, keys_of(way, kSteps), surface);
   Tracker tracker;
-  CloudMaker maker;
+  CloudMaker maker(surface);
   PointCloud cloud;
   std::vector<double> times;
   Result result;
@@ -43,7 +43,7 @@ Result follow(const std::string& object, const Way& way) {
     const Map map = frames.map(sequence);
     const double before = cpu_us();
     maker.make(map.grid, 1, cloud);
-    const auto& pose = tracker.follow(ContactView(map.grid, cloud, 10), sequence);
+    const auto& pose = tracker.follow(ContactView(map.grid, cloud, maker.table(), 10), sequence);
     times.push_back(cpu_us() - before);
     if (pose.state == Tracker::State::lost) {
       ++result.lost;
@@ -62,8 +62,9 @@ Result follow(const std::string& object, const Way& way) {
   return result;
 }
 
-void expect_found(const std::string& object, const Way& way, std::size_t most_hidden) {
-  const Result result = follow(object, way);
+void expect_found(const std::string& object, const Way& way, std::size_t most_hidden,
+                  const recon::Surface& surface = {}) {
+  const Result result = follow(object, way, surface);
   EXPECT_EQ(result.lost, 0);
   EXPECT_LT(result.worst.um, 80);
   EXPECT_LT(result.worst.degrees, 1.0);
@@ -86,6 +87,28 @@ TEST(PoseOnTheSimulatedLayer, ABallShowsThreeDirections) {
   }
 }
 
+class PoseOnAFinger : public testing::TestWithParam<recon::Surface> {};
+
+TEST_P(PoseOnAFinger, M4Nut) {
+  for (const Way& way : {kSlide, kTwist, kDeeper}) {
+    expect_found("object = \"m4_nut\"", way, 1, GetParam());
+  }
+}
+
+TEST_P(PoseOnAFinger, Cube) {
+  for (const Way& way : {kSlide, kTwist, kDeeper}) {
+    expect_found("object = \"cube\"\nside_mm = 5.0", way, 0, GetParam());
+  }
+}
+
+TEST_P(PoseOnAFinger, ABallShowsThreeDirections) {
+  for (const Way& way : {kSlide, kTwist, kDeeper}) {
+    expect_found("object = \"ball\"\nradius_mm = 4.0", way, 3, GetParam());
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Surfaces, PoseOnAFinger, testing::Values(kSphere, kCylinder));
+
 // Those that it is compared with have to be able to.
 TEST(NormalFlow, FollowsACube) {
   for (const Way& way : {kSlide, kTwist}) {
@@ -96,7 +119,7 @@ TEST(NormalFlow, FollowsACube) {
     for (std::uint64_t sequence = 0; sequence <= 2 * Sequence::kFps; sequence += kEvery) {
       const Map map = frames.map(sequence);
       maker.make(map.grid, 1, cloud);
-      const auto& pose = flow.follow(map.grid, cloud, ContactView(map.grid, cloud, 10));
+      const auto& pose = flow.follow(map.grid, cloud, ContactView(map.grid, cloud, nullptr, 10));
       ASSERT_FALSE(pose.lost) << way.name << ", frame " << sequence;
       const perceive::Motion truth = frames.motion(sequence);
       const Eigen::AngleAxisd off(pose.motion.rotation * truth.rotation.transpose());

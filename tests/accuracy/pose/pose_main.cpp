@@ -101,8 +101,8 @@ std::vector<float> points_of(const PointCloud& cloud, const ContactView& view) {
       const auto i = static_cast<std::size_t>(row) * static_cast<std::size_t>(cloud.width) +
                      static_cast<std::size_t>(column);
       const auto part = [&](PointCloud::Part which) { return cloud.part(which)[i]; };
-      if (!cloud.has(i) || !view.at(static_cast<double>(part(PointCloud::kX)),
-                                    static_cast<double>(part(PointCloud::kY)))) {
+      if (!cloud.has(i) ||
+          !view.at({part(PointCloud::kX), part(PointCloud::kY), part(PointCloud::kZ)})) {
         continue;
       }
       for (int which = 0; which < PointCloud::kParts; ++which) {
@@ -130,14 +130,14 @@ void follow(const std::string& object, const std::string& keys, int steps, int e
     const Map clean = frames.map(sequence, 0);
     maker.make(clean.grid, 1, cloud);
     append(truth, frames.motion(sequence));
-    const ContactView clear(clean.grid, cloud, kUncertaintyUm);
+    const ContactView clear(clean.grid, cloud, maker.table(), kUncertaintyUm);
     const auto surfels = clear.choose(600);
     append_seen(truth, perceive::align(surfels, clear, {}));
 
     const Map map = frames.map(sequence);
     const double before = cpu_us();
     maker.make(map.grid, 1, cloud);
-    const ContactView view(map.grid, cloud, kUncertaintyUm);
+    const ContactView view(map.grid, cloud, maker.table(), kUncertaintyUm);
     const double made = cpu_us();
     const auto& pose = tracker.follow(view, sequence);
     const double followed = cpu_us();

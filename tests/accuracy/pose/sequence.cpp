@@ -37,8 +37,16 @@ std::string key(double t, double x, double y, double depth, double rotation, dou
       t, x, y, depth, rotation, tilt_y);
 }
 
-hal::sim::Scene scene_of(const std::string& object, const std::string& keys) {
-  return hal::sim::parse_scene(fmt::format("[[press]]\n{}\n{}", object, keys), "sequence");
+hal::sim::Scene scene_of(const std::string& object, const std::string& keys,
+                         const recon::Surface& surface) {
+  std::string text;
+  if (surface.kind != recon::Surface::Kind::plane) {
+    const bool sphere = surface.kind == recon::Surface::Kind::sphere;
+    text = fmt::format("[surface]\nshape = \"{}\"\nradius_mm = {:.9f}\ncamera_mm = {:.9f}\n",
+                       sphere ? "sphere" : "cylinder", surface.radius_mm,
+                       surface.air_mm + surface.gel_mm);
+  }
+  return hal::sim::parse_scene(fmt::format("{}[[press]]\n{}\n{}", text, object, keys), "sequence");
 }
 
 }  // namespace
@@ -75,8 +83,9 @@ std::string keys_of_a_minute(int steps) {
   return keys + "]\n";
 }
 
-Sequence::Sequence(const std::string& object, const std::string& keys)
-    : truth_(scene_of(object, keys)) {}
+Sequence::Sequence(const std::string& object, const std::string& keys,
+                   const recon::Surface& surface)
+    : truth_(scene_of(object, keys, surface)) {}
 
 Map Sequence::map(std::uint64_t sequence, double noise_um) {
   truth_.indentation_mm(sequence, mm_);

@@ -31,6 +31,10 @@ inline constexpr Way kDeeper{.name = "deeper", .deeper_mm = 0.3};
 /// Keys of a minute: slid to and fro along a cross and twisted, again and again.
 [[nodiscard]] std::string keys_of_a_minute(int steps);
 
+/// Fingers of 30 mm of radius whose tips are 28 mm before the camera.
+inline constexpr recon::Surface kSphere{recon::Surface::Kind::sphere, 30, 0, 20, 8, 1};
+inline constexpr recon::Surface kCylinder{recon::Surface::Kind::cylinder, 30, 0, 20, 8, 1};
+
 /// Indentation, whole micrometres, cut out around what is pressed.
 struct Map {
   std::vector<std::int16_t> values;
@@ -44,8 +48,9 @@ class Sequence {
   static constexpr int kFps = 60;
   static constexpr double kNoiseUm = 3;
 
-  /// `object`: the lines of a scene's press that say what it is.
-  Sequence(const std::string& object, const std::string& keys);
+  /// `object`: the lines of a scene's press that say what it is. A cylinder `surface` lies along x,
+  /// and rays are straight (refraction 1), as in the simulator.
+  Sequence(const std::string& object, const std::string& keys, const recon::Surface& surface = {});
 
   /// The map of a frame; `noise_um`: the deviation of its noise, another with every call.
   [[nodiscard]] Map map(std::uint64_t sequence, double noise_um = kNoiseUm);

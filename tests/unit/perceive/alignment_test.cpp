@@ -10,9 +10,10 @@ namespace {
 using namespace test;
 using Eigen::Vector3d;
 
-Alignment align_to(const Balls& object, const Motion& motion, double noise_um = 0) {
-  const Frame before(object, {}, noise_um, 1);
-  const Frame after(object, motion, noise_um, 2);
+Alignment align_to(const Balls& object, const Motion& motion, double noise_um = 0,
+                   const recon::Surface& surface = {}) {
+  const Frame before(object, {}, noise_um, 1, surface);
+  const Frame after(object, motion, noise_um, 2, surface);
   return align(before.view().choose(600), after.view(), {});
 }
 
@@ -51,6 +52,38 @@ TEST(Align, ABallDoesNotShowItsRotationAndDoesNotRoll) {
     // Nothing turned: so the whole slide is found, though part of it might have been a roll.
     EXPECT_LT(Eigen::AngleAxisd(found.motion.rotation).angle(), 0.002);
     EXPECT_LT((found.motion.translation - motion.translation).norm(), 1e-5);
+  }
+}
+
+TEST(Align, OnCurvedSurfacesToo) {
+  for (const recon::Surface& surface : curved()) {
+    for (const Motion& motion :
+         {moved({0.15, -0.1, 0}), moved({0, 0, 0}, Vector3d::UnitZ(), 4), moved({0, 0, -0.08}),
+          moved({0, 0, 0}, {1, 0.5, 0}, 2), moved({0.1, 0.05, -0.03}, {0.3, -0.2, 1}, 3)}) {
+      const Alignment found = align_to(bumps(), motion, 0, surface);
+      EXPECT_TRUE(found.unobservable.empty());
+      EXPECT_LT(error_of(found, motion).degrees, 0.1);
+      EXPECT_LT(error_of(found, motion).um, 3);
+    }
+  }
+}
+
+TEST(Align, ABallOnTheSideOfAFingerDoesNotShowItsRotation) {
+  for (const recon::Surface& surface : curved()) {
+    const Vector3d centre(0, 0, -surface.radius_mm);
+    const Vector3d middle =
+        centre + (surface.radius_mm + 3.2) * Vector3d(0.1, 0.12, 1).normalized();
+    const Balls ball{{{middle, 4.0}}};
+    const Motion motion = moved({0.2, -0.1, -0.05});
+    for (const double noise_um : {0.0, 10.0}) {
+      const Alignment found = align_to(ball, motion, noise_um, surface);
+      ASSERT_EQ(found.unobservable.size(), 3U);
+      EXPECT_LT(error_of(found, motion).um, 6);
+      const Eigen::AngleAxisd turn(found.motion.rotation);
+      EXPECT_LT(turn.angle(), 0.002);
+      const Vector3d moved_by = 1e3 * (found.motion * (1e-3 * middle)) - middle;
+      EXPECT_LT((moved_by - Vector3d(0.2, -0.1, -0.05)).norm(), 0.01);
+    }
   }
 }
 

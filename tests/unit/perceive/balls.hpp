@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <random>
 #include <vector>
 
@@ -29,19 +30,51 @@ inline Balls bumps() {
            {{2.2, 1.2, 1.1}, 1.5}}};
 }
 
+/// Fingers whose field of 8 mm falls away by half a millimetre and more.
+inline std::vector<recon::Surface> curved() {
+  return {{recon::Surface::Kind::sphere, 15, 0, 20, 8, 1.41},
+          {recon::Surface::Kind::cylinder, 12, 30, 20, 8, 1.41}};
+}
+
 /// Turns by `degrees` about `axis` through the origin and then shifts by `mm`.
 inline Motion moved(const Eigen::Vector3d& mm,
                     const Eigen::Vector3d& axis = Eigen::Vector3d::UnitZ(), double degrees = 0) {
   return {Eigen::AngleAxisd(degrees * M_PI / 180, axis.normalized()).toRotationMatrix(), mm * 1e-3};
 }
 
+constexpr int kSize = 160;  ///< Pixels along each side of a map.
+constexpr double kPx = 0.05;
+
+/// What does not change between frames on a surface: the rays take long.
+struct Gel {
+  explicit Gel(const recon::Surface& surface) : maker(surface) {
+    for (int row = 0; row < kSize; ++row) {
+      for (int column = 0; column < kSize; ++column) {
+        pixels.push_back(
+            cast_ray(surface, (column - 0.5 * (kSize - 1)) * kPx, (row - 0.5 * (kSize - 1)) * kPx)
+                .value());
+      }
+    }
+  }
+  CloudMaker maker;
+  std::vector<SurfacePoint> pixels;
+};
+/// The same for the same surface.
+inline Gel& gel_of(const recon::Surface& surface) {
+  static std::deque<Gel> all;
+  for (Gel& one : all) {
+    if (one.maker.surface() == surface) return one;
+  }
+  return all.emplace_back(surface);
+}
+
 /// One frame: the map, its points and the view of them.
 struct Frame {
-  /// The balls after `motion`, with `noise_um` of noise that is alike over some pixels, as the
-  /// daemon's smoothing leaves it.
-  Frame(const Balls& object, const Motion& motion, double noise_um = 0, unsigned seed = 1) {
-    constexpr int kSize = 160;
-    constexpr double kPx = 0.05;
+  /// The balls after `motion` in `surface`, with `noise_um` of noise that is alike over some
+  /// pixels, as the daemon's smoothing leaves it.
+  Frame(const Balls& object, const Motion& motion, double noise_um = 0, unsigned seed = 1,
+        const recon::Surface& surface = {})
+      : gel(gel_of(surface)) {
     values.resize(std::size_t{kSize} * kSize);
     std::mt19937 random(seed);
     std::normal_distribution<double> normal;
@@ -49,14 +82,16 @@ struct Frame {
     for (double& one : noise) one = normal(random);
     for (int row = 0; row < kSize; ++row) {
       for (int column = 0; column < kSize; ++column) {
-        const double x = (column - 0.5 * (kSize - 1)) * kPx;
-        const double y = (row - 0.5 * (kSize - 1)) * kPx;
+        const SurfacePoint& there = gel.pixels[static_cast<std::size_t>(row * kSize + column)];
+        const Eigen::Vector3d normal_there(there.normal.data());
         double depth = 0;
         for (const auto& ball : object.balls) {
-          const Eigen::Vector3d at = 1e3 * (motion * (1e-3 * ball.middle));
-          const double rest =
-              ball.radius * ball.radius - (x - at.x()) * (x - at.x()) - (y - at.y()) * (y - at.y());
-          if (rest > 0) depth = std::max(depth, std::sqrt(rest) - at.z());
+          // Where the normal leaves the ball, going inwards.
+          const Eigen::Vector3d from =
+              1e3 * (Eigen::Vector3d(there.point.data()) - motion * (1e-3 * ball.middle));
+          const double over = from.dot(normal_there);
+          const double rest = over * over - from.squaredNorm() + ball.radius * ball.radius;
+          if (rest > 0) depth = std::max(depth, over + std::sqrt(rest));
         }
         double error = 0;
         int count = 0;
@@ -75,14 +110,15 @@ struct Frame {
     grid.width = grid.height = grid.full_width = grid.full_height = kSize;
     grid.mm_per_px = kPx;
     grid.values = values;
-    CloudMaker().make(grid, 1, cloud);
+    gel.maker.make(grid, 1, cloud);
   }
   [[nodiscard]] ContactView view(double uncertainty_um = 10) const {
-    return ContactView(grid, cloud, uncertainty_um);
+    return ContactView(grid, cloud, gel.maker.table(), uncertainty_um);
   }
 
   std::vector<std::int16_t> values;
   DepthGrid grid;
+  Gel& gel;
   PointCloud cloud;
 };
 

@@ -79,5 +79,40 @@ TEST(SurfaceTable, HasTheMapsPixels) {
   EXPECT_GT(table.point[1][6 * 21 + 10], 0.5e-3F);
 }
 
+TEST(FootOf, IsWhereThePointWasLiftedFrom) {
+  for (const recon::Surface& surface :
+       {recon::Surface{Kind::sphere, 12, 0, 20, 8, 1.41}, {Kind::cylinder, 9, 30, 15, 6, 1.41}}) {
+    constexpr double kPx = 0.05;
+    const SurfaceTable table = make_surface_table(surface, 201, 161, kPx);
+    for (const double column : {0.4, 17.3, 100.0, 188.9}) {
+      for (const double row : {0.3, 80.0, 151.6}) {
+        const auto at = cast_ray(surface, (column - 100) * kPx, (row - 80) * kPx);
+        ASSERT_TRUE(at.has_value());
+        for (const double lift : {-1e-3, 0.0, 0.5e-3}) {
+          Vector point = at->point;
+          for (std::size_t i = 0; i < 3; ++i) point[i] += lift * at->normal[i];
+          const auto foot = foot_of(table, point);
+          ASSERT_TRUE(foot.has_value()) << column << ", " << row << ", " << lift;
+          EXPECT_NEAR(foot->column, column, 0.02);
+          EXPECT_NEAR(foot->row, row, 0.02)
+              << column << ", " << lift << ", " << surface.radius_mm << " " << foot->column;
+          expect_near(foot->normal, at->normal, 1e-3);
+        }
+      }
+    }
+  }
+}
+
+TEST(FootOf, BesideTheTableThereIsNone) {
+  const SurfaceTable table = make_surface_table({Kind::sphere, 12, 0, 20, 8, 1.41}, 101, 101, 0.05);
+  EXPECT_TRUE(foot_of(table, {2.3e-3, 0, 0}).has_value());
+  EXPECT_FALSE(foot_of(table, {2.7e-3, 0, -0.3e-3}).has_value());
+  EXPECT_FALSE(foot_of(table, {0, -9e-3, -4e-3}).has_value());
+  EXPECT_FALSE(foot_of(table, {std::nan(""), 0, 0}).has_value());
+  // Rays that miss the surface.
+  const SurfaceTable wide = make_surface_table({Kind::sphere, 3, 0, 20, 5, 1.41}, 181, 181, 0.1);
+  EXPECT_FALSE(foot_of(wide, {8e-3, 0, -2e-3}).has_value());
+}
+
 }  // namespace
 }  // namespace dtact::perceive

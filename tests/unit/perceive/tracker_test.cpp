@@ -27,6 +27,15 @@ Error follow(Tracker& tracker, const Vector3d& end_mm, const Vector3d& axis, dou
   return error;
 }
 
+/// A twist about the surface's normal in the apex, then by `angle` about an axis at a finger's
+/// centre.
+Motion round_the_centre(double radius_mm, const Vector3d& axis, double angle, double twist_deg) {
+  const Vector3d centre(0, 0, -1e-3 * radius_mm);
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, axis).toRotationMatrix() *
+                               moved({0, 0, 0}, Vector3d::UnitZ(), twist_deg).rotation;
+  return {turn, centre - turn * centre};
+}
+
 TEST(Tracker, SlidesFourMillimetresPartlyOutOfView) {
   Tracker tracker;
   const Error error = follow(tracker, {3, 2.6, 0}, Vector3d::UnitZ(), 0, 40, 5);
@@ -46,6 +55,28 @@ TEST(Tracker, RollsAndPressesDeeper) {
   const Error error = follow(tracker, {0, 0, -0.2}, Vector3d::UnitX(), 8, 30, 5);
   EXPECT_LT(error.um, 30);
   EXPECT_LT(error.degrees, 0.8);
+}
+
+// Round the finger, so that it stays as deep: three millimetres and a twist.
+TEST(Tracker, SlidesRoundAFinger) {
+  for (const recon::Surface& surface : curved()) {
+    const double radius_mm = surface.radius_mm;
+    const double axis_deg = surface.axis_deg * M_PI / 180;
+    const Vector3d axis(std::cos(axis_deg), std::sin(axis_deg), 0);
+    Tracker tracker;
+    Error error;
+    constexpr int kFrames = 40;
+    for (int i = 0; i <= kFrames; ++i) {
+      const double part = static_cast<double>(i) / kFrames;
+      const Motion truth = round_the_centre(radius_mm, axis, part * 3 / radius_mm, part * 15);
+      const Frame frame(bumps(), truth, 5, static_cast<unsigned>(i), surface);
+      const auto& pose = tracker.follow(frame.view(), 100 + static_cast<unsigned>(i));
+      EXPECT_EQ(pose.state, i == 0 ? State::started : State::tracked) << i;
+      error = error_of(pose.alignment, truth);
+    }
+    EXPECT_LT(error.um, 30);
+    EXPECT_LT(error.degrees, 0.8);
+  }
 }
 
 TEST(Tracker, StandsStillWithoutDrifting) {
