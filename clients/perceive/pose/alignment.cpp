@@ -74,7 +74,7 @@ struct Equations {
   std::size_t points = 0;
 
   void add(const Twist& row, double residual, double w) {
-    matrix.selfadjointView<Eigen::Lower>().rankUpdate(row, w);
+    matrix += (w * row) * row.transpose();
     vector -= w * residual * row;
   }
 };
