@@ -213,9 +213,7 @@ void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
 }
 
 void CaptureLoop::tell(HealthSet health, std::int64_t now_ns) noexcept {
-  const HealthSet told = teller_.state(state(), health, stamp(now_ns));
-  exchange_.state.store(state(), std::memory_order_relaxed);
-  exchange_.health.store(told.bits(), std::memory_order_relaxed);
+  teller_.state(state(), health, stamp(now_ns));
 }
 
 /// After the newest frame.

@@ -1,5 +1,7 @@
 #include "daemon/pipeline/teller.hpp"
 
+#include <atomic>
+
 namespace dtact::pipeline {
 namespace {
 
@@ -20,13 +22,15 @@ void Teller::contact(const DepthFrame& frame) noexcept {
   if (push(ContactChanged{touching, at, frame.contact})) touching_ = touching;
 }
 
-HealthSet Teller::state(State state, HealthSet health, const Stamp& now) noexcept {
+void Teller::state(State state, HealthSet health, const Stamp& now) noexcept {
   if (health.has(Health::beyond_calibration)) beyond_until_ns_ = now.monotonic_ns + kLastsNs;
   health.set(Health::beyond_calibration, now.monotonic_ns < beyond_until_ns_);
-  if (state_ && state_->state == state && state_->health == health) return health;
+  // Before the event: whoever has read that asks for the status.
+  exchange_.state.store(state, std::memory_order_relaxed);
+  exchange_.health.store(health.bits(), std::memory_order_relaxed);
+  if (state_ && state_->state == state && state_->health == health) return;
   const StateChanged changed{state, health, now};
   if (push(changed)) state_ = changed;
-  return health;
 }
 
 void Teller::flush() noexcept {

@@ -21,9 +21,9 @@ class Teller {
 
   /// A frame that was not measured changes nothing: what touched before it counts as held.
   void contact(const DepthFrame& frame) noexcept;
-  /// A press at the list's end would send an event with every frame: Health::beyond_calibration is
-  /// told to last a second longer than it does. Returns what is told.
-  HealthSet state(State state, HealthSet health, const Stamp& now) noexcept;
+  /// For the status, and as an event where it changed. A press at the list's end would send one
+  /// with every frame: Health::beyond_calibration is told to last a second longer than it does.
+  void state(State state, HealthSet health, const Stamp& now) noexcept;
   /// Tries what is due.
   void flush() noexcept;
 

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <optional>
+#include <thread>
 #include <variant>
 
 // A missing value ends the test by the exception of its access.
@@ -74,33 +76,62 @@ TEST_F(TellerTest, AFrameThatWasNotMeasuredTellsNothingOfContact) {
 }
 
 TEST_F(TellerTest, TheFirstStateIsAlwaysTold) {
-  (void)teller.state(State::settling, {}, {.monotonic_ns = 0});
-  (void)teller.state(State::settling, {}, {.monotonic_ns = 0});
+  teller.state(State::settling, {}, {.monotonic_ns = 0});
+  teller.state(State::settling, {}, {.monotonic_ns = 0});
   ASSERT_TRUE(next());
   EXPECT_FALSE(next());
   HealthSet health;
   health.set(Health::frames_lost);
-  (void)teller.state(State::settling, health, {.monotonic_ns = 0});
+  teller.state(State::settling, health, {.monotonic_ns = 0});
   EXPECT_TRUE(std::get<StateChanged>(next().value()).health.has(Health::frames_lost));
 }
 
 TEST_F(TellerTest, BeyondTheListIsToldASecondLonger) {
   HealthSet beyond;
   beyond.set(Health::beyond_calibration);
-  EXPECT_EQ(teller.state(State::serving, beyond, {.monotonic_ns = 0}), beyond);
+  const auto told = [this](HealthSet health, std::int64_t now_ns) {
+    teller.state(State::serving, health, {.monotonic_ns = now_ns});
+    return exchange.health.load();
+  };
+  EXPECT_EQ(told(beyond, 0), beyond.bits());
   EXPECT_EQ(std::get<StateChanged>(next().value()).health, beyond);
-  EXPECT_EQ(teller.state(State::serving, {}, {.monotonic_ns = 500'000'000}), beyond);
-  EXPECT_EQ(teller.state(State::serving, beyond, {.monotonic_ns = 700'000'000}), beyond);
-  EXPECT_EQ(teller.state(State::serving, {}, {.monotonic_ns = 1'699'999'999}), beyond);
+  EXPECT_EQ(told({}, 500'000'000), beyond.bits());
+  EXPECT_EQ(told(beyond, 700'000'000), beyond.bits());
+  EXPECT_EQ(told({}, 1'699'999'999), beyond.bits());
   EXPECT_FALSE(next()) << "flicker is one event";
-  EXPECT_TRUE(teller.state(State::serving, {}, {.monotonic_ns = 1'700'000'000}).empty());
+  EXPECT_EQ(told({}, 1'700'000'000), 0U);
   EXPECT_TRUE(std::get<StateChanged>(next().value()).health.empty());
+}
+
+// A client that was told that depth flows again asks for the status at once.
+TEST_F(TellerTest, WhoHasReadTheEventReadsItInTheStatus) {
+  constexpr int kChanges = 2000;
+  std::atomic<int> read{0};
+  int contradictions = 0;
+  std::thread network([&] {
+    while (read < kChanges) {
+      const auto report = next();
+      if (!report) {
+        std::this_thread::yield();
+        continue;
+      }
+      const State now = exchange.state.load(std::memory_order_relaxed);
+      if (std::get<StateChanged>(*report).state != now) ++contradictions;
+      ++read;
+    }
+  });
+  for (int i = 0; i < kChanges; ++i) {
+    teller.state(i % 2 == 0 ? State::serving : State::settling, {}, {.monotonic_ns = 0});
+    while (read <= i) std::this_thread::yield();
+  }
+  network.join();
+  EXPECT_EQ(contradictions, 0);
 }
 
 TEST_F(TellerTest, WhatDoesNotFitIsToldLater) {
   fill();
   teller.contact(frame(true, 7));
-  (void)teller.state(State::serving, {}, {.monotonic_ns = 0});
+  teller.state(State::serving, {}, {.monotonic_ns = 0});
   teller.reference({.restored = true, .at = {.sequence = 8}});
   teller.answer({.ticket = 9});
   teller.flush();
@@ -112,7 +143,7 @@ TEST_F(TellerTest, WhatDoesNotFitIsToldLater) {
   EXPECT_EQ(std::get<ReferenceTaken>(next().value()).at.sequence, 8U);
   EXPECT_FALSE(next());
   teller.contact(frame(true, 10));  // the next frames carry the rest
-  (void)teller.state(State::serving, {}, {.monotonic_ns = 0});
+  teller.state(State::serving, {}, {.monotonic_ns = 0});
   EXPECT_EQ(std::get<ContactChanged>(next().value()).at.sequence, 10U);
   EXPECT_EQ(std::get<StateChanged>(next().value()).state, State::serving);
 }
