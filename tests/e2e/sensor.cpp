@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <map>
 #include <stdexcept>
 
 namespace dtact::e2e {
@@ -15,15 +16,15 @@ void run_or_throw(const std::vector<std::string>& command) {
 }
 
 /// Untouched until frame 120 of the scene, pressed and still from frame 180 on.
-void calibrate(const fs::path& folder) {
+void calibrate(const fs::path& folder, const std::string& method) {
   const std::string scene = scene_file("calibrate_ball.toml").string();
   const std::string reference = (folder / "reference").string();
   const std::string ball = (folder / "ball").string();
   run_or_throw({SIM_RENDER_PROGRAM, "--scene", scene, "--frames", "0:32", "-o", reference});
   run_or_throw({SIM_RENDER_PROGRAM, "--scene", scene, "--frames", "200:232", "-o", ball});
   run_or_throw({CALIBRATE_PROGRAM, "depth", "--reference", reference, "--ball", ball, "--radius-mm",
-                "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400", "--crop", "580,580", "-o",
-                (folder / "calibration").string()});
+                "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400", "--crop", "580,580",
+                "--method", method, "-o", (folder / method).string()});
 }
 
 }  // namespace
@@ -32,13 +33,12 @@ fs::path scene_file(const std::string& name) {
   return fs::path(DTACT_SOURCE_DIR) / "config/scenes" / name;
 }
 
-const fs::path& calibration_folder() {
+const fs::path& calibration_folder(const std::string& method) {
   static const TempFolder folder;
-  static const fs::path calibration = [] {
-    calibrate(folder.path());
-    return folder.path() / "calibration";
-  }();
-  return calibration;
+  static std::map<std::string, fs::path> made;
+  const auto [at, missing] = made.try_emplace(method, folder.path() / method);
+  if (missing) calibrate(folder.path(), method);
+  return at->second;
 }
 
 Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::string>& settings) {
