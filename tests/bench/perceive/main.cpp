@@ -1,0 +1,228 @@
+// What dtact-perceive's work takes: points and normals of a whole map and of a contact's box, and
+// the motion of what touches, on each surface, as a Markdown table, and the goals.
+//
+//   bench_perceive [RUNS]
+//
+// A thing of four balls slides over the map, whose points and motion are known: what is timed is
+// compared with that first, and 1 is returned when it is wrong. CPU time of the one thread; the
+// surfaces take turns, medians and quartiles over RUNS (50 when left out).
+#include <fmt/format.h>
+#include <time.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <exception>
+#include <functional>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/perceive/pose/tracker.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+using Eigen::Vector3d;
+using Kind = recon::Surface::Kind;
+
+constexpr int kSide = 580;
+constexpr double kMmPerPx = 0.0413793;
+constexpr double kMapGoalMs = 0.3;
+constexpr double kPoseGoalMs = 5;  // 200 a second
+/// Frames in which the object slides by kSlideMm.
+constexpr int kFrames = 20;
+constexpr double kSlideMm = 1;
+
+struct Ball {
+  Vector3d middle;  ///< Millimetres, surface frame.
+  double radius;
+};
+/// No motion leaves all four as they were.
+const std::array kObject{Ball{{-1.3, -0.9, 0.95}, 1.5}, Ball{{1.2, -1.1, 1.5}, 2.0},
+                         Ball{{0.2, 1.3, 1.9}, 2.5}, Ball{{2.2, 1.2, 1.1}, 1.5}};
+
+struct Sensor {
+  const char* name;
+  recon::Surface surface;
+  std::vector<SurfacePoint> pixels;
+};
+
+Sensor sensor(const char* name, const recon::Surface& surface) {
+  Sensor made{name, surface, {}};
+  for (int row = 0; row < kSide; ++row) {
+    for (int column = 0; column < kSide; ++column) {
+      made.pixels.push_back(cast_ray(surface, (column - 0.5 * (kSide - 1)) * kMmPerPx,
+                                     (row - 0.5 * (kSide - 1)) * kMmPerPx)
+                                .value());
+    }
+  }
+  return made;
+}
+
+/// Whole micrometres of the object after a slide, with 3 µm of noise.
+std::vector<std::int16_t> map_of(const Sensor& sensor, double slide_mm) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 3);
+  std::vector<std::int16_t> map;
+  map.reserve(sensor.pixels.size());
+  for (const SurfacePoint& pixel : sensor.pixels) {
+    const Vector3d normal(pixel.normal.data());
+    double depth = 0;
+    for (const Ball& ball : kObject) {
+      const Vector3d from =
+          1e3 * Vector3d(pixel.point.data()) - ball.middle - Vector3d(slide_mm, 0, 0);
+      const double over = from.dot(normal);
+      const double rest = over * over - from.squaredNorm() + ball.radius * ball.radius;
+      if (rest > 0) depth = std::max(depth, over + std::sqrt(rest));
+    }
+    map.push_back(static_cast<std::int16_t>(std::lround(1000 * depth + noise(random))));
+  }
+  return map;
+}
+
+/// The part of a map that begins at (x, y).
+struct Part {
+  Part(const std::vector<std::int16_t>& map, int x, int y, int width, int height) {
+    for (int row = y; row < y + height; ++row) {
+      const auto* from = map.data() + std::ptrdiff_t{row} * kSide + x;
+      values.insert(values.end(), from, from + width);
+    }
+    grid = {x, y, width, height, kSide, kSide, kMmPerPx, 1, -32768, values};
+  }
+  std::vector<std::int16_t> values;
+  DepthGrid grid;
+};
+
+double cpu_ms(const std::function<void()>& work) {
+  const auto now = [] {
+    timespec time{};
+    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) * 1e3 + static_cast<double>(time.tv_nsec) * 1e-6;
+  };
+  const double began = now();
+  work();
+  return now() - began;
+}
+
+struct Times {
+  std::vector<double> ms;
+
+  [[nodiscard]] double part(double share) {
+    std::sort(ms.begin(), ms.end());
+    return ms[static_cast<std::size_t>(share * static_cast<double>(ms.size() - 1))];
+  }
+};
+
+/// Every point where the surface's normal takes it, to a tenth of a micrometre.
+void verify(const Sensor& sensor, const Part& part, const PointCloud& cloud) {
+  for (int row = 0; row < cloud.height; ++row) {
+    for (int column = 0; column < cloud.width; ++column) {
+      const auto i = static_cast<std::size_t>(row * cloud.width + column);
+      const SurfacePoint& pixel =
+          sensor
+              .pixels[static_cast<std::size_t>((part.grid.y + row) * kSide + part.grid.x + column)];
+      const Vector3d there =
+          Vector3d(pixel.point.data()) - 1e-6 * part.values[i] * Vector3d(pixel.normal.data());
+      const Vector3d point(cloud.part(PointCloud::kX)[i], cloud.part(PointCloud::kY)[i],
+                           cloud.part(PointCloud::kZ)[i]);
+      const Vector3d normal(cloud.part(PointCloud::kNormalX)[i],
+                            cloud.part(PointCloud::kNormalY)[i],
+                            cloud.part(PointCloud::kNormalZ)[i]);
+      if (!((point - there).norm() < 1e-7) || !(std::abs(normal.norm() - 1) < 1e-4)) {
+        throw std::runtime_error(
+            fmt::format("{}: the point of row {}, column {} is wrong", sensor.name, row, column));
+      }
+    }
+  }
+}
+
+struct Measured {
+  Times map;
+  Times box;
+  Times pose;
+};
+
+void measure(const Sensor& sensor, const Part& whole, const std::vector<Part>& frames,
+             CloudMaker& maker, Measured& measured) {
+  PointCloud cloud;
+  maker.make(whole.grid, 1, cloud);
+  verify(sensor, whole, cloud);
+  measured.map.ms.push_back(cpu_ms([&] { maker.make(whole.grid, 1, cloud); }));
+  Tracker tracker;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    PointCloud contact;
+    maker.make(frames[i].grid, 1, contact);
+    measured.box.ms.push_back(cpu_ms([&] { maker.make(frames[i].grid, 1, contact); }));
+    const double ms = cpu_ms(
+        [&] { (void)tracker.follow(ContactView(frames[i].grid, contact, maker.table(), 10), i); });
+    if (i > 0) measured.pose.ms.push_back(ms + measured.box.ms.back());
+  }
+  const Motion& motion = tracker.pose().alignment.motion;
+  const double off_mm = (1e3 * motion.translation - Vector3d(kSlideMm, 0, 0)).norm();
+  if (tracker.pose().state != Tracker::State::tracked || !(off_mm < 0.03)) {
+    throw std::runtime_error(fmt::format("{}: the slide is {:.3f} mm off", sensor.name, off_mm));
+  }
+}
+
+int run(int runs) {
+  const std::array sensors{sensor("plane", {}),
+                           sensor("sphere", {Kind::sphere, 30, 0, 20, 8, 1.41}),
+                           sensor("cylinder", {Kind::cylinder, 30, 30, 20, 8, 1.41})};
+  std::vector<Part> wholes;
+  std::vector<std::vector<Part>> frames;
+  std::vector<CloudMaker> makers;
+  for (const Sensor& one : sensors) {
+    wholes.emplace_back(map_of(one, 0), 0, 0, kSide, kSide);
+    frames.emplace_back();
+    for (int i = 0; i <= kFrames; ++i) {
+      frames.back().emplace_back(map_of(one, kSlideMm * i / kFrames), 190, 210, 220, 170);
+    }
+    makers.emplace_back(one.surface);
+  }
+  std::array<Measured, sensors.size()> measured;
+  for (int i = 0; i < runs; ++i) {
+    for (std::size_t k = 0; k < sensors.size(); ++k) {
+      measure(sensors[k], wholes[k], frames[k], makers[k], measured[k]);
+    }
+  }
+  const auto cell = [](Times& times) {
+    return fmt::format("{:.3f} ({:.3f}–{:.3f})", times.part(0.5), times.part(0.25),
+                       times.part(0.75));
+  };
+  fmt::print("| ms, one core | points of {0}×{0} | of 220×170 | motion, points included |\n",
+             kSide);
+  fmt::print("| --- | --- | --- | --- |\n");
+  std::string goals;
+  for (std::size_t k = 0; k < sensors.size(); ++k) {
+    Measured& one = measured[k];
+    fmt::print("| {} | {} | {} | {} |\n", sensors[k].name, cell(one.map), cell(one.box),
+               cell(one.pose));
+    const auto goal = [&](const char* what, double is, double wanted) {
+      goals += fmt::format("{}  {}, {}: {:.3f} ms, goal {}\n", is <= wanted ? "met  " : "SHORT",
+                           sensors[k].name, what, is, wanted);
+    };
+    goal("points of a whole map", one.map.part(0.5), kMapGoalMs);
+    goal("motion", one.pose.part(0.5), kPoseGoalMs);
+  }
+  fmt::print("\n{}", goals);
+  return 0;
+}
+
+}  // namespace
+}  // namespace dtact::perceive
+
+int main(int argc, char** argv) {
+  try {
+    const int runs = argc > 1 ? std::atoi(argv[1]) : 50;
+    if (runs < 1) throw std::invalid_argument("RUNS is a whole number above 0");
+    return dtact::perceive::run(runs);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "bench_perceive: {}\n", e.what());
+    return 1;
+  }
+}
