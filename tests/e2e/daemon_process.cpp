@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "hal/base/atomic_file.hpp"
+#include "tests/e2e/patience.hpp"
 
 namespace dtact::e2e {
 namespace {
@@ -79,7 +80,7 @@ DaemonProcess::DaemonProcess(const std::vector<std::string>& arguments, Environm
 }
 
 void DaemonProcess::wait_until_ready() {
-  const auto deadline = Clock::now() + std::chrono::seconds(60);
+  const auto deadline = Clock::now() + kSlower * std::chrono::seconds(60);
   while (Clock::now() < deadline) {
     if (const auto message = notify_.next(std::chrono::milliseconds(100))) {
       if (message->find("READY=1") != std::string::npos &&
@@ -93,7 +94,7 @@ void DaemonProcess::wait_until_ready() {
       throw std::runtime_error("dtactd ended before it was ready:\n" + log());
     }
   }
-  throw std::runtime_error("dtactd was not ready within 60 s:\n" + log());
+  throw std::runtime_error("dtactd was not ready in time:\n" + log());
 }
 
 std::string DaemonProcess::log() const { return base::read_file(folder_.path() / "log"); }
@@ -101,7 +102,7 @@ std::string DaemonProcess::log() const { return base::read_file(folder_.path() /
 int DaemonProcess::stop(int signal) {
   if (pid_ < 0) return -1;
   ::kill(pid_, signal);
-  const auto deadline = Clock::now() + std::chrono::seconds(20);
+  const auto deadline = Clock::now() + kSlower * std::chrono::seconds(20);
   int status = 0;
   while (::waitpid(pid_, &status, WNOHANG) != pid_) {
     if (Clock::now() > deadline) {

@@ -40,7 +40,7 @@ using Environment = std::vector<std::pair<std::string, std::string>>;
 class DaemonProcess {
  public:
   /// `arguments` follow the program's name, `environment` adds to this program's. Throws
-  /// std::runtime_error with the log when the daemon ends or is not ready within 60 s.
+  /// std::runtime_error with the log when the daemon ends or is not ready within 60 s (kSlower).
   explicit DaemonProcess(const std::vector<std::string>& arguments, Environment environment = {});
   DaemonProcess(const DaemonProcess&) = delete;
   DaemonProcess& operator=(const DaemonProcess&) = delete;

@@ -14,6 +14,7 @@
 #include "hal/base/atomic_file.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/e2e/depth_error.hpp"
+#include "tests/e2e/patience.hpp"
 #include "tests/e2e/sensor.hpp"
 
 namespace dtact::e2e {
@@ -60,10 +61,8 @@ bool there(const Sensor& sensor, const std::string& name) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 // Programs with sanitizers that share a core keep up with no more whole pictures.
 constexpr unsigned kFps = 20;
-constexpr int kSlower = 5;  // as in tests/CMakeLists.txt
 #else
 constexpr unsigned kFps = 60;
-constexpr int kSlower = 1;
 #endif
 
 std::string rate() { return fmt::format("camera.fps={}", kFps); }

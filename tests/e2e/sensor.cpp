@@ -5,6 +5,8 @@
 #include <map>
 #include <stdexcept>
 
+#include "tests/e2e/patience.hpp"
+
 namespace dtact::e2e {
 namespace {
 
@@ -67,11 +69,6 @@ void Sensor::restart() {
 
 bool read_until(client::Client& client, const std::function<bool(const Item&)>& done,
                 std::chrono::seconds patience) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  constexpr int kSlower = 5;  // as in tests/CMakeLists.txt
-#else
-  constexpr int kSlower = 1;
-#endif
   const auto deadline = std::chrono::steady_clock::now() + kSlower * patience;
   while (std::chrono::steady_clock::now() < deadline) {
     const auto item = client.next(std::chrono::milliseconds(500));
