@@ -18,7 +18,7 @@ void run_or_throw(const std::vector<std::string>& command) {
 }
 
 /// Untouched until frame 120 of the scene, pressed and still from frame 180 on.
-void calibrate(const fs::path& folder, const std::string& method) {
+void calibrate(const fs::path& folder, const std::string& method, const fs::path& calibration) {
   const std::string scene = scene_file("calibrate_ball.toml").string();
   const std::string reference = (folder / "reference").string();
   const std::string ball = (folder / "ball").string();
@@ -26,7 +26,7 @@ void calibrate(const fs::path& folder, const std::string& method) {
   run_or_throw({SIM_RENDER_PROGRAM, "--scene", scene, "--frames", "200:232", "-o", ball});
   run_or_throw({CALIBRATE_PROGRAM, "depth", "--reference", reference, "--ball", ball, "--radius-mm",
                 "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400", "--crop", "580,580",
-                "--method", method, "-o", (folder / method).string()});
+                "--method", method, "-o", calibration.string()});
 }
 
 }  // namespace
@@ -38,8 +38,11 @@ fs::path scene_file(const std::string& name) {
 const fs::path& calibration_folder(const std::string& method) {
   static const TempFolder folder;
   static std::map<std::string, fs::path> made;
-  const auto [at, missing] = made.try_emplace(method, folder.path() / method);
-  if (missing) calibrate(folder.path(), method);
+  const auto [at, missing] = made.try_emplace(method, folder.path() / method / "calibration");
+  if (missing) {
+    fs::create_directory(folder.path() / method);
+    calibrate(folder.path(), method, at->second);
+  }
   return at->second;
 }
 
