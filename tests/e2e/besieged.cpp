@@ -19,12 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-// They keep up to 256 MiB of what was freed, to see who still uses it (quarantine_size_mb).
-constexpr std::int64_t kMemorySlackKib = (256 + 8) * 1024;
-#else
-constexpr std::int64_t kMemorySlackKib = 8 * 1024;
-#endif
 constexpr std::chrono::seconds kPatience{60};
 
 /// "VmRSS:    1234 kB" of /proc/PID/status.

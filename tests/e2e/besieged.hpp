@@ -13,6 +13,14 @@
 
 namespace dtact::e2e {
 
+/// How much more a daemon may hold than before, afterwards and where nothing is to be held.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+// They keep up to 256 MiB of what was freed, to see who still uses it (quarantine_size_mb).
+inline constexpr std::int64_t kMemorySlackKib = (256 + 8) * 1024;
+#else
+inline constexpr std::int64_t kMemorySlackKib = 8 * 1024;
+#endif
+
 /// What a process holds, as the kernel counts it.
 struct Held {
   std::int64_t resident_kib = 0;  ///< VmRSS; with ONFAULT that is also what is locked.

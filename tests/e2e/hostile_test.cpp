@@ -184,7 +184,7 @@ TEST_F(Hostile, SixteenMebibytesBeforeHello) {
     ::setsockopt(peers.back().get(), SOL_SOCKET, SO_SNDTIMEO, &soon, sizeof soon);
     send_all(peers.back(), bytes);
   }
-  EXPECT_LE(held_by(daemon->pid()).resident_kib, daemon->before().resident_kib + 8 * 1024);
+  EXPECT_LE(held_by(daemon->pid()).resident_kib, daemon->before().resident_kib + kMemorySlackKib);
   peers.clear();
   daemon->end("200 peers that announce 16 MiB before Hello");
 }
