@@ -92,7 +92,8 @@ TEST(Reconnecting, ARequestTriesWhenTheNextAttemptIsDue) {
   while (status.version().empty()) {
     try {
       status = client.status();
-    } catch (const ConnectionError&) {  // too early
+    } catch (const ConnectionError&) {
+      continue;  // too early
     }
   }
   EXPECT_EQ(next<Reconnected>(client).last_sequence, 0U);
