@@ -28,14 +28,15 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
     std::atomic<int> lent{0};    ///< Frames out on loan now.
     std::atomic<std::uint64_t> delivered{0};
     std::function<void(std::uint64_t)> on_grab;  ///< On the capture thread, with delivered so far.
-    hal::CameraInfo info{.backend = "fake",
-                         .identity = "fake camera",
-                         .pixel_format = "GREY",
-                         .width = kToyWidth,
-                         .height = kToyHeight,
-                         .fps = 100,  // promised: less than it has, so that it is never slow
-                         .light_delay_frames = 2,
-                         .controls = {}};
+    hal::CameraInfo info{
+        .backend = "fake",
+        .identity = "fake camera",
+        .pixel_format = "GREY",
+        .width = kToyWidth,
+        .height = kToyHeight,
+        .fps = 25,  // promised: what even an emulator has, so that it is never slow
+        .light_delay_frames = 2,
+        .controls = {}};
     bool refuse_start = false;
 
     void show(const ToyScene& scene) {

@@ -75,13 +75,8 @@ class PipelineTest : public ::testing::Test {
     return until(
         [&] { return frame != nullptr && frame->camera.timestamp_ns > from && like(*frame); });
   }
-  /// On a busy machine the fake camera may be slower than it promises.
   bool until_fresh() {
-    return until_frame([](const DepthFrame& f) {
-      HealthSet health = f.health;
-      health.set(Health::camera_slow, false);
-      return f.has_depth && health.empty();
-    });
+    return until_frame([](const DepthFrame& f) { return f.has_depth && f.health.empty(); });
   }
   /// Sends a command and waits for its answer.
   CommandDone ask(decltype(Command::what) what) {
