@@ -5,8 +5,6 @@
 //   once NAME COUNT    COUNT runs and no more, for counting instructions
 //   target             the instruction set the kernels run with
 //   export FOLDER      the inputs, for the Python pipeline
-#include <time.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <exception>
@@ -18,10 +16,12 @@
 
 #include "daemon/recon/vector_kernels.hpp"
 #include "tests/bench/cases.hpp"
+#include "tests/bench/cpu_time.hpp"
 
 namespace {
 
 using dtact::bench::Case;
+using dtact::bench::thread_ns;
 
 /// Made when first asked for.
 const Case& find(const std::string& name) {
@@ -29,13 +29,6 @@ const Case& find(const std::string& name) {
   const auto known = cases.find(name);
   return known != cases.end() ? known->second
                               : cases.emplace(name, dtact::bench::make_case(name)).first->second;
-}
-
-/// CPU time of this thread, so that other programs on the core do not count.
-std::int64_t thread_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
 }
 
 void time(const Case& c, int count) {

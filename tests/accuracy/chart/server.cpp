@@ -8,7 +8,6 @@
 //   instructions          user instructions a frame, or "none"
 //   export FOLDER         what the Python pipeline reads
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <exception>
@@ -20,18 +19,13 @@
 
 #include "tests/accuracy/chart/instructions.hpp"
 #include "tests/accuracy/chart/settings.hpp"
+#include "tests/bench/cpu_time.hpp"
 
 namespace {
 
 using namespace dtact::chart;
+using dtact::bench::thread_ns;
 namespace image = dtact::image;
-
-/// CPU time of this thread, so that other programs on the core do not count.
-std::int64_t thread_ns() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return now.tv_sec * std::int64_t{1'000'000'000} + now.tv_nsec;
-}
 
 template <typename T>
 void write_raw(const std::string& file, const std::vector<T>& values) {

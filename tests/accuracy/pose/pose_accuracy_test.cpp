@@ -11,6 +11,7 @@
 
 #include "tests/accuracy/pose/normal_flow.hpp"
 #include "tests/accuracy/pose/sequence.hpp"
+#include "tests/bench/cpu_time.hpp"
 #include "tests/unit/perceive/balls.hpp"
 
 namespace dtact::pose {
@@ -41,10 +42,10 @@ Result follow(const std::string& object, const Way& way, const recon::Surface& s
   Result result;
   for (std::uint64_t sequence = 0; sequence <= 2 * Sequence::kFps; sequence += kEvery) {
     const Map map = frames.map(sequence);
-    const double before = cpu_us();
+    const double before = bench::thread_us();
     maker.make(map.grid, 1, cloud);
     const auto& pose = tracker.follow(ContactView(map.grid, cloud, maker.table(), 10), sequence);
-    times.push_back(cpu_us() - before);
+    times.push_back(bench::thread_us() - before);
     if (pose.state == Tracker::State::lost) {
       ++result.lost;
       continue;

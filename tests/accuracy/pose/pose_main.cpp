@@ -16,6 +16,7 @@
 #include "clients/perceive/pose/tracker.hpp"
 #include "tests/accuracy/pose/normal_flow.hpp"
 #include "tests/accuracy/pose/sequence.hpp"
+#include "tests/bench/cpu_time.hpp"
 
 namespace dtact::pose {
 namespace {
@@ -135,14 +136,14 @@ void follow(const std::string& object, const std::string& keys, int steps, int e
     append_seen(truth, perceive::align(surfels, clear, {}));
 
     const Map map = frames.map(sequence);
-    const double before = cpu_us();
+    const double before = bench::thread_us();
     maker.make(map.grid, 1, cloud);
     const ContactView view(map.grid, cloud, maker.table(), kUncertaintyUm);
-    const double made = cpu_us();
+    const double made = bench::thread_us();
     const auto& pose = tracker.follow(view, sequence);
-    const double followed = cpu_us();
+    const double followed = bench::thread_us();
     const auto& flown = flow.follow(map.grid, cloud, view);
-    const double end = cpu_us();
+    const double end = bench::thread_us();
     append(ours, pose.alignment.motion);
     ours.insert(ours.end(), {pose.state == Tracker::State::lost ? 1.0 : 0.0, followed - before});
     append(flows, flown.motion);

@@ -1,7 +1,6 @@
 #include "tests/accuracy/pose/sequence.hpp"
 
 #include <fmt/format.h>
-#include <time.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -138,12 +137,6 @@ Motion Sequence::motion(std::uint64_t sequence) const {
   const Motion to = place(sequence);
   const Eigen::Matrix3d rotation = to.rotation * from.rotation.transpose();
   return {rotation, to.translation - rotation * from.translation};
-}
-
-double cpu_us() {
-  timespec now{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
 }
 
 }  // namespace dtact::pose

@@ -65,7 +65,4 @@ class Sequence {
   std::vector<float> mm_;
 };
 
-/// Processor time of this thread, microseconds.
-[[nodiscard]] double cpu_us();
-
 }  // namespace dtact::pose

@@ -9,13 +9,11 @@
 // the exit code is 1 when a goal of size is short. A map that does not come back ends the program
 // with 1.
 #include <fmt/format.h>
-#include <time.h>
 
 #include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -24,6 +22,7 @@
 
 #include "daemon/net/depth_view.hpp"
 #include "proto/depth_encoding.hpp"
+#include "tests/bench/cpu_time.hpp"
 #include "tests/bench/encodings/maps.hpp"
 
 namespace dtact::bench {
@@ -46,17 +45,6 @@ const std::vector<Subscription> kSubscriptions = {
 };
 constexpr auto kEncodings = {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD, v1::DEPTH_RVL,
                              v1::DEPTH_PREDICT_ZSTD};
-
-double cpu_ms(const std::function<void()>& once) {
-  const auto now = [] {
-    timespec time{};
-    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-    return static_cast<double>(time.tv_sec) * 1e3 + static_cast<double>(time.tv_nsec) * 1e-6;
-  };
-  const double began = now();
-  once();
-  return now() - began;
-}
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;

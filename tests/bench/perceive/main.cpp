@@ -7,7 +7,6 @@
 // compared with that first, and 1 is returned when it is wrong. CPU time of the one thread; the
 // surfaces take turns, medians and quartiles over RUNS (50 when left out).
 #include <fmt/format.h>
-#include <time.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -15,7 +14,6 @@
 #include <cmath>
 #include <cstdlib>
 #include <exception>
-#include <functional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -23,6 +21,8 @@
 
 #include "clients/perceive/geometry/point_cloud.hpp"
 #include "clients/perceive/pose/tracker.hpp"
+#include "tests/bench/cpu_time.hpp"
+#include "tests/unit/perceive/balls.hpp"
 
 namespace dtact::perceive {
 namespace {
@@ -37,14 +37,6 @@ constexpr double kPoseGoalMs = 5;  // 200 a second
 /// Frames in which the object slides by kSlideMm.
 constexpr int kFrames = 20;
 constexpr double kSlideMm = 1;
-
-struct Ball {
-  Vector3d middle;  ///< Millimetres, surface frame.
-  double radius;
-};
-/// No motion leaves all four as they were.
-const std::array kObject{Ball{{-1.3, -0.9, 0.95}, 1.5}, Ball{{1.2, -1.1, 1.5}, 2.0},
-                         Ball{{0.2, 1.3, 1.9}, 2.5}, Ball{{2.2, 1.2, 1.1}, 1.5}};
 
 struct Sensor {
   const char* name;
@@ -66,20 +58,14 @@ Sensor sensor(const char* name, const recon::Surface& surface) {
 
 /// Whole micrometres of the object after a slide, with 3 µm of noise.
 std::vector<std::int16_t> map_of(const Sensor& sensor, double slide_mm) {
+  const test::Balls object = test::bumps();
+  const Motion motion = test::moved({slide_mm, 0, 0});
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0, 3);
   std::vector<std::int16_t> map;
   map.reserve(sensor.pixels.size());
   for (const SurfacePoint& pixel : sensor.pixels) {
-    const Vector3d normal(pixel.normal.data());
-    double depth = 0;
-    for (const Ball& ball : kObject) {
-      const Vector3d from =
-          1e3 * Vector3d(pixel.point.data()) - ball.middle - Vector3d(slide_mm, 0, 0);
-      const double over = from.dot(normal);
-      const double rest = over * over - from.squaredNorm() + ball.radius * ball.radius;
-      if (rest > 0) depth = std::max(depth, over + std::sqrt(rest));
-    }
+    const double depth = test::indentation_mm(object, motion, pixel);
     map.push_back(static_cast<std::int16_t>(std::lround(1000 * depth + noise(random))));
   }
   return map;
@@ -97,17 +83,6 @@ struct Part {
   std::vector<std::int16_t> values;
   DepthGrid grid;
 };
-
-double cpu_ms(const std::function<void()>& work) {
-  const auto now = [] {
-    timespec time{};
-    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-    return static_cast<double>(time.tv_sec) * 1e3 + static_cast<double>(time.tv_nsec) * 1e-6;
-  };
-  const double began = now();
-  work();
-  return now() - began;
-}
 
 struct Times {
   std::vector<double> ms;
@@ -152,13 +127,13 @@ void measure(const Sensor& sensor, const Part& whole, const std::vector<Part>& f
   PointCloud cloud;
   maker.make(whole.grid, 1, cloud);
   verify(sensor, whole, cloud);
-  measured.map.ms.push_back(cpu_ms([&] { maker.make(whole.grid, 1, cloud); }));
+  measured.map.ms.push_back(bench::cpu_ms([&] { maker.make(whole.grid, 1, cloud); }));
   Tracker tracker;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     PointCloud contact;
     maker.make(frames[i].grid, 1, contact);
-    measured.box.ms.push_back(cpu_ms([&] { maker.make(frames[i].grid, 1, contact); }));
-    const double ms = cpu_ms(
+    measured.box.ms.push_back(bench::cpu_ms([&] { maker.make(frames[i].grid, 1, contact); }));
+    const double ms = bench::cpu_ms(
         [&] { (void)tracker.follow(ContactView(frames[i].grid, contact, maker.table(), 10), i); });
     if (i > 0) measured.pose.ms.push_back(ms + measured.box.ms.back());
   }

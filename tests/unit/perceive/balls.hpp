@@ -42,6 +42,21 @@ inline Motion moved(const Eigen::Vector3d& mm,
   return {Eigen::AngleAxisd(degrees * M_PI / 180, axis.normalized()).toRotationMatrix(), mm * 1e-3};
 }
 
+/// How deep the balls reach after `motion` along a surface's normal, millimetres.
+inline double indentation_mm(const Balls& object, const Motion& motion, const SurfacePoint& at) {
+  const Eigen::Vector3d normal(at.normal.data());
+  double depth = 0;
+  for (const auto& ball : object.balls) {
+    // Where the normal leaves the ball, going inwards.
+    const Eigen::Vector3d from =
+        1e3 * (Eigen::Vector3d(at.point.data()) - motion * (1e-3 * ball.middle));
+    const double over = from.dot(normal);
+    const double rest = over * over - from.squaredNorm() + ball.radius * ball.radius;
+    if (rest > 0) depth = std::max(depth, over + std::sqrt(rest));
+  }
+  return depth;
+}
+
 constexpr int kSize = 160;  ///< Pixels along each side of a map.
 constexpr double kPx = 0.05;
 
@@ -82,17 +97,8 @@ struct Frame {
     for (double& one : noise) one = normal(random);
     for (int row = 0; row < kSize; ++row) {
       for (int column = 0; column < kSize; ++column) {
-        const SurfacePoint& there = gel.pixels[static_cast<std::size_t>(row * kSize + column)];
-        const Eigen::Vector3d normal_there(there.normal.data());
-        double depth = 0;
-        for (const auto& ball : object.balls) {
-          // Where the normal leaves the ball, going inwards.
-          const Eigen::Vector3d from =
-              1e3 * (Eigen::Vector3d(there.point.data()) - motion * (1e-3 * ball.middle));
-          const double over = from.dot(normal_there);
-          const double rest = over * over - from.squaredNorm() + ball.radius * ball.radius;
-          if (rest > 0) depth = std::max(depth, over + std::sqrt(rest));
-        }
+        double depth = indentation_mm(object, motion,
+                                      gel.pixels[static_cast<std::size_t>(row * kSize + column)]);
         double error = 0;
         int count = 0;
         for (int r = std::max(0, row - 1); r <= std::min(kSize - 1, row + 1); ++r) {
