@@ -65,7 +65,7 @@ check_format() {
 
 # test_sanitized PRESET LABELS TESTS: all tests but those with such labels or names.
 test_sanitized() {
-  build_preset "$1" hal/all daemon/all clients/all tests/{unit,fuzz,e2e,soak}/all bench_memory bench_tls
+  build_preset "$1" hal/all daemon/all clients/all tests/{unit,fuzz,e2e,soak}/all bench_tests
   # End to end a test has the machine for itself; the unit tests' deadlines stand company.
   ctest --test-dir "build/$1" --output-on-failure -L unit -E "$3" -j"$(nproc)"
   ctest --test-dir "build/$1" --output-on-failure -LE "unit|$2" -E "$3"

@@ -27,6 +27,6 @@ cp "$(dirname "$0")/arm64.cmake" "$root/arm64.cmake"
 echo "arm64.sh: building"
 inside 'cd /source
   cmake --preset dev -D CMAKE_UNITY_BUILD=ON -B /build --toolchain /arm64.cmake > /build.log
-  cmake --build /build --target daemon/all clients/all tests/{unit,fuzz}/all bench_memory bench_tls > /build.log 2>&1 || { grep -v "^\[" /build.log; exit 1; }
+  cmake --build /build --target daemon/all clients/all tests/{unit,fuzz}/all bench_tests > /build.log 2>&1 || { grep -v "^\[" /build.log; exit 1; }
   ctest --test-dir /build --output-on-failure -L unit'
 package "$source_folder/build/dev/packages-debian12-arm64" arm64 /build
