@@ -39,7 +39,7 @@ class Watched {
   [[nodiscard]] int stop() { return daemon_.stop(SIGTERM); }
 
  private:
-  std::vector<std::string> arguments(const std::vector<std::string>& settings) const {
+  [[nodiscard]] std::vector<std::string> arguments(const std::vector<std::string>& settings) const {
     std::vector<std::string> arguments;
     for (const std::string& setting : settings) {
       arguments.insert(arguments.end(), {"--set", setting});

@@ -31,7 +31,7 @@ Place unmoved(const Shot& shot, int x, int y, int width, int height) {
           cy + std::cos(angle) * dy - std::sin(angle) * dx};
 }
 
-Spoiler::Spoiler(std::shared_ptr<const hal::sim::Truth> truth, std::uint64_t seed)
+Spoiler::Spoiler(const std::shared_ptr<const hal::sim::Truth>& truth, std::uint64_t seed)
     : renderer_(truth, truth->scene(), seed),
       seed_(seed),
       width_(truth->scene().camera.width),

@@ -47,7 +47,7 @@ struct Place {
 /// Makes frames of a solved scene and spoils them. One thread.
 class Spoiler {
  public:
-  Spoiler(std::shared_ptr<const hal::sim::Truth> truth, std::uint64_t seed);
+  Spoiler(const std::shared_ptr<const hal::sim::Truth>& truth, std::uint64_t seed);
 
   /// Frame `sequence`; the buffer is valid until the next call.
   [[nodiscard]] hal::LumaView make(const Shot& shot, std::uint64_t sequence);

@@ -223,7 +223,7 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
     by_free = std::make_unique<Reader>(presses == 1 ? table::ours_single(material)
                                                     : table::ours_many(material));
   } catch (const std::runtime_error&) {
-    // A chain of presses asks for a light one; result.free_mm stays NaN.
+    by_free.reset();  // a chain of presses asks for a light one; result.free_mm stays NaN
   }
   std::array<table::Error, 2> sharpened;
   double depth = 0;

@@ -19,12 +19,13 @@ std::vector<double> force_over_modulus(const hal::sim::LayerModel& layer,
   const hal::sim::Layer solver(side, side, kSpacing_mm, layer.thickness_mm, layer.poisson);
   std::vector<double> forces;
   cv::Mat1d pressure;
+  const int middle = side / 2;
   for (const double depth : depths_mm) {
     cv::Mat1d target(side, side);
     for (int row = 0; row < side; ++row) {
       for (int column = 0; column < side; ++column) {
-        target(row, column) = depth - object.height_mm((column - side / 2) * kSpacing_mm,
-                                                       (row - side / 2) * kSpacing_mm);
+        target(row, column) =
+            depth - object.height_mm((column - middle) * kSpacing_mm, (row - middle) * kSpacing_mm);
       }
     }
     pressure = solver.solve(target, pressure).pressure;

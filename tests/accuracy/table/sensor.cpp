@@ -14,8 +14,8 @@ constexpr auto kPixels = std::size_t{kFrameWidth} * kFrameHeight;
 
 }  // namespace
 
-Sensor::Sensor(std::shared_ptr<const hal::sim::Truth> truth, const Configuration& configuration,
-               std::uint64_t seed)
+Sensor::Sensor(const std::shared_ptr<const hal::sim::Truth>& truth,
+               const Configuration& configuration, std::uint64_t seed)
     : renderer_(truth, lit(truth->scene(), configuration), seed),
       light_(hal::sim::led_levels(light_of(configuration))),
       luma_(kFrameWidth, kFrameHeight),

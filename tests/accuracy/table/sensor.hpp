@@ -17,7 +17,7 @@ namespace dtact::table {
 /// The simulated sensor under one light, seen through its camera, MJPEG included.
 class Sensor {
  public:
-  Sensor(std::shared_ptr<const hal::sim::Truth> truth, const Configuration& configuration,
+  Sensor(const std::shared_ptr<const hal::sim::Truth>& truth, const Configuration& configuration,
          std::uint64_t seed);
 
   /// Frame `sequence` as the daemon would get it.

@@ -22,8 +22,14 @@ class Vivid : public GuestCamera {
       fd_.reset(::open("/dev/video8", O_RDWR | O_CLOEXEC));
       return static_cast<bool>(fd_);
     }));
-    v4l2_dv_timings timings = V4L2_DV_BT_DMT_800X600P60;
-    ASSERT_EQ(hal::v4l2::call(fd_.get(), VIDIOC_S_DV_TIMINGS, timings), 0);
+    // Of the driver's own timings, since the kernel's macros for them are no C++.
+    v4l2_enum_dv_timings offered{};
+    do {
+      ASSERT_EQ(hal::v4l2::call(fd_.get(), VIDIOC_ENUM_DV_TIMINGS, offered), 0);
+      ++offered.index;
+    } while (offered.timings.bt.width != 800 || offered.timings.bt.height != 600 ||
+             offered.timings.bt.pixelclock != 40'000'000);  // 60 Hz
+    ASSERT_EQ(hal::v4l2::call(fd_.get(), VIDIOC_S_DV_TIMINGS, offered.timings), 0);
     set("Test Pattern", 20);  // grey ramp
     set("OSD Text Mode", 2);  // none
   }
