@@ -1,6 +1,7 @@
 # shellcheck shell=bash disable=SC2154
 # The hardened unit's process opens a camera, an SPI device and a GPIO line of real kernel drivers by the
-# groups that udev's rules give them to.
+# groups that udev's rules give them to; the line's bias reaches the chip, and a line that another holds is
+# named with its holder, through the libgpiod of this Debian.
 for module in font cfbcopyarea cfbfillrect cfbimgblt v4l2-tpg videobuf2-dma-contig; do
   insmod "/job/modules/$module.ko"
 done
@@ -10,6 +11,9 @@ mount -t configfs configfs /sys/kernel/config
 sim=/sys/kernel/config/gpio-sim/power
 mkdir -p $sim/bank0
 echo 4 > $sim/bank0/num_lines
+mkdir -p $sim/bank0/line2/hog
+echo lcd-reset > $sim/bank0/line2/hog/name
+echo output-low > $sim/bank0/line2/hog/direction
 echo 1 > $sim/live
 udevadm trigger --subsystem-match=video4linux --subsystem-match=spidev --subsystem-match=gpio --action=add
 udevadm settle
@@ -29,6 +33,7 @@ spi_check_rate = false # the mock's transfers take no time
 [ring.ws2812.power]
 chip = "/dev/$chip"
 line = 1
+bias = "pull-up"
 [net]
 port = 7410
 T
@@ -40,6 +45,13 @@ open=$(ls -l "/proc/$(pid dtactd@devices)/fd")
 for node in /dev/video8 /dev/spidev0.0 gpio; do
   grep -qF "$node" <<< "$open" || fail "$node is not open: $open"
 done
+line=/sys/devices/platform/$(cat $sim/dev_name)/$chip/sim_gpio1
+[ "$(cat "$line/value")" = 1 ] || fail "the ring has no power"
+[ "$(cat "$line/pull")" = pull-up ] || fail "the line's bias is $(cat "$line/pull")"
+frames 30 10 --port 7410
+sed -i 's/^line = 1$/line = 2/' /etc/dtactd/devices.toml
+systemctl restart dtactd@devices
+within 60 bash -c 'dtactctl --port 7410 status | grep -qF "in use by \"lcd-reset\""'
 frames 30 10 --port 7410
 systemctl stop dtactd@devices
 rm /etc/dtactd/devices.toml
