@@ -22,7 +22,7 @@ from power_cut import cut_uploads, cut_upgrades
 HERE = Path(__file__).resolve().parent
 SHORT = ('install', 'purge')
 ALL = ('install', 'restart', 'hung_camera', 'broken_configuration', 'reload', 'state_disc', 'clock',
-       'two_sensors', 'outside', 'devices', 'upgrade', 'purge')
+       'two_sensors', 'outside', 'credentials', 'devices', 'upgrade', 'purge')
 
 
 def job_folder(folder: Path, debs: Path) -> Path:

@@ -1,0 +1,25 @@
+# shellcheck shell=bash
+# Tokens, key and certificate that only root can read on disk reach the unprivileged daemon as systemd's
+# credentials.
+store=/etc/credstore
+install -d -m 700 $store
+fingerprint=$(dtactctl cert -o /tmp/keys | sed -n 's/^--fingerprint //p')
+install -m 600 /tmp/keys/dtactd.crt $store/dtactd.tls-certificate
+install -m 600 /tmp/keys/dtactd.key $store/dtactd.tls-key
+dtactctl token --new view > /tmp/token-line
+install -m 600 /tmp/token-line $store/dtactd.tokens
+cut -d ' ' -f 2 /tmp/token-line > /tmp/token
+chmod 600 /tmp/token
+sed -i '/^\[net\]/,/^\[metrics\]/{
+  s|^tls_certificate = ""|tls_certificate = "credential:tls-certificate"|
+  s|^tls_key = ""|tls_key = "credential:tls-key"|
+  s|^token_file = ""|token_file = "credential:tokens"|
+}' "$config"
+systemctl restart dtactd
+tls=(--host 127.0.0.1 --fingerprint "$fingerprint")
+within 120 dtactctl "${tls[@]}" --token-file /tmp/token status
+expect token dtactctl "${tls[@]}" status
+frames 30 5 "${tls[@]}" --token-file /tmp/token
+expect 'control' dtactctl "${tls[@]}" --token-file /tmp/token led --brightness 10
+runuser -u dtactd -- test -r $store/dtactd.tokens && fail "the daemon's user reads the tokens on disk"
+rm -r $store /tmp/keys /tmp/token /tmp/token-line
