@@ -1,4 +1,4 @@
-# shellcheck shell=bash
+# shellcheck shell=bash disable=SC2154
 # Tokens, key and certificate that only root can read on disk reach the unprivileged daemon as systemd's
 # credentials.
 store=/etc/credstore
