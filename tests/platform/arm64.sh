@@ -3,7 +3,8 @@
 # so that the other architecture's packages stay out of this machine, and runs the tests under
 # qemu-user. Of the Debian packages named, libraries are taken for arm64 and tools for this machine;
 # umockdev is both, and the tests load its library. Makes Debian packages of what it built, in
-# build/dev/packages-debian12-arm64.
+# build/dev/packages-debian12-arm64, installs them there, has the daemon serve a client on the simulated
+# sensor, each under qemu-user, and purges them.
 #
 # Exit code: 0 passed; 77 such a chroot cannot be had here (the reason is printed); else failed.
 set -euo pipefail
@@ -30,3 +31,28 @@ inside 'cd /source
   cmake --build /build --target daemon/all clients/all tests/{unit,fuzz}/all bench_tests > /build.log 2>&1 || { grep -v "^\[" /build.log; exit 1; }
   ctest --test-dir /build --output-on-failure -L unit'
 package "$source_folder/build/dev/packages-debian12-arm64" arm64 /build
+echo "arm64.sh: installing the packages"
+# shellcheck disable=SC2016  # the inner shell expands it
+inside 'cd /packages
+  apt-get install -y -qq --no-install-recommends ./dtactd_*.deb ./dtact-tools_*.deb ./libdtact1_*.deb > /packages/apt.log 2>&1 \
+    || { cat /packages/apt.log; exit 1; }
+  client() { qemu-aarch64-static /usr/bin/dtactctl --host unix:/packages/dtactd.sock "$@"; }
+  rm -rf /packages/state
+  qemu-aarch64-static /usr/bin/dtactd --config /etc/dtactd/dtactd.toml --set state_dir=/packages/state --set net.address= \
+    --set net.unix_socket=/packages/dtactd.sock --set camera.fps=10 &> /packages/daemon.log &
+  daemon=$!
+  trap "kill $daemon 2> /dev/null || true; cat /packages/daemon.log" EXIT
+  end=$((SECONDS + 300))
+  until client status > /packages/status.log 2>&1; do
+    ((SECONDS < end)) || { cat /packages/status.log; exit 1; }
+    sleep 1
+  done
+  watched=$(client watch --summary --seconds 10 | tail -n 1)
+  echo "$watched"
+  [[ $watched =~ :\ ([0-9]+)\ frames ]] && ((BASH_REMATCH[1] >= 10))
+  kill $daemon
+  wait $daemon
+  trap - EXIT
+  apt-get purge -y -qq dtactd:arm64 dtact-tools:arm64 libdtact1:arm64 > /packages/apt.log 2>&1
+  left=$(ls -d /etc/dtactd /usr/bin/dtact* /lib/systemd/system/dtact* 2> /dev/null || true)
+  [ -z "$left" ] || { echo "arm64.sh: purge leaves $left"; exit 1; }'
