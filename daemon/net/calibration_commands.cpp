@@ -1,5 +1,5 @@
-// The commands that read, list and change calibrations, or read the untouched image: their files
-// take longer than a frame, so the worker reads, writes and packs them.
+#include "daemon/net/calibration_commands.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,7 +8,6 @@
 #include <exception>
 #include <utility>
 
-#include "daemon/net/commands.hpp"
 #include "daemon/net/hub.hpp"
 #include "daemon/net/messages.hpp"
 #include "hal/base/utf8.hpp"
@@ -57,8 +56,22 @@ Outcome<Value> attempt(v1::ErrorCode failure, const Step& step) {
 
 }  // namespace
 
+CalibrationCommands::CalibrationCommands(asio::io_context& io, asio::thread_pool& worker,
+                                         const NetConfig& config, Hub& hub, pipeline::Port& port,
+                                         CalibrationStore& store, Submit submit)
+    : io_(io),
+      worker_(worker),
+      config_(config),
+      hub_(hub),
+      port_(port),
+      store_(store),
+      submit_(std::move(submit)),
+      in_use_(store.current_number()) {
+  if (in_use_) hub_.number_calibration(0, *in_use_);  // the pipeline's key of the first
+}
+
 template <typename Work, typename Done>
-void Commands::on_worker(Work work, Done done) {
+void CalibrationCommands::on_worker(Work work, Done done) {
   // The guard keeps the network thread's loop alive until the result has come back.
   asio::post(worker_, [guard = asio::make_work_guard(io_), weak = weak_from_this(),
                        work = std::move(work), done = std::move(done)]() mutable {
@@ -69,7 +82,7 @@ void Commands::on_worker(Work work, Done done) {
   });
 }
 
-void Commands::get_calibration(const Who& who, const v1::GetCalibration& request) {
+void CalibrationCommands::get(const Who& who, const v1::GetCalibration& request) {
   std::optional<std::uint64_t> number;
   if (request.has_number()) number = request.number();
   if (!number && port_.status().calibration == nullptr) {
@@ -84,7 +97,7 @@ void Commands::get_calibration(const Who& who, const v1::GetCalibration& request
       [&store = store_, number] {
         return attempt<CalibrationFiles>(v1::ERROR_STORAGE, [&] { return store.read(number); });
       },
-      [who](Commands& self, Outcome<CalibrationFiles> read) {
+      [who](CalibrationCommands& self, Outcome<CalibrationFiles> read) {
         --self.reading_;
         const auto& [session, id] = who;
         if (read.failed()) {
@@ -100,7 +113,7 @@ void Commands::get_calibration(const Who& who, const v1::GetCalibration& request
       });
 }
 
-void Commands::list_calibrations(const Who& who) {
+void CalibrationCommands::list(const Who& who) {
   if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
   ++reading_;
   using List = std::vector<StoredCalibration>;
@@ -108,7 +121,7 @@ void Commands::list_calibrations(const Who& who) {
       [&store = store_] {
         return attempt<List>(v1::ERROR_STORAGE, [&store] { return store.list(); });
       },
-      [who](Commands& self, const Outcome<List>& list) {
+      [who](CalibrationCommands& self, const Outcome<List>& list) {
         --self.reading_;
         const auto& [session, id] = who;
         if (list.failed()) {
@@ -126,7 +139,7 @@ void Commands::list_calibrations(const Who& who) {
       });
 }
 
-void Commands::upload_calibration(const Who& who, const v1::UploadCalibration& request) {
+void CalibrationCommands::upload(const Who& who, const v1::UploadCalibration& request) {
   const auto& [session, id] = who;
   if (!valid_name(request.name())) {
     return session->reply_error(
@@ -144,10 +157,10 @@ void Commands::upload_calibration(const Who& who, const v1::UploadCalibration& r
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
   auto files = std::make_shared<const CalibrationFiles>(CalibrationFiles{
       .name = request.name(), .toml = request.calibration_toml(), .png = request.reference_png()});
-  change_calibration(who, {std::move(files), 0, {}, 0, {}});
+  change(who, {std::move(files), 0, {}, 0, {}});
 }
 
-void Commands::activate_calibration(const Who& who, const v1::ActivateCalibration& request) {
+void CalibrationCommands::activate(const Who& who, const v1::ActivateCalibration& request) {
   const auto& [session, id] = who;
   if (!request.has_number()) {
     return session->reply_error(id, v1::ERROR_INVALID,
@@ -155,10 +168,10 @@ void Commands::activate_calibration(const Who& who, const v1::ActivateCalibratio
                                 "shows the numbers there are");
   }
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
-  change_calibration(who, {nullptr, request.number(), {}, 0, {}});
+  change(who, {nullptr, request.number(), {}, 0, {}});
 }
 
-void Commands::change_calibration(const Who& who, CalibrationChange change) {
+void CalibrationCommands::change(const Who& who, Change change) {
   changing_ = true;
   using Loaded = std::shared_ptr<const calibration::Calibration>;
   on_worker(
@@ -167,18 +180,19 @@ void Commands::change_calibration(const Who& who, CalibrationChange change) {
           return change.upload != nullptr ? store.check(*change.upload) : store.load(change.number);
         });
       },
-      [who, change](Commands& self, Outcome<Loaded> loaded) mutable {
+      [who, change](CalibrationCommands& self, Outcome<Loaded> loaded) mutable {
         if (loaded.failed()) {
           self.changing_ = false;
           return who.first->reply_error(who.second, loaded.code, loaded.error);
         }
         change.name = loaded.value->name;
         self.changing_ =
-            self.submit(who, pipeline::UseCalibration{std::move(loaded.value)}, std::move(change));
+            self.submit_(who, pipeline::UseCalibration{std::move(loaded.value)}, std::move(change));
       });
 }
 
-void Commands::keep_calibration(const Pending& pending, const CalibrationChange& change) {
+void CalibrationCommands::keep(const std::weak_ptr<Session>& asking, std::uint64_t id,
+                               const Change& change) {
   config_.log({LogLevel::info, fmt::format("calibration {} is in use", change.name)});
   in_use_.reset();
   if (change.upload == nullptr) {
@@ -195,14 +209,13 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
           return change.number;
         });
       },
-      [weak = pending.session, id = pending.id, change](Commands& self,
-                                                        const Outcome<std::uint64_t>& kept) {
+      [weak = asking, id, change](CalibrationCommands& self, const Outcome<std::uint64_t>& kept) {
         self.changing_ = false;
         if (!kept.failed()) {
           self.in_use_ = kept.value;
           self.hub_.number_calibration(change.key, kept.value);
         }
-        self.tell_calibration(change, self.in_use_);
+        self.tell(change, self.in_use_);
         // The client may be gone before somebody wonders why the change did not outlive a restart.
         if (kept.failed()) {
           self.config_.log({LogLevel::warning,
@@ -226,8 +239,7 @@ void Commands::keep_calibration(const Pending& pending, const CalibrationChange&
       });
 }
 
-void Commands::tell_calibration(const CalibrationChange& change,
-                                std::optional<std::uint64_t> number) {
+void CalibrationCommands::tell(const Change& change, std::optional<std::uint64_t> number) {
   v1::ServerMessage message;
   auto& event = *message.mutable_event();
   fill(change.at, event);
@@ -236,13 +248,13 @@ void Commands::tell_calibration(const CalibrationChange& change,
   hub_.broadcast(message);
 }
 
-void Commands::get_reference(const Who& who) {
+void CalibrationCommands::get_reference(const Who& who) {
   if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
-  if (submit(who, pipeline::CopyReference{}, Pending::Reference{})) ++reading_;
+  if (submit_(who, pipeline::CopyReference{}, ReferenceWanted{})) ++reading_;
 }
 
-void Commands::send_reference(const Who& who,
-                              const std::shared_ptr<const pipeline::ReferenceCopy>& reference) {
+void CalibrationCommands::send_reference(
+    const Who& who, const std::shared_ptr<const pipeline::ReferenceCopy>& reference) {
   ++reading_;
   on_worker(
       [reference] {
@@ -253,7 +265,7 @@ void Commands::send_reference(const Who& who,
         });
       },
       [who, reference, number = hub_.calibration_number(reference->calibration)](
-          Commands& self, Outcome<std::string> png) {
+          CalibrationCommands& self, Outcome<std::string> png) {
         --self.reading_;
         if (png.failed()) return who.first->reply_error(who.second, png.code, png.error);
         auto message = reply_to(who.second);

@@ -76,15 +76,15 @@ std::string change(const v1::SetLight& request, hal::Light& light) {
 
 Commands::Commands(asio::io_context& io, asio::thread_pool& worker, const NetConfig& config,
                    Hub& hub, pipeline::Port& port, CalibrationStore& store)
-    : io_(io),
-      worker_(worker),
-      config_(config),
+    : config_(config),
       hub_(hub),
       port_(port),
-      store_(store),
-      in_use_(store.current_number()) {
-  if (in_use_) hub_.number_calibration(0, *in_use_);  // the pipeline's key of the first
-}
+      calibrations_(std::make_shared<CalibrationCommands>(
+          io, worker, config, hub, port, store,
+          [this](const Who& who, decltype(pipeline::Command::what) command, auto what) {
+            return std::visit(
+                [&](auto& one) { return submit(who, std::move(command), std::move(one)); }, what);
+          })) {}
 
 void Commands::on_request(const std::shared_ptr<Session>& session,
                           const v1::ClientMessage& message) {
@@ -99,15 +99,15 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
     case v1::ClientMessage::kGetStatus:
       return get_status(who);
     case v1::ClientMessage::kGetCalibration:
-      return get_calibration(who, message.get_calibration());
+      return calibrations_->get(who, message.get_calibration());
     case v1::ClientMessage::kUploadCalibration:
-      return upload_calibration(who, message.upload_calibration());
+      return calibrations_->upload(who, message.upload_calibration());
     case v1::ClientMessage::kListCalibrations:
-      return list_calibrations(who);
+      return calibrations_->list(who);
     case v1::ClientMessage::kActivateCalibration:
-      return activate_calibration(who, message.activate_calibration());
+      return calibrations_->activate(who, message.activate_calibration());
     case v1::ClientMessage::kGetReference:
-      return get_reference(who);
+      return calibrations_->get_reference(who);
     case v1::ClientMessage::kPing:
       return ping(who);
     case v1::ClientMessage::kSetReconstruction:
@@ -199,21 +199,21 @@ void Commands::on_done(const pipeline::CommandDone& done) {
     const bool kept = done.outcome == pipeline::Outcome::ring_away;
     if (!ok && !kept && lights_pending_ == 0) light_.reset();
   }
-  auto* const change = std::get_if<CalibrationChange>(&pending.what);
+  auto* const change = std::get_if<CalibrationCommands::Change>(&pending.what);
   if (change != nullptr && ok) {
     change->key = done.ticket;
     change->at = done.at;
-    return keep_calibration(pending, *change);
+    return calibrations_->keep(pending.session, pending.id, *change);
   }
-  if (change != nullptr) changing_ = false;
+  if (change != nullptr) calibrations_->refused();
   const auto* rules = std::get_if<pipeline::ReconstructionRules>(&pending.what);
   if (rules != nullptr && ok) tell_reconstruction(*rules, done.at);
-  const bool reference = std::holds_alternative<Pending::Reference>(pending.what);
-  if (reference) --reading_;
+  const bool reference = std::holds_alternative<CalibrationCommands::ReferenceWanted>(pending.what);
+  if (reference) calibrations_->copied();
 
   const auto session = pending.session.lock();
   if (session == nullptr) return;
-  if (reference && ok) return send_reference({session, pending.id}, done.reference);
+  if (reference && ok) return calibrations_->send_reference({session, pending.id}, done.reference);
   if (!ok) return session->reply_error(pending.id, code_of(done.outcome), done.message);
   auto message = reply_to(pending.id);
   if (light != nullptr) {
