@@ -24,6 +24,10 @@ constexpr std::int64_t kFirstFrame = 1000 * kMillisecond;
 /// A stalled camera is closed and opened anew after this long: many come back by it.
 constexpr std::int64_t kReopenAfter = 3000 * kMillisecond;
 constexpr std::chrono::seconds kWatchPeriod{1};
+/// Buffers looked at in one call: they go back as others come out, so there could be no end.
+constexpr unsigned kMaxTaken = 8;
+/// In frames; a larger step of the driver's count is a new count.
+constexpr std::uint32_t kPlausibleGap = 1U << 16U;
 
 std::int64_t now_ns() noexcept { return base::system_clock().monotonic_ns(); }
 
@@ -37,8 +41,7 @@ LiveCamera::LiveCamera(const CameraConfig& config, const std::string& backend,
                        const std::string& identity, Opener opener)
     : open_(std::move(opener)),
       period_ns_(std::llround(1e9 / config.fps)),
-      pool_{luma::LumaBuffer(config.width, config.height),
-            luma::LumaBuffer(config.width, config.height)} {
+      lender_(config.width, config.height) {
   if (!(config.fps > 0)) throw std::runtime_error("camera.fps must be positive");
   info_.backend = backend;
   info_.identity = identity;
@@ -105,6 +108,7 @@ void LiveCamera::connect() {
   info_.pixel_format = std::move(opened.pixel_format);
   info_.controls = std::move(opened.controls);
   remedy_ = "the camera has been opened; its first frame is awaited";
+  lender_.use(opened.source);
   connection_ = std::move(fresh);
 }
 
@@ -130,6 +134,7 @@ void LiveCamera::disconnect(CameraState state, const std::string& remedy) {
   {
     const std::lock_guard guard(mutex_);
     old = std::exchange(connection_, nullptr);
+    lender_.use(nullptr);
     state_.store(state);
     remedy_ = remedy;
   }
@@ -191,6 +196,109 @@ GrabStatus LiveCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexce
   }
 }
 
+LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
+  Source& source = *connection_->source;
+  // The newest whole frame, and the one before in case that the newest cannot be decoded.
+  std::array<std::pair<Filled, std::uint64_t>, 2> whole;  // with its sequence; oldest first
+  std::size_t count = 0;
+  bool damaged = false;
+  for (unsigned taken = 0; taken < kMaxTaken; ++taken) {
+    Filled filled;
+    const DequeueStatus status = source.dequeue(filled);
+    if (status == DequeueStatus::none) break;
+    if (status == DequeueStatus::failed) return Collected::lost;
+    last_buffer_ns_ = base::system_clock().monotonic_ns();
+    count_gap(filled.sequence);
+    const PayloadStatus payload = connection_->decoder.inspect(filled);
+    int home = filled.index;
+    if (payload != PayloadStatus::ok) {
+      count_damage(payload);
+      damaged = true;
+    } else if (count < whole.size()) {
+      whole[count++] = {filled, sequence_};
+      continue;
+    } else {
+      home = whole[0].first.index;
+      whole[0] = std::exchange(whole[1], {filled, sequence_});
+      add(counters_.skipped);
+    }
+    if (!source.enqueue(home)) return Collected::lost;
+  }
+  bool done = false;
+  for (std::size_t i = count; i-- > 0;) {
+    const auto& [filled, sequence] = whole[i];
+    if (done) {
+      add(counters_.skipped);
+    } else {
+      bool kept = false;
+      const PayloadStatus status =
+          lender_.deliver(connection_->decoder, filled, facts_of(filled, sequence), out, kept);
+      done = status == PayloadStatus::ok;
+      if (done) {
+        note_delivery();
+      } else {
+        count_damage(status);
+      }
+      damaged = damaged || !done;
+      if (kept) continue;
+    }
+    // A frame that was delivered stays delivered: the next call meets the error again.
+    if (!source.enqueue(filled.index) && !done) return Collected::lost;
+  }
+  if (done) return Collected::frame;
+  return damaged ? Collected::damaged : Collected::nothing;
+}
+
+FrameInfo LiveCamera::facts_of(const Filled& filled, std::uint64_t sequence) const noexcept {
+  FrameInfo frame;
+  frame.sequence = sequence;
+  frame.timestamp_ns = filled.timestamp_ns;
+  frame.meaning = filled.meaning;
+  frame.ready_ns = last_buffer_ns_;
+  frame.flags = after_gap_ ? kFrameAfterGap : kFrameNormal;
+  if (reopened_) frame.flags |= kFrameReopened;
+  if (controls_moved_.load(std::memory_order_relaxed)) frame.flags |= kFrameControlsMoved;
+  return frame;
+}
+
+void LiveCamera::note_delivery() noexcept {
+  after_gap_ = false;
+  reopened_ = false;
+  add(counters_.delivered);
+  if (state_.load(std::memory_order_relaxed) == CameraState::streaming) return;
+  const std::lock_guard guard(mutex_);
+  state_.store(CameraState::streaming);
+  remedy_.clear();
+}
+
+void LiveCamera::count_gap(std::uint32_t counted) noexcept {
+  // The driver's count begins anew with every connection, and within one with some drivers; ours
+  // goes on.
+  std::uint32_t step = last_counted_ ? counted - *last_counted_ : 1;
+  if (step == 0 || step > kPlausibleGap) step = 1;
+  last_counted_ = counted;
+  sequence_ += step;
+  if (step > 1) {
+    add(counters_.lost, step - 1);
+    after_gap_ = true;
+  }
+}
+
+void LiveCamera::count_damage(PayloadStatus status) noexcept {
+  switch (status) {
+    case PayloadStatus::flagged:
+      return add(counters_.flagged);
+    case PayloadStatus::markers:
+      return add(counters_.markers);
+    case PayloadStatus::too_short:
+      return add(counters_.too_short);
+    case PayloadStatus::undecodable:
+      return add(counters_.undecodable);
+    case PayloadStatus::ok:
+      return;
+  }
+}
+
 std::int64_t LiveCamera::silence_ns(std::int64_t now) const noexcept {
   return now - (last_buffer_ns_ == 0 ? opened_ns_ : last_buffer_ns_);
 }
@@ -220,6 +328,7 @@ void LiveCamera::note_silence(std::int64_t now) noexcept {
   {
     const std::lock_guard guard(mutex_);
     old = std::exchange(connection_, nullptr);
+    lender_.use(nullptr);
   }
   old->source->stop();
   next_try_ns_ = now;

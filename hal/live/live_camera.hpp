@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
@@ -12,9 +11,9 @@
 
 #include "hal/camera.hpp"
 #include "hal/config.hpp"
+#include "hal/live/frame_lender.hpp"
 #include "hal/live/payload.hpp"
 #include "hal/live/source.hpp"
-#include "hal/luma/luma_buffer.hpp"
 
 namespace dtact::hal::live {
 
@@ -25,7 +24,7 @@ namespace dtact::hal::live {
 ///
 /// A second thread reads the locked controls once a second (a USB transfer each, too slow for the
 /// capture thread) and sets back what has moved.
-class LiveCamera : public Camera, private FrameOwner {
+class LiveCamera : public Camera {
  public:
   /// `opener` is called by start() and then whenever the camera is away. `identity` stands in
   /// messages until it has succeeded. Throws std::runtime_error for an impossible size or rate.
@@ -50,8 +49,6 @@ class LiveCamera : public Camera, private FrameOwner {
     PayloadDecoder decoder;
   };
 
-  void give_back(int index) noexcept override;
-
   void connect();
   [[nodiscard]] bool try_connect() noexcept;
   void disconnect(CameraState state, const std::string& remedy);
@@ -64,10 +61,7 @@ class LiveCamera : public Camera, private FrameOwner {
   /// What collect() found in the driver's queue.
   enum class Collected : std::uint8_t { frame, damaged, nothing, lost };
   [[nodiscard]] Collected collect(Frame& out) noexcept;
-  /// Makes `out` of the payload. `kept`: the payload itself was lent and comes back with the frame.
-  [[nodiscard]] PayloadStatus deliver(const Filled& filled, std::uint64_t sequence, Frame& out,
-                                      bool& kept) noexcept;
-  [[nodiscard]] std::uint32_t take_flags() noexcept;
+  [[nodiscard]] FrameInfo facts_of(const Filled& filled, std::uint64_t sequence) const noexcept;
   void note_delivery() noexcept;
   void count_gap(std::uint32_t sequence) noexcept;
   void count_damage(PayloadStatus status) noexcept;
@@ -77,18 +71,8 @@ class LiveCamera : public Camera, private FrameOwner {
   const std::int64_t period_ns_;
 
   // The capture thread's own.
-  std::array<luma::LumaBuffer, 2> pool_;  // one with the caller, one to decode into
-  std::array<std::atomic<bool>, 2> lent_{};
-  /// A payload that is lent. Two sources may have lent buffers of the same index at a time: one
-  /// before and one after the camera was away.
-  struct Loan {
-    std::shared_ptr<Source> lender;
-    int index = -1;  // of the lender's buffer
-  };
-  void end_loan(Loan& loan) noexcept;
-  std::array<Loan, 2> loans_;  // one with the caller, one to deliver; without lender: free
-  std::array<Loan, 2> jpegs_;  // what the pool's buffers were decoded from
-  std::optional<Area> area_;   // what will be read; none: the whole image
+  FrameLender lender_;
+  std::optional<Area> area_;  // what will be read; none: the whole image
   std::int64_t next_try_ns_ = 0;
   std::int64_t last_buffer_ns_ = 0;  // the last sign of life, damaged or not
   std::int64_t opened_ns_ = 0;
