@@ -36,9 +36,7 @@ Row row(std::string_view id) {
   return *found;
 }
 
-Outcome at(std::string_view id, double value) {
-  return run(ours().calibration, row(id).script(value));
-}
+Outcome at(std::string_view id, double value) { return run(ours(), row(id).script(value)); }
 
 double nominal_mm() {
   static const double error = at("noise", 1).error_mm();
@@ -77,7 +75,7 @@ TEST(Atlas, CleanScenesAreNotFlagged) {
   double flagged = 0;
   int frames = 0;
   for (const Script& script : clean_scripts()) {
-    const Outcome outcome = run(ours().calibration, script);
+    const Outcome outcome = run(ours(), script);
     flagged += outcome.flagged * outcome.frames;
     frames += outcome.frames;
   }
@@ -114,7 +112,7 @@ TEST(Atlas, ReferenceUnderAPressIsToldFromAFifthOfAMillimetreOn) {
 int followed(Script script) {
   script.frames = kPress + 120;
   script.judged = script.frames;
-  const Outcome outcome = run(ours().calibration, script);
+  const Outcome outcome = run(ours(), script);
   return outcome.conditions.at(static_cast<std::size_t>(pipeline::Health::exposure_follows));
 }
 

@@ -19,8 +19,9 @@ const std::vector<Method>& methods() {
       calibration.model = method.calibrate(material);
       calibration.crop_col = table::kCropCol;
       calibration.crop_row = table::kCropRow;
-      all.push_back(
-          {method.name, std::make_shared<const calibration::Calibration>(std::move(calibration))});
+      all.push_back({method.name,
+                     std::make_shared<const calibration::Calibration>(std::move(calibration)),
+                     method.sharpen_steps});
     }
     return all;
   }();

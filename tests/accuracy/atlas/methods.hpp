@@ -12,6 +12,7 @@ namespace dtact::atlas {
 struct Method {
   std::string_view name;
   std::shared_ptr<const calibration::Calibration> calibration;
+  int sharpen_steps = 0;
 };
 
 /// The table's methods, each calibrated once.

@@ -13,7 +13,7 @@ matplotlib.rcParams["svg.hashsalt"] = "dtact"  # the same picture from the same 
 import matplotlib.pyplot as plt  # noqa: E402  (the back end is chosen first)
 
 GROUPS = ["light", "image", "scene", "reference"]
-COLOURS = ["#9a6324", "#1f77b4", "#2ca02c", "#7b3fa0"]
+COLOURS = ["#9a6324", "#1f77b4", "#2ca02c", "#7b3fa0", "#d1495b", "#444444"]
 
 
 def number(text):

@@ -201,12 +201,11 @@ double Outcome::error_mm() const noexcept {
   return std::max(inside_mm, outside_mm);
 }
 
-Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
-            const Script& script) {
+Outcome run(const Method& method, const Script& script) {
   fakes::FakeClock clock;
   ScriptedCamera camera(script, clock);
   pipeline::DepthFrame prototype;
-  const recon::RectifyTable& table = calibration->model->rectify;
+  const recon::RectifyTable& table = method.calibration->model->rectify;
   prototype.depth_um.resize(static_cast<std::size_t>(table.width) *
                             static_cast<std::size_t>(table.height));
   pipeline::Exchange exchange(prototype);
@@ -216,6 +215,7 @@ Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
   pipeline::PipelineConfig config;
   config.reference.frames = 16;
   config.reconstruction.decimation = 1;
+  config.reconstruction.sharpen = method.sharpen_steps;
   if (!script.follow) config.drift.limit_percent = 0;
   pipeline::LightDriver light(std::make_unique<hal::null::NullRing>(), config.light, clock,
                               exchange);
@@ -223,9 +223,9 @@ Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
   pipeline::PlaceWatch place(table.frame_width, table.frame_height, config.reference.frames);
   place.start();
   camera.attach(place);
-  pipeline::CaptureLoop loop({camera, light, writer, place, exchange, clock}, config,
-                             pipeline::activate(calibration, camera.info(), config.reconstruction),
-                             false);
+  pipeline::CaptureLoop loop(
+      {camera, light, writer, place, exchange, clock}, config,
+      pipeline::activate(method.calibration, camera.info(), config.reconstruction), false);
   while (!exchange.stop) loop.step();
   return camera.outcome();
 }

@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "daemon/calibration/calibration.hpp"
 #include "daemon/pipeline/health.hpp"
 #include "hal/sim/truth.hpp"
 #include "tests/accuracy/atlas/disturbance.hpp"
+#include "tests/accuracy/atlas/methods.hpp"
 
 namespace dtact::atlas {
 
@@ -55,8 +55,7 @@ struct Outcome {
 
 /// Runs the loop on this thread: the camera's clock is the only one, so a minute takes seconds and
 /// the same script gives the same outcome. Without real-time settings, state folder or ring.
-[[nodiscard]] Outcome run(const std::shared_ptr<const calibration::Calibration>& calibration,
-                          const Script& script);
+[[nodiscard]] Outcome run(const Method& method, const Script& script);
 
 /// Names of the conditions that at least a tenth of the frames carried, comma separated.
 [[nodiscard]] std::string conditions_of(const Outcome& outcome);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/model/model_build.hpp"
 
 namespace dtact::table {
 namespace {
@@ -24,17 +25,28 @@ std::shared_ptr<const recon::Model> published_single(const Material& material) {
   return from_one(material, recon::Method::published);
 }
 
-calibration::BallPresses many_presses(const Material& material) {
+calibration::BallPresses no_presses(const Material& material) {
   calibration::BallPresses set;
   set.reference_q8 = material.reference_q8;
-  for (std::size_t i = 0; i < material.many.size(); ++i) {
-    set.presses.push_back(
-        {.name = "press " + std::to_string(i + 1), .frames = material.many[i], .depth_mm = {}});
-  }
   set.ball_radius_mm = material.trial->centre.radius_mm;
   set.mm_per_px = kMmPerPx;
   set.crop = calibration::Crop{kCropCol, kCropRow, kCrop, kCrop};
   return set;
+}
+
+calibration::BallPresses many_presses(const Material& material) {
+  calibration::BallPresses set = no_presses(material);
+  for (std::size_t i = 0; i < material.many.size(); ++i) {
+    set.presses.push_back(
+        {.name = "press " + std::to_string(i + 1), .frames = material.many[i], .depth_mm = {}});
+  }
+  return set;
+}
+
+std::shared_ptr<const recon::Model> layer_model(const Material& material) {
+  calibration::BallPresses set = no_presses(material);
+  set.presses.push_back({.name = "centre", .frames = material.centre, .depth_mm = {}});
+  return calibration::build_model(set).calibration.model;
 }
 
 std::shared_ptr<const recon::Model> published_regression(const Material& material) {
@@ -43,11 +55,13 @@ std::shared_ptr<const recon::Model> published_regression(const Material& materia
       .model;
 }
 
-constexpr std::array<Method, 4> kMethods = {{
+constexpr std::array<Method, 6> kMethods = {{
     {"published single image", published_single},
     {"published regression", published_regression},
     {"ours, one press", ours_single},
     {"ours, many presses", [](const Material& material) { return ours_many(material); }},
+    {"ours, layer model of one press", layer_model},
+    {"ours, layer model of one press, sharpened", layer_model, 2},
 }};
 
 }  // namespace

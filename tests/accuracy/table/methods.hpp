@@ -38,6 +38,7 @@ inline constexpr std::size_t kReferenceFrames = 32;
 struct Method {
   std::string_view name;
   std::shared_ptr<const recon::Model> (*calibrate)(const Material& material) = nullptr;
+  int sharpen_steps = 0;
 };
 
 [[nodiscard]] std::span<const Method> methods();

@@ -8,6 +8,7 @@
 #include <memory>
 #include <set>
 
+#include "clients/calibrate/fit/model/model_fit.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/accuracy/table/another_law.hpp"
@@ -60,14 +61,18 @@ Spread spread(const std::vector<Cell>& cells, std::size_t configuration, std::si
 }
 
 template <typename Value>
-void add_rows(std::string& out, const std::vector<Cell>& cells, std::size_t columns, Law law,
-              const char* truth, const Value& value) {
+void add_rows(std::string& out, const std::vector<Cell>& cells, std::size_t columns, int seeds,
+              Law law, const char* truth, const Value& value) {
   for (std::size_t m = 0; m < methods().size(); ++m) {
     out += fmt::format("| {}, {} |", methods()[m].name, truth);
     for (std::size_t c = 0; c < columns; ++c) {
       const Spread s = spread(cells, c, m, law, value);
-      out += s.count == 0 ? " – |"
-                          : fmt::format(" {:.4f} ({:.4f}–{:.4f}) |", s.mean, s.least, s.greatest);
+      if (s.count == 0) {
+        out += " – |";
+        continue;
+      }
+      out += fmt::format(" {:.4f} ({:.4f}–{:.4f}", s.mean, s.least, s.greatest);
+      out += s.count == seeds ? ") |" : fmt::format("; {} refused) |", seeds - s.count);
     }
     out += '\n';
   }
@@ -90,7 +95,13 @@ std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count,
     const Material material = gather(sensor, trial, configurations()[c].regression_centre);
     const auto tests = photograph(sensor, trial, crop8(material.reference_q8));
     for (std::size_t m = 0; m < methods().size(); ++m) {
-      recon::Reconstructor reconstructor(methods()[m].calibrate(material));
+      std::shared_ptr<const recon::Model> model;
+      try {
+        model = methods()[m].calibrate(material);
+      } catch (const calibration::ModelRefused&) {
+        continue;  // no calibration is no error of depth; the table counts them
+      }
+      recon::Reconstructor reconstructor(model, methods()[m].sharpen_steps);
       Cell cell{trial.seed, c, m, law, {}, {}};
       for (std::size_t t = 0; t < tests.size(); ++t) {
         reconstructor.run(tests[t].luma.data(), kFrameWidth, depth);
@@ -142,11 +153,12 @@ std::string to_markdown(const std::vector<Cell>& cells) {
     regression += paper ? fmt::format(" {:.4f} |", paper->regression_mm) : " – |";
   }
   out += '\n' + rule + '\n' + deviation + '\n' + single + '\n' + regression + '\n';
-  add_rows(out, cells, columns, Law::built_in, "circle truth",
+  const auto count = static_cast<int>(seeds.size());
+  add_rows(out, cells, columns, count, Law::built_in, "circle truth",
            [](const Cell& cell) { return cell.circle.mean_mm(); });
   const auto indentation = [](const Cell& cell) { return cell.indentation.mean_mm(); };
-  add_rows(out, cells, columns, Law::built_in, "true indentation", indentation);
-  add_rows(out, cells, columns, Law::another, "true indentation, another law", indentation);
+  add_rows(out, cells, columns, count, Law::built_in, "true indentation", indentation);
+  add_rows(out, cells, columns, count, Law::another, "true indentation, another law", indentation);
   out += fmt::format(
       "\nMeans over {} seeds, least and greatest seed in brackets. Simulated sensor, "
       "apart from the paper's two rows.\n",
