@@ -1,6 +1,6 @@
 #pragma once
 
-// Inside of the reconstructor: reconstructor.cpp and reconstructor_rows.cpp only.
+// Inside of the reconstructor.
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/recon/kernels.hpp"
 #include "daemon/recon/list_table.hpp"
+#include "daemon/recon/lit_reference.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/sharpener.hpp"
 #include "daemon/recon/smoother.hpp"
@@ -24,7 +24,6 @@ namespace dtact::recon {
 /// Pairs of rows that a step works on before the next step: one row of tiles.
 inline constexpr int kStrip = Smoother::kStrip;
 static_assert(2 * kStrip == TileGrid::kRows);
-inline constexpr int kMaxDecimation = 4;
 
 /// Splits the time of a run into steps. Reads no clock when nobody asks.
 class Stopwatch {
@@ -43,21 +42,14 @@ class Stopwatch {
   Clock::time_point last_;
 };
 
+/// Makes the rows of a frame: rectified, smoothed and looked up, strip by strip.
 struct Reconstructor::Impl {
   Impl(std::shared_ptr<const Model> the_model, int the_steps);
 
-  /// Where row y begins in the planes below, whose rows are whole blocks.
-  [[nodiscard]] std::size_t at(int y) const noexcept {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(vec::padded(grid.width));
-  }
   /// Where row y begins in a depth map.
   [[nodiscard]] std::ptrdiff_t packed(int y) const noexcept {
     return std::ptrdiff_t{y} * grid.width;
   }
-  void rectify_reference(std::span<const std::uint16_t> reference_q8) noexcept;
-  void smooth_reference(std::span<std::int16_t> smoothed) noexcept;
-  void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
-  void set_light(double factor) noexcept;
   /// `sums` null: nobody asks.
   void run_list(const std::uint8_t* luma, const TileRows& tiles, std::int16_t* depth,
                 StripSums* sums, StepTimes& times, Stopwatch& watch) noexcept;
@@ -73,22 +65,12 @@ struct Reconstructor::Impl {
   Smoother smoother;
   Smoother second;  ///< The second filter of the published method.
   RowBuffer in;     ///< A strip before smoothing.
-  RowBuffer fine;   ///< The rows of one row of a coarse map.
   RowBuffer between;
   RowBuffer out;  ///< A strip after smoothing.
   std::optional<Sharpener> sharpener;
   TileRows sharpener_tiles;  ///< Whose levels it reads.
   ListTable list;
-  std::vector<std::int16_t> calibration_q6;  ///< Smoothed reference of the calibration.
-  // The reference as it was taken and its gain, 0 where untrusted; and both in the present light.
-  std::vector<std::int16_t> taken_q6;
-  std::vector<std::int16_t> taken_gain_q12;
-  std::vector<std::int16_t> reference_q6;
-  std::vector<std::int16_t> gain_q12;
-  std::vector<std::uint8_t> untrusted;
-  /// Sharpened levels are under their gain already: one, 0 where untrusted.
-  std::vector<std::int16_t> marks_q12;
-  std::uint64_t rest = 0;  ///< Counts the references: each has its own untouched map.
+  LitReference reference;
   int beyond = 0;
 
  private:

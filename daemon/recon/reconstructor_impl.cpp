@@ -1,10 +1,48 @@
-// What is done to the rows of a frame: rectified, smoothed and looked up, strip by strip.
-#include <algorithm>
-#include <bit>
-
 #include "daemon/recon/reconstructor_impl.hpp"
 
+#include <algorithm>
+#include <bit>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "daemon/recon/kernels.hpp"
+
 namespace dtact::recon {
+namespace {
+
+const DepthList& list_for(const Model& model, int steps) {
+  if (steps == 0) return model.list;
+  const auto found = std::ranges::find(model.sharpened, steps, &Model::Sharpened::steps);
+  if (found == model.sharpened.end()) {
+    throw std::invalid_argument("sharpened: the calibration has no list for " +
+                                std::to_string(steps) + (steps == 1 ? " step" : " steps") +
+                                " of sharpening");
+  }
+  return found->list;
+}
+
+}  // namespace
+
+Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, int the_steps)
+    : model(std::move(the_model)),
+      steps(the_steps),
+      grid(model->rectify.width, model->rectify.height),
+      all_tiles(static_cast<std::size_t>(grid.rows()), grid.all()),
+      plan(model->rectify),
+      smoother(taps_of(*model), grid.width, grid.height),
+      second(published_taps(), grid.width, grid.height),
+      in(2 * kStrip, grid.width),
+      between(2, grid.width),
+      out(2 * kStrip, grid.width),
+      sharpener_tiles(static_cast<std::size_t>(grid.rows())),
+      list(list_for(*model, steps), model->method),
+      reference(model) {
+  // check() wants the scattering where there are lists for steps.
+  if (const auto& scattering = model->scattering; steps > 0 && scattering) {
+    sharpener.emplace(*scattering, steps, model->mm_per_px, grid.width, grid.height);
+  }
+}
 
 void Reconstructor::Impl::prefetch(const TileRows& tiles, int row,
                                    const std::int16_t* depth) const noexcept {
@@ -16,7 +54,7 @@ void Reconstructor::Impl::prefetch(const TileRows& tiles, int row,
     for (int y = row * TileGrid::kRows; y < end; ++y) {
       for (int block = first * grid.blocks_per_tile; block < last; ++block) {
         const std::size_t x = static_cast<std::size_t>(block) * vec::kBlock;
-        __builtin_prefetch(gain_q12.data() + at(y) + x, 0, kToL2);
+        __builtin_prefetch(reference.gain_q12(y) + x, 0, kToL2);
         __builtin_prefetch(depth + packed(y) + x, kForWriting, kToL2);
       }
     }
@@ -41,11 +79,11 @@ void Reconstructor::Impl::rectify(const std::uint8_t* luma, int y, int x0, int x
                             plan.blocks() * RectifyPlan::kGroups);
   if (decimation == 1) {
     vec::rectify_difference(plan, y, first, last, luma, entries(y), table.fine_width(),
-                            reference_q6.data() + at(y), row);
+                            reference.q6(y), row);
     return;
   }
   vec::rectify_mean_difference(plan, decimation, y, first, last, luma, entries(y * decimation),
-                               table.fine_width(), reference_q6.data() + at(y), row);
+                               table.fine_width(), reference.q6(y), row);
 }
 
 void Reconstructor::Impl::rectify_pair(const std::uint8_t* luma, int pair, std::uint64_t tiles,
@@ -108,9 +146,9 @@ void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& til
                                    Stopwatch& watch) noexcept {
   if (sharpener) return run_sharpened(*sharpener, luma, tiles, depth, sums, times, watch);
   const auto look_up = [&](int row, int first, int last) {
-    const std::size_t here = at(row * TileGrid::kRows);
-    look_up_rows({out.row(0), out.stride(), gain_q12.data() + here, vec::padded(grid.width)}, row,
-                 first, last, depth);
+    look_up_rows({out.row(0), out.stride(), reference.gain_q12(row * TileGrid::kRows),
+                  vec::padded(grid.width)},
+                 row, first, last, depth);
     times.list_ns += watch.lap();
   };
   smooth_tiles(
@@ -174,7 +212,7 @@ void Reconstructor::Impl::run_sharpened(Sharpener& filter, const std::uint8_t* l
   const auto take_levels = [&](int row, int first, int last) {
     const int y0 = row * TileGrid::kRows;
     for (int y = y0; y < std::min(y0 + TileGrid::kRows, grid.height); ++y) {
-      vec::lit_row(out.row(y - y0), gain_q12.data() + at(y), first, last, filter.level(y));
+      vec::lit_row(out.row(y - y0), reference.gain_q12(y), first, last, filter.level(y));
     }
     times.list_ns += watch.lap();
   };
@@ -186,7 +224,7 @@ void Reconstructor::Impl::run_sharpened(Sharpener& filter, const std::uint8_t* l
     const int y = row * TileGrid::kRows;
     for_each_run(tiles[static_cast<std::size_t>(row)], [&](int first, int last) {
       look_up_rows(
-          {filter.sharpened(y), filter.stride(), marks_q12.data() + at(y), vec::padded(grid.width)},
+          {filter.sharpened(y), filter.stride(), reference.marks_q12(y), vec::padded(grid.width)},
           row, first * grid.blocks_per_tile, std::min(last * grid.blocks_per_tile, grid.blocks()),
           depth);
     });
@@ -219,7 +257,7 @@ void Reconstructor::Impl::run_published(const std::uint8_t* luma, std::int16_t* 
     second.take(pair, out.row(0), out.row(1), 0, blocks);
     for (int y = 2 * pair; y < std::min(2 * pair + 2, grid.height); ++y) {
       std::copy_n(out.row(y - 2 * pair), grid.width, depth + packed(y));
-      kernels::mask_row(untrusted.data() + at(y), grid.width, depth + packed(y));
+      kernels::mask_row(reference.untrusted(y), grid.width, depth + packed(y));
     }
     times.smooth_ns += watch.lap();
   }
@@ -232,17 +270,16 @@ void Reconstructor::Impl::clear(std::uint64_t tiles, int row, std::int16_t* dept
     for (int y = row * TileGrid::kRows; y < std::min((row + 1) * TileGrid::kRows, grid.height);
          ++y) {
       std::fill_n(depth + packed(y) + x0, x1 - x0, std::int16_t{0});
-      kernels::mask_row(untrusted.data() + at(y) + static_cast<std::size_t>(x0), x1 - x0,
-                        depth + packed(y) + x0);
+      kernels::mask_row(reference.untrusted(y) + x0, x1 - x0, depth + packed(y) + x0);
     }
   });
 }
 
 void Reconstructor::Impl::clear_rest(const TileRows& tiles, DrawnTiles& drawn,
                                      std::int16_t* depth) const noexcept {
-  if (drawn.rest != rest || drawn.tiles.size() != tiles.size()) {
+  if (drawn.rest != reference.count() || drawn.tiles.size() != tiles.size()) {
     drawn.tiles = all_tiles;
-    drawn.rest = rest;
+    drawn.rest = reference.count();
   }
   for (int row = 0; row < grid.rows(); ++row) {
     std::uint64_t& was = drawn.tiles[static_cast<std::size_t>(row)];
