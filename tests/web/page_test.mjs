@@ -1,5 +1,6 @@
 // The page in a browser, on simulated sensors: what it shows against what the daemon sent.
 import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
 import path from "node:path";
 import { after, before, beforeEach, test } from "node:test";
 import { canvas, fact, numberOf, open, pause, PHONE, resume, until } from "./browser.mjs";
@@ -249,6 +250,35 @@ test("the surface is loaded when it is looked at", async () => {
   );
   await pane.getByLabel("Exaggeration of depth").fill("1");
   assert.equal(await pane.locator(".exaggeration output").textContent(), "true scale");
+  await pane.getByRole("radio", { name: "Depth" }).click();
+});
+
+test("a snapshot of the surface is the newest map, not what was shown before", async () => {
+  await view.page.keyboard.press("2");
+  await until(
+    () => pane.locator("canvas.map").getAttribute("width"),
+    (width) => width === "800",
+    10_000,
+  );
+  await pane.getByRole("radio", { name: "Surface" }).click();
+  const [download] = await Promise.all([
+    view.page.waitForEvent("download"),
+    pane.getByRole("button", { name: "Snapshot" }).click(),
+  ]);
+  const png = (await readFile(await download.path())).toString("base64");
+  const picture = await view.page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (c) => c.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+    const canvas = new OffscreenCanvas(image.width, image.height);
+    const context = canvas.getContext("2d");
+    context.drawImage(image, 0, 0);
+    const { data } = context.getImageData(12, 12, 580, 580);
+    let coloured = 0;
+    for (let i = 0; i < data.length; i += 4) if (Math.abs(data[i] - data[i + 2]) > 8) ++coloured;
+    return { width: image.width, coloured: coloured / (580 * 580) };
+  }, png);
+  assert.equal(picture.width, 580 + 96 + 12);
+  assert.ok(picture.coloured > 0.5, `${picture.coloured} of the map is in colour`);
   await pane.getByRole("radio", { name: "Depth" }).click();
 });
 

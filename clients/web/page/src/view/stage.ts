@@ -172,12 +172,17 @@ export class Stage {
     if (this.line) this.tellProfile();
   }
 
-  /** The map as it is shown with its marks, bar and these lines of text below, as a PNG. */
+  /**
+   * The map, or the camera's picture where that is shown, with its marks, bar and these lines of text
+   * below, as a PNG. Of a surface it is the newest map: the canvas still has what was shown before.
+   */
   picturePng(lines: string[], ink: string, paper: string): Promise<Blob> {
+    const depth = this.view === "camera" ? undefined : this.depth;
+    if (depth) this.map.drawDepth(depth);
     const [width, height] = [this.canvas.width, this.canvas.height];
     const scale = Math.max(1, Math.round(580 / width));
     const [mapWidth, mapHeight] = [width * scale, height * scale];
-    const bar = this.view === "depth" ? 96 : 12;
+    const bar = depth ? 96 : 12;
     const made = el("canvas", {
       width: String(mapWidth + bar + 12),
       height: String(mapHeight + 24 + 18 * lines.length),
@@ -189,9 +194,10 @@ export class Stage {
     context.save();
     context.translate(12, 12);
     context.drawImage(this.canvas, 0, 0, mapWidth, mapHeight);
-    if (this.view === "depth" && this.depth)
-      drawMarks(context, mapWidth, mapHeight, this.marks(this.depth));
-    if (this.view === "depth") drawColourBar(context, mapWidth + 10, 0, mapHeight, this.range, ink);
+    if (depth) {
+      drawMarks(context, mapWidth, mapHeight, this.marks(depth));
+      drawColourBar(context, mapWidth + 10, 0, mapHeight, this.range, ink);
+    }
     context.restore();
     context.fillStyle = ink;
     context.font = "12px system-ui, sans-serif";
