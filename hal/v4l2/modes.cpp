@@ -145,7 +145,10 @@ std::string alternatives(const std::vector<Mode>& modes, const CameraConfig& ask
   std::ranges::stable_partition(
       usable, [&](const Mode& mode) { return mode.has_size(asked.width, asked.height); });
   if (!usable.empty() || modes.empty()) return describe(usable);
-  return fmt::format("nothing (it has only {}, which cannot be read)", describe(modes));
+  return fmt::format(
+      "nothing (it has only {}, which cannot be read; of a bare sensor's raw Bayer "
+      "camera.backend = \"libcamera\" makes an image)",
+      describe(modes));
 }
 
 std::string describe(const std::vector<Mode>& modes) {

@@ -2,7 +2,7 @@
 # setup.sh: makes the guest kernel of the kernel tests, once, in a cache folder.
 #
 # The kernel is User Mode Linux (a Linux kernel that runs as an ordinary program) built from
-# Debian's linux-source-6.1 with uml.config: about 4 minutes on 2 cores. What modules are built with
+# Debian's linux-source-6.1 with uml.config: 2 to 7 minutes on 2 cores. What modules are built with
 # is kept beside it, so that a change in modules/ builds those alone, in seconds. Nothing is
 # installed but build tools, and those only by root. Every time, the kernel is booted once to see that
 # it runs here.

@@ -68,7 +68,8 @@ TEST(Modes, NamesTheModesThatWouldDo) {
                                 mode(V4L2_PIX_FMT_YUYV, 800, 600, {30})};
   EXPECT_EQ(alternatives(modes, asked(800, 600, 60)), "YUYV 800x600 at 30; MJPEG 1280x720 at 60");
   EXPECT_EQ(alternatives({modes[1]}, asked(800, 600, 60)),
-            "nothing (it has only H264 800x600 at 60, which cannot be read)");
+            "nothing (it has only H264 800x600 at 60, which cannot be read; of a bare sensor's raw "
+            "Bayer camera.backend = \"libcamera\" makes an image)");
   EXPECT_EQ(alternatives({}, asked(800, 600, 60)), "nothing (the driver lists no mode)");
 }
 
