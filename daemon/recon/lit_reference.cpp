@@ -27,6 +27,7 @@ LitReference::LitReference(std::shared_ptr<const Model> model)
     : model_(std::move(model)),
       width_(model_->rectify.width),
       height_(model_->rectify.height),
+      stride_(static_cast<std::size_t>(vec::padded(width_))),
       smoother_(taps_of(*model_), width_, height_),
       in_(2, width_),
       out_(2, width_),
@@ -42,10 +43,6 @@ LitReference::LitReference(std::shared_ptr<const Model> model)
   smooth(calibration_q6_);
   apply(model_->gain, {width_, height_, vec::padded(width_), model_->mm_per_px}, calibration_q6_);
   set(model_->reference_q8);
-}
-
-std::size_t LitReference::at(int y) const noexcept {
-  return static_cast<std::size_t>(y) * static_cast<std::size_t>(vec::padded(width_));
 }
 
 void LitReference::rectify(std::span<const std::uint16_t> reference_q8) noexcept {

@@ -49,13 +49,16 @@ class LitReference {
 
  private:
   /// Where row y begins in the planes below.
-  [[nodiscard]] std::size_t at(int y) const noexcept;
+  [[nodiscard]] std::size_t at(int y) const noexcept {
+    return static_cast<std::size_t>(y) * stride_;
+  }
   void rectify(std::span<const std::uint16_t> reference_q8) noexcept;
   void smooth(std::span<std::int16_t> smoothed) noexcept;
 
   std::shared_ptr<const Model> model_;
   int width_;
   int height_;
+  std::size_t stride_;
   Smoother smoother_;
   RowBuffer in_;
   RowBuffer out_;

@@ -52,9 +52,10 @@ void Reconstructor::Impl::prefetch(const TileRows& tiles, int row,
   for_each_run(tiles[static_cast<std::size_t>(row)], [&](int first, int last) {
     last = std::min(last * grid.blocks_per_tile, grid.blocks());
     for (int y = row * TileGrid::kRows; y < end; ++y) {
+      const std::int16_t* const gain = reference.gain_q12(y);
       for (int block = first * grid.blocks_per_tile; block < last; ++block) {
         const std::size_t x = static_cast<std::size_t>(block) * vec::kBlock;
-        __builtin_prefetch(reference.gain_q12(y) + x, 0, kToL2);
+        __builtin_prefetch(gain + x, 0, kToL2);
         __builtin_prefetch(depth + packed(y) + x, kForWriting, kToL2);
       }
     }
