@@ -199,6 +199,12 @@ class FoxglovesClient(unittest.TestCase):
 
     def test_points_are_as_deep_as_the_contact(self) -> None:
         # Of each topic the newest is told: on a busy machine two seldom are of one frame.
+        for _ in range(10):
+            if self.points_and_contacts_of_one_frame() > 0:
+                return
+        self.fail("no points and contact came of one frame")
+
+    def points_and_contacts_of_one_frame(self) -> int:
         node = told("/sensors/touch/foxglove", V1, 160)
         channels = [entry["channel"] for entry in node["channel"]]
         self.assertEqual({one["topic"]: one["schemaName"] for one in channels}, POINTS)
@@ -218,7 +224,7 @@ class FoxglovesClient(unittest.TestCase):
                 # Every other pixel of the map, z towards the object.
                 self.assertAlmostEqual(-1000 * points[:, 2].min(), deepest_mm, delta=0.02)
                 compared += 1
-        self.assertGreater(compared, 0)
+        return compared
 
     def test_all_sensors_under_the_sdks_name(self) -> None:
         node = told("/foxglove", SDK, 0)
