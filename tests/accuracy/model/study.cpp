@@ -7,8 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "clients/calibrate/fit/difference.hpp"
-#include "daemon/recon/reconstructor.hpp"
+#include "tests/accuracy/table/depth_reader.hpp"
 #include "tests/accuracy/table/judge.hpp"
 #include "tests/accuracy/table/methods.hpp"
 #include "tests/accuracy/table/sensor.hpp"
@@ -28,94 +27,25 @@ Specimen with_optics(std::string name, double thickness_mm, const hal::sim::Opti
 
 class Reader {
  public:
-  explicit Reader(std::shared_ptr<const recon::Model> model)
-      : model_(std::move(model)), reconstructor_(model_), depth_(model_->rectify.entries.size()) {}
+  explicit Reader(const std::shared_ptr<const recon::Model>& model, int sharpen_steps = 0)
+      : reader_(model, sharpen_steps) {}
 
   void read(const image::Grey8& frame, const table::TruePress& truth) {
-    std::vector<std::uint8_t> luma = frame.pixels;
-    luma.resize(luma.size() + recon::kLumaPadding);
-    reconstructor_.run(luma.data(), table::kFrameWidth, depth_);
-    error_ += table::against_indentation(depth_, truth);
-    for (std::size_t i = 0; i < depth_.size(); ++i) {
-      if (truth.contact[i] == 0 || depth_[i] == recon::kUntrusted) continue;
-      bias_ += 0.001 * depth_[i] - static_cast<double>(truth.indentation_mm[i]);
+    const auto depth = reader_.read(frame);
+    error_ += table::against_indentation(depth, truth);
+    for (std::size_t i = 0; i < depth.size(); ++i) {
+      if (truth.contact[i] == 0 || depth[i] == recon::kUntrusted) continue;
+      bias_ += 0.001 * depth[i] - static_cast<double>(truth.indentation_mm[i]);
     }
   }
   [[nodiscard]] double mean_mm() const { return error_.mean_mm(); }
   [[nodiscard]] double bias_mm() const { return bias_ / static_cast<double>(error_.pixels); }
 
  private:
-  std::shared_ptr<const recon::Model> model_;
-  recon::Reconstructor reconstructor_;
-  std::vector<std::int16_t> depth_;
+  table::DepthReader reader_;
   table::Error error_;
   double bias_ = 0;
 };
-
-/// A separable Gaussian, the border replicated.
-std::vector<float> gaussian(const std::vector<float>& map, int width, int height, double sigma_px) {
-  const int reach = static_cast<int>(std::ceil(3.5 * sigma_px));
-  std::vector<float> taps;
-  float sum = 0;
-  for (int k = -reach; k <= reach; ++k) {
-    taps.push_back(static_cast<float>(std::exp(-0.5 * k * k / (sigma_px * sigma_px))));
-    sum += taps.back();
-  }
-  for (float& tap : taps) tap /= sum;
-  const auto index = [width](int x, int y) {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-           static_cast<std::size_t>(x);
-  };
-  std::vector<float> between(map.size());
-  std::vector<float> out(map.size());
-  for (int y = 0; y < height; ++y) {
-    for (int k = -reach; k <= reach; ++k) {
-      const float tap = taps[static_cast<std::size_t>(k + reach)];
-      const int from = std::clamp(y + k, 0, height - 1);
-      for (int x = 0; x < width; ++x) between[index(x, y)] += tap * map[index(x, from)];
-    }
-  }
-  std::vector<float> line(static_cast<std::size_t>(width + 2 * reach));
-  for (int y = 0; y < height; ++y) {
-    for (int x = -reach; x < width + reach; ++x) {
-      line[static_cast<std::size_t>(x + reach)] = between[index(std::clamp(x, 0, width - 1), y)];
-    }
-    for (int k = 0; k <= 2 * reach; ++k) {
-      const float tap = taps[static_cast<std::size_t>(k)];
-      for (int x = 0; x < width; ++x) {
-        out[index(x, y)] += tap * line[static_cast<std::size_t>(x + k)];
-      }
-    }
-  }
-  return out;
-}
-
-/// Reads a frame through the filter's steps, one after the other: x ← x + L − Hx.
-void read_sharpened(const recon::Model& model, const image::Grey8& frame,
-                    const table::TruePress& truth, std::array<table::Error, 2>& errors) {
-  const calibration::DifferenceMap map =
-      calibration::smoothed_difference(model, model.reference_q8, {&frame, 1});
-  const recon::Scattering& scattering = *model.scattering;
-  const auto narrow = static_cast<float>(scattering.narrow_weight);
-  std::vector<float> x = map.levels;
-  for (std::size_t step = 0; step < errors.size(); ++step) {
-    const std::vector<float> sharp =
-        gaussian(x, map.width, map.height, scattering.narrow_mm / map.mm_per_px);
-    const std::vector<float> wide =
-        gaussian(x, map.width, map.height, scattering.wide_mm / map.mm_per_px);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      x[i] += map.levels[i] - narrow * sharp[i] - (1 - narrow) * wide[i];
-    }
-    const recon::DepthList& list = model.sharpened[step].list;
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      if (truth.contact[i] == 0) continue;
-      const long entry = std::lround(x[i] * recon::kEntriesPerLevel) - list.first_q6;
-      const long last = static_cast<long>(list.um.size()) - 1;
-      errors[step].add(0.001 * list.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))] -
-                       static_cast<double>(truth.indentation_mm[i]));
-    }
-  }
-}
 
 double stated_mm(const recon::Model& model, double depth_mm) {
   double nearest = 1e9;
@@ -205,7 +135,7 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
   }
   Result result;
   result.true_depth_mm = trial.centre.depth_mm;
-  std::unique_ptr<Reader> by_model;
+  std::vector<Reader> by_model;  // plain, and by one and two steps
   const auto begin = std::chrono::steady_clock::now();
   std::shared_ptr<const recon::Model> model;
   try {
@@ -213,7 +143,7 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
     model = made.calibration.model;
     result.fit = made.fit;
     result.light_levels = made.light_levels;
-    by_model = std::make_unique<Reader>(model);
+    for (int steps = 0; steps <= 2; ++steps) by_model.emplace_back(model, steps);
   } catch (const calibration::ModelRefused& e) {
     result.refused = e.what();
   }
@@ -225,27 +155,23 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
   } catch (const std::runtime_error&) {
     by_free.reset();  // a chain of presses asks for a light one; result.free_mm stays NaN
   }
-  std::array<table::Error, 2> sharpened;
   double depth = 0;
   for (std::size_t i = 0; i < trial.tests.size(); ++i) {
     const std::size_t press = 1 + trial.many.size() + i;
     const image::Grey8 frame = sensor.press(press, 1).front();
     const table::TruePress truth =
         table::true_press(sensor.truth(), table::first_still_frame(sensor.truth(), press));
-    if (by_model) {
-      by_model->read(frame, truth);
-      read_sharpened(*model, frame, truth, sharpened);
-    }
+    for (Reader& reader : by_model) reader.read(frame, truth);
     if (by_free) by_free->read(frame, truth);
     depth += trial.tests[i].depth_mm / static_cast<double>(trial.tests.size());
   }
   if (by_free) result.free_mm = by_free->mean_mm();
-  if (by_model) {
-    result.model_mm = by_model->mean_mm();
-    for (std::size_t i = 0; i < sharpened.size(); ++i) {
-      result.sharpened_mm[i] = sharpened[i].mean_mm();
+  if (!by_model.empty()) {
+    result.model_mm = by_model[0].mean_mm();
+    for (std::size_t i = 0; i < result.sharpened_mm.size(); ++i) {
+      result.sharpened_mm[i] = by_model[i + 1].mean_mm();
     }
-    result.bias_mm = by_model->bias_mm();
+    result.bias_mm = by_model[0].bias_mm();
     result.stated_mm = stated_mm(*model, 0.5 * depth);
   }
   return result;

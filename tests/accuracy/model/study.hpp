@@ -32,7 +32,7 @@ struct Result {
   double free_mm = std::numeric_limits<double>::quiet_NaN();  ///< Under a 5 mm ball, by the free
                                                               ///< list of the same images.
   double model_mm = 0;                                        ///< By the model's.
-  /// By its lists for one and two steps of the filter, which is applied here in double precision.
+  /// By its lists for one and two steps of the filter, as the daemon applies it.
   std::array<double, 2> sharpened_mm = {};
   double bias_mm = 0;    ///< Its mean error with its sign.
   double stated_mm = 0;  ///< What it says of itself at the tests' mean depth.

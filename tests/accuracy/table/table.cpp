@@ -9,9 +9,9 @@
 #include <set>
 
 #include "clients/calibrate/fit/model/model_fit.hpp"
-#include "daemon/recon/reconstructor.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/accuracy/table/another_law.hpp"
+#include "tests/accuracy/table/depth_reader.hpp"
 #include "tests/accuracy/table/methods.hpp"
 
 namespace dtact::table {
@@ -19,7 +19,7 @@ namespace {
 
 // A test press as it is judged: one frame, as the daemon sees it.
 struct Test {
-  std::vector<std::uint8_t> luma;  // padded for the reconstructor
+  image::Grey8 frame;
   calibration::Circle circle;
   double radius_mm = 0;
 };
@@ -28,10 +28,8 @@ std::vector<Test> photograph(Sensor& sensor, const Trial& trial, const image::Gr
   std::vector<Test> tests;
   for (std::size_t i = 0; i < trial.tests.size(); ++i) {
     const auto frames = sensor.press(1 + trial.many.size() + i, 1);
-    Test test{frames[0].pixels, calibration::published_circle(reference, crop8(mean_q8(frames))),
-              trial.tests[i].radius_mm};
-    test.luma.resize(test.luma.size() + recon::kLumaPadding);
-    tests.push_back(std::move(test));
+    tests.push_back({frames[0], calibration::published_circle(reference, crop8(mean_q8(frames))),
+                     trial.tests[i].radius_mm});
   }
   return tests;
 }
@@ -89,7 +87,6 @@ std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count,
         true_press(*truth, first_still_frame(*truth, 1 + trial.many.size() + i)));
   }
   std::vector<Cell> cells;
-  std::vector<std::int16_t> depth(std::size_t{kCrop} * kCrop);
   for (std::size_t c = 0; c < configuration_count; ++c) {
     Sensor sensor(truth, configurations()[c], trial.seed);
     const Material material = gather(sensor, trial, configurations()[c].regression_centre);
@@ -101,10 +98,10 @@ std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count,
       } catch (const calibration::ModelRefused&) {
         continue;  // no calibration is no error of depth; the table counts them
       }
-      recon::Reconstructor reconstructor(model, methods()[m].sharpen_steps);
+      DepthReader reader(model, methods()[m].sharpen_steps);
       Cell cell{trial.seed, c, m, law, {}, {}};
       for (std::size_t t = 0; t < tests.size(); ++t) {
-        reconstructor.run(tests[t].luma.data(), kFrameWidth, depth);
+        const auto depth = reader.read(tests[t].frame);
         cell.circle += against_circle(depth, tests[t].circle, tests[t].radius_mm);
         cell.indentation += against_indentation(depth, indentations[t]);
       }
