@@ -1,16 +1,19 @@
 #!/usr/bin/env bash
 # Makes the tables, plots and pages that lie beside this file from the simulated sensor:
-# tables.sh BIN [table|atlas|thickness|study|pose ...], all of them without a name. BIN: where the accuracy
+# tables.sh BIN [table|objects|atlas|thickness|study|pose ...], all of them without a name. BIN: where the accuracy
 # tests were built.
 set -euo pipefail
 here=$(dirname "$(readlink -f "$0")")
 bin=$1
 shift
-(($#)) || set -- table atlas thickness study pose
+(($#)) || set -- table objects atlas thickness study pose
 for part in "$@"; do
   case $part in
     table)
       "$bin/table/paper_table" --out "$here/table"
+      ;;
+    objects)
+      "$bin/model/model_objects" --out "$here/model"
       ;;
     atlas)
       "$bin/atlas/stability_atlas" --out "$here/atlas" >/dev/null
@@ -34,7 +37,7 @@ for part in "$@"; do
       echo "pose: tests/accuracy/pose/README.md"
       ;;
     *)
-      echo "tables.sh: '$part' is none of table, atlas, thickness, study, pose" >&2
+      echo "tables.sh: '$part' is none of table, objects, atlas, thickness, study, pose" >&2
       exit 2
       ;;
   esac

@@ -2,6 +2,9 @@
 // tuned on. Seeds other than those of README's table. The whole study: model_study.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "tests/accuracy/model/objects.hpp"
 #include "tests/accuracy/model/study.hpp"
 
 namespace dtact::model_study {
@@ -24,6 +27,19 @@ TEST(Model, KnowsAnAbsoluteDepthUnderOtherOptics) {
   ASSERT_TRUE(result.fit) << result.refused;
   EXPECT_LE(result.model_mm, 0.04);
   EXPECT_LT(result.model_mm, 0.5 * result.free_mm);
+}
+
+TEST(Model, ReadsObjectsOfManyShapesSharpened) {
+  const auto errors = read_objects(1);
+  const ObjectErrors& list = errors.at(2);        // of one press
+  const ObjectErrors& sharpened = errors.back();  // the layer's model
+  EXPECT_LE(sharpened.mean_mm(), 0.040);
+  EXPECT_LT(sharpened.mean_mm(), 0.5 * list.mean_mm());
+  const std::vector<std::string> names = object_names();
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    EXPECT_LE(sharpened.object_mm(i), 0.085) << names[i];
+    EXPECT_LT(sharpened.object_mm(i), list.object_mm(i)) << names[i];
+  }
 }
 
 }  // namespace

@@ -1,0 +1,30 @@
+// Prints objects of many shapes as every method of the paper's table reads them, or writes the
+// page.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+
+#include "hal/base/atomic_file.hpp"
+#include "tests/accuracy/model/objects.hpp"
+
+int main(int argc, char** argv) {
+  try {
+    CLI::App app("Objects of many shapes, read by calibrations from presses of a ball");
+    int seeds = 10;
+    std::filesystem::path out;
+    app.add_option("--seeds", seeds, "Repetitions")->check(CLI::Range(1, 100));
+    app.add_option("--out", out, "Folder of objects.md; without it, only printed");
+    CLI11_PARSE(app, argc, argv);
+    const std::string page =
+        dtact::model_study::to_markdown(dtact::model_study::read_objects(seeds), seeds);
+    fmt::print("{}", page);
+    if (!out.empty()) dtact::base::write_file_atomically(out / "objects.md", page);
+    return 0;
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "model_objects: {}\n", e.what());
+    return 1;
+  }
+}
