@@ -2,7 +2,8 @@
 # Tokens, key and certificate that only root can read on disk reach the unprivileged daemon as systemd's
 # credentials.
 store=/etc/credstore
-install -d -m 700 $store
+# Debian 13's systemd brings the folder.
+[ -d $store ] || { install -d -m 700 $store; made=1; }
 fingerprint=$(dtactctl cert -o /tmp/keys | sed -n 's/^--fingerprint //p')
 install -m 600 /tmp/keys/dtactd.crt $store/dtactd.tls-certificate
 install -m 600 /tmp/keys/dtactd.key $store/dtactd.tls-key
@@ -22,4 +23,5 @@ expect token dtactctl "${tls[@]}" status
 frames 30 5 "${tls[@]}" --token-file /tmp/token
 expect 'control' dtactctl "${tls[@]}" --token-file /tmp/token led --brightness 10
 runuser -u dtactd -- test -r $store/dtactd.tokens && fail "the daemon's user reads the tokens on disk"
-rm -r $store /tmp/keys /tmp/token /tmp/token-line
+rm -r $store/dtactd.* /tmp/keys /tmp/token /tmp/token-line
+[ -z "${made-}" ] || rmdir $store
