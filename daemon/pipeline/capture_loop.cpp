@@ -24,8 +24,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       period_ns_(std::llround(1e9 / camera_.info().fps)),
       timeout_(std::min<std::chrono::nanoseconds>(std::chrono::nanoseconds(3 * period_ns_),
                                                   kLongestGrab)),
-      untouched_(camera_.info().width, camera_.info().height, config.light, config, parts.writer,
-                 parts.place),
+      untouched_(camera_.info().width, camera_.info().height, config.light, config),
       depth_(config, clock_),
       watch_(period_ns_),
       timeline_(config.light, config.light_delay_frames.value_or(camera_.info().light_delay_frames),
@@ -41,10 +40,6 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
   // What the status says until the first frame.
   exchange_.state = state();
   exchange_.health = health(now_ns).bits();
-}
-
-void CaptureLoop::restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light) {
-  untouched_.restore(reference_q8, light);
 }
 
 void CaptureLoop::run() noexcept {

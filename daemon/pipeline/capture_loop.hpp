@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
-#include <span>
 
 #include "daemon/pipeline/camera_watch.hpp"
 #include "daemon/pipeline/depth/depth_maker.hpp"
@@ -23,8 +22,6 @@ namespace dtact::pipeline {
 struct CaptureParts {
   hal::Camera& camera;
   LightDriver& light;
-  ReferenceWriter& writer;
-  PlaceWatch& place;
   Exchange& exchange;
   base::Clock& clock;
 };
@@ -39,8 +36,9 @@ class CaptureLoop {
   CaptureLoop(const CaptureParts& parts, const PipelineConfig& config,
               std::unique_ptr<ActiveCalibration> active, bool unusable);
 
-  /// Before the first step: the last good reference of an earlier run.
-  void restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light);
+  /// For what is not the loop's: its threads, what they say, and what is restored before the first
+  /// step.
+  [[nodiscard]] UntouchedImage& untouched() noexcept { return untouched_; }
   /// Steps until Exchange::stop; notices it within a tenth of a second unless the camera blocks
   /// longer than it was asked to.
   void run() noexcept;

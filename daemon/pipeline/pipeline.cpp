@@ -7,8 +7,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "daemon/pipeline/untouched/reference_store.hpp"
-
 namespace dtact::pipeline {
 namespace {
 
@@ -49,8 +47,6 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
       info_(checked(camera_->info())),
       exchange_(prototype(calibration.get())),
       light_(std::move(ring), config_.light, clock, exchange_),
-      writer_(info_.width, info_.height, config_.state_folder),
-      place_(info_.width, info_.height, config_.reference.frames),
       depth_capacity_(exchange_.slot.back().depth_um.capacity()),
       rules_(config_.reconstruction) {
   std::unique_ptr<ActiveCalibration> active;
@@ -67,14 +63,11 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
       restore_failure_ = e.what();
     }
   }
-  loop_ = std::make_unique<CaptureLoop>(
-      CaptureParts{*camera_, light_, writer_, place_, exchange_, clock_}, config_,
-      std::move(active), unusable);
-  if (!calibrations_.empty() && !config_.state_folder.empty()) {
+  loop_ = std::make_unique<CaptureLoop>(CaptureParts{*camera_, light_, exchange_, clock_}, config_,
+                                        std::move(active), unusable);
+  if (!calibrations_.empty()) {
     try {
-      const auto stored =
-          load_reference(*calibration, info_.width, info_.height, config_.state_folder);
-      if (stored) loop_->restore(stored->image_q8, stored->light);
+      loop_->untouched().restore(*calibration);
     } catch (const std::exception& e) {
       restore_failure_ = e.what();  // the calibration's own reference does instead
     }
@@ -107,8 +100,7 @@ void Pipeline::start() {
   light_.start();
   camera_->start();
   compare_camera();
-  writer_.start();
-  place_.start();
+  loop_->untouched().start();
   capture_ = base::RtThread(
       {.name = "dtact-capture", .cpu = config_.cpu, .fifo_priority = config_.fifo_priority},
       [this] { loop_->run(); });
@@ -122,8 +114,7 @@ void Pipeline::stop() noexcept {
   exchange_.stop = true;
   capture_.join();
   light_.stop();
-  writer_.stop();
-  place_.stop();
+  loop_->untouched().stop();
 }
 
 std::optional<Event> Pipeline::next_event() {
@@ -278,9 +269,9 @@ Status Pipeline::status() const {
   status.stages = exchange_.statistics.stages();
   status.capture_thread = exchange_.statistics.usage();
   status.light_followed = exchange_.light_followed.load(std::memory_order_relaxed);
-  status.place_message = place_.message();
-  status.storage_message = writer_.message();
-  if (status.storage_message.empty() && !writer_.has_written()) {
+  status.place_message = loop_->untouched().place_message();
+  status.storage_message = loop_->untouched().storage_message();
+  if (status.storage_message.empty() && !loop_->untouched().has_written()) {
     status.storage_message = restore_failure_;
   }
   return status;

@@ -13,8 +13,6 @@
 #include "daemon/pipeline/light_driver.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/pipeline/port.hpp"
-#include "daemon/pipeline/untouched/place_watch.hpp"
-#include "daemon/pipeline/untouched/reference_writer.hpp"
 #include "hal/base/rt_thread.hpp"
 
 namespace dtact::pipeline {
@@ -74,8 +72,6 @@ class Pipeline final : public Port {
   hal::CameraInfo info_;
   Exchange exchange_;
   LightDriver light_;
-  ReferenceWriter writer_;
-  PlaceWatch place_;
   std::unique_ptr<CaptureLoop> loop_;
   std::size_t depth_capacity_;  // pixels that every frame of the pool has room for
   std::string restore_failure_;

@@ -26,7 +26,6 @@ class SteppedLoop {
     config.reference.frames = 16;
     exchange.want_contact = true;
     exchange.want_depth = true;
-    place.start();
   }
 
   /// After this the configuration is the loop's.
@@ -35,8 +34,9 @@ class SteppedLoop {
     light.emplace(std::make_unique<FakeRing>(ring), config.light, clock, exchange);
     std::unique_ptr<pipeline::ActiveCalibration> active;
     if (calibration) active = activated(calibration);
-    loop.emplace(pipeline::CaptureParts{camera, *light, writer, place, exchange, clock}, config,
-                 std::move(active), unusable);
+    loop.emplace(pipeline::CaptureParts{camera, *light, exchange, clock}, config, std::move(active),
+                 unusable);
+    loop->untouched().start();
   }
   [[nodiscard]] std::unique_ptr<pipeline::ActiveCalibration> activated(
       const std::shared_ptr<const calibration::Calibration>& calibration) {
@@ -47,7 +47,7 @@ class SteppedLoop {
 
   /// One turn of the loop; true if it published a frame.
   bool step() {
-    place.settle();  // what it finds would else come a frame sooner or later
+    loop->untouched().settle();  // what it finds would else come a frame sooner or later
     loop->step();
     pipeline::Report report;
     while (exchange.reports.pop(report)) reports.push_back(report);
@@ -130,8 +130,6 @@ class SteppedLoop {
   Camera camera;
   FakeRing::Handle ring;
   pipeline::Exchange exchange{prototype()};
-  pipeline::ReferenceWriter writer{kToyWidth, kToyHeight, {}};
-  pipeline::PlaceWatch place{kToyWidth, kToyHeight, 16};
   std::optional<pipeline::LightDriver> light;
   std::optional<pipeline::CaptureLoop> loop;
   const pipeline::DepthFrame* frame = nullptr;  ///< The newest.

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "daemon/pipeline/untouched/reference_store.hpp"
+
 namespace dtact::pipeline {
 namespace {
 
@@ -12,15 +14,31 @@ constexpr double kOtherLevel = 0.1;
 }  // namespace
 
 UntouchedImage::UntouchedImage(int width, int height, const hal::Light& light,
-                               const PipelineConfig& config, ReferenceWriter& writer,
-                               PlaceWatch& place)
+                               const PipelineConfig& config)
     : width_(width),
       height_(height),
-      writer_(writer),
-      place_(place),
+      folder_(config.state_folder),
+      writer_(width, height, folder_),
+      place_(width, height, config.reference.frames),
       keeper_(width, height, config.reference),
       follower_(config.drift),
       shown_(light) {}
+
+void UntouchedImage::start() {
+  writer_.start();
+  place_.start();
+}
+
+void UntouchedImage::stop() noexcept {
+  writer_.stop();
+  place_.stop();
+}
+
+void UntouchedImage::restore(const calibration::Calibration& calibration) {
+  if (folder_.empty()) return;
+  const auto stored = load_reference(calibration, width_, height_, folder_);
+  if (stored) restore(stored->image_q8, stored->light);
+}
 
 void UntouchedImage::restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light) {
   keeper_.restore(reference_q8, light == shown_, light.leds == shown_.leds);

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
 
 #include "daemon/pipeline/health.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
@@ -44,14 +46,31 @@ struct Trust {
 
 /// The untouched image in the present light, reference × light + drift, and all that is known of
 /// it: where a frame differs from it, what the light does, which conditions hold, how far it can be
-/// trusted. Nobody else knows any of this. Capture thread only; does not allocate after
-/// construction.
+/// trusted. Nobody else knows any of this. Capture thread, where it says nothing else; there it
+/// does not allocate.
 class UntouchedImage {
  public:
   /// Frames of width × height pixels; `light`: what the ring shows at first. Throws
   /// std::invalid_argument when the frames are too small or the rules impossible.
-  UntouchedImage(int width, int height, const hal::Light& light, const PipelineConfig& config,
-                 ReferenceWriter& writer, PlaceWatch& place);
+  UntouchedImage(int width, int height, const hal::Light& light, const PipelineConfig& config);
+
+  // Not on the capture thread.
+
+  /// Its threads run: one writes good references to the state folder, one compares places.
+  void start();
+  /// Ends them after what they have been given is done.
+  void stop() noexcept;
+  /// Waits until all that was given to the comparison of places has been judged. Any thread.
+  void settle() const noexcept { place_.settle(); }
+  /// How far the camera has moved since calibration; empty: not. Any thread.
+  [[nodiscard]] std::string place_message() const { return place_.message(); }
+  /// Why the last reference could not be written and what to do; empty when it was. Any thread.
+  [[nodiscard]] std::string storage_message() const { return writer_.message(); }
+  /// A reference was written: the one of an earlier run is no longer there. Any thread.
+  [[nodiscard]] bool has_written() const noexcept { return writer_.has_written(); }
+  /// The last good reference of an earlier run by this calibration, if the state folder has one.
+  /// Before the first look. Throws std::runtime_error naming the file that cannot be read.
+  void restore(const calibration::Calibration& calibration);
 
   // What happens to the image, or is asked of it.
 
@@ -114,8 +133,9 @@ class UntouchedImage {
 
   int width_;
   int height_;
-  ReferenceWriter& writer_;
-  PlaceWatch& place_;
+  const std::filesystem::path folder_;
+  ReferenceWriter writer_;
+  PlaceWatch place_;
   CalibratedImage* image_ = nullptr;
   ReferenceKeeper keeper_;
   LightFollower follower_;

@@ -129,7 +129,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
       : script_(script), clock_(clock), spoiler_(script.truth, 5), judge_(script) {}
 
   void attach(pipeline::Exchange& exchange) { exchange_ = &exchange; }
-  void attach(const pipeline::PlaceWatch& place) { place_ = &place; }
+  void attach(const pipeline::UntouchedImage& untouched) { untouched_ = &untouched; }
   [[nodiscard]] Outcome outcome() { return judge_.outcome(); }
 
   [[nodiscard]] hal::CameraInfo info() const override {
@@ -146,7 +146,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
 
   [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
                                      std::chrono::nanoseconds /*timeout*/) noexcept override {
-    place_->settle();  // what it finds would else come a frame sooner or later
+    untouched_->settle();  // what it finds would else come a frame sooner or later
     harvest();
     const int n = next_++;
     if (n >= script_.frames) {
@@ -189,7 +189,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
   Spoiler spoiler_;
   Judge judge_;
   pipeline::Exchange* exchange_ = nullptr;
-  const pipeline::PlaceWatch* place_ = nullptr;
+  const pipeline::UntouchedImage* untouched_ = nullptr;
   int next_ = 0;
 };
 
@@ -219,13 +219,11 @@ Outcome run(const Method& method, const Script& script) {
   if (!script.follow) config.drift.limit_percent = 0;
   pipeline::LightDriver light(std::make_unique<hal::null::NullRing>(), config.light, clock,
                               exchange);
-  pipeline::ReferenceWriter writer(table.frame_width, table.frame_height, {});
-  pipeline::PlaceWatch place(table.frame_width, table.frame_height, config.reference.frames);
-  place.start();
-  camera.attach(place);
   pipeline::CaptureLoop loop(
-      {camera, light, writer, place, exchange, clock}, config,
+      {camera, light, exchange, clock}, config,
       pipeline::activate(method.calibration, camera.info(), config.reconstruction), false);
+  camera.attach(loop.untouched());
+  loop.untouched().start();
   while (!exchange.stop) loop.step();
   return camera.outcome();
 }

@@ -102,7 +102,7 @@ TEST(CaptureLoop, AStaleReferenceIsInTheUncertainty) {
     SteppedLoop loop;
     loop.camera.scene.press_mm = 1;
     loop.begin(toy_calibration());
-    if (restored) loop.loop->restore(fakes::toy_reference_q8(), loop.config.light);
+    if (restored) loop.loop->untouched().restore(fakes::toy_reference_q8(), loop.config.light);
     EXPECT_TRUE(loop.until([&] { return loop.frame != nullptr && loop.frame->has_depth; }));
     EXPECT_NE(loop.frame->health.has(Health::reference_stale), restored);
     return loop.frame->uncertainty_um;
@@ -116,7 +116,7 @@ TEST(CaptureLoop, AReferenceFromAnotherBrightnessIsNotTheLastGoodOne) {
   loop.begin(toy_calibration());
   hal::Light dim;
   dim.brightness = 128;
-  loop.loop->restore(fakes::toy_reference_q8(), dim);
+  loop.loop->untouched().restore(fakes::toy_reference_q8(), dim);
   ASSERT_TRUE(loop.until([&] { return loop.frame != nullptr && loop.frame->has_depth; }));
   EXPECT_TRUE(loop.frame->health.has(Health::reference_stale));
   EXPECT_FALSE(loop.frame->health.has(Health::reference_restored));

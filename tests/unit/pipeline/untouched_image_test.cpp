@@ -18,9 +18,14 @@ namespace {
 constexpr int kReferenceFrames = 16;
 constexpr Moment kUnsettled{.settled = false, .whole = true};
 
+std::filesystem::path folder() {
+  return std::filesystem::path(::testing::TempDir()) / "dtact_untouched";
+}
+
 PipelineConfig config() {
   PipelineConfig made;
   made.reference.frames = kReferenceFrames;
+  made.state_folder = folder();
   return made;
 }
 
@@ -29,14 +34,13 @@ class UntouchedImageTest : public ::testing::Test {
  protected:
   UntouchedImageTest() {
     std::filesystem::remove_all(folder_);
-    place_.start();
-    writer_.start();
+    image_.start();
     image_.use(&calibrated_);
   }
 
  public:
   ~UntouchedImageTest() override {
-    writer_.stop();
+    image_.stop();
     std::filesystem::remove_all(folder_);
   }
 
@@ -45,7 +49,7 @@ class UntouchedImageTest : public ::testing::Test {
     now_ns_ += 16'666'667;
     moment.timestamp_ns = moment.now_ns = now_ns_;
     const Look seen = image_.look(frame.view(), moment);
-    place_.settle();
+    image_.settle();
     return seen;
   }
   void show(int frames) {
@@ -62,11 +66,8 @@ class UntouchedImageTest : public ::testing::Test {
   PipelineConfig config_ = config();
   fakes::ToyScene scene_{.marks = 2};
   CalibratedImage calibrated_{fakes::toy_calibration(scene_)};
-  std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) / "dtact_untouched";
-  ReferenceWriter writer_{fakes::kToyWidth, fakes::kToyHeight, folder_};
-  PlaceWatch place_{fakes::kToyWidth, fakes::kToyHeight, kReferenceFrames};
-  UntouchedImage image_{fakes::kToyWidth, fakes::kToyHeight, config_.light,
-                        config_,          writer_,           place_};
+  std::filesystem::path folder_ = folder();
+  UntouchedImage image_{fakes::kToyWidth, fakes::kToyHeight, config_.light, config_};
   std::uint64_t sequence_ = 0;
   std::int64_t now_ns_ = 0;
 };
@@ -74,7 +75,7 @@ class UntouchedImageTest : public ::testing::Test {
 TEST_F(UntouchedImageTest, AnotherLightThanAtCalibrationIsToldFromTheStart) {
   hal::Light dim = config_.light;
   dim.brightness = 128;
-  UntouchedImage dimmed(fakes::kToyWidth, fakes::kToyHeight, dim, config_, writer_, place_);
+  UntouchedImage dimmed(fakes::kToyWidth, fakes::kToyHeight, dim, config_);
   dimmed.use(&calibrated_);
   EXPECT_TRUE(dimmed.conditions().has(Health::light_mismatch));
   EXPECT_FALSE(has(Health::light_mismatch));
@@ -145,7 +146,7 @@ TEST_F(UntouchedImageTest, AReferenceForcedUnderATouchIsNotKeptForTheNextStart) 
   show(3 * kReferenceFrames);
   constexpr std::size_t kMiddle = 60 * fakes::kToyWidth + 80;
   EXPECT_NEAR(image_.reference()[kMiddle], 119 * 256, 3 * 256);
-  writer_.stop();
+  image_.stop();
   const auto kept =
       load_reference(*calibrated_.calibration, fakes::kToyWidth, fakes::kToyHeight, folder_);
   ASSERT_TRUE(kept.has_value());
