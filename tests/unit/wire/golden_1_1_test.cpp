@@ -137,6 +137,72 @@ TEST(Golden11, ContactWithForce) {
                                "12 14 4a 12 49 00 00 00 00 00 00 f8 3f 51 00 00 00 00 00 00 d0 3f");
 }
 
+TEST(Golden11, SetReconstruction) {
+  expect_golden<ClientMessage>(
+      R"(id: 4 set_reconstruction { method: "m" sharpen: "s" max_error_um: 30 })",
+      "08 04 6a 0f 0a 01 6d 12 01 73 19 00 00 00 00 00 00 3e 40");
+}
+
+TEST(Golden11, SubscribeToPointsAndPose) {
+  expect_golden<ClientMessage>(
+      R"(id: 2 subscribe { cloud: CLOUD_INT16 cloud_hz: 1 pose: true pose_hz: 30 })",
+      "08 02 1a 1a a0 01 02 a9 01 00 00 00 00 00 00 f0 3f b0 01 01 b9 01 00 00 00 00 00 00 "
+      "3e 40");
+}
+
+TEST(Golden11, Reconstruction) {
+  expect_golden<ServerMessage>(
+      R"(reply { id: 9 reconstruction { method: "m" sharpen: "s" max_error_um: 1 } })",
+      "0a 13 08 09 5a 0f 0a 01 6d 12 01 73 19 00 00 00 00 00 00 f0 3f");
+}
+
+TEST(Golden11, ReconstructionEvent) {
+  expect_golden<ServerMessage>(
+      R"(event { reconstruction { method: "m" sharpen: "s" max_error_um: 1 } sequence: 1 )"
+      R"(monotonic_ns: 2 wall_ns: 3 })",
+      "1a 17 30 01 38 04 40 06 4a 0f 0a 01 6d 12 01 73 19 00 00 00 00 00 00 f0 3f");
+}
+
+TEST(Golden11, StatusWithReconstruction) {
+  expect_golden<ServerMessage>(
+      R"(reply { id: 9 status { calibration { name: "n" sharpen_steps: 1 sharpen_steps: 2 } )"
+      R"(reconstruction { method: "m" sharpen: "s" max_error_um: 1 } } })",
+      "0a 1f 08 09 32 1b 3a 07 0a 01 6e 5a 02 01 02 b2 01 0f 0a 01 6d 12 01 73 19 00 00 00 "
+      "00 00 00 f0 3f");
+}
+
+TEST(Golden11, DepthThatWasSharpened) {
+  expect_golden<ServerMessage>(R"(frame { depth { sharpen_steps: 2 made_decimation: 4 } })",
+                               "12 06 5a 04 70 02 78 04");
+}
+
+TEST(Golden11, Surface) {
+  expect_golden<ServerMessage>(
+      R"(frame { surface { shape: CYLINDER radius_mm: 1 axis_deg: 2 air_mm: 3 gel_mm: 4 )"
+      R"(refraction: 5 } })",
+      "12 32 a2 01 2f 08 02 11 00 00 00 00 00 00 f0 3f 19 00 00 00 00 00 00 00 40 21 00 00 "
+      "00 00 00 00 08 40 29 00 00 00 00 00 00 10 40 31 00 00 00 00 00 00 14 40");
+}
+
+TEST(Golden11, Cloud) {
+  expect_golden<ServerMessage>(
+      R"(frame { cloud { encoding: CLOUD_INT16 width: 2 height: 1 metres_per_unit: 0.5 data: )"
+      R"("d" decimation: 4 points: 5 make_ns: 6 } })",
+      "12 1b aa 01 18 08 02 10 02 18 01 21 00 00 00 00 00 00 e0 3f 2a 01 64 30 04 38 05 40 "
+      "06");
+}
+
+TEST(Golden11, Pose) {
+  expect_golden<ServerMessage>(
+      R"(frame { pose { tracking: RECOVERED since_sequence: 1 translation_mm { x: 1 y: 2 z: )"
+      R"(3 } rotation_deg { z: 1 } unobservable { rotation { x: 1 } translation { y: 1 } } )"
+      R"(centre_mm { y: 1 } residual_um: 3 points: 4 track_ns: 5 arm_mm: 2 } })",
+      "12 68 b2 01 65 08 04 10 01 1a 1b 09 00 00 00 00 00 00 f0 3f 11 00 00 00 00 00 00 00 "
+      "40 19 00 00 00 00 00 00 08 40 22 09 19 00 00 00 00 00 00 f0 3f 2a 16 0a 09 09 00 00 "
+      "00 00 00 00 f0 3f 12 09 11 00 00 00 00 00 00 f0 3f 32 09 11 00 00 00 00 00 00 f0 3f "
+      "39 00 00 00 00 00 00 08 40 40 04 48 05 51 00 00 00 00 00 00 00 40");
+}
+
 TEST(Golden11, ErrorCodes) {
   EXPECT_EQ(ERROR_UNSUPPORTED, 10);
   EXPECT_EQ(ERROR_DENIED, 11);
