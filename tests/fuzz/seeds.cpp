@@ -89,7 +89,12 @@ void add_requests(const Corpus& corpus) {
          m.mutable_subscribe()->set_events(false);
        })},
       {"get_reference", request([](M& m) { m.mutable_get_reference(); })},
-      {"ping", request([](M& m) { m.mutable_ping(); })}};
+      {"ping", request([](M& m) { m.mutable_ping(); })},
+      {"set_reconstruction", request([](M& m) {
+         m.mutable_set_reconstruction()->set_method("half");
+         m.mutable_set_reconstruction()->set_sharpen("auto");
+         m.mutable_set_reconstruction()->set_max_error_um(30);
+       })}};
   std::string stream;
   std::string session = "\x01";
   for (const auto& [name, message] : all) {
