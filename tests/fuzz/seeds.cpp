@@ -168,7 +168,7 @@ void add_answers(const Corpus& corpus) {
 }
 
 /// A map of a pressed slope with untouched and untrusted parts, as depth_maps.cpp and, in each
-/// encoding, as depth_decoders.cpp take it.
+/// encoding, as depth_decoders.cpp and python_rvl.cpp take it.
 void add_depth(const Corpus& corpus, const std::string& name, std::size_t width,
                std::size_t height) {
   std::vector<std::int16_t> map;
@@ -186,6 +186,7 @@ void add_depth(const Corpus& corpus, const std::string& name, std::size_t width,
     const std::string head{static_cast<char>(width), 0, static_cast<char>(height), 0,
                            static_cast<char>(encoding)};
     corpus.add("depth_decoders", name + '_' + std::to_string(encoding), head + bytes);
+    if (encoding == v1::DEPTH_RVL) corpus.add("python_rvl", name, head.substr(0, 4) + bytes);
   }
   encoder.encode(v1::DEPTH_INT16, map, width, bytes);
   corpus.add("depth_maps", name, static_cast<char>(width - 1) + bytes);

@@ -1,64 +1,11 @@
-/* RVL, the run-length and nibble code of Wilson, "Fast Lossless Depth Image Compression" (2017):
- * the pixels are, in turn, a run of zeros (its length) and a run of others (its length, then the
- * difference of each to the last pixel that was not zero, zigzag). Numbers are sent as nibbles of
- * three bits, least significant first, the fourth bit says that another follows; eight nibbles
- * fill a 32-bit word from its most significant end, and words are little-endian. */
+/* The module dtact._rvl: _rvl_decode.h for Python. */
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
-#include <stdint.h>
 #include <string.h>
 
-struct nibbles {
-  const uint8_t *next; /* the next word */
-  const uint8_t *end;
-  uint32_t word;
-  int left; /* nibbles of `word` not taken yet */
-};
+#include "_rvl_decode.h"
 
-/* The next number; -1 when the words end before it does, or it is longer than any in a map or than
- * it needs to be. */
-static int32_t take(struct nibbles *in) {
-  uint32_t value = 0;
-  for (int shift = 0; shift < 30; shift += 3) {
-    if (in->left == 0) {
-      if (in->end - in->next < 4) return -1;
-      in->word = (uint32_t)in->next[0] | (uint32_t)in->next[1] << 8 |
-                 (uint32_t)in->next[2] << 16 | (uint32_t)in->next[3] << 24;
-      in->next += 4;
-      in->left = 8;
-    }
-    const uint32_t nibble = in->word >> 28;
-    in->word <<= 4;
-    --in->left;
-    value |= (nibble & 7) << shift;
-    if (nibble < 8) return nibble != 0 || shift == 0 ? (int32_t)value : -1;
-  }
-  return -1;
-}
-
-/* What is wrong, or null. `out` is zero before. Exactly what the encoder makes is taken, as by the
- * C++ library. */
-static const char *decode(struct nibbles in, int16_t *out, Py_ssize_t count) {
-  int32_t previous = 0;
-  Py_ssize_t at = 0;
-  while (at < count) {
-    const int32_t zeros = take(&in);
-    if (zeros < 0 || zeros > count - at || (zeros == 0 && at != 0)) return "bad run of zeros";
-    at += zeros;
-    const int32_t others = take(&in);
-    if (others < 0 || others > count - at || (others == 0 && at != count)) return "bad run";
-    for (const Py_ssize_t end = at + others; at < end; ++at) {
-      const int32_t zigzag = take(&in);
-      if (zigzag < 0) return "the bytes end within a run";
-      previous += (zigzag >> 1) ^ -(zigzag & 1);
-      if (previous < INT16_MIN || previous > INT16_MAX || previous == 0) return "bad pixel";
-      out[at] = (int16_t)previous;
-    }
-  }
-  return in.next == in.end && in.word == 0 ? NULL : "bytes follow the last pixel";
-}
-
-static PyObject *rvl_decode(PyObject *self, PyObject *arguments) {
+static PyObject *decode(PyObject *self, PyObject *arguments) {
   (void)self;
   Py_buffer data;
   Py_ssize_t count;
@@ -77,8 +24,7 @@ static PyObject *rvl_decode(PyObject *self, PyObject *arguments) {
   const char *wrong;
   Py_BEGIN_ALLOW_THREADS;
   memset(out, 0, 2 * (size_t)count);
-  const struct nibbles in = {data.buf, (const uint8_t *)data.buf + data.len, 0, 0};
-  wrong = decode(in, out, count);
+  wrong = rvl_decode(data.buf, data.len, out, count);
   Py_END_ALLOW_THREADS;
   PyBuffer_Release(&data);
   if (wrong != NULL) {
@@ -90,7 +36,7 @@ static PyObject *rvl_decode(PyObject *self, PyObject *arguments) {
 }
 
 static PyMethodDef methods[] = {
-    {"decode", rvl_decode, METH_VARARGS,
+    {"decode", decode, METH_VARARGS,
      "decode(data, count): the `count` pixels as native int16 in a bytearray; ValueError for bytes\n"
      "that are not RVL of exactly so many."},
     {NULL, NULL, 0, NULL},
