@@ -6,7 +6,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <set>
 #include <vector>
 
@@ -84,15 +83,17 @@ foxglove::CompressedImage jpeg_picture(const v1::Frame& frame, std::uint64_t tim
 
 foxglove::PointCloud point_cloud(const v1::Frame& frame, std::uint64_t time_ns) {
   const v1::PointCloud& cloud = frame.cloud();
+  constexpr std::size_t kStride = kPointParts.size() * sizeof(float);
   const std::size_t size = std::size_t{cloud.width()} * cloud.height();
-  if (cloud.encoding() != v1::CLOUD_FLOAT32 ||
-      cloud.data().size() != kPointParts.size() * size * sizeof(float)) {
+  // Divided, as the product of what the daemon says may not fit 64 bits.
+  if (cloud.encoding() != v1::CLOUD_FLOAT32 || cloud.data().size() % kStride != 0 ||
+      cloud.data().size() / kStride != size || cloud.points() > size) {
     throw client::ProtocolError("a cloud of points is damaged: update dtact-perceive or dtact-web");
   }
   foxglove::PointCloud out;
   stamp(out, time_ns, frame.frame_id());
   out.mutable_pose()->mutable_orientation()->set_w(1);
-  out.set_point_stride(kPointParts.size() * sizeof(float));
+  out.set_point_stride(kStride);
   for (std::size_t part = 0; part < kPointParts.size(); ++part) {
     foxglove::PackedElementField& field = *out.add_fields();
     field.set_name(kPointParts[part]);
@@ -101,9 +102,9 @@ foxglove::PointCloud point_cloud(const v1::Frame& frame, std::uint64_t time_ns) 
   }
   // The wire has one array after the other; Foxglove wants one point after the other.
   std::vector<float> values(kPointParts.size() * size);
-  std::memcpy(values.data(), cloud.data().data(), cloud.data().size());
+  cloud.data().copy(reinterpret_cast<char*>(values.data()), cloud.data().size());
   std::string& data = *out.mutable_data();
-  data.reserve(std::size_t{cloud.points()} * out.point_stride());
+  data.reserve(cloud.points() * kStride);
   for (std::size_t i = 0; i < size; ++i) {
     if (std::isnan(values[i])) continue;
     for (std::size_t part = 0; part < kPointParts.size(); ++part) {

@@ -140,6 +140,22 @@ TEST(FoxgloveTopics, ACloudOfThePointsThatAreThere) {
   EXPECT_THROW((void)message_of(Topic::points, frame), client::ProtocolError);
 }
 
+TEST(FoxgloveTopics, ACloudWhoseNumbersDoNotFitItsDataIsRefused) {
+  v1::Frame frame;
+  auto& cloud = *frame.mutable_cloud();
+  cloud.set_encoding(v1::CLOUD_FLOAT32);
+  cloud.set_width(1);
+  cloud.set_height(1);
+  cloud.set_data(std::string(24, '\0'));
+  cloud.set_points(UINT32_MAX);  // 100 GB of them
+  EXPECT_THROW((void)message_of(Topic::points, frame), client::ProtocolError);
+  cloud.set_points(0);
+  cloud.set_data("");
+  cloud.set_width(1U << 31U);  // 24 * 2^62 is 0 in 64 bits
+  cloud.set_height(1U << 31U);
+  EXPECT_THROW((void)message_of(Topic::points, frame), client::ProtocolError);
+}
+
 TEST(FoxgloveTopics, AreThoseThatTheDaemonServes) {
   EXPECT_EQ(served_by(std::nullopt).count(), kTopics - 1);
   EXPECT_FALSE(served_by(v1::HelloReply()).test(index(Topic::points)));
