@@ -138,11 +138,25 @@ v1::ServerMessage frame(v1::DepthEncoding encoding) {
   return message;
 }
 
+v1::ServerMessage points() {
+  v1::ServerMessage message;
+  auto& cloud = *message.mutable_frame()->mutable_cloud();
+  cloud.set_encoding(v1::CLOUD_FLOAT32);
+  cloud.set_width(2);
+  cloud.set_height(1);
+  cloud.set_points(2);
+  cloud.set_metres_per_unit(1);
+  cloud.set_data(std::string(2 * 6 * sizeof(float), '\0'));
+  return message;
+}
+
 void add_answers(const Corpus& corpus) {
   corpus.add("answers", "frame_int16", frame(v1::DEPTH_INT16).SerializeAsString());
   corpus.add("answers", "frame_delta_zstd", frame(v1::DEPTH_DELTA_ZSTD).SerializeAsString());
   corpus.add("answers", "frame_rvl", frame(v1::DEPTH_RVL).SerializeAsString());
   corpus.add("answers", "frame_predict_zstd", frame(v1::DEPTH_PREDICT_ZSTD).SerializeAsString());
+  corpus.add("web", "depth", frame(v1::DEPTH_RVL).SerializeAsString());
+  corpus.add("web", "points", points().SerializeAsString());
   v1::ServerMessage message;
   message.mutable_reply()->set_id(3);
   auto& status = *message.mutable_reply()->mutable_status();

@@ -1,8 +1,11 @@
 // What dtact-web reads of daemons and of Foxglove's clients: a frame that is relayed is the frame
-// that was sent, and no text or bytes of a client's break anything.
+// that was sent, what Foxglove is shown of it is made or refused, and no text or bytes of a
+// client's break anything.
 #include <stdexcept>
 
+#include "clients/cpp/errors.hpp"
 #include "clients/web/foxglove/protocol.hpp"
+#include "clients/web/foxglove/topics.hpp"
 #include "clients/web/relayed_frame.hpp"
 #include "clients/web/token_query.hpp"
 #include "tests/fuzz/fuzz.hpp"
@@ -21,6 +24,19 @@ void try_relay(const std::string& bytes) {
   message.mutable_frame()->clear_dropped();
   require(got.SerializeAsString() == message.frame().SerializeAsString(),
           "what is relayed is what was sent");
+}
+
+void try_topics(const std::string& bytes) {
+  using namespace web::foxglove;
+  v1::ServerMessage message;
+  if (!message.ParseFromString(bytes)) return;
+  for (const TopicInfo& info : topics()) {
+    try {
+      (void)message_of(info.topic, message.frame());
+    } catch (const client::ProtocolError& e) {
+      require_sentence(e.what());
+    }
+  }
 }
 
 void try_foxglove(const std::string& text) {
@@ -43,6 +59,7 @@ void try_foxglove(const std::string& text) {
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string bytes(reinterpret_cast<const char*>(data), size);
   dtact::fuzz::try_relay(bytes);
+  dtact::fuzz::try_topics(bytes);
   dtact::fuzz::try_foxglove(bytes);
   return 0;
 }
