@@ -88,15 +88,14 @@ class AnyMap(unittest.TestCase):
             ]:
                 yield width, height, [int(v) for v in values]
 
-    def test_rvl(self):
+    def test_every_encoding(self):
         for width, height, values in self.maps():
             wanted = np.reshape(values, (height, width)).tolist()
-            self.assertEqual(decode(3, width, height, MAKER.rvl(width, values)), wanted)
-
-    def test_predict_zstd(self):
-        for width, height, values in self.maps():
-            wanted = np.reshape(values, (height, width)).tolist()
-            self.assertEqual(decode(4, width, height, zst(MAKER.predict(width, values))), wanted)
+            for encoding, data in [
+                (1, MAKER.int16(width, values)), (2, zst(MAKER.delta(width, values))),
+                (3, MAKER.rvl(width, values)), (4, zst(MAKER.predict(width, values))),
+            ]:
+                self.assertEqual(decode(encoding, width, height, data), wanted, encoding)
 
 
 class Damaged(unittest.TestCase):
