@@ -1,5 +1,5 @@
-// The page's decoders against the wire's golden vectors: DEPTH_DECODERS and FRAMING are the bundles
-// that build.sh makes of its sources, GOLDEN the folder of the vectors.
+// The page's decoders against the wire's golden vectors: PAGE_NODE is the folder of the bundles that
+// prepare.sh makes of its sources, GOLDEN that of the vectors, RANDOM_MAPS that of random_maps.py's.
 import assert from "node:assert/strict";
 import { readFileSync, readdirSync } from "node:fs";
 import path from "node:path";
@@ -10,11 +10,14 @@ const { framed, unframed } = await import(path.resolve(process.env.PAGE_NODE, "f
 const golden = process.env.GOLDEN;
 const encodings = { int16: 1, delta_zstd: 2, rvl: 3, predict_zstd: 4 };
 
-function vector(name) {
-  const lines = readFileSync(path.join(golden, name), "utf8").trimEnd().split("\n");
+function vector(name, folder = golden) {
+  const lines = readFileSync(path.join(folder, name), "utf8").trimEnd().split("\n");
   const fields = Object.fromEntries(lines.map((line) => line.split(" ")));
   const bytes = (key) => new Uint8Array(Buffer.from(fields[key], "hex"));
-  return { width: Number(fields.width), height: Number(fields.height), bytes };
+  const [width, height] = [Number(fields.width), Number(fields.height)];
+  const raw = Buffer.from(bytes("int16"));
+  const expected = Int16Array.from({ length: width * height }, (_, i) => raw.readInt16LE(2 * i));
+  return { width, height, bytes, expected };
 }
 
 function decoded(encoding, data, width, height) {
@@ -28,9 +31,7 @@ const names = readdirSync(golden).filter((name) => name.endsWith(".txt"));
 test("there are golden vectors", () => assert.equal(names.length, 10));
 
 for (const name of names) {
-  const { width, height, bytes } = vector(name);
-  const raw = Buffer.from(bytes("int16"));
-  const expected = Int16Array.from({ length: width * height }, (_, i) => raw.readInt16LE(2 * i));
+  const { width, height, bytes, expected } = vector(name);
   for (const [key, encoding] of Object.entries(encodings)) {
     test(`${name}: ${key}`, () => {
       assert.deepEqual(decoded(encoding, bytes(key), width, height), expected);
@@ -52,6 +53,18 @@ for (const name of names) {
     });
   }
 }
+
+test("random maps", () => {
+  const folder = process.env.RANDOM_MAPS;
+  const names = readdirSync(folder);
+  assert.equal(names.length, 24);
+  for (const name of names) {
+    const { width, height, bytes, expected } = vector(name, folder);
+    for (const [key, encoding] of Object.entries(encodings)) {
+      assert.deepEqual(decoded(encoding, bytes(key), width, height), expected, `${name}: ${key}`);
+    }
+  }
+});
 
 test("the worked example of proto/README.md", () => {
   const rvl = Uint8Array.from([
