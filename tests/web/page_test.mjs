@@ -193,6 +193,77 @@ test("a line tells its length and the difference of its ends", async () => {
   await resume(pane);
 });
 
+test("while paused the frames before are shown one by one", async () => {
+  const paused = await pausedAt(1.0);
+  const shown = async () =>
+    Number(/frame (\d+)/.exec(await pane.locator(".steps").textContent())[1]);
+  const first = await shown();
+  let [sequence, frame] = [first, undefined];
+  // The other client may have missed some of them.
+  for (let steps = 0; steps < 30 && frame === undefined; ++steps) {
+    const before = sequence;
+    await pane.getByRole("button", { name: "One frame back" }).click();
+    sequence = await until(shown, (now) => now < before, 10_000);
+    frame = tap.frame(sequence);
+  }
+  assert.ok(frame, "one that both clients have");
+  assert.notEqual(frame, paused);
+  assertEqual(await canvas(pane), frame);
+  await view.page.locator("body").press("ArrowRight");
+  await until(shown, (now) => now > sequence, 10_000);
+  await resume(pane);
+});
+
+test("keys choose what is shown and how it is read", async () => {
+  const press = (key) => view.page.locator("body").press(key);
+  const chosen = (name) => pane.getByRole("radio", { name }).isChecked();
+  await press("l");
+  assert.ok(await chosen("Line"));
+  await press("p");
+  assert.ok(await chosen("Point"));
+  await press("3");
+  assert.ok(await chosen("Surface"));
+  await press("2");
+  assert.ok(await chosen("Camera"));
+  await press("1");
+  assert.ok(await chosen("Depth"));
+  const [download] = await Promise.all([view.page.waitForEvent("download"), press("s")]);
+  assert.match(download.suggestedFilename(), /\.png$/);
+  await press(" ");
+  await pane.getByRole("button", { name: "Resume" }).waitFor();
+  await press(" ");
+  await pane.getByRole("button", { name: "Pause" }).waitFor();
+});
+
+test("deeper is lighter in the colour map, step by step", () => {
+  const linear = (value) => {
+    const share = value / 255;
+    return share <= 0.04045 ? share / 12.92 : ((share + 0.055) / 1.055) ** 2.4;
+  };
+  const luminance = (i) => {
+    const [r, g, b] = colourMap.subarray(4 * i, 4 * i + 3);
+    return 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b);
+  };
+  for (let i = 8; i < 256; i += 8) assert.ok(luminance(i) > luminance(i - 8), `colour ${i}`);
+});
+
+test("the theme turns and is remembered", async () => {
+  const ground = () => view.page.evaluate(() => getComputedStyle(document.body).backgroundColor);
+  const sum = (colour) =>
+    colour
+      .match(/\d+/g)
+      .slice(0, 3)
+      .map(Number)
+      .reduce((a, b) => a + b);
+  const dark = sum(await ground());
+  const turn = view.page.getByRole("button", { name: /theme/i });
+  await turn.click();
+  assert.ok(sum(await ground()) > dark + 300, "light now");
+  assert.equal(await view.page.evaluate(() => localStorage.getItem("dtact theme")), "light");
+  await turn.click();
+  assert.equal(sum(await ground()), dark);
+});
+
 test("the camera's picture and its grey values", async () => {
   await pane.getByRole("radio", { name: "Camera" }).click();
   await until(
