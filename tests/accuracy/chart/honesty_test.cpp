@@ -1,6 +1,6 @@
 // Whether depth maps are worth what they state: true error over stated uncertainty. What is stated
 // rests on constants that were taken from simulated scenes: the blur's from all_objects.toml on the
-// built-in sensor (daemon/pipeline/uncertainty.hpp), the zero's from presses on sensors drawn
+// built-in sensor (daemon/pipeline/depth/uncertainty.hpp), the zero's from presses on sensors drawn
 // between those fitted to sensor_a and sensor_b (list_worth.hpp), those of the list of several
 // presses from layers of 1.5, 2 and 3 mm (chain_fit.cpp, press_set.cpp). None of the layers,
 // lights, seeds, balls and objects here had part in any constant; that the list of several presses
@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/model/model_build.hpp"
 #include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/pipeline/active_calibration.hpp"
@@ -133,7 +134,12 @@ constexpr Method kMethods[] = {
     {"regression",
      [](const calibration::BallPresses& set) { return calibration::build_regression(set); }, true},
     {"several presses", [](const calibration::BallPresses& set) { return calibration::build(set); },
-     true}};
+     true},
+    {"layer model of one press", [](const calibration::BallPresses& set) {
+       calibration::BallPresses first = set;
+       first.presses.resize(1);
+       return calibration::build_model(first).calibration;
+     }}};
 
 /// True over stated, of one frame as the daemon works it at full resolution.
 double ratio(const pipeline::ActiveCalibration& active, const image::Grey8& frame,
@@ -229,6 +235,7 @@ TEST_F(Honesty, OfOnePress) { expect_honest(0); }
 TEST_F(Honesty, OfThePublishedList) { expect_honest(1); }
 TEST_F(Honesty, OfThePublishedRegression) { expect_honest(2); }
 TEST_F(Honesty, OfSeveralPresses) { expect_honest(3); }
+TEST_F(Honesty, OfTheLayerModel) { expect_honest(4); }
 
 }  // namespace
 }  // namespace dtact::chart
