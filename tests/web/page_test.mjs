@@ -248,20 +248,22 @@ test("deeper is lighter in the colour map, step by step", () => {
 });
 
 test("the theme turns and is remembered", async () => {
-  const ground = () => view.page.evaluate(() => getComputedStyle(document.body).backgroundColor);
-  const sum = (colour) =>
-    colour
+  const stored = () => view.page.evaluate(() => localStorage.getItem("dtact theme"));
+  const ground = () =>
+    view.page.evaluate(() => getComputedStyle(document.documentElement).backgroundColor);
+  const brightness = async () =>
+    (await ground())
       .match(/\d+/g)
       .slice(0, 3)
-      .map(Number)
-      .reduce((a, b) => a + b);
-  const dark = sum(await ground());
-  const turn = view.page.getByRole("button", { name: /theme/i });
+      .reduce((sum, part) => sum + Number(part), 0);
+  const turn = view.page.getByRole("button", { name: "Switch between light and dark" });
+  const before = await brightness();
   await turn.click();
-  assert.ok(sum(await ground()) > dark + 300, "light now");
-  assert.equal(await view.page.evaluate(() => localStorage.getItem("dtact theme")), "light");
+  const turned = await brightness();
+  assert.ok(Math.abs(turned - before) > 300, `${before} and ${turned}`);
+  assert.equal(await stored(), turned > before ? "light" : "dark");
   await turn.click();
-  assert.equal(sum(await ground()), dark);
+  assert.equal(await brightness(), before);
 });
 
 test("the camera's picture and its grey values", async () => {
