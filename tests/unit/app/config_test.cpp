@@ -2,13 +2,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <sstream>
 #include <stdexcept>
 
 #include "hal/base/atomic_file.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::app {
 namespace {
@@ -21,7 +21,7 @@ class ConfigFile : public ::testing::Test {
  protected:
   void SetUp() override {
     ::unsetenv("DTACTD_LOG");
-    folder_ = fs::path(::testing::TempDir()) / ("config_" + std::to_string(::getpid()));
+    folder_ = fakes::own_path();
     fs::create_directories(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "tests/fakes/notify_socket.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::app {
 namespace {
@@ -24,8 +25,7 @@ TEST(Service, SaysNothingWithoutAServiceManager) {
 }
 
 TEST(Service, TellsReadinessWithStatus) {
-  const fakes::NotifySocket manager(std::filesystem::path(::testing::TempDir()) /
-                                    ("dtact_notify_" + std::to_string(::getpid())));
+  const fakes::NotifySocket manager(fakes::own_path());
   ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
   notify_ready("listening");
   ::unsetenv("NOTIFY_SOCKET");
@@ -34,8 +34,7 @@ TEST(Service, TellsReadinessWithStatus) {
 
 // The queue of such a socket holds net.unix.max_dgram_qlen messages.
 TEST(Service, DoesNotWaitForAManagerThatDoesNotRead) {
-  const fakes::NotifySocket manager(std::filesystem::path(::testing::TempDir()) /
-                                    ("dtact_notify_" + std::to_string(::getpid())));
+  const fakes::NotifySocket manager(fakes::own_path());
   ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
   int told = 0;
   while (told < 100'000 && notify_status("serving")) ++told;
@@ -63,8 +62,7 @@ TEST(Service, WatchdogIsFedTwiceAnInterval) {
 }
 
 TEST(Service, TellsThatItReadsItsConfigurationAgain) {
-  const fakes::NotifySocket manager(std::filesystem::path(::testing::TempDir()) /
-                                    ("dtact_notify_" + std::to_string(::getpid())));
+  const fakes::NotifySocket manager(fakes::own_path());
   ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
   notify_reloading();
   ::unsetenv("NOTIFY_SOCKET");
@@ -73,8 +71,7 @@ TEST(Service, TellsThatItReadsItsConfigurationAgain) {
 }
 
 TEST(Service, ACredentialIsTheFileThatSystemdHandedIn) {
-  const auto folder = std::filesystem::path(::testing::TempDir()) /
-                      ("dtact_credentials_" + std::to_string(::getpid()));
+  const auto folder = fakes::own_path();
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "tokens") << "x";
   ::setenv("CREDENTIALS_DIRECTORY", folder.c_str(), 1);

@@ -1,7 +1,6 @@
 #include "daemon/app/watchdog.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
 #include <chrono>
@@ -11,6 +10,7 @@
 #include <string>
 
 #include "tests/fakes/notify_socket.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::app {
 namespace {
@@ -38,8 +38,7 @@ class WatchdogTest : public ::testing::Test {
     return count;
   }
 
-  fakes::NotifySocket manager{std::filesystem::path(::testing::TempDir()) /
-                              ("dtact_watchdog_" + std::to_string(::getpid()))};
+  fakes::NotifySocket manager{fakes::own_path()};
   boost::asio::io_context io{1};
 };
 

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "tests/fakes/file_log.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::base {
 namespace {
@@ -15,7 +16,7 @@ namespace fs = std::filesystem;
 class AtomicFile : public ::testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(::testing::TempDir()) / ("atomic_" + std::to_string(::getpid()));
+    folder_ = fakes::own_path();
     fs::create_directories(folder_);
   }
   void TearDown() override { fs::remove_all(folder_); }

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "hal/base/atomic_file.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::image {
 namespace {
@@ -25,7 +26,7 @@ TEST(Png, Grey8IsWidened) {
 TEST(Png, ColourBecomesBt601Luma) {
   // 0.299·255 = 76.2, 0.587·255 = 149.7, 0.114·255 = 29.1
   const Rgb8 image{4, 1, {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255}};
-  const std::string file = ::testing::TempDir() + "dtact_png_test.png";
+  const std::filesystem::path file = fakes::own_path(".png");
   base::write_file_atomically(file, encode_png(image));
   EXPECT_EQ(read_png_grey8(file).pixels, (std::vector<std::uint8_t>{76, 150, 29, 255}));
 }

@@ -15,6 +15,7 @@
 #include "hal/replay/replay_camera.hpp"
 #include "tests/fakes/fake_clock.hpp"
 #include "tests/fakes/jpeg_maker.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::hal::replay {
 namespace {
@@ -62,9 +63,7 @@ class ReplayTest : public ::testing::Test {
     return "";
   }
 
-  fs::path folder = fs::path(::testing::TempDir()) /
-                    (std::string("dtact_replay_") +
-                     ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  fs::path folder = fakes::own_path();
   CameraConfig config;
   fakes::FakeClock clock;
   std::optional<ReplayCamera> opened;

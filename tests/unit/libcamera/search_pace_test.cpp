@@ -5,14 +5,15 @@
 #include <filesystem>
 #include <fstream>
 
+#include "tests/fakes/own_path.hpp"
+
 namespace dtact::hal::libcamera_backend {
 namespace {
 
 using namespace std::chrono_literals;
 
 TEST(SearchPace, LooksSeldomUnlessNodesAreNew) {
-  const std::filesystem::path devices =
-      std::filesystem::path(testing::TempDir()) / "search_pace_devices";
+  const std::filesystem::path devices = fakes::own_path();
   std::filesystem::remove_all(devices);
   std::filesystem::create_directories(devices);
   const std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();

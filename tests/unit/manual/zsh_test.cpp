@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <array>
 #include <cstdio>
@@ -12,6 +11,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "tests/fakes/own_path.hpp"
 #include "tests/unit/manual/pages.hpp"
 
 namespace dtact::manual {
@@ -26,7 +26,7 @@ class Zsh : public ::testing::Test {
  protected:
   void SetUp() override {
     if (std::system("command -v zsh >/dev/null") != 0) GTEST_SKIP() << "zsh is not installed";
-    folder_ = fs::path(::testing::TempDir()) / fmt::format("zsh_{}", ::getpid());
+    folder_ = fakes::own_path();
     fs::create_directories(folder_);
     const fs::path root = DTACT_SOURCE_DIR;
     for (const File& file : all_files(root)) {

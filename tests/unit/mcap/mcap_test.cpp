@@ -15,6 +15,7 @@
 #include "hal/base/atomic_file.hpp"
 #include "hal/mcap/reader.hpp"
 #include "hal/mcap/writer.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::mcap {
 namespace {
@@ -129,9 +130,7 @@ class Mcap : public testing::Test {
   }
 
  private:
-  fs::path folder_ =
-      fs::path(testing::TempDir()) /
-      (std::string("dtact_mcap_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+  fs::path folder_ = fakes::own_path();
 };
 
 TEST_F(Mcap, WritesTheFormat) {

@@ -2,11 +2,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 
+#include "tests/fakes/own_path.hpp"
 #include "tests/unit/metrics/sample.hpp"
 
 namespace dtact::metrics {
@@ -62,7 +62,7 @@ TEST(MetricsText, LeavesOutWhatIsNotKnown) {
 }
 
 TEST(Temperatures, AreThoseThatAnswer) {
-  const fs::path folder = fs::path(testing::TempDir()) / ("thermal" + std::to_string(::getpid()));
+  const fs::path folder = fakes::own_path();
   const auto zone = [&](const char* name, const char* type, const char* temp) {
     fs::create_directories(folder / name);
     std::ofstream(folder / name / "type") << type << '\n';

@@ -10,6 +10,7 @@
 #include "daemon/pipeline/untouched/reference_store.hpp"
 #include "daemon/pipeline/untouched/reference_writer.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "tests/fakes/own_path.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
 // A missing value ends the test by the exception of its access.
@@ -35,9 +36,7 @@ class StoreTest : public ::testing::Test {
   }
   auto load() { return load_reference(*calibration, fakes::kToyWidth, fakes::kToyHeight, folder); }
 
-  fs::path folder = fs::path(::testing::TempDir()) /
-                    (std::string("dtact_store_") +
-                     ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  fs::path folder = fakes::own_path();
   std::shared_ptr<calibration::Calibration> calibration = fakes::toy_calibration();
 };
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "daemon/pipeline/untouched/reference_store.hpp"
+#include "tests/fakes/own_path.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
 namespace dtact::pipeline {
@@ -18,14 +19,10 @@ namespace {
 constexpr int kReferenceFrames = 16;
 constexpr Moment kUnsettled{.settled = false, .whole = true};
 
-std::filesystem::path folder() {
-  return std::filesystem::path(::testing::TempDir()) / "dtact_untouched";
-}
-
 PipelineConfig config() {
   PipelineConfig made;
   made.reference.frames = kReferenceFrames;
-  made.state_folder = folder();
+  made.state_folder = fakes::own_path();
   return made;
 }
 
@@ -66,7 +63,7 @@ class UntouchedImageTest : public ::testing::Test {
   PipelineConfig config_ = config();
   fakes::ToyScene scene_{.marks = 2};
   CalibratedImage calibrated_{fakes::toy_calibration(scene_)};
-  std::filesystem::path folder_ = folder();
+  std::filesystem::path folder_ = fakes::own_path();
   UntouchedImage image_{fakes::kToyWidth, fakes::kToyHeight, config_.light, config_};
   std::uint64_t sequence_ = 0;
   std::int64_t now_ns_ = 0;

@@ -17,6 +17,7 @@
 #include "daemon/pipeline/pipeline.hpp"
 #include "tests/fakes/fake_camera.hpp"
 #include "tests/fakes/fake_ring.hpp"
+#include "tests/fakes/own_path.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
 namespace dtact::pipeline {
@@ -106,9 +107,7 @@ class PipelineTest : public ::testing::Test {
     return light;
   }
 
-  std::filesystem::path folder = std::filesystem::path(::testing::TempDir()) /
-                                 (std::string("dtact_pipeline_") +
-                                  ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  std::filesystem::path folder = fakes::own_path();
   PipelineConfig config;
   fakes::FakeCamera::Handle camera;
   fakes::FakeRing::Handle ring;

@@ -8,6 +8,7 @@
 #include "clients/recording/recording_writer.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
+#include "tests/fakes/own_path.hpp"
 #include "tests/unit/recording/sample.hpp"
 
 namespace dtact::recording {
@@ -51,9 +52,7 @@ class Export : public testing::Test {
     return base::read_file(out_ / name);
   }
 
-  fs::path folder_ = fs::path(testing::TempDir()) /
-                     (std::string("dtact_export_") +
-                      testing::UnitTest::GetInstance()->current_test_info()->name());
+  fs::path folder_ = fakes::own_path();
   fs::path file_ = folder_ / "press.mcap";
   fs::path out_ = folder_ / "out";
   std::string said_;

@@ -8,6 +8,7 @@
 
 #include "clients/recording/channels.hpp"
 #include "clients/recording/read_recording.hpp"
+#include "tests/fakes/own_path.hpp"
 #include "tests/unit/recording/sample.hpp"
 
 namespace dtact::recording {
@@ -22,9 +23,7 @@ class RecorderTest : public testing::Test {
   ~RecorderTest() override { fs::remove(path_); }
 
  protected:
-  fs::path path_ = fs::path(testing::TempDir()) /
-                   (std::string("dtact_recorder_") +
-                    testing::UnitTest::GetInstance()->current_test_info()->name() + ".mcap");
+  fs::path path_ = fakes::own_path(".mcap");
   struct Seen {
     std::vector<std::uint64_t> frames;
     int events = 0;

@@ -9,6 +9,7 @@
 #include "clients/recording/foxglove.pb.h"
 #include "clients/recording/read_recording.hpp"
 #include "clients/recording/recording_writer.hpp"
+#include "tests/fakes/own_path.hpp"
 #include "tests/unit/recording/sample.hpp"
 
 namespace dtact::recording {
@@ -25,9 +26,7 @@ class RecordingFile : public testing::Test {
   ~RecordingFile() override { fs::remove(path_); }
 
  protected:
-  fs::path path_ = fs::path(testing::TempDir()) /
-                   (std::string("dtact_recording_") +
-                    testing::UnitTest::GetInstance()->current_test_info()->name() + ".mcap");
+  fs::path path_ = fakes::own_path(".mcap");
   mcap::FileSink sink_{path_, true};
 
   /// (sequence, log time, publish time) of a topic.

@@ -1,7 +1,6 @@
 #include "hal/sim/objects.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <stdexcept>
@@ -9,6 +8,7 @@
 
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
+#include "tests/fakes/own_path.hpp"
 
 namespace dtact::hal::sim {
 namespace {
@@ -119,8 +119,7 @@ TEST(Objects, RingAndPlugAndKey) {
 }
 
 TEST(Objects, HeightMapPressesWhitestDeepest) {
-  const auto file = std::filesystem::temp_directory_path() /
-                    ("dtact_objects_" + std::to_string(::getpid()) + ".png");
+  const auto file = fakes::own_path(".png");
   base::write_file_atomically(file, image::encode_png(image::Grey8{3, 1, {0, 204, 51}}));
   const Object o = height_map(file, 0.5, 2.0);
   EXPECT_NEAR(o.height_mm(0, 0), 0, 1e-12);

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <exception>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include "hal/base/atomic_file.hpp"
 #include "hal/sim/calibrated.hpp"
 #include "hal/sim/optics.hpp"
+#include "tests/fakes/own_path.hpp"
 #include "tests/unit/sim/small_scene.hpp"
 
 namespace dtact::hal::sim {
@@ -107,8 +107,7 @@ class CalibratedScene : public ::testing::Test {
     base::write_file_atomically(folder_ / "calibration.toml", toml);
   }
 
-  std::filesystem::path folder_ =
-      std::filesystem::path(::testing::TempDir()) / fmt::format("calibrated_scene_{}", ::getpid());
+  std::filesystem::path folder_ = fakes::own_path();
 };
 
 // As dtact-calibrate writes it, errors beside the numbers.

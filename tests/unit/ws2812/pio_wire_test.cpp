@@ -4,11 +4,11 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 
 #include "hal/base/atomic_file.hpp"
+#include "tests/fakes/own_path.hpp"
 #include "tests/unit/ws2812/fakes.hpp"
 
 namespace dtact::hal::ws2812 {
@@ -30,8 +30,7 @@ TEST(Ws2812PioWire, ADeviceThatIsNotThereNamesTheOverlay) {
 }
 
 TEST(Ws2812PioWire, AFileIsNoDeviceAndStaysAsItIs) {
-  const std::filesystem::path file =
-      std::filesystem::path(testing::TempDir()) / ("leds" + std::to_string(::getpid()));
+  const std::filesystem::path file = fakes::own_path();
   base::write_file_atomically(file, "mine");
   EXPECT_THAT(refusal_of(file), HasSubstr("No such device"));
   EXPECT_EQ(base::read_file(file), "mine");
