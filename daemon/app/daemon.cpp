@@ -204,9 +204,10 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
       io, [&pipeline] { return pipeline.status(); },
       fmt::format("listening on {}", fmt::join(server.addresses(), " and ")), told);
   Config running = config;
+  bool stopping = false;
   std::function<void()> wait_for_hangup = [&] {
     hangups.async_wait([&](const boost::system::error_code& error, int) {
-      if (error) return;
+      if (error || stopping) return;  // one that came with the signal to stop has no error
       notify_reloading();
       teller.set_note(reload(running, load, server));
       notify_ready(teller.text());
@@ -220,6 +221,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
     if (error) return;
     spdlog::info("{}: stopping", signal == SIGTERM ? "SIGTERM" : "SIGINT");
     notify_stopping();
+    stopping = true;
     hangups.cancel();
     teller.stop();
     watchdog.stop();

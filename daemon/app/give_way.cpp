@@ -22,10 +22,16 @@ long voluntary_switches() noexcept {
 
 GiveWay::GiveWay(boost::asio::io_context& io) : timer_(io) { wait(); }
 
+void GiveWay::stop() {
+  // The timer may have expired already: then its handler still comes, without an error.
+  stopped_ = true;
+  timer_.cancel();
+}
+
 void GiveWay::wait() {
   timer_.expires_after(kInterval);
   timer_.async_wait([this](const boost::system::error_code& error) {
-    if (error) return;
+    if (error || stopped_) return;
     if (voluntary_switches() == waits_) std::this_thread::sleep_for(kPause);
     waits_ = voluntary_switches();
     wait();

@@ -16,12 +16,13 @@ class GiveWay {
  public:
   explicit GiveWay(boost::asio::io_context& io);
   /// Then `io` has no work of it left.
-  void stop() { timer_.cancel(); }
+  void stop();
 
  private:
   void wait();
 
   boost::asio::steady_timer timer_;
+  bool stopped_ = false;
   long waits_ = 0;  ///< Voluntary context switches when last looked at.
 };
 

@@ -30,10 +30,16 @@ StatusTeller::StatusTeller(boost::asio::io_context& io, std::function<pipeline::
   wait();
 }
 
+void StatusTeller::stop() {
+  // The timer may have expired already: then its handler still comes, without an error.
+  stopped_ = true;
+  timer_.cancel();
+}
+
 void StatusTeller::wait() {
   timer_.expires_after(std::chrono::seconds(1));
   timer_.async_wait([this](const boost::system::error_code& error) {
-    if (error) return;
+    if (error || stopped_) return;
     const pipeline::Status status = status_();
     const std::string text = status_text(status, note_, listening_);
     if (told_ != text && notify_status(text)) told_ = text;

@@ -29,12 +29,13 @@ class StatusTeller {
   /// What else there is to say from now on.
   void set_note(std::string note) { note_ = std::move(note); }
   /// Then `io` has no work of it left.
-  void stop() { timer_.cancel(); }
+  void stop();
 
  private:
   void wait();
 
   boost::asio::steady_timer timer_;
+  bool stopped_ = false;
   std::function<pipeline::Status()> status_;
   std::string listening_;
   std::string note_;

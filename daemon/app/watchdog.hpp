@@ -20,12 +20,13 @@ class Watchdog {
   /// `heartbeat`: a count that goes on as long as the watched thread works.
   Watchdog(boost::asio::io_context& io, std::function<std::uint64_t()> heartbeat);
   /// Then `io` has no work of it left.
-  void stop() { timer_.cancel(); }
+  void stop();
 
  private:
   void wait();
 
   boost::asio::steady_timer timer_;
+  bool stopped_ = false;
   std::function<std::uint64_t()> heartbeat_;
   std::chrono::microseconds interval_;
   std::uint64_t last_;

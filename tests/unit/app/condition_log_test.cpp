@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <thread>
+
 #include "daemon/app/status_teller.hpp"
 
 namespace dtact::app {
@@ -96,6 +100,16 @@ TEST(StatusText, SaysStateRateAndHealth) {
   EXPECT_EQ(status_text(status, "needs a restart: camera.fps", "listening on x"),
             "camera_lost, 0 fps, camera_trouble, ring_trouble; needs a restart: camera.fps; "
             "listening on x");
+}
+
+TEST(StatusTeller, LeavesNoWorkWhenItIsStoppedAsItsTimeComes) {
+  boost::asio::io_context io(1);
+  boost::asio::steady_timer sooner(io, 1ms);
+  StatusTeller teller(io, [] { return pipeline::Status{}; }, "", {});
+  sooner.async_wait([&](const boost::system::error_code&) { teller.stop(); });
+  std::this_thread::sleep_for(1100ms);  // both are due
+  io.run_for(10s);
+  EXPECT_TRUE(io.stopped());
 }
 
 }  // namespace

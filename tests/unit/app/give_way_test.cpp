@@ -5,8 +5,10 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <functional>
+#include <thread>
 
 namespace dtact::app {
 namespace {
@@ -33,6 +35,17 @@ TEST(GiveWay, PutsAThreadToSleepThatNeverWaits) {
   boost::asio::post(io, work);
   io.run();
   EXPECT_GE(voluntary_switches() - before, 2);
+}
+
+TEST(GiveWay, LeavesNoWorkWhenItIsStoppedAsItsTimeComes) {
+  using namespace std::chrono_literals;
+  boost::asio::io_context io(1);
+  boost::asio::steady_timer sooner(io, 1ms);
+  GiveWay give_way(io);
+  sooner.async_wait([&](const boost::system::error_code&) { give_way.stop(); });
+  std::this_thread::sleep_for(150ms);  // both are due
+  io.run_for(10s);
+  EXPECT_TRUE(io.stopped());
 }
 
 }  // namespace

@@ -3,11 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <string>
+#include <thread>
 
 #include "tests/fakes/notify_socket.hpp"
 #include "tests/fakes/own_path.hpp"
@@ -62,6 +64,16 @@ TEST_F(WatchdogTest, IsNotFedWhileTheHeartStandsStill) {
   watchdog.stop();
   io.run();  // ends: nothing is left to do
   EXPECT_EQ(told(), 0);
+}
+
+TEST_F(WatchdogTest, LeavesNoWorkWhenItIsStoppedAsItsTimeComes) {
+  ::setenv("WATCHDOG_USEC", "20000", 1);
+  boost::asio::steady_timer sooner(io, 1ms);
+  Watchdog watchdog(io, [] { return 1; });
+  sooner.async_wait([&](const boost::system::error_code&) { watchdog.stop(); });
+  std::this_thread::sleep_for(50ms);  // both are due
+  io.run_for(10s);
+  EXPECT_TRUE(io.stopped());
 }
 
 TEST_F(WatchdogTest, HasNoWorkWhereNoWatchdogIsSet) {
