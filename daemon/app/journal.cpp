@@ -48,14 +48,20 @@ bool is_journal(int fd) {
 constexpr std::array<int, spdlog::level::n_levels> kPriorities = {
     LOG_DEBUG, LOG_DEBUG, LOG_INFO, LOG_WARNING, LOG_ERR, LOG_CRIT, LOG_INFO};
 
-/// As spdlog's own systemd_sink, with fields.
+/// As spdlog's own systemd_sink, with fields; but the last words of a process go to its standard
+/// error, which the journal knows from the start as the unit's: whose the entry is that comes
+/// through the socket, it looks up then, and in vain when the process has ended.
 class JournalSink final : public spdlog::sinks::base_sink<std::mutex> {
   void sink_it_(const spdlog::details::log_msg& msg) override {
     const std::string_view text(msg.payload.data(), msg.payload.size());
-    std::vector<std::string> entry{
-        fmt::format("MESSAGE={}", text),
-        fmt::format("PRIORITY={}", kPriorities.at(static_cast<std::size_t>(msg.level))),
-        "SYSLOG_IDENTIFIER=dtactd"};
+    const int priority = kPriorities.at(static_cast<std::size_t>(msg.level));
+    if (msg.level == spdlog::level::critical) {
+      std::cerr << fmt::format("<{}>{}\n", priority, text);  // sd-daemon(3) names the prefix
+      return;
+    }
+    std::vector<std::string> entry{fmt::format("MESSAGE={}", text),
+                                   fmt::format("PRIORITY={}", priority),
+                                   "SYSLOG_IDENTIFIER=dtactd"};
     const auto add = [&entry](const char* name, const std::string& value) {
       if (!value.empty()) entry.push_back(fmt::format("{}={}", name, value));
     };

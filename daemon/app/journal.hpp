@@ -16,6 +16,7 @@ using LogFields = std::vector<std::pair<const char*, std::string>>;
 /// Where everything is logged: to the journal, with priorities and fields, when standard error
 /// leads there ($JOURNAL_STREAM), else to standard error as text. A line that repeats the one
 /// before is counted for a minute instead of written, and the next line is preceded by the count.
+/// Critical is what a process ends with.
 [[nodiscard]] std::shared_ptr<spdlog::logger> make_logger();
 
 /// Logs a line with fields.

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """journal_test.py DTACTD DTACTCTL: in a mount namespace of its own the test is journald. What the
-daemon sends there has priorities and fields, and nothing of it goes to standard error.
+daemon sends there has priorities and fields, and nothing of it goes to standard error but what a process
+ends with.
 """
 import json
 import os
@@ -109,6 +110,13 @@ def test(daemon, ctl, folder):
     skipped = sum(int(line.split()[1]) for line in lines if line.startswith("Skipped "))
     assert written + skipped == 20 and written < 10, lines
     assert not log.read_bytes(), log.read_text()
+
+    # What a process ends with, on the stream that is known as the unit's.
+    with open(log, "wb") as stderr:
+        check = subprocess.run([daemon, "--config", config, "--check-config"], stderr=stderr, check=False,
+                               env={**os.environ, "JOURNAL_STREAM": f"{about.st_dev}:{about.st_ino}"})
+    assert check.returncode == 1
+    assert log.read_text().startswith(f"<2>{config}:1: camera.width"), log.read_text()
     print(json.dumps(journal.entries, indent=1))
 
 
