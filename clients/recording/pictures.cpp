@@ -45,7 +45,7 @@ std::string pixels_of(const v1::DepthMap& map) {
   data.reserve(2 * values.size());
   for (const std::int16_t value : values) {
     const double um = value == map.untrusted_value() ? 0 : value * map.um_per_unit();
-    const auto pixel = static_cast<std::uint16_t>(std::clamp(um + 0.5, 0.0, 65535.0));
+    const auto pixel = static_cast<std::uint16_t>(um > 0 ? std::min(um + 0.5, 65535.0) : 0);
     data += static_cast<char>(pixel % 256);
     data += static_cast<char>(pixel / 256);
   }

@@ -110,6 +110,9 @@ TEST(FoxgloveTopics, APictureOfDepth) {
   EXPECT_EQ(image.timestamp().nanos(), 2);
   EXPECT_EQ(message_of(Topic::luma, frame), nullptr);
   EXPECT_EQ(message_of(Topic::contact, frame), nullptr);
+  map.set_um_per_unit(std::numeric_limits<double>::quiet_NaN());  // of another's daemon
+  ASSERT_TRUE(image.ParseFromString(message_of(Topic::depth, frame)->payload));
+  EXPECT_EQ(image.data(), std::string(8, '\0'));
 }
 
 TEST(FoxgloveTopics, ACloudOfThePointsThatAreThere) {
