@@ -26,7 +26,9 @@ prepare 'dpkg --add-architecture arm64' crossbuild-essential-arm64 qemu-user-sta
 copy_source
 cp "$(dirname "$0")/arm64.cmake" "$root/arm64.cmake"
 echo "arm64.sh: building"
-inside 'cd /source
+# An interrupted run leaves its packages installed, and tests would take those programs for this machine's.
+inside 'dpkg-query -W -f "\${binary:Package}\n" "dtact*" "libdtact*" 2> /dev/null | xargs -r dpkg --purge > /purge.log
+  cd /source
   cmake --preset dev -D CMAKE_UNITY_BUILD=ON -B /build --toolchain /arm64.cmake > /build.log
   cmake --build /build --target daemon/all clients/all tests/{unit,fuzz}/all bench_tests > /build.log 2>&1 || { grep -v "^\[" /build.log; exit 1; }
   ctest --test-dir /build --output-on-failure -L unit'
