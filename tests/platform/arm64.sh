@@ -27,6 +27,7 @@ copy_source
 cp "$(dirname "$0")/arm64.cmake" "$root/arm64.cmake"
 echo "arm64.sh: building"
 # An interrupted run leaves its packages installed, and tests would take those programs for this machine's.
+# shellcheck disable=SC2016  # the inner shell expands it
 inside 'dpkg-query -W -f "\${binary:Package}\n" "dtact*" "libdtact*" 2> /dev/null | xargs -r dpkg --purge > /purge.log
   cd /source
   cmake --preset dev -D CMAKE_UNITY_BUILD=ON -B /build --toolchain /arm64.cmake > /build.log
