@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """tidy.py BUILD: clang-tidy over every source file of ours that BUILD compiles.
 
-BUILD is up to date. A file that passed is not looked at again until something that it is made of
-changes: its own text, every header's, the compiler's command line, the rules or the tool's version.
-What passed is kept by a digest of all that in $TIDY_CACHE (default ~/.cache/dtactd-tidy).
+BUILD is up to date. A file that passed is not looked at again until something that it was compiled
+with changes: its own text, the files' that BUILD put together with it, every header's, the compiler's
+command line, the rules or the tool's version. What passed is kept by a digest of all that in $TIDY_CACHE
+(default ~/.cache/dtactd-tidy).
 
 The tool spends most of its time in the system's headers. So files of one folder that are compiled
 alike are looked at together, as one that includes them, which takes a tenth of the time; where their
@@ -51,12 +52,20 @@ def headers(build):
     return read
 
 
+def apart(entry):
+    """An entry for each file that CMake put together into one (CMAKE_UNITY_BUILD), or itself."""
+    if not re.search(r"/Unity/unity_\d+_cxx\.cxx$", entry["file"]):
+        return [entry]
+    text = pathlib.Path(entry["file"]).read_text()
+    return [{**entry, "file": file} for file in re.findall(r'^#include "(.+)"$', text, re.MULTILINE)]
+
+
 def key(entry, read, common):
     made = re.search(r" -o (\S+)", entry["command"]).group(1)
     if made not in read:
         sys.exit(f"tidy: {made} is not built: bring {entry['directory']} up to date first")
     texts = (digest_of(os.path.join(entry["directory"], path)) for path in read[made])
-    return hashlib.sha256("\n".join([common, entry["command"], *texts]).encode()).hexdigest()
+    return hashlib.sha256("\n".join([common, entry["command"], entry["file"], *texts]).encode()).hexdigest()
 
 
 def flags(entry):
@@ -97,8 +106,9 @@ def main():
     version = subprocess.run([TOOL, "--version"], check=True, capture_output=True, text=True).stdout
     rules = pathlib.Path(".clang-tidy").read_text()
     rules_of_tests = rules + pathlib.Path("tests/.clang-tidy").read_text()
-    entries = json.loads(pathlib.Path(build, "compile_commands.json").read_text())
+    compiled = json.loads(pathlib.Path(build, "compile_commands.json").read_text())
     source = os.getcwd() + "/"
+    entries = [file for entry in compiled for file in apart(entry)]
     ours = [e for e in entries if e["file"].startswith(source) and OURS.match(e["file"][len(source) - 1 :])]
     read = headers(build)
 
@@ -122,7 +132,7 @@ def main():
                 return verdict(entries, told)
         verdicts = collections.Counter()
         for entry in entries:
-            verdicts.update(verdict([entry], run(["-p", build, entry["file"]])))
+            verdicts.update(verdict([entry], run([entry["file"], "--", *flags(entry)])))
         return verdicts
 
     unknown = [entry for entry in ours if not passed(entry).exists()]

@@ -30,7 +30,7 @@ echo "arm64.sh: building"
 # shellcheck disable=SC2016  # the inner shell expands it
 inside 'dpkg-query -W -f "\${binary:Package}\n" "dtact*" "libdtact*" 2> /dev/null | xargs -r dpkg --purge > /purge.log
   cd /source
-  cmake --preset dev -D CMAKE_UNITY_BUILD=ON -B /build --toolchain /arm64.cmake > /build.log
+  cmake --preset dev -B /build --toolchain /arm64.cmake > /build.log
   cmake --build /build --target daemon/all clients/all tests/{unit,fuzz}/all bench_tests > /build.log 2>&1 || { grep -v "^\[" /build.log; exit 1; }
   ctest --test-dir /build --output-on-failure -L unit'
 package "$source_folder/build/dev/packages-debian12-arm64" arm64 /build

@@ -14,7 +14,7 @@ prepare true "$@"
 copy_source
 echo "debian13.sh: building"
 inside 'cd /source
-  cmake --preset dev -D CMAKE_UNITY_BUILD=ON -B /build > /build.log
+  cmake --preset dev -B /build > /build.log
   cmake --build /build > /build.log 2>&1 || { grep -v "^\[" /build.log; exit 1; }
   ctest --test-dir /build --output-on-failure -L unit'
 architecture=$(dpkg --print-architecture)

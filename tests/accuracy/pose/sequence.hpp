@@ -32,8 +32,8 @@ inline constexpr Way kDeeper{.name = "deeper", .deeper_mm = 0.3};
 [[nodiscard]] std::string keys_of_a_minute(int steps);
 
 /// Fingers of 30 mm of radius whose tips are 28 mm before the camera.
-inline constexpr recon::Surface kSphere{recon::Surface::Kind::sphere, 30, 0, 20, 8, 1};
-inline constexpr recon::Surface kCylinder{recon::Surface::Kind::cylinder, 30, 0, 20, 8, 1};
+inline const recon::Surface kSphere{recon::Surface::Kind::sphere, 30, 0, 20, 8, 1};
+inline const recon::Surface kCylinder{recon::Surface::Kind::cylinder, 30, 0, 20, 8, 1};
 
 /// Indentation, whole micrometres, cut out around what is pressed.
 struct Map {
