@@ -143,6 +143,35 @@ void fill_camera(const hal::CameraInfo& info, const hal::CameraReport& report,
   }
 }
 
+v1::Surface::Shape to_wire(recon::Surface::Kind kind) {
+  switch (kind) {
+    case recon::Surface::Kind::plane:
+      return v1::Surface::PLANE;
+    case recon::Surface::Kind::sphere:
+      return v1::Surface::SPHERE;
+    case recon::Surface::Kind::cylinder:
+      return v1::Surface::CYLINDER;
+    case recon::Surface::Kind::height_map:
+      return v1::Surface::HEIGHT_MAP;
+  }
+  return v1::Surface::PLANE;
+}
+
+void fill(const recon::Surface& surface, v1::Surface& out) {
+  out.set_shape(to_wire(surface.kind));
+  out.set_radius_mm(surface.radius_mm);
+  out.set_axis_deg(surface.axis_deg);
+  out.set_air_mm(surface.air_mm);
+  out.set_gel_mm(surface.gel_mm);
+  out.set_refraction(surface.refraction);
+  if (!surface.heights) return;
+  v1::HeightMap& heights = *out.mutable_heights();
+  heights.set_width(static_cast<std::uint32_t>(surface.heights->width));
+  heights.set_height(static_cast<std::uint32_t>(surface.heights->height));
+  heights.set_spacing_mm(surface.heights->spacing_mm);
+  heights.mutable_z_um()->Add(surface.heights->z_um.begin(), surface.heights->z_um.end());
+}
+
 }  // namespace
 
 void fill(const hal::Light& light, std::optional<std::int64_t> since_ns, v1::LightState& out) {
@@ -185,14 +214,7 @@ void fill(const pipeline::DepthFrame& frame, v1::Frame& out) {
     fill(frame.contact, *out.mutable_contact());
   }
   if (frame.has_depth && frame.surface.kind != recon::Surface::Kind::plane) {
-    auto& surface = *out.mutable_surface();
-    surface.set_shape(frame.surface.kind == recon::Surface::Kind::sphere ? v1::Surface::SPHERE
-                                                                         : v1::Surface::CYLINDER);
-    surface.set_radius_mm(frame.surface.radius_mm);
-    surface.set_axis_deg(frame.surface.axis_deg);
-    surface.set_air_mm(frame.surface.air_mm);
-    surface.set_gel_mm(frame.surface.gel_mm);
-    surface.set_refraction(frame.surface.refraction);
+    fill(frame.surface, *out.mutable_surface());
   }
 }
 

@@ -31,6 +31,7 @@ void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
 void* __libc_realloc(void*, std::size_t);
 void* __libc_memalign(std::size_t, std::size_t);
+void __libc_free(void*);
 // NOLINTEND(bugprone-reserved-identifier)
 
 void* malloc(std::size_t size) {
@@ -52,6 +53,10 @@ void* memalign(std::size_t alignment, std::size_t size) {
 void* aligned_alloc(std::size_t alignment, std::size_t size) {
   note();
   return __libc_memalign(alignment, size);
+}
+void free(void* old) {
+  if (old != nullptr) note();
+  __libc_free(old);
 }
 int posix_memalign(void** out, std::size_t alignment, std::size_t size) {
   note();

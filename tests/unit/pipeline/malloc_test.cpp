@@ -38,6 +38,18 @@ std::vector<std::vector<std::uint8_t>> payloads(int count) {
   return made;
 }
 
+/// The toy's calibration with a surface of heights of its own: the last that lets go of them frees.
+std::shared_ptr<const calibration::Calibration> calibration_with_heights() {
+  auto made = fakes::scattering_toy_calibration(15);
+  recon::Model model = *made->model;
+  model.surface = {
+      .kind = recon::Surface::Kind::height_map, .air_mm = 20, .gel_mm = 8, .refraction = 1.41};
+  model.surface.heights = std::make_shared<const recon::SurfaceHeights>(recon::SurfaceHeights{
+      .width = 4, .height = 4, .spacing_mm = 1, .z_um = std::vector<std::int32_t>(16)});
+  made->model = std::make_shared<const recon::Model>(std::move(model));
+  return made;
+}
+
 /// Page faults of the calling thread so far.
 std::array<long, 2> faults() {
   rusage usage{};
@@ -68,7 +80,7 @@ class CaptureThread : public ::testing::Test {
     config.reconstruction = rules;
     fakes::FakeRing::Handle ring;
     Pipeline pipeline(std::move(camera), std::make_unique<fakes::FakeRing>(ring),
-                      fakes::scattering_toy_calibration(15), config);
+                      calibration_with_heights(), config);
     pipeline.want({.contact = true, .depth = true, .luma = true, .jpeg = true});
     pipeline.start();
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -105,7 +117,7 @@ class CaptureThread : public ::testing::Test {
       case 2:
         return {commands_, CopyReference{}};
       default:
-        return {commands_, UseCalibration{fakes::scattering_toy_calibration(15)}};
+        return {commands_, UseCalibration{calibration_with_heights()}};
     }
   }
 
@@ -115,22 +127,25 @@ class CaptureThread : public ::testing::Test {
   bool depth_ = false;
 };
 
-TEST_F(CaptureThread, AllocatesNothingAfterItsFirstHundredFrames) {
-  if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer brings its own malloc";
-  run(600, [](std::uint64_t delivered) {
+/// On from the hundredth frame until shortly before the thread's end, which frees what was its own.
+std::function<void(std::uint64_t)> counting(std::uint64_t frames) {
+  return [frames](std::uint64_t delivered) {
     if (delivered == 100) fakes::count_allocations(true);
-  });
+    if (delivered + 10 == frames) fakes::count_allocations(false);
+  };
+}
+
+// Two calibrations long, with heights each.
+TEST_F(CaptureThread, AllocatesAndFreesNothingAfterItsFirstHundredFrames) {
+  if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer brings its own malloc";
+  run(1400, counting(1400));
   EXPECT_EQ(fakes::counted_allocations(), 0U);
 }
 
-TEST_F(CaptureThread, AllocatesNothingWhileItSharpensMoreAndLess) {
+TEST_F(CaptureThread, AllocatesAndFreesNothingWhileItSharpensMoreAndLess) {
   if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer brings its own malloc";
   // The plain list is taken for 50 um: the first frames are plain, the pressed ones sharpened.
-  run(600,
-      [](std::uint64_t delivered) {
-        if (delivered == 100) fakes::count_allocations(true);
-      },
-      {.sharpen = ReconstructionRules::kAutoSharpen, .max_error_um = 55});
+  run(600, counting(600), {.sharpen = ReconstructionRules::kAutoSharpen, .max_error_um = 55});
   EXPECT_EQ(fakes::counted_allocations(), 0U);
 }
 
