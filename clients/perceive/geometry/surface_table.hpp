@@ -4,12 +4,10 @@
 #include <optional>
 #include <vector>
 
+#include "clients/perceive/geometry/vector.hpp"
 #include "daemon/recon/surface.hpp"
 
 namespace dtact::perceive {
-
-/// A point or direction of the surface frame.
-using Vector = std::array<double, 3>;
 
 /// A point of the untouched surface and the outward unit normal there.
 struct SurfacePoint {
@@ -19,7 +17,8 @@ struct SurfacePoint {
 
 /// Where the camera ray leaves the gel that crosses the plane z = 0 at (x, y), in millimetres: what
 /// a depth map's pixel means, since a lens is calibrated on that plane. The ray is refracted where
-/// it enters the gel's flat back (Snell's law). Nothing where it passes beside the surface.
+/// it enters the gel's flat back (Snell's law). Nothing where it passes beside the surface. Throws
+/// std::invalid_argument for a height map whose sizes contradict each other.
 [[nodiscard]] std::optional<SurfacePoint> cast_ray(const recon::Surface& surface, double x_mm,
                                                    double y_mm);
 
