@@ -66,10 +66,12 @@ perceive::PointCloud points_of(const DepthImage& depth) {
   // Micrometres, as they came.
   std::vector<std::int16_t> values;
   values.reserve(depth.mm.size());
-  perceive::DepthGrid grid{.width = depth.width,
+  perceive::DepthGrid grid{.x = depth.x,
+                           .y = depth.y,
+                           .width = depth.width,
                            .height = depth.height,
-                           .full_width = depth.width,
-                           .full_height = depth.height,
+                           .full_width = std::max(depth.full_width, depth.width),
+                           .full_height = std::max(depth.full_height, depth.height),
                            .mm_per_px = depth.mm_per_px,
                            .values = {}};
   for (const float mm : depth.mm) {

@@ -13,6 +13,11 @@ struct DepthImage {
   int height = 0;
   double mm_per_px = 0;
   std::span<const float> mm;
+  /// The whole map that it is a part of, where it is one: its first pixel there, and the size.
+  int x = 0;
+  int y = 0;
+  int full_width = 0;  ///< 0: it is the whole.
+  int full_height = 0;
   recon::Surface surface = {};  ///< That it is measured from.
 };
 

@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "clients/common/depth_file.hpp"
+#include "clients/common/depth_message.hpp"
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
 #include "clients/cpp/maps.hpp"
@@ -220,9 +221,7 @@ class Exporter {
   std::string write_map(const v1::Frame& frame, std::uint64_t index) {
     if (!frame.has_depth() || options_.format == "csv") return {};
     const auto mm = client::millimetres_of(frame.depth());
-    const cli::DepthImage depth{static_cast<int>(frame.depth().width()),
-                                static_cast<int>(frame.depth().height()), frame.depth().mm_per_px(),
-                                mm};
+    const cli::DepthImage depth = cli::depth_image(frame, mm);
     const std::uint64_t map = maps_++;
     if (stack_) {
       stack_->add(depth, index);

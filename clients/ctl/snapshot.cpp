@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "clients/common/depth_file.hpp"
+#include "clients/common/depth_message.hpp"
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
 #include "clients/cpp/maps.hpp"
@@ -80,10 +81,8 @@ std::string encode(const v1::Frame& frame, const SnapshotOptions& options) {
                                           static_cast<int>(frame.luma().height()),
                                           client::pixels_of(frame.luma())});
   }
-  const v1::DepthMap& depth = frame.depth();
-  const auto mm = client::millimetres_of(depth);
-  return cli::encoder_for(options.output, encode_grey_png)(
-      {static_cast<int>(depth.width()), static_cast<int>(depth.height()), depth.mm_per_px(), mm});
+  const auto mm = client::millimetres_of(frame.depth());
+  return cli::encoder_for(options.output, encode_grey_png)(cli::depth_image(frame, mm));
 }
 
 void run_snapshot(const Context& context, const SnapshotOptions& options) {

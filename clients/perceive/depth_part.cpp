@@ -35,19 +35,6 @@ std::vector<std::int16_t> values_of(const v1::DepthMap& map) {
 
 }  // namespace
 
-recon::Surface surface_of(const v1::Surface& surface) {
-  using Kind = recon::Surface::Kind;
-  recon::Surface made;
-  if (surface.shape() == v1::Surface::PLANE) return made;
-  made.kind = surface.shape() == v1::Surface::SPHERE ? Kind::sphere : Kind::cylinder;
-  made.radius_mm = surface.radius_mm();
-  made.axis_deg = surface.axis_deg();
-  made.air_mm = surface.air_mm();
-  made.gel_mm = surface.gel_mm();
-  made.refraction = surface.refraction();
-  return made;
-}
-
 DepthPart::DepthPart(const v1::DepthMap& map)
     : values_(values_of(map)),
       whole_{.x = static_cast<int>(map.x()),

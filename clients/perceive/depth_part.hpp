@@ -9,12 +9,9 @@
 
 namespace dtact::v1 {
 class DepthMap;
-class Surface;
-}  // namespace dtact::v1
+}
 
 namespace dtact::perceive {
-
-[[nodiscard]] recon::Surface surface_of(const v1::Surface& surface);
 
 /// The depth map of a frame and the parts of it that clients ask for.
 class DepthPart {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "clients/common/depth_message.hpp"
 #include "clients/perceive/cloud_message.hpp"
 #include "clients/perceive/pose_message.hpp"
 #include "proto/framing.hpp"
@@ -33,7 +34,7 @@ void FrameMaker::begin(v1::Frame frame, bool pose) {
   frame_.clear_dropped();
   if (frame_.has_depth()) {
     if (frame_.contact().touching()) depth_.emplace(frame_.depth());
-    const recon::Surface surface = surface_of(frame_.surface());
+    const recon::Surface surface = cli::surface_of(frame_.surface());
     if (surface != clouds_.surface()) {
       clouds_ = CloudMaker(surface);
       tracker_.release();

@@ -1,0 +1,116 @@
+#include "clients/common/depth_message.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+
+#include "clients/cpp/errors.hpp"
+#include "daemon/recon/surface_limits.hpp"
+
+namespace dtact::cli {
+namespace {
+
+using Kind = recon::Surface::Kind;
+using Limits = recon::SurfaceLimits;
+
+[[noreturn]] void refuse(const std::string& what) {
+  throw client::ProtocolError(
+      fmt::format("a surface {}: install the same release on both sides", what));
+}
+
+Kind kind_of(v1::Surface::Shape shape) {
+  switch (shape) {
+    case v1::Surface::PLANE:
+      return Kind::plane;
+    case v1::Surface::SPHERE:
+      return Kind::sphere;
+    case v1::Surface::CYLINDER:
+      return Kind::cylinder;
+    case v1::Surface::HEIGHT_MAP:
+      return Kind::height_map;
+    default:
+      refuse(fmt::format("has a shape, {}, that is not known here", static_cast<int>(shape)));
+  }
+}
+
+/// False for NaN.
+bool within(double value, double low, double high) { return value >= low && value <= high; }
+
+std::shared_ptr<const recon::SurfaceHeights> heights_of(const v1::HeightMap& map) {
+  const bool sized =
+      within(map.width(), Limits::kLeastNodes, Limits::kMostNodes) &&
+      within(map.height(), Limits::kLeastNodes, Limits::kMostNodes) &&
+      static_cast<std::uint64_t>(map.z_um_size()) == std::uint64_t{map.width()} * map.height();
+  constexpr std::int32_t kMostUm = 1000 * static_cast<std::int32_t>(Limits::kMostHeightMm);
+  const bool bounded = std::ranges::all_of(
+      map.z_um(), [](std::int32_t z_um) { return z_um >= -kMostUm && z_um <= kMostUm; });
+  if (!sized || !bounded ||
+      !within(map.spacing_mm(), Limits::kLeastSpacingMm, Limits::kMostSpacingMm)) {
+    refuse(fmt::format("of {} heights on {}x{} nodes, {} mm apart, contradicts itself",
+                       map.z_um_size(), map.width(), map.height(), map.spacing_mm()));
+  }
+  return std::make_shared<const recon::SurfaceHeights>(
+      recon::SurfaceHeights{.width = static_cast<int>(map.width()),
+                            .height = static_cast<int>(map.height()),
+                            .spacing_mm = map.spacing_mm(),
+                            .z_um = {map.z_um().begin(), map.z_um().end()}});
+}
+
+}  // namespace
+
+recon::Surface surface_of(const v1::Surface& surface) {
+  recon::Surface made;
+  made.kind = kind_of(surface.shape());
+  if (made.kind == Kind::plane) return made;
+  made.air_mm = surface.air_mm();
+  made.gel_mm = surface.gel_mm();
+  made.refraction = surface.refraction();
+  bool possible = within(made.air_mm, Limits::kLeastDistanceMm, Limits::kMostDistanceMm) &&
+                  within(made.gel_mm, Limits::kLeastDistanceMm, Limits::kMostDistanceMm) &&
+                  within(made.refraction, 1, Limits::kMostRefraction);
+  if (made.kind == Kind::height_map) {
+    made.heights = heights_of(surface.heights());
+  } else {
+    made.radius_mm = surface.radius_mm();
+    made.axis_deg = surface.axis_deg();
+    possible = possible && within(made.radius_mm, Limits::kLeastRadiusMm, Limits::kMostRadiusMm) &&
+               within(made.axis_deg, -180, 180);
+  }
+  if (!possible) {
+    refuse(fmt::format(
+        "of {} mm radius, its axis at {} degrees, behind {} mm of air and {} mm of "
+        "gel of index {} cannot be",
+        surface.radius_mm(), surface.axis_deg(), made.air_mm, made.gel_mm, made.refraction));
+  }
+  return made;
+}
+
+DepthImage depth_image(const v1::Frame& frame, std::span<const float> mm) {
+  const v1::DepthMap& map = frame.depth();
+  // A daemon of 1.0 says neither.
+  const std::uint64_t full_width = std::max(map.full_width(), map.width());
+  const std::uint64_t full_height = std::max(map.full_height(), map.height());
+  constexpr std::uint64_t kMostSide = 1U << 20U;
+  if (std::uint64_t{map.x()} + map.width() > full_width ||
+      std::uint64_t{map.y()} + map.height() > full_height || full_width > kMostSide ||
+      full_height > kMostSide) {
+    throw client::ProtocolError(
+        fmt::format("a depth map of {}x{} pixels at {}, {} of {}x{} contradicts itself: install "
+                    "the same release on both sides",
+                    map.width(), map.height(), map.x(), map.y(), full_width, full_height));
+  }
+  return {.width = static_cast<int>(map.width()),
+          .height = static_cast<int>(map.height()),
+          .mm_per_px = map.mm_per_px(),
+          .mm = mm,
+          .x = static_cast<int>(map.x()),
+          .y = static_cast<int>(map.y()),
+          .full_width = static_cast<int>(full_width),
+          .full_height = static_cast<int>(full_height),
+          .surface = surface_of(frame.surface())};
+}
+
+}  // namespace dtact::cli

@@ -1,0 +1,136 @@
+#include "clients/common/depth_message.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "clients/cpp/errors.hpp"
+
+namespace dtact::cli {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+using Kind = recon::Surface::Kind;
+
+v1::Surface sphere() {
+  v1::Surface surface;
+  surface.set_shape(v1::Surface::SPHERE);
+  surface.set_radius_mm(10);
+  surface.set_air_mm(20);
+  surface.set_gel_mm(5);
+  surface.set_refraction(1.41);
+  return surface;
+}
+
+/// 4 × 5 nodes 3 mm apart, all at −1 mm.
+v1::Surface heights() {
+  v1::Surface surface = sphere();
+  surface.set_shape(v1::Surface::HEIGHT_MAP);
+  surface.clear_radius_mm();
+  v1::HeightMap& map = *surface.mutable_heights();
+  map.set_width(4);
+  map.set_height(5);
+  map.set_spacing_mm(3);
+  for (int i = 0; i < 20; ++i) map.add_z_um(-1000);
+  return surface;
+}
+
+void expect_refused(const v1::Surface& surface, const std::string& what) {
+  EXPECT_THAT([&] { (void)surface_of(surface); },
+              ThrowsMessage<client::ProtocolError>(HasSubstr(what)));
+}
+
+TEST(SurfaceOf, ReadsEachShape) {
+  EXPECT_EQ(surface_of({}), recon::Surface{});
+  EXPECT_EQ(surface_of(sphere()), (recon::Surface{Kind::sphere, 10, 0, 20, 5, 1.41}));
+  v1::Surface cylinder = sphere();
+  cylinder.set_shape(v1::Surface::CYLINDER);
+  cylinder.set_axis_deg(-30);
+  EXPECT_EQ(surface_of(cylinder), (recon::Surface{Kind::cylinder, 10, -30, 20, 5, 1.41}));
+  const recon::Surface found = surface_of(heights());
+  EXPECT_EQ(found.kind, Kind::height_map);
+  EXPECT_EQ(found.gel_mm, 5);
+  ASSERT_TRUE(found.heights);
+  EXPECT_EQ(found.heights->width, 4);
+  EXPECT_EQ(found.heights->height, 5);
+  EXPECT_EQ(found.heights->spacing_mm, 3);
+  EXPECT_EQ(found.heights->z_um, std::vector<std::int32_t>(20, -1000));
+}
+
+TEST(SurfaceOf, RefusesWhatContradictsItself) {
+  v1::Surface surface = sphere();
+  surface.set_shape(static_cast<v1::Surface::Shape>(9));
+  expect_refused(surface, "a shape, 9,");
+  surface = sphere();
+  surface.set_radius_mm(0);
+  expect_refused(surface, "0 mm radius");
+  surface = sphere();
+  surface.set_gel_mm(std::numeric_limits<double>::quiet_NaN());
+  expect_refused(surface, "nan mm of gel");
+  surface = heights();
+  surface.mutable_heights()->add_z_um(0);
+  expect_refused(surface, "21 heights on 4x5 nodes");
+  surface = heights();
+  surface.mutable_heights()->set_width(1U << 31U);
+  expect_refused(surface, "20 heights on 2147483648x5");
+  surface = heights();
+  surface.mutable_heights()->set_spacing_mm(0);
+  expect_refused(surface, "0 mm apart");
+  surface = heights();
+  surface.mutable_heights()->set_z_um(7, std::numeric_limits<std::int32_t>::min());
+  expect_refused(surface, "contradicts itself");
+  surface = heights();
+  surface.clear_heights();
+  expect_refused(surface, "0 heights");
+  surface = heights();
+  surface.set_refraction(0.9);
+  expect_refused(surface, "index 0.9");
+}
+
+/// A map of 3 × 2 pixels of a millimetre of one that has 9 × 8.
+v1::Frame frame_of(const v1::Surface& surface) {
+  v1::Frame frame;
+  *frame.mutable_surface() = surface;
+  v1::DepthMap& map = *frame.mutable_depth();
+  map.set_x(5);
+  map.set_y(4);
+  map.set_width(3);
+  map.set_height(2);
+  map.set_full_width(9);
+  map.set_full_height(8);
+  map.set_mm_per_px(1);
+  return frame;
+}
+
+TEST(DepthImage, ItsPointsLieOnTheSurfaceWhereTheMapIs) {
+  const std::vector<float> mm(6, 0);
+  const auto first_point = [&](const v1::Surface& surface) {
+    const std::string pcd = encoder_for("a.pcd", nullptr)(depth_image(frame_of(surface), mm));
+    std::array<float, 3> point{};
+    const std::size_t data = pcd.find("DATA binary\n") + std::strlen("DATA binary\n");
+    std::memcpy(point.data(), pcd.data() + data, sizeof point);
+    return point;
+  };
+  // (5 − 4, 4 − 3.5) mm from the middle.
+  const auto flat = first_point({});
+  EXPECT_FLOAT_EQ(flat[0], 1e-3F);
+  EXPECT_FLOAT_EQ(flat[1], 0.5e-3F);
+  EXPECT_EQ(flat[2], 0);
+  EXPECT_NEAR(first_point(sphere())[2], -0.0626e-3, 0.002e-3) << "1.12² / (2 · 10) mm";
+  EXPECT_NEAR(first_point(heights())[2], -1e-3, 1e-9);
+}
+
+TEST(DepthImage, RefusesAMapBesideItsWhole) {
+  v1::Frame frame = frame_of({});
+  frame.mutable_depth()->set_x(7);
+  EXPECT_THROW((void)depth_image(frame, {}), client::ProtocolError);
+}
+
+}  // namespace
+}  // namespace dtact::cli
