@@ -37,6 +37,17 @@ struct PointCloud {
   /// x, y, z (metres), then the normal's x, y, z: six arrays of width · height, row-major. Where
   /// there is no point all six are NaN.
   std::vector<float> values;
+  /// CloudMaker's own: what of `values` its next call may leave as it is. Whoever changes the
+  /// values empties it.
+  struct Drawn {
+    std::uint64_t tables = 0;  ///< Which surface and whole map; 0: nothing is known.
+    /// Bits of a row's tiles: which hold the untouched surface's …
+    struct Row {
+      std::uint64_t rest = 0;    ///< … points and normals, …
+      std::uint64_t placed = 0;  ///< … points; of a plane their x and y.
+    };
+    std::vector<Row> rows;
+  } drawn;
 
   enum Part : std::uint8_t { kX, kY, kZ, kNormalX, kNormalY, kNormalZ, kParts };
   [[nodiscard]] std::size_t size() const noexcept {
@@ -52,7 +63,8 @@ struct PointCloud {
 };
 
 /// Makes point clouds of depth maps that belong to one surface. Its tables are made at the first
-/// map of a size; it allocates at no later one of it.
+/// map of a size; it allocates at no later one of it. Where nothing touches, now and when `out` was
+/// made before of the same part of a map, `out` is left as it is.
 class CloudMaker {
  public:
   explicit CloudMaker(const recon::Surface& surface = {}) : surface_(surface) {}
@@ -67,32 +79,33 @@ class CloudMaker {
 
   [[nodiscard]] const recon::Surface& surface() const noexcept { return surface_; }
   /// Of the maps made last; null for a plane.
-  [[nodiscard]] const SurfaceTable* table() const noexcept {
-    return surface_.kind == recon::Surface::Kind::plane ? nullptr : &table_;
-  }
+  [[nodiscard]] const SurfaceTable* table() const noexcept { return flat() ? nullptr : &table_; }
 
   /// Less lets the depth's noise into the normals, more blurs edges.
   static constexpr double kReachMm = 0.16;
 
  private:
-  /// Where the parts of the row that is being made go.
-  using Row = std::array<float*, PointCloud::kParts>;
+  /// A cloud that is being made.
+  struct Work;
 
-  void read(const DepthGrid& depth);
-  void flat_row(const DepthGrid& depth, int row, int reach, const Row& out) const;
-  void curved_row(const DepthGrid& depth, int row, int reach, const Row& out) const;
-  void mend(const DepthGrid& depth, int row, int column, int reach, const Row& out) const;
-  [[nodiscard]] Vector point(const DepthGrid& depth, int row, int column) const;
-  [[nodiscard]] float depth_at(const DepthGrid& depth, int row, int column) const {
-    return depth_[static_cast<std::size_t>(row) * static_cast<std::size_t>(depth.width) +
-                  static_cast<std::size_t>(column)];
-  }
+  [[nodiscard]] bool flat() const noexcept { return surface_.kind == recon::Surface::Kind::plane; }
+  void prepare(const DepthGrid& depth);
+  void make_whole(const DepthGrid& depth, PointCloud& out);
+  [[nodiscard]] std::uint64_t resting(const Work& work, int row) const;
+  void make_row(const Work& work, int row);
+  void place(const Work& work, int row) const;
+  void press_row(const Work& work, int row) const;
+  void make_part(const Work& work, int row, int begin, int end);
+  void mend(const Work& work, int row, int column);
+  void erase_lone(const Work& work) const;
+  [[nodiscard]] Vector point(const Work& work, int row, int column) const;
 
   recon::Surface surface_;
-  SurfaceTable table_;         ///< Empty for a plane.
-  std::vector<float> depth_;   ///< Metres, NaN where untrusted.
-  std::vector<float> points_;  ///< Of a curved surface: x, y and z of all.
-  std::vector<float> row_;     ///< The row being made, of which a stride takes some.
+  SurfaceTable table_;                  ///< Of a plane the sizes alone.
+  std::uint64_t tables_ = 0;            ///< As PointCloud::Drawn says it.
+  std::vector<std::uint64_t> touched_;  ///< Of a row: bits of the tiles with a depth but 0.
+  std::vector<std::size_t> lone_;       ///< Points that turned out to have no normal.
+  PointCloud whole_;                    ///< That a stride takes some of.
 };
 
 /// Calls back(a, b, c) with the indices of each triangle, counter-clockwise as seen from outside:

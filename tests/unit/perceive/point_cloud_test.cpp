@@ -82,7 +82,7 @@ TEST(PointCloud, AFlatMapIsAPlane) {
     EXPECT_EQ(cloud.part(PointCloud::kZ)[i], 0);
     EXPECT_EQ(cloud.part(PointCloud::kNormalX)[i], 0);
     EXPECT_EQ(cloud.part(PointCloud::kNormalY)[i], 0);
-    EXPECT_EQ(cloud.part(PointCloud::kNormalZ)[i], 1);
+    EXPECT_FLOAT_EQ(cloud.part(PointCloud::kNormalZ)[i], 1);
   }
 }
 

@@ -1,0 +1,144 @@
+// What CloudMaker leaves as it is, and what each instruction set makes, against points made anew.
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "clients/perceive/geometry/point_cloud.hpp"
+#include "tests/unit/perceive/sampled.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+using Kind = recon::Surface::Kind;
+
+std::vector<recon::Surface> surfaces() {
+  return {{},
+          {Kind::sphere, 4, 0, 20, 8, 1.41},  // rays at the map's corners miss it
+          {Kind::cylinder, 12, 30, 20, 8, 1.41},
+          test::sampled({Kind::sphere, 12, 0, 20, 8, 1.41}, 12, 0.5)};
+}
+
+constexpr int kWidth = 150;  // four tiles and a part of one
+constexpr int kHeight = 110;
+
+/// 0 but for a ball that is `frame` · 7 pixels further right, some noise in it, and holes and lone
+/// pixels that come and go.
+std::vector<std::int16_t> map_of(int frame) {
+  std::mt19937 random(static_cast<unsigned>(frame));
+  std::vector<std::int16_t> map(std::size_t{kWidth} * kHeight, 0);
+  const auto at = [&](int row, int column) -> std::int16_t& {
+    return map[static_cast<std::size_t>(row * kWidth + column)];
+  };
+  for (int row = 0; row < kHeight; ++row) {
+    for (int column = 0; column < kWidth; ++column) {
+      const double off = std::hypot(row - 50, column - 20 - 7 * frame);
+      if (off < 18)
+        at(row, column) =
+            static_cast<std::int16_t>(900 - 3 * off * off + static_cast<double>(random() % 7));
+    }
+  }
+  for (int i = 0; i < 12; ++i)
+    at(static_cast<int>(random() % kHeight), static_cast<int>(random() % kWidth)) = -32768;
+  if (frame % 2 == 1) {
+    for (int row = 70; row < 95; ++row) {
+      for (int column = 30; column < 80; ++column) at(row, column) = -32768;
+    }
+    at(82, 50) = 0;  // alone, as deep as nothing
+  }
+  return map;
+}
+
+DepthGrid grid_of(const std::vector<std::int16_t>& map) {
+  return {.width = kWidth,
+          .height = kHeight,
+          .full_width = kWidth,
+          .full_height = kHeight,
+          .mm_per_px = 0.05,
+          .values = map};
+}
+
+/// As their bits are, every NaN alike.
+void expect_same(const PointCloud& actual, const PointCloud& expected, const char* what) {
+  ASSERT_EQ(actual.values.size(), expected.values.size()) << what;
+  for (std::size_t i = 0; i < actual.values.size(); ++i) {
+    const float a = actual.values[i];
+    const float b = expected.values[i];
+    if (std::isnan(a) && std::isnan(b)) continue;
+    ASSERT_EQ(std::bit_cast<std::uint32_t>(a), std::bit_cast<std::uint32_t>(b))
+        << what << ", value " << i << ": " << a << " for " << b;
+  }
+}
+
+TEST(CloudMaker, WhatItLeavesIsWhatItWouldMake) {
+  for (const recon::Surface& surface : surfaces()) {
+    CloudMaker maker(surface);
+    PointCloud cloud;
+    PointCloud coarse;
+    for (int frame = 0; frame < 12; ++frame) {
+      const auto map = map_of(frame);
+      maker.make(grid_of(map), 1, cloud);
+      PointCloud anew;
+      CloudMaker(surface).make(grid_of(map), 1, anew);
+      expect_same(cloud, anew, "whole");
+      maker.make(grid_of(map), 3, coarse);
+      CloudMaker(surface).make(grid_of(map), 3, anew);
+      expect_same(coarse, anew, "coarse");
+      // Another unit in between, and another part of the map in the same cloud.
+      DepthGrid other = grid_of(map);
+      if (frame % 5 == 2) other.um_per_unit = 2;
+      if (frame % 5 == 3) {
+        other.x = 20;
+        other.full_width = kWidth + 40;
+      }
+      maker.make(other, 1, cloud);
+      CloudMaker(surface).make(other, 1, anew);
+      expect_same(cloud, anew, "other");
+    }
+  }
+}
+
+TEST(CloudMaker, LeavesACloudOfAnotherMakerAlone) {
+  const auto map = map_of(0);
+  PointCloud cloud;
+  CloudMaker(surfaces()[1]).make(grid_of(map), 1, cloud);
+  CloudMaker flat;
+  PointCloud expected;
+  flat.make(grid_of(map), 1, expected);
+  flat.make(grid_of(map), 1, cloud);
+  expect_same(cloud, expected, "after a sphere's");
+}
+
+TEST(CloudMaker, WhereZeroIsNoDepthNothingIsUntouched) {
+  const auto map = map_of(0);
+  DepthGrid grid = grid_of(map);
+  CloudMaker maker;
+  PointCloud cloud;
+  maker.make(grid, 1, cloud);
+  EXPECT_TRUE(cloud.has(0));
+  grid.untrusted = 0;
+  maker.make(grid, 1, cloud);
+  EXPECT_FALSE(cloud.has(0));
+}
+
+TEST(CloudMaker, EveryInstructionSetMakesTheSameBits) {
+  for (const recon::Surface& surface : surfaces()) {
+    std::vector<PointCloud> made;
+    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
+      hwy::SetSupportedTargetsForTest(target);
+      const auto map = map_of(3);
+      CloudMaker(surface).make(grid_of(map), 1, made.emplace_back());
+    }
+    hwy::SetSupportedTargetsForTest(0);
+    ASSERT_FALSE(made.empty());
+    for (const PointCloud& cloud : made) expect_same(cloud, made.front(), "a target");
+  }
+}
+
+}  // namespace
+}  // namespace dtact::perceive
