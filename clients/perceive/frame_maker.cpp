@@ -50,8 +50,8 @@ void FrameMaker::follow(DepthPart& depth, double uncertainty_um) {
   const std::optional<DepthGrid> grid = depth.contact();
   if (!grid) return;
   const std::uint32_t took = timed([&] {
-    clouds_.make(*grid, 1, cloud_);
-    (void)tracker_.follow(ContactView(*grid, cloud_, clouds_.table(), uncertainty_um),
+    clouds_.make(*grid, 1, contact_);
+    (void)tracker_.follow(ContactView(*grid, contact_, clouds_.table(), uncertainty_um),
                           frame_.sequence());
   });
   if (tracker_.pose().state == Tracker::State::idle) return;

@@ -36,6 +36,7 @@ class FrameMaker {
   std::optional<DepthPart> depth_;
   CloudMaker clouds_;
   PointCloud cloud_;
+  PointCloud contact_;  ///< Its own: what is as it was in cloud_ is not made again.
   Tracker tracker_;
   std::optional<v1::ObjectPose> pose_;
   std::vector<std::pair<net::FrameKind, std::shared_ptr<const net::EncodedFrame>>> done_;
