@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstdint>
-#include <span>
 #include <string>
 
+#include "clients/perceive/geometry/rows.hpp"
 #include "proto/dtact.pb.h"
 
 static_assert(std::endian::native == std::endian::little);
@@ -18,21 +17,7 @@ constexpr float kMost = 32767;
 
 /// A micrometre, or more where the cloud is too large for that.
 double unit_of(const PointCloud& cloud) {
-  float largest = 0;
-  for (const float value : std::span(cloud.values).first(3 * cloud.size())) {
-    if (std::abs(value) > largest) largest = std::abs(value);  // false for NaN
-  }
-  return std::max(1e-6, static_cast<double>(largest) / kMost);
-}
-
-void quantise(std::span<const float> values, float per_metre, std::string& out) {
-  for (const float value : values) {
-    std::int16_t unit = INT16_MIN;
-    if (!std::isnan(value)) {
-      unit = static_cast<std::int16_t>(std::clamp(std::round(value * per_metre), -kMost, kMost));
-    }
-    out.append(reinterpret_cast<const char*>(&unit), sizeof unit);
-  }
+  return std::max(1e-6, double{largest(cloud.values.data(), 3 * cloud.size())} / kMost);
 }
 
 }  // namespace
@@ -41,9 +26,8 @@ void fill(const PointCloud& cloud, int encoding, v1::PointCloud& out) {
   out.set_encoding(static_cast<v1::CloudEncoding>(encoding));
   out.set_width(static_cast<std::uint32_t>(cloud.width));
   out.set_height(static_cast<std::uint32_t>(cloud.height));
-  std::uint32_t points = 0;
-  for (std::size_t i = 0; i < cloud.size(); ++i) points += cloud.has(i) ? 1U : 0U;
-  out.set_points(points);
+  const auto size = static_cast<int>(cloud.size());
+  out.set_points(static_cast<std::uint32_t>(size - count_holes(cloud.values.data(), size)));
   std::string& data = *out.mutable_data();
   if (encoding == v1::CLOUD_FLOAT32) {
     out.set_metres_per_unit(1);
@@ -53,10 +37,11 @@ void fill(const PointCloud& cloud, int encoding, v1::PointCloud& out) {
   }
   const double unit = unit_of(cloud);
   out.set_metres_per_unit(unit);
-  data.reserve(cloud.values.size() * sizeof(std::int16_t));
-  const auto values = std::span(cloud.values);
-  quantise(values.first(3 * cloud.size()), static_cast<float>(1 / unit), data);
-  quantise(values.subspan(3 * cloud.size()), kMost, data);
+  data.resize(cloud.values.size() * sizeof(std::int16_t));
+  auto* units = reinterpret_cast<std::int16_t*>(data.data());
+  const std::size_t half = 3 * cloud.size();
+  quantise(cloud.values.data(), half, static_cast<float>(1 / unit), units);
+  quantise(cloud.values.data() + half, half, kMost, units + half);
 }
 
 }  // namespace dtact::perceive

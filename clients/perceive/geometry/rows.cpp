@@ -1,6 +1,7 @@
 #include "clients/perceive/geometry/rows.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "clients/perceive/geometry/rows.cpp"
@@ -37,15 +38,15 @@ HWY_INLINE V Read(D d, const std::int16_t* values, V none) {
 
 /// Calls some(d, i) for as many pixels of [begin, end) at a time as there are lanes. The last ones
 /// are made again with some of those before rather than one by one.
-template <typename Some>
-HWY_INLINE void InVectors(int begin, int end, Some some) {
+template <typename Index, typename Some>
+HWY_INLINE void InVectors(Index begin, Index end, Some some) {
   const hn::ScalableTag<float> d;
-  const int lanes = static_cast<int>(hn::Lanes(d));
+  const auto lanes = static_cast<Index>(hn::Lanes(d));
   if (end - begin < lanes) {
-    for (int i = begin; i < end; ++i) some(hn::CappedTag<float, 1>(), i);
+    for (Index i = begin; i < end; ++i) some(hn::CappedTag<float, 1>(), i);
     return;
   }
-  int i = begin;
+  Index i = begin;
   for (; i + lanes <= end; i += lanes) some(d, i);
   if (i < end) some(d, end - lanes);
 }
@@ -96,6 +97,37 @@ int CountHoles(const float* values, int count) {
   return static_cast<int>(holes);
 }
 
+float Largest(const float* values, std::size_t count) {
+  const hn::ScalableTag<float> d;
+  const std::size_t lanes = hn::Lanes(d);
+  auto found = hn::Zero(d);
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    const auto size = hn::Abs(hn::LoadU(d, values + i));
+    found = hn::IfThenElse(hn::Gt(size, found), size, found);  // false for NaN
+  }
+  float most = hn::GetLane(hn::MaxOfLanes(d, found));
+  for (; i < count; ++i) {
+    if (std::abs(values[i]) > most) most = std::abs(values[i]);
+  }
+  return most;
+}
+
+void Quantise(const float* HWY_RESTRICT values, std::size_t count, float per_unit,
+              std::int16_t* HWY_RESTRICT out) {
+  InVectors(std::size_t{0}, count, [&](auto d, std::size_t i) HWY_ATTR {
+    const hn::RebindToSigned<decltype(d)> wide;
+    const hn::Rebind<std::int16_t, decltype(d)> narrow;
+    const auto most = hn::Set(d, 32767.0F);
+    const auto value = hn::LoadU(d, values + i);
+    const auto none = hn::RebindMask(wide, hn::IsNaN(value));
+    const auto units = hn::Mul(value, hn::Set(d, per_unit));
+    const auto whole = hn::NearestInt(hn::Min(hn::Max(units, hn::Neg(most)), most));
+    hn::StoreU(hn::DemoteTo(narrow, hn::IfThenElse(none, hn::Set(wide, -32768), whole)), narrow,
+               out + i);
+  });
+}
+
 void Press(const float* HWY_RESTRICT point, const float* HWY_RESTRICT normal,
            const std::int16_t* HWY_RESTRICT depth, DepthUnit unit, int count,
            float* HWY_RESTRICT out) {
@@ -110,8 +142,8 @@ void Press(const float* HWY_RESTRICT point, const float* HWY_RESTRICT normal,
 void Flat(const std::int16_t* HWY_RESTRICT depth, DepthUnit unit, float px_metres,
           const RowPart& part, float* HWY_RESTRICT z, float* HWY_RESTRICT nx,
           float* HWY_RESTRICT ny, float* HWY_RESTRICT nz) {
-  const auto rows = static_cast<float>((part.below - part.above) / part.width);
-  const float per_row = unit.metres / (rows * px_metres);
+  const std::ptrdiff_t rows = (part.below - part.above) / part.width;
+  const float per_row = unit.metres / (static_cast<float>(rows) * px_metres);
   WithNeighbours(part, [&](auto d, int i, int left, int right) HWY_ATTR {
     const float per_column = unit.metres / (static_cast<float>(right - left) * px_metres);
     const std::int16_t* at = depth + i;
@@ -167,6 +199,8 @@ namespace dtact::perceive {
 
 HWY_EXPORT(TouchedTiles);
 HWY_EXPORT(CountHoles);
+HWY_EXPORT(Largest);
+HWY_EXPORT(Quantise);
 HWY_EXPORT(Press);
 HWY_EXPORT(Flat);
 HWY_EXPORT(Curved);
@@ -177,6 +211,14 @@ std::uint64_t touched_tiles(const std::int16_t* values, int width, int tile) noe
 
 int count_holes(const float* values, int count) noexcept {
   return HWY_DYNAMIC_DISPATCH(CountHoles)(values, count);
+}
+
+float largest(const float* values, std::size_t count) noexcept {
+  return HWY_DYNAMIC_DISPATCH(Largest)(values, count);
+}
+
+void quantise(const float* values, std::size_t count, float per_unit, std::int16_t* out) noexcept {
+  HWY_DYNAMIC_DISPATCH(Quantise)(values, count, per_unit, out);
 }
 
 void press(const float* point, const float* normal, const std::int16_t* depth, DepthUnit unit,

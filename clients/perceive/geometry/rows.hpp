@@ -24,6 +24,12 @@ struct DepthUnit {
   int untrusted = 0;
 };
 
+/// The largest size of all that are not NaN; 0 when there is none.
+[[nodiscard]] float largest(const float* values, std::size_t count) noexcept;
+
+/// The nearest whole number to value · per_unit, within ±32767; −32768 for NaN.
+void quantise(const float* values, std::size_t count, float per_unit, std::int16_t* out) noexcept;
+
 /// point − depth · normal of one axis; NaN where untrusted.
 void press(const float* point, const float* normal, const std::int16_t* depth, DepthUnit unit,
            int count, float* out) noexcept;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/perceive/geometry/rows.hpp"
 #include "tests/unit/perceive/sampled.hpp"
 
 namespace dtact::perceive {
@@ -78,17 +79,27 @@ void expect_same(const PointCloud& actual, const PointCloud& expected, const cha
 TEST(CloudMaker, WhatItLeavesIsWhatItWouldMake) {
   for (const recon::Surface& surface : surfaces()) {
     CloudMaker maker(surface);
+    CloudMaker other_maker(surface);  // of clouds that know nothing
     PointCloud cloud;
     PointCloud coarse;
     for (int frame = 0; frame < 12; ++frame) {
       const auto map = map_of(frame);
       maker.make(grid_of(map), 1, cloud);
-      PointCloud anew;
-      CloudMaker(surface).make(grid_of(map), 1, anew);
-      expect_same(cloud, anew, "whole");
+      PointCloud whole;
+      other_maker.make(grid_of(map), 1, whole);
+      expect_same(cloud, whole, "whole");
       maker.make(grid_of(map), 3, coarse);
-      CloudMaker(surface).make(grid_of(map), 3, anew);
-      expect_same(coarse, anew, "coarse");
+      for (int i = 0; i < coarse.height; ++i) {
+        for (int k = 0; k < coarse.width; ++k) {
+          const std::size_t from =
+              static_cast<std::size_t>((coarse.y + 3 * i) * kWidth + coarse.x + 3 * k);
+          const std::size_t to = static_cast<std::size_t>(i * coarse.width + k);
+          ASSERT_EQ(coarse.has(to), whole.has(from));
+          if (!coarse.has(to)) continue;
+          ASSERT_EQ(coarse.part(PointCloud::kZ)[to], whole.part(PointCloud::kZ)[from]);
+          ASSERT_EQ(coarse.part(PointCloud::kNormalX)[to], whole.part(PointCloud::kNormalX)[from]);
+        }
+      }
       // Another unit in between, and another part of the map in the same cloud.
       DepthGrid other = grid_of(map);
       if (frame % 5 == 2) other.um_per_unit = 2;
@@ -97,7 +108,8 @@ TEST(CloudMaker, WhatItLeavesIsWhatItWouldMake) {
         other.full_width = kWidth + 40;
       }
       maker.make(other, 1, cloud);
-      CloudMaker(surface).make(other, 1, anew);
+      PointCloud anew;
+      other_maker.make(other, 1, anew);
       expect_same(cloud, anew, "other");
     }
   }
@@ -129,14 +141,22 @@ TEST(CloudMaker, WhereZeroIsNoDepthNothingIsUntouched) {
 TEST(CloudMaker, EveryInstructionSetMakesTheSameBits) {
   for (const recon::Surface& surface : surfaces()) {
     std::vector<PointCloud> made;
+    std::vector<std::vector<std::int16_t>> units;
+    std::vector<float> largest_of;
     for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
       hwy::SetSupportedTargetsForTest(target);
       const auto map = map_of(3);
-      CloudMaker(surface).make(grid_of(map), 1, made.emplace_back());
+      const PointCloud& cloud = made.emplace_back();
+      CloudMaker(surface).make(grid_of(map), 1, made.back());
+      auto& quantised = units.emplace_back(cloud.values.size());
+      quantise(cloud.values.data(), quantised.size(), 1e6F, quantised.data());
+      largest_of.push_back(largest(cloud.values.data(), cloud.size()));
     }
     hwy::SetSupportedTargetsForTest(0);
     ASSERT_FALSE(made.empty());
     for (const PointCloud& cloud : made) expect_same(cloud, made.front(), "a target");
+    for (const auto& one : units) EXPECT_EQ(one, units.front());
+    for (const float one : largest_of) EXPECT_EQ(one, largest_of.front());
   }
 }
 
