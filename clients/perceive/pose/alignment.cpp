@@ -141,6 +141,24 @@ void apply(const Twist& step, const Eigen::Vector3d& centre, double arm, Motion&
 
 }  // namespace
 
+Twist screw_of(const Motion& motion, const Eigen::Vector3d& centre, double arm) {
+  const Eigen::AngleAxisd turn(motion.rotation);
+  const double angle = turn.angle();
+  const Eigen::Vector3d& axis = turn.axis();
+  const Eigen::Vector3d shift = motion * centre - centre;
+  Eigen::Vector3d along = shift;
+  // The inverse of the left Jacobian of SO(3): Barfoot, State Estimation for Robotics, 7.1.3.
+  constexpr double kLeast = 1e-6;
+  if (angle > kLeast) {
+    const double half = angle / 2;
+    const double cotangent = half / std::tan(half);
+    along = cotangent * shift + (1 - cotangent) * axis * axis.dot(shift) - half * axis.cross(shift);
+  }
+  Twist twist;
+  twist << arm * angle * axis, along;
+  return twist;
+}
+
 Alignment align(std::span<const Surfel> surfels, const ContactView& view, const Motion& start) {
   Alignment result;
   result.motion = start;

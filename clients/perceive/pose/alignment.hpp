@@ -16,11 +16,22 @@ struct Motion {
   [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& p) const {
     return rotation * p + translation;
   }
+  /// `first`, and then this one.
+  [[nodiscard]] Motion operator*(const Motion& first) const {
+    return {rotation * first.rotation, *this * first.translation};
+  }
+  [[nodiscard]] Motion inverse() const {
+    return {rotation.transpose(), -(rotation.transpose() * translation)};
+  }
 };
 
 /// A small motion about Alignment::centre: rotation (radians times Alignment::arm, metres), then
 /// translation (metres).
 using Twist = Eigen::Matrix<double, 6, 1>;
+
+/// The one twist about `centre`, its rotation times `arm`, that going along for a while is
+/// `motion`: a screw.
+[[nodiscard]] Twist screw_of(const Motion& motion, const Eigen::Vector3d& centre, double arm);
 
 /// How surfels were brought onto a view.
 struct Alignment {

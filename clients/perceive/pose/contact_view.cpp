@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "clients/perceive/pose/spread.hpp"
+
 namespace dtact::perceive {
 namespace {
 
@@ -16,8 +18,6 @@ constexpr double kTouchingPart = 0.3;
 constexpr double kUncertainties = 3;
 /// Pixels to each side that the normals' change is taken over.
 constexpr int kBendPixels = 3;
-/// Normals are told apart by their x and y, in so many steps each.
-constexpr int kDirections = 12;
 
 }  // namespace
 
@@ -119,29 +119,18 @@ std::optional<ContactView::Sample> ContactView::at(const Eigen::Vector3d& point_
 }
 
 std::vector<Surfel> ContactView::choose(std::size_t most) const {
-  std::array<std::vector<std::size_t>, std::size_t{kDirections} * kDirections> by_direction;
-  const auto step = [](float component) {
-    return std::clamp(static_cast<int>((component + 1) / 2 * kDirections), 0, kDirections - 1);
-  };
+  std::vector<std::size_t> pixels;
+  std::vector<Eigen::Vector3d> normals;
+  pixels.reserve(pixels_);
+  normals.reserve(pixels_);
   for (std::size_t i = 0; i < touching_.size(); ++i) {
     if (touching_[i] == 0) continue;
-    const int direction = step(cloud_.part(PointCloud::kNormalY)[i]) * kDirections +
-                          step(cloud_.part(PointCloud::kNormalX)[i]);
-    by_direction[static_cast<std::size_t>(direction)].push_back(i);
+    pixels.push_back(i);
+    normals.push_back(normal(i));
   }
-  // Those with few give all they have, and leave more to the others.
-  std::sort(by_direction.begin(), by_direction.end(),
-            [](const auto& a, const auto& b) { return a.size() < b.size(); });
   std::vector<Surfel> chosen;
-  for (std::size_t bin = 0; bin < by_direction.size(); ++bin) {
-    const auto& pixels = by_direction[bin];
-    const std::size_t share = (most - chosen.size()) / (by_direction.size() - bin);
-    const std::size_t count = std::min(share, pixels.size());
-    for (std::size_t k = 0; k < count; ++k) {
-      const std::size_t i = pixels[k * pixels.size() / count];
-      chosen.push_back({point(i), normal(i)});
-    }
-  }
+  for (const std::size_t k : spread(normals, most))
+    chosen.push_back({point(pixels[k]), normals[k]});
   return chosen;
 }
 

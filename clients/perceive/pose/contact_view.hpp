@@ -41,15 +41,27 @@ class ContactView {
   /// between the pixels around; nothing where one of them does not touch.
   [[nodiscard]] std::optional<Sample> at(const Eigen::Vector3d& point) const;
 
-  /// At most `most` points, alike many of each direction that the surface looks in, so that a few
-  /// edges count beside a large flat (Rusinkiewicz and Levoy, Efficient Variants of the ICP
-  /// Algorithm, 3DIM 2001: normal-space sampling). The same for the same map.
+  /// At most `most` points, alike many of each direction that the surface looks in: spread().
   [[nodiscard]] std::vector<Surfel> choose(std::size_t most) const;
   /// The mean of all that touches.
   [[nodiscard]] const Eigen::Vector3d& centre() const noexcept { return centre_; }
   /// The mean of the untouched surface's normals there, of length 1.
   [[nodiscard]] const Eigen::Vector3d& upright() const noexcept { return upright_; }
   [[nodiscard]] std::size_t pixels() const noexcept { return pixels_; }
+
+  /// The points that it is of; a pixel's index in them.
+  [[nodiscard]] const PointCloud& cloud() const noexcept { return cloud_; }
+  [[nodiscard]] bool touches(std::size_t i) const noexcept { return touching_[i] != 0; }
+  /// From one pixel to the next, metres.
+  [[nodiscard]] double px() const noexcept { return px_; }
+  [[nodiscard]] Eigen::Vector3d point(std::size_t i) const {
+    return {cloud_.part(PointCloud::kX)[i], cloud_.part(PointCloud::kY)[i],
+            cloud_.part(PointCloud::kZ)[i]};
+  }
+  [[nodiscard]] Eigen::Vector3d normal(std::size_t i) const {
+    return {cloud_.part(PointCloud::kNormalX)[i], cloud_.part(PointCloud::kNormalY)[i],
+            cloud_.part(PointCloud::kNormalZ)[i]};
+  }
 
  private:
   /// Between the pixels of the cloud.
@@ -67,16 +79,6 @@ class ContactView {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(cloud_.width) +
            static_cast<std::size_t>(column);
   }
-  [[nodiscard]] Eigen::Vector3d normal(std::size_t i) const {
-    return {cloud_.part(PointCloud::kNormalX)[i], cloud_.part(PointCloud::kNormalY)[i],
-            cloud_.part(PointCloud::kNormalZ)[i]};
-  }
-
-  [[nodiscard]] Eigen::Vector3d point(std::size_t i) const {
-    return {cloud_.part(PointCloud::kX)[i], cloud_.part(PointCloud::kY)[i],
-            cloud_.part(PointCloud::kZ)[i]};
-  }
-
   const PointCloud& cloud_;
   const SurfaceTable* table_;
   std::vector<std::uint8_t> touching_;

@@ -29,12 +29,12 @@ bool is_good(const Alignment& alignment) {
   return alignment.overlap >= kGoodOverlap && alignment.rms <= kGoodRms;
 }
 
+}  // namespace
+
 bool is_near(const Motion& a, const Motion& b, const Eigen::Vector3d& at) {
   const double turn = Eigen::AngleAxisd(a.rotation.transpose() * b.rotation).angle();
   return (a * at - b * at).norm() <= kMostSlide && turn <= kMostTurn;
 }
-
-}  // namespace
 
 void Tracker::release() {
   keyframes_.clear();

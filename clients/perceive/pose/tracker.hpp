@@ -7,6 +7,10 @@
 
 namespace dtact::perceive {
 
+/// From one frame to the next what is followed may go from `a` to `b`: no more than a millimetre
+/// and 14°, about `at`.
+[[nodiscard]] bool is_near(const Motion& a, const Motion& b, const Eigen::Vector3d& at);
+
 /// Follows an object from the frame in which it is first touched. What is seen of it then, and at
 /// keyframes later, is kept as surfels where they lay in that first frame; a frame is aligned with
 /// the keyframe that it shares most with, so that errors add up over keyframes and not over frames.
@@ -16,13 +20,15 @@ class Tracker {
     idle,     ///< Nothing touches.
     started,  ///< From this frame on.
     tracked,
-    lost,      ///< No motion explains the frame; `motion` is the last one that was known.
-    recovered  ///< Tracked again.
+    lost,       ///< No motion explains the frame; `motion` is the last one that was known.
+    recovered,  ///< Tracked again.
+    searching   ///< Of an ObjectTracker: no place of the object is known yet.
   };
   struct Pose {
     State state = State::idle;
     std::uint64_t since = 0;  ///< Sequence of the frame that it is measured from.
     Alignment alignment;
+    std::uint32_t alternatives = 0;  ///< Of an ObjectTracker: as Placement has them.
   };
 
   /// The next frame, seen as ContactView says.

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "clients/perceive/pose/alignment.hpp"
+#include "clients/perceive/pose/contact_view.hpp"
+
+namespace dtact::perceive {
+
+/// What one frame says of where an object may be, in a few hundred samples of the gel's surface:
+/// where it lies against the object, and where the object can only be further away. All in the
+/// contact's frame: its origin in the middle of the contact, z along the untouched surface's normal
+/// there, towards the object. Metres. It holds on to nothing: another thread may have it.
+struct ContactPatch {
+  struct Sample {
+    Eigen::Vector3d point;
+    Eigen::Vector3d normal;
+  };
+  /// The gel lies against the object: it touches, and does not bend away as where it hangs between
+  /// an edge and the untouched surface (there it is a shoulder, under an object a bowl or flat).
+  std::vector<Sample> core;
+  /// Some of all other places: no part of the object is below them.
+  std::vector<Sample> beside;
+  /// How many places of the core one of them stands for.
+  double beside_weight = 1;
+  /// The contact's frame to the surface frame.
+  Motion frame;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Of the core.
+  double lowest = 0;   ///< z of the core, but for its lowest twentieth.
+  double highest = 0;  ///< And but for its highest.
+  double arm = 0;      ///< How far the core reaches from its middle: root mean square.
+  double area = 0;     ///< Of the core, square metres.
+};
+
+/// At most about 1500 samples of the core and twice as many beside, each in no order. No core where
+/// nothing is seen.
+[[nodiscard]] ContactPatch make_patch(const ContactView& view);
+
+/// At most `most` of the core's samples and twice as many of the others.
+[[nodiscard]] ContactPatch thinned(const ContactPatch& patch, std::size_t most);
+
+}  // namespace dtact::perceive

@@ -1,0 +1,206 @@
+#include "clients/perceive/pose/object_tracker.hpp"
+
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "clients/perceive/pose/contact_patch.hpp"
+#include "clients/perceive/pose/spread.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+using Eigen::Vector3d;
+
+/// A contact of fewer pixels has no shape.
+constexpr std::size_t kFewestPixels = 300;
+/// One that has grown so many times may tell apart what was alike: it is searched again.
+constexpr double kGrown = 2;
+/// After a search that found nothing the next one waits for so many frames, or for so much growth.
+constexpr int kPause = 30;
+constexpr double kGrownInVain = 1.25;
+/// Surfels that are looked at and compared, of those that may touch.
+constexpr std::size_t kLookedAt = 3000;
+constexpr std::size_t kSurfels = 600;
+/// What lies against the gel is so near to it, metres, and looks the same way within this cosine.
+constexpr double kTouching = 1.5e-4;
+constexpr double kSameWay = 0.7;
+constexpr double kUpright = 0.1;
+/// What a good alignment has at least and at most.
+constexpr double kGoodOverlap = 0.5;
+constexpr double kGoodRms = 4e-5;  // metres
+constexpr double kGoodArea = 0.1;  // of the contact
+
+/// The surfels that touch where `place` puts the object, those that lie around the view.
+std::vector<Surfel> touching(const ObjectModel& object, const ContactView& view,
+                             const Motion& place) {
+  const double reach = 0.75 * view.px() * std::max(view.cloud().width, view.cloud().height);
+  std::vector<const Surfel*> around;
+  for (const Surfel& surfel : object.surfels) {
+    const Vector3d normal = place.rotation * surfel.normal;
+    if (normal.dot(view.upright()) < kUpright) continue;
+    if ((place * surfel.point - view.centre()).squaredNorm() < reach * reach) {
+      around.push_back(&surfel);
+    }
+  }
+  const std::size_t every = 1 + around.size() / kLookedAt;
+  std::vector<Surfel> found;
+  for (std::size_t i = 0; i < around.size(); i += every) {
+    const Vector3d moved = place * around[i]->point;
+    const auto sample = view.at(moved);
+    if (!sample || std::abs(sample->normal.dot(moved - sample->point)) > kTouching) continue;
+    if (sample->normal.dot(place.rotation * around[i]->normal) < kSameWay) continue;
+    found.push_back(*around[i]);
+  }
+  const double area = object.spacing * object.spacing * static_cast<double>(found.size() * every);
+  const double contact = view.px() * view.px() * static_cast<double>(view.pixels());
+  if (area < kGoodArea * contact) found.clear();
+  return found;
+}
+
+}  // namespace
+
+void ObjectTracker::release() {
+  contact_.release();
+  placement_.reset();
+  // Its thread goes on to its end; what it finds is another contact's.
+  if (search_) search_->wanted = false;
+  searched_pixels_ = 0;
+  pause_ = 0;
+  pose_ = {};
+}
+
+std::optional<Alignment> ObjectTracker::align_object(const ContactView& view,
+                                                     const Motion& start) const {
+  const std::vector<Surfel> near = touching(*object_, view, start);
+  std::vector<Vector3d> normals;
+  normals.reserve(near.size());
+  for (const Surfel& surfel : near) normals.push_back(start.rotation * surfel.normal);
+  std::vector<Surfel> chosen;
+  for (const std::size_t i : spread(normals, kSurfels)) chosen.push_back(near[i]);
+  if (chosen.empty()) return std::nullopt;
+  Alignment found = align(chosen, view, start);
+  if (found.overlap < kGoodOverlap || found.rms > kGoodRms) return std::nullopt;
+  if (!is_near(start, found.motion, found.centre)) return std::nullopt;
+  return found;
+}
+
+std::vector<Twist> ObjectTracker::unknown(const Alignment& alignment) const {
+  const std::vector<Twist>& by_shape = alignment.unobservable;
+  const std::vector<Twist>& by_outline = placement_->hidden;
+  if (by_shape.empty() || by_outline.empty()) return {};
+  const Motion& pose = alignment.motion;
+  const Vector3d shift = alignment.centre - pose * placement_->centre;
+  Eigen::MatrixXd shape(6, by_shape.size());
+  for (std::size_t i = 0; i < by_shape.size(); ++i) {
+    shape.col(static_cast<Eigen::Index>(i)) = by_shape[i];
+  }
+  Eigen::MatrixXd outline(6, by_outline.size());
+  for (std::size_t i = 0; i < by_outline.size(); ++i) {
+    const Vector3d turn = pose.rotation * by_outline[i].head<3>() / placement_->arm;
+    const Vector3d slide = pose.rotation * by_outline[i].tail<3>() + turn.cross(shift);
+    outline.col(static_cast<Eigen::Index>(i)) << alignment.arm * turn, slide;
+  }
+  // What both have in common: the principal angles between the two.
+  const Eigen::MatrixXd base = Eigen::HouseholderQR<Eigen::MatrixXd>(outline).householderQ() *
+                               Eigen::MatrixXd::Identity(6, outline.cols());
+  const Eigen::JacobiSVD<Eigen::MatrixXd> angles(shape.transpose() * base, Eigen::ComputeThinU);
+  constexpr double kCommon = 0.9;
+  std::vector<Twist> common;
+  for (Eigen::Index k = 0; k < angles.singularValues().size(); ++k) {
+    if (angles.singularValues()[k] > kCommon) common.emplace_back(shape * angles.matrixU().col(k));
+  }
+  return common;
+}
+
+void ObjectTracker::begin_search(const ContactView& view) {
+  Search& search = search_.emplace();
+  search.contact = contact_.pose().alignment.motion;
+  search.pixels = view.pixels();
+  std::optional<Motion> present;
+  if (placement_) present = place_;
+  search.result =
+      std::async(std::launch::async, [object = object_, patch = make_patch(view), present] {
+        return perceive::search(*object, patch, present);
+      });
+}
+
+std::optional<Placement> ObjectTracker::finished() {
+  if (!search_) return std::nullopt;
+  if (search_->result.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    return std::nullopt;
+  }
+  std::optional<Placement> found = search_->result.get();
+  const Search search = std::move(*search_);
+  search_.reset();
+  if (!search.wanted) return std::nullopt;
+  searched_pixels_ = search.pixels;
+  if (!found) {
+    pause_ = kPause;
+    return std::nullopt;
+  }
+  const Motion since = contact_.pose().alignment.motion * search.contact.inverse();
+  const Motion back = found->pose.inverse();
+  found->centre = back * found->centre;
+  for (Twist& twist : found->hidden) {
+    twist << back.rotation * twist.head<3>(), back.rotation * twist.tail<3>();
+  }
+  found->pose = since * found->pose;
+  return found;
+}
+
+void ObjectTracker::follow_contact(const ContactView& view, std::uint64_t sequence) {
+  const Motion before = contact_.pose().alignment.motion;
+  (void)contact_.follow(view, sequence);
+  if (contact_.pose().state != Tracker::State::lost) {
+    place_ = contact_.pose().alignment.motion * before.inverse() * place_;
+    return;
+  }
+  contact_.release();
+  (void)contact_.follow(view, sequence);
+  // What has moved since it began is not known.
+  if (search_) search_->wanted = false;
+}
+
+const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_t sequence) {
+  using State = Tracker::State;
+  if (view.pixels() < kFewestPixels && pose_.state == State::idle) return pose_;
+  follow_contact(view, sequence);
+  const bool was_lost = pose_.state == State::lost;
+  std::optional<Alignment> aligned;
+  if (const std::optional<Placement> found = finished()) {
+    if ((aligned = align_object(view, found->pose))) {
+      if (!placement_) pose_.since = sequence;
+      pose_.state = placement_ ? State::recovered : State::started;
+      if (placement_ && !was_lost && is_near(place_, aligned->motion, aligned->centre)) {
+        pose_.state = State::tracked;
+      }
+      placement_ = found;
+    }
+  }
+  if (!aligned && placement_ && (aligned = align_object(view, place_))) {
+    pose_.state = was_lost ? State::recovered : State::tracked;
+  }
+  if (aligned) {
+    place_ = aligned->motion;
+    pose_.alignment = *std::move(aligned);
+    pose_.alignment.unobservable = unknown(pose_.alignment);
+    pose_.alternatives = placement_->alternatives;
+  } else {
+    pose_.state = placement_ ? State::lost : State::searching;
+  }
+  const bool unknown_place = pose_.state == State::lost || pose_.state == State::searching;
+  const auto times = [&](double factor) {
+    return static_cast<double>(view.pixels()) >= factor * static_cast<double>(searched_pixels_);
+  };
+  if (pause_ > 0) --pause_;
+  const bool again = unknown_place ? pause_ == 0 || times(kGrownInVain) : times(kGrown);
+  if (!search_ && again && view.pixels() >= kFewestPixels) begin_search(view);
+  return pose_;
+}
+
+}  // namespace dtact::perceive

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <future>
+#include <memory>
+#include <optional>
+
+#include "clients/perceive/pose/object_model.hpp"
+#include "clients/perceive/pose/placement_search.hpp"
+#include "clients/perceive/pose/tracker.hpp"
+
+namespace dtact::perceive {
+
+/// Follows a known object: where it is, in the surface frame. A Tracker follows the contact from
+/// frame to frame. Beside it, on another thread, the object is searched for in what one frame
+/// showed; what the contact has moved by since then is added to what is found. From there on each
+/// frame is aligned with the object itself, so that nothing adds up, along the directions that its
+/// touched shape shows; along the others the contact's motion is taken.
+class ObjectTracker {
+ public:
+  explicit ObjectTracker(std::shared_ptr<const ObjectModel> object) : object_(std::move(object)) {}
+
+  /// The next frame, seen as ContactView says. A search that was begun is not waited for, but for
+  /// the end of this object's life.
+  const Tracker::Pose& follow(const ContactView& view, std::uint64_t sequence);
+  /// Nothing touches any more: what comes is another contact.
+  void release();
+  [[nodiscard]] const Tracker::Pose& pose() const noexcept { return pose_; }
+  [[nodiscard]] const ObjectModel& object() const noexcept { return *object_; }
+  /// A search is under way.
+  [[nodiscard]] bool is_searching() const noexcept { return search_.has_value(); }
+
+ private:
+  struct Search {
+    std::future<std::optional<Placement>> result;
+    Motion contact;          ///< The contact's motion at its frame.
+    std::size_t pixels = 0;  ///< Of the contact then.
+    bool wanted = true;      ///< The contact is still the same.
+  };
+
+  /// Moves the place as the contact moved.
+  void follow_contact(const ContactView& view, std::uint64_t sequence);
+  void begin_search(const ContactView& view);
+  /// The end of a search, if it is over: what it found, moved to the present frame.
+  [[nodiscard]] std::optional<Placement> finished();
+  /// Aligned with the object from `start` on; nothing where that does not explain the frame.
+  [[nodiscard]] std::optional<Alignment> align_object(const ContactView& view,
+                                                      const Motion& start) const;
+  /// What neither the touched shape nor, at the search, the outline shows.
+  [[nodiscard]] std::vector<Twist> unknown(const Alignment& alignment) const;
+
+  std::shared_ptr<const ObjectModel> object_;
+  Tracker contact_;
+  std::optional<Search> search_;
+  std::optional<Placement> placement_;  ///< Its centre and hidden twists in the object's frame.
+  Motion place_;                        ///< Where the object is, as far as its contact tells.
+  std::size_t searched_pixels_ = 0;
+  int pause_ = 0;
+  Tracker::Pose pose_;
+};
+
+}  // namespace dtact::perceive

@@ -1,0 +1,229 @@
+#include "clients/perceive/pose/placement_search.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "clients/perceive/pose/placement.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// Evenly on the sphere: 5° from one to the next.
+constexpr int kDirections = 1600;
+constexpr int kTurns = 36;
+/// Turns of a direction that are looked at more closely.
+constexpr std::size_t kTurnsKept = 2;
+/// Samples of the core for a first impression, and the limit of their distances, metres; for a
+/// closer look.
+constexpr std::size_t kFirstSamples = 60;
+constexpr double kFirstLimit = 2e-4;
+constexpr std::size_t kSamples = 200;
+/// The object's lowest part is what is within the core's height and this, metres.
+constexpr double kLift = 8e-5;
+/// As far up as anything of it may be in the gel's way.
+constexpr double kInTheWay = 1e-3;
+/// Its area is the core's within this factor: the core ends short of edges.
+constexpr double kAreaFactor = 4;
+constexpr double kFirstStep = 3e-4;
+constexpr double kFirstLast = 8e-5;
+constexpr double kStep = 2e-4;
+constexpr double kLast = 1e-5;
+constexpr std::size_t kImpressions = 500;
+constexpr std::size_t kCandidates = 64;
+/// Nearer than this is the same: radians, metres.
+constexpr double kSameTurn = 0.26;
+constexpr double kSamePlace = 4e-4;
+/// A motion of which no more than this part is not along hidden twists leads to the same placement.
+constexpr double kOnTheWay = 0.3;
+/// What explains a contact has this score, and what explains it as well lacks no more than this.
+constexpr double kExplained = 0.5;
+constexpr double kAsWell = 0.06;
+
+struct Candidate {
+  Matrix3d turn;  ///< Of the object's frame to the underside's.
+  Motion move;    ///< The contact's frame to the underside's.
+  Motion place;   ///< The object's frame to the contact's.
+  double score = 0;
+  bool present = false;
+};
+
+/// Its last row is `up`.
+Matrix3d turn_to(const Vector3d& up) {
+  Matrix3d turn;
+  turn << up.unitOrthogonal().transpose(), Eigen::RowVector3d::Zero(), up.transpose();
+  turn.row(1) = up.cross(turn.row(0).transpose()).transpose();
+  return turn;
+}
+
+class Search {
+ public:
+  Search(const ObjectModel& object, const ContactPatch& patch)
+      : object_(object),
+        patch_(patch),
+        some_(thinned(patch, kSamples)),
+        few_(thinned(patch, kFirstSamples)) {}
+
+  std::optional<Placement> run(const std::optional<Motion>& present) {
+    for (const Vector3d& down : object_.rests) look(turn_to(-down));
+    for (const Vector3d& down : all_directions(kDirections)) look(turn_to(-down));
+    keep(kImpressions);
+    climb_all(few_, kFirstStep, kFirstLast);
+    keep_apart();
+    if (present) add_present(*present);
+    climb_all(some_, kStep, kLast);
+    keep(candidates_.size());
+    if (candidates_.empty() || candidates_.front().score < kExplained) return std::nullopt;
+    return best();
+  }
+
+ private:
+  [[nodiscard]] Underside underside_of(const Matrix3d& turn) const {
+    return {object_, turn, patch_.highest - patch_.lowest + kInTheWay};
+  }
+  [[nodiscard]] static Motion place_of(const Underside& underside, const Motion& move) {
+    return move.inverse() * underside.from_object();
+  }
+
+  /// The contact turned by `angle`, its core's middle on `low`'s.
+  [[nodiscard]] Motion laid(const Underside& underside, const Eigen::Vector2d& low,
+                            double angle) const {
+    Motion move;
+    move.rotation = Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
+    move.translation = -(move.rotation * patch_.middle);
+    move.translation.head<2>() += low;
+    move.translation.z() = -patch_.lowest;
+    // Where the lowest of it does not touch, it is not as deep.
+    std::array<double, kFirstSamples> gaps{};
+    std::size_t count = 0;
+    for (const auto& sample : few_.core) {
+      const Vector3d point = move * sample.point;
+      const Surfel* surfel = underside.at(point);
+      if (surfel != nullptr && count < gaps.size()) {
+        gaps.at(count++) = surfel->point.z() - point.z();
+      }
+    }
+    if (count == 0) return move;
+    const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(gaps.begin(), middle, gaps.begin() + static_cast<std::ptrdiff_t>(count));
+    constexpr double kMostGap = 3e-4;
+    move.translation.z() += std::clamp(*middle, -kMostGap, kMostGap);
+    return move;
+  }
+
+  void look(const Matrix3d& turn) {
+    const Underside underside = underside_of(turn);
+    const Underside::Low low = underside.below(patch_.highest - patch_.lowest + kLift);
+    if (low.area * kAreaFactor < patch_.area || low.area > kAreaFactor * patch_.area) return;
+    std::array<std::pair<double, Motion>, kTurns> turns;
+    for (int i = 0; i < kTurns; ++i) {
+      const Motion move = laid(underside, low.middle, 2 * std::numbers::pi * i / kTurns);
+      turns.at(static_cast<std::size_t>(i)) = {score_of(underside, few_, move, kFirstLimit), move};
+    }
+    std::partial_sort(turns.begin(), turns.begin() + kTurnsKept, turns.end(),
+                      [](const auto& a, const auto& b) { return a.first > b.first; });
+    for (std::size_t i = 0; i < kTurnsKept; ++i) {
+      candidates_.push_back({turn, turns.at(i).second, {}, turns.at(i).first, false});
+    }
+  }
+
+  void keep(std::size_t most) {
+    std::ranges::sort(candidates_, std::ranges::greater{}, &Candidate::score);
+    if (candidates_.size() > most) candidates_.resize(most);
+  }
+
+  void climb_all(const ContactPatch& patch, double step, double last) {
+    for (Candidate& one : candidates_) {
+      const Underside underside = underside_of(one.turn);
+      const Climbed climbed = climb(underside, patch, one.move, step, last);
+      one.move = climbed.move;
+      one.place = place_of(underside, climbed.move);
+      one.score = climbed.score;
+    }
+  }
+
+  void add_present(const Motion& pose) {
+    Candidate& one = candidates_.emplace_back();
+    one.place = patch_.frame.inverse() * pose;
+    one.turn = one.place.rotation;
+    one.move = underside_of(one.turn).from_object() * one.place.inverse();
+    one.present = true;
+  }
+
+  /// What moves one placement to another.
+  [[nodiscard]] Twist between(const Candidate& a, const Candidate& b) const {
+    return screw_of(b.place * a.place.inverse(), patch_.middle, patch_.arm);
+  }
+  [[nodiscard]] bool near(const Twist& twist) const {
+    return twist.head<3>().norm() < kSameTurn * patch_.arm && twist.tail<3>().norm() < kSamePlace;
+  }
+
+  /// The best, each not near a better one.
+  void keep_apart() {
+    keep(candidates_.size());
+    std::vector<Candidate> kept;
+    for (const Candidate& one : candidates_) {
+      const bool apart = std::ranges::none_of(
+          kept, [&](const Candidate& better) { return near(between(one, better)); });
+      if (apart) kept.push_back(one);
+      if (kept.size() == kCandidates) break;
+    }
+    candidates_ = std::move(kept);
+  }
+
+  [[nodiscard]] Placement best() const {
+    const double most = candidates_.front().score;
+    const auto present = std::ranges::find(candidates_, true, &Candidate::present);
+    const bool stays = present != candidates_.end() && present->score >= most - kAsWell;
+    const Candidate& first = stays ? *present : candidates_.front();
+    const Underside underside = underside_of(first.turn);
+    const Climbed climbed = climb(underside, patch_, first.move, kStep, kLast);
+    const std::vector<Twist> hidden = hidden_of(underside, patch_, climbed.move);
+    const auto same = [&](const Candidate& a, const Candidate& b) {
+      const Twist twist = between(a, b);
+      Twist rest = twist;
+      for (const Twist& one : hidden) rest -= one * one.dot(twist);
+      return near(twist) || near(rest) || rest.norm() < kOnTheWay * twist.norm();
+    };
+    std::vector<const Candidate*> families{&first};
+    for (const Candidate& one : candidates_) {
+      if (one.score < most - kAsWell) break;
+      const bool another =
+          std::ranges::none_of(families, [&](const Candidate* known) { return same(*known, one); });
+      if (another) families.push_back(&one);
+    }
+    Placement found;
+    found.pose = patch_.frame * place_of(underside, climbed.move);
+    found.score = climbed.score;
+    found.centre = patch_.frame * patch_.middle;
+    found.arm = patch_.arm;
+    for (const Twist& one : hidden) {
+      Twist& turned = found.hidden.emplace_back();
+      turned << patch_.frame.rotation * one.head<3>(), patch_.frame.rotation * one.tail<3>();
+    }
+    found.alternatives = static_cast<std::uint32_t>(families.size() - 1);
+    return found;
+  }
+
+  const ObjectModel& object_;
+  const ContactPatch& patch_;
+  ContactPatch some_;
+  ContactPatch few_;
+  std::vector<Candidate> candidates_;
+};
+
+}  // namespace
+
+std::optional<Placement> search(const ObjectModel& object, const ContactPatch& patch,
+                                const std::optional<Motion>& present) {
+  constexpr std::size_t kFewest = 20;
+  if (patch.core.size() < kFewest) return std::nullopt;
+  return Search(object, patch).run(present);
+}
+
+}  // namespace dtact::perceive

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "clients/perceive/pose/contact_patch.hpp"
+#include "clients/perceive/pose/object_model.hpp"
+
+namespace dtact::perceive {
+
+/// Where a known object is.
+struct Placement {
+  Motion pose;       ///< The object's frame to the surface frame.
+  double score = 0;  ///< score_of(), at most 1.
+  /// Unit twists about `centre`, their rotation times `arm`, that neither the shape nor its outline
+  /// shows. All in the surface frame.
+  std::vector<Twist> hidden;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double arm = 0;
+  /// Other placements that explain the contact as well and that no motion along `hidden` leads to.
+  std::uint32_t alternatives = 0;
+};
+
+/// Looks for the object everywhere: its underside in every direction (all over a sphere, 5° apart,
+/// and where it rests on a plane), turned in steps of 10°, its lowest part laid on the contact's
+/// core; the best are climbed from. Nothing where none explains the contact. The whole contact has
+/// to be in view. Takes some tenths of a second.
+[[nodiscard]] std::optional<Placement> search(const ObjectModel& object, const ContactPatch& patch,
+                                              const std::optional<Motion>& present = {});
+
+}  // namespace dtact::perceive

@@ -1,0 +1,36 @@
+#include "clients/perceive/pose/spread.hpp"
+
+#include <algorithm>
+#include <array>
+
+namespace dtact::perceive {
+namespace {
+
+/// Normals are told apart by their x and y, in so many steps each.
+constexpr int kDirections = 12;
+
+}  // namespace
+
+std::vector<std::size_t> spread(std::span<const Eigen::Vector3d> normals, std::size_t most) {
+  std::array<std::vector<std::size_t>, std::size_t{kDirections} * kDirections> by_direction;
+  const auto step = [](double component) {
+    return std::clamp(static_cast<int>((component + 1) / 2 * kDirections), 0, kDirections - 1);
+  };
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    const int direction = step(normals[i].y()) * kDirections + step(normals[i].x());
+    by_direction.at(static_cast<std::size_t>(direction)).push_back(i);
+  }
+  // Those with few give all they have, and leave more to the others.
+  std::sort(by_direction.begin(), by_direction.end(),
+            [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  std::vector<std::size_t> chosen;
+  for (std::size_t bin = 0; bin < by_direction.size(); ++bin) {
+    const auto& alike = by_direction.at(bin);
+    const std::size_t share = (most - chosen.size()) / (by_direction.size() - bin);
+    const std::size_t count = std::min(share, alike.size());
+    for (std::size_t k = 0; k < count; ++k) chosen.push_back(alike[k * alike.size() / count]);
+  }
+  return chosen;
+}
+
+}  // namespace dtact::perceive
