@@ -1,5 +1,6 @@
 #include "clients/perceive/pose/object_tracker.hpp"
 
+#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>

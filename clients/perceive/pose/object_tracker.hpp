@@ -29,6 +29,10 @@ class ObjectTracker {
   [[nodiscard]] const ObjectModel& object() const noexcept { return *object_; }
   /// A search is under way.
   [[nodiscard]] bool is_searching() const noexcept { return search_.has_value(); }
+  /// Waits for its end; the next frame makes use of it. For studies that are not made in real time.
+  void wait() const {
+    if (search_) search_->result.wait();
+  }
 
  private:
   struct Search {

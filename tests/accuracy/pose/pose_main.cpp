@@ -4,7 +4,6 @@
 
 #include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
-#include <array>
 #include <cmath>
 #include <exception>
 #include <filesystem>
@@ -16,6 +15,7 @@
 #include "clients/perceive/pose/tracker.hpp"
 #include "tests/accuracy/pose/normal_flow.hpp"
 #include "tests/accuracy/pose/sequence.hpp"
+#include "tests/accuracy/pose/things.hpp"
 #include "tests/bench/cpu_time.hpp"
 
 namespace dtact::pose {
@@ -34,29 +34,6 @@ constexpr int kEvery = 2;
 constexpr int kEveryOfAMinute = 4;
 /// Points that are handed out, along both sides.
 constexpr int kStride = 2;
-
-struct Thing {
-  const char* name;
-  const char* lines;
-};
-constexpr std::array kThings{
-    Thing{"ball", "object = \"ball\"\nradius_mm = 4.0"},
-    Thing{"ball array",
-          "object = \"ball_array\"\nradius_mm = 1.5\npitch_mm = 4.0\nrows = 2\ncolumns = 3"},
-    Thing{"disc", "object = \"disc\"\nradius_mm = 4.0"},
-    Thing{"cube", "object = \"cube\"\nside_mm = 5.0"},
-    Thing{"cylinder", "object = \"cylinder\"\nradius_mm = 2.5\nlength_mm = 8.0"},
-    Thing{"grating", "object = \"grating\"\npitch_mm = 2.0\ngroove_mm = 1.0\nside_mm = 8.0"},
-    Thing{"pin board", "object = \"pin_board\""},
-    Thing{"M4 nut", "object = \"m4_nut\""},
-    Thing{"M3 long nut", "object = \"m3_long_nut\""},
-    Thing{"M5 screw", "object = \"m5_hexagon_screw\""},
-    Thing{"set screws", "object = \"three_set_screws\""},
-    Thing{"star", "object = \"star\"\nradius_mm = 4.0"},
-    Thing{"screw cap", "object = \"screw_cap\""},
-    Thing{"USB-C plug", "object = \"usb_c_plug\""},
-    Thing{"key", "object = \"key\""},
-};
 
 /// A NumPy file, format 1.0, of rows of equal length; none where `width` is 0.
 template <class T>

@@ -56,10 +56,13 @@ class Sequence {
   [[nodiscard]] Map map(std::uint64_t sequence, double noise_um = kNoiseUm);
   /// What has happened to the object's points since the first frame, metres.
   [[nodiscard]] perceive::Motion motion(std::uint64_t sequence) const;
+  /// From the object's own frame to the surface frame, metres.
+  [[nodiscard]] perceive::Motion place(std::uint64_t sequence) const;
+  [[nodiscard]] const hal::sim::Object& object() const {
+    return truth_.scene().presses.at(0).object;
+  }
 
  private:
-  [[nodiscard]] perceive::Motion place(std::uint64_t sequence) const;
-
   hal::sim::Truth truth_;
   std::mt19937 random_{1};
   std::vector<float> mm_;
