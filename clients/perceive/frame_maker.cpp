@@ -37,13 +37,18 @@ void FrameMaker::begin(v1::Frame frame, bool pose) {
     const recon::Surface surface = cli::surface_of(frame_.surface());
     if (surface != clouds_.surface()) {
       clouds_ = CloudMaker(surface);
-      tracker_.release();
+      release();
     }
   }
   const bool gone = frame_.has_contact() && !frame_.contact().touching();
-  if (!pose || gone) tracker_.release();
+  if (!pose || gone) release();
   if (pose && depth_) follow(*depth_, frame_.depth().uncertainty_um());
   frame_.clear_depth();
+}
+
+void FrameMaker::release() {
+  tracker_.release();
+  if (object_) object_->release();
 }
 
 void FrameMaker::follow(DepthPart& depth, double uncertainty_um) {
@@ -51,12 +56,18 @@ void FrameMaker::follow(DepthPart& depth, double uncertainty_um) {
   if (!grid) return;
   const std::uint32_t took = timed([&] {
     clouds_.make(*grid, 1, contact_);
-    (void)tracker_.follow(ContactView(*grid, contact_, clouds_.table(), uncertainty_um),
-                          frame_.sequence());
+    const ContactView view(*grid, contact_, clouds_.table(), uncertainty_um);
+    if (object_) {
+      (void)object_->follow(view, frame_.sequence());
+    } else {
+      (void)tracker_.follow(view, frame_.sequence());
+    }
   });
-  if (tracker_.pose().state == Tracker::State::idle) return;
+  const Tracker::Pose& found = object_ ? object_->pose() : tracker_.pose();
+  if (found.state == Tracker::State::idle) return;
   v1::ObjectPose& pose = pose_.emplace();
-  fill(tracker_.pose(), pose);
+  fill(found, pose);
+  if (object_) pose.set_object(object_->object().name);
   pose.set_track_ns(took);
 }
 

@@ -8,6 +8,7 @@
 
 #include "clients/perceive/depth_part.hpp"
 #include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/perceive/pose/object_tracker.hpp"
 #include "clients/perceive/pose/tracker.hpp"
 #include "daemon/serve/encoded_frame.hpp"
 #include "daemon/serve/frame_kind.hpp"
@@ -19,6 +20,10 @@ namespace dtact::perceive {
 /// nothing that nobody is due.
 class FrameMaker {
  public:
+  /// `object`: whose pose is told; null: the motion of whatever is touched.
+  explicit FrameMaker(const std::shared_ptr<const ObjectModel>& object = nullptr) {
+    if (object) object_.emplace(object);
+  }
   /// Begins another frame; with `pose` the object's motion is followed. Throws
   /// client::ProtocolError for a damaged map.
   void begin(v1::Frame frame, bool pose);
@@ -31,6 +36,7 @@ class FrameMaker {
  private:
   void add_cloud(DepthPart& depth, const net::FrameKind& kind, v1::PointCloud& out);
   void follow(DepthPart& depth, double uncertainty_um);
+  void release();
 
   v1::Frame frame_;  ///< Without what is made here, and without the depth map.
   std::optional<DepthPart> depth_;
@@ -38,6 +44,7 @@ class FrameMaker {
   PointCloud cloud_;
   PointCloud contact_;  ///< Its own: what is as it was in cloud_ is not made again.
   Tracker tracker_;
+  std::optional<ObjectTracker> object_;  ///< In its place.
   std::optional<v1::ObjectPose> pose_;
   std::vector<std::pair<net::FrameKind, std::shared_ptr<const net::EncodedFrame>>> done_;
 };

@@ -1,5 +1,7 @@
 #include "clients/perceive/perceive.hpp"
 
+#include <fmt/format.h>
+
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <memory>
@@ -7,6 +9,7 @@
 #include <string>
 
 #include "clients/common/listen_options.hpp"
+#include "clients/perceive/object_file.hpp"
 #include "clients/perceive/server.hpp"
 #include "clients/perceive/watch.hpp"
 #include "daemon/serve/net_config.hpp"
@@ -15,7 +18,14 @@
 namespace dtact::perceive {
 namespace {
 
-void serve(const cli::Context& context, net::NetConfig config) {
+struct Settings {
+  net::NetConfig net;
+  std::string object;  ///< A file; none: empty.
+  std::string object_unit = "mm";
+};
+
+void serve(const cli::Context& context, const Settings& settings) {
+  net::NetConfig config = settings.net;
   config.program = "dtact-perceive " DTACT_VERSION;
   config.version = DTACT_VERSION;
   config.features = wire::kPerceiveFeatures;
@@ -23,8 +33,15 @@ void serve(const cli::Context& context, net::NetConfig config) {
   config.log = [&out = context.out](const net::LogLine& line) {
     out << line.text << '\n' << std::flush;
   };
+  std::shared_ptr<const ObjectModel> object;
+  if (!settings.object.empty()) {
+    object = load_object(settings.object, settings.object_unit);
+    config.log(
+        {net::LogLevel::info, fmt::format("following {}: {} places {:.2f} mm apart", object->name,
+                                          object->surfels.size(), 1e3 * object->spacing)});
+  }
   boost::asio::io_context io;
-  const auto server = std::make_shared<Server>(io, config, context.target);
+  const auto server = std::make_shared<Server>(io, config, context.target, object);
   for (const std::string& address : server->addresses()) {
     config.log({net::LogLevel::info, "listening on " + address});
   }
@@ -39,13 +56,23 @@ void serve(const cli::Context& context, net::NetConfig config) {
 void add_serve(CLI::App& app, cli::Context& context) {
   auto* command = app.add_subcommand(
       "serve", "Serve point clouds and poses of the daemon's frames, until Ctrl-C or SIGTERM");
-  const auto settings = std::make_shared<net::NetConfig>();
-  settings->port = wire::kPerceivePort;
-  cli::add_listen_options(*command, *settings);
+  const auto settings = std::make_shared<Settings>();
+  settings->net.port = wire::kPerceivePort;
+  cli::add_listen_options(*command, settings->net);
   command
-      ->add_option("--unix-socket", settings->unix_socket,
+      ->add_option("--unix-socket", settings->net.unix_socket,
                    "A socket for clients on this machine, too")
       ->type_name("FILE");
+  command
+      ->add_option(
+          "--object", settings->object,
+          "The touched object's shape: poses are then its place in the sensor's frame, not "
+          "the motion since it was touched. STL, PLY with faces, or a PLY cloud with outward "
+          "normals, of at most 64 MiB")
+      ->type_name("FILE");
+  command->add_option("--object-unit", settings->object_unit, "Of the lengths in that file")
+      ->check(CLI::IsMember({"mm", "m"}))
+      ->capture_default_str();
   command->callback([&context, settings] { serve(context, *settings); });
 }
 

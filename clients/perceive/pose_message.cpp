@@ -26,6 +26,8 @@ v1::ObjectPose::Tracking to_wire(Tracker::State state) {
       return v1::ObjectPose::LOST;
     case Tracker::State::recovered:
       return v1::ObjectPose::RECOVERED;
+    case Tracker::State::searching:
+      return v1::ObjectPose::SEARCHING;
   }
   return v1::ObjectPose::UNSPECIFIED;
 }
@@ -36,6 +38,7 @@ void fill(const Tracker::Pose& pose, v1::ObjectPose& out) {
   constexpr double kMillimetres = 1e3;
   const Alignment& found = pose.alignment;
   out.set_tracking(to_wire(pose.state));
+  if (pose.state == Tracker::State::searching) return;
   out.set_since_sequence(pose.since);
   fill(kMillimetres * found.motion.translation, *out.mutable_translation_mm());
   const Eigen::AngleAxisd turn(found.motion.rotation);
@@ -49,6 +52,7 @@ void fill(const Tracker::Pose& pose, v1::ObjectPose& out) {
   out.set_arm_mm(kMillimetres * found.arm);
   out.set_residual_um(1e6 * found.rms);
   out.set_points(static_cast<std::uint32_t>(found.points));
+  out.set_alternatives(pose.alternatives);
 }
 
 }  // namespace dtact::perceive

@@ -13,8 +13,9 @@ namespace dtact::perceive {
 namespace asio = boost::asio;
 using net::Subscription;
 
-Server::Server(asio::io_context& io, net::NetConfig config, client::Options daemon)
-    : io_(io), entrance_(io, std::move(config)), daemon_(std::move(daemon)) {}
+Server::Server(asio::io_context& io, net::NetConfig config, client::Options daemon,
+               const std::shared_ptr<const ObjectModel>& object)
+    : io_(io), entrance_(io, std::move(config)), maker_(object), daemon_(std::move(daemon)) {}
 
 void Server::start() {
   const auto weak = weak_from_this();

@@ -18,9 +18,10 @@ namespace dtact::perceive {
 /// connection to the daemon is on the thread that runs `io`.
 class Server : public net::SessionHost, public std::enable_shared_from_this<Server> {
  public:
-  /// Listens from here on. Throws std::runtime_error naming the setting, address or port and the
-  /// remedy.
-  Server(boost::asio::io_context& io, net::NetConfig config, client::Options daemon);
+  /// Listens from here on; `object` as FrameMaker takes it. Throws std::runtime_error naming the
+  /// setting, address or port and the remedy.
+  Server(boost::asio::io_context& io, net::NetConfig config, client::Options daemon,
+         const std::shared_ptr<const ObjectModel>& object = nullptr);
 
   void start();
   void stop();

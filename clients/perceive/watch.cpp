@@ -35,9 +35,29 @@ const char* name_of(v1::ObjectPose::Tracking tracking) {
       return "lost";
     case v1::ObjectPose::RECOVERED:
       return "recovered";
+    case v1::ObjectPose::SEARCHING:
+      return "searching";
     default:
       return "unknown";
   }
+}
+
+/// "  tracked: moved (1.02, 0.00, -0.10) mm, ...", "  nut tracked: at ...", "  nut searching".
+std::string words_of(const v1::ObjectPose& pose) {
+  const std::string object = pose.object().empty() ? "" : pose.object() + " ";
+  if (pose.tracking() == v1::ObjectPose::SEARCHING) {
+    return fmt::format("  {}searching, in {:.2f} ms", object, pose.track_ns() * 1e-6);
+  }
+  const auto& moved = pose.translation_mm();
+  const auto& turned = pose.rotation_deg();
+  std::string line = fmt::format(
+      "  {}{}: {} ({:.2f}, {:.2f}, {:.2f}) mm, turned ({:.1f}, {:.1f}, {:.1f}) deg, {} of 6 "
+      "directions seen, {:.0f} um off, in {:.2f} ms",
+      object, name_of(pose.tracking()), object.empty() ? "moved" : "at", moved.x(), moved.y(),
+      moved.z(), turned.x(), turned.y(), turned.z(), 6 - pose.unobservable_size(),
+      pose.residual_um(), pose.track_ns() * 1e-6);
+  if (pose.alternatives() > 0) line += fmt::format(", or {} others", pose.alternatives());
+  return line;
 }
 
 /// "58.1 fps  12,340 points in 0.21 ms  tracked: moved (1.02, 0.00, -0.10) mm, ...".
@@ -48,16 +68,7 @@ std::string line_of(const v1::Frame& frame, double fps) {
     line += fmt::format("  {} points in {:.2f} ms", frame.cloud().points(),
                         frame.cloud().make_ns() * 1e-6);
   }
-  if (frame.has_pose()) {
-    const v1::ObjectPose& pose = frame.pose();
-    const auto& moved = pose.translation_mm();
-    const auto& turned = pose.rotation_deg();
-    line += fmt::format(
-        "  {}: moved ({:.2f}, {:.2f}, {:.2f}) mm, turned ({:.1f}, {:.1f}, {:.1f}) deg, {} of 6 "
-        "directions seen, {:.0f} um off, in {:.2f} ms",
-        name_of(pose.tracking()), moved.x(), moved.y(), moved.z(), turned.x(), turned.y(),
-        turned.z(), 6 - pose.unobservable_size(), pose.residual_um(), pose.track_ns() * 1e-6);
-  }
+  if (frame.has_pose()) line += words_of(frame.pose());
   return line + "\n";
 }
 

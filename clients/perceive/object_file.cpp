@@ -1,0 +1,24 @@
+#include "clients/perceive/object_file.hpp"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+
+#include "clients/perceive/geometry/mesh_file.hpp"
+#include "hal/base/atomic_file.hpp"
+
+namespace dtact::perceive {
+
+std::shared_ptr<const ObjectModel> load_object(const std::filesystem::path& file,
+                                               const std::string& unit) {
+  const Mesh mesh = parse_mesh(base::read_file(file, kMostMeshBytes), file.string());
+  try {
+    return std::make_shared<const ObjectModel>(
+        make_object(mesh, unit == "m" ? 1 : 1e-3, file.stem().string()));
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(
+        fmt::format("{}, read in {} (--object-unit): {}", file.string(), unit, e.what()));
+  }
+}
+
+}  // namespace dtact::perceive
