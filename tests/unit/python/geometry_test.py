@@ -64,6 +64,10 @@ class Pose(unittest.TestCase):
         hidden.translation.y = 1
         pose = dtact.Frame(m).pose
         self.assertEqual((pose.tracking, pose.since_sequence), ("tracked", 7))
+        self.assertEqual((pose.object, pose.alternatives), ("", 0))
+        m.pose.tracking, m.pose.object, m.pose.alternatives = 5, "nut", 11
+        known = dtact.Frame(m).pose
+        self.assertEqual((known.tracking, known.object, known.alternatives), ("searching", "nut", 11))
         np.testing.assert_allclose(pose.matrix() @ [1, 0, 0, 1], [2, 1, 0, 1], atol=1e-12)
         self.assertEqual(pose.unobservable.tolist(), [[0, 0, 0, 0, 1, 0]])
 

@@ -58,9 +58,12 @@ class PointCloud:
 @dataclass(frozen=True)
 class ObjectPose:
     """How the touched object has moved since the contact was made, in the surface frame: a point p
-    of it now lies at `matrix() @ (p, 1)`, in millimetres."""
+    of it now lies at `matrix() @ (p, 1)`, in millimetres. Of a known object (`object`) p is in the
+    frame of its file."""
 
-    tracking: str  #: "started", "tracked", "lost" (the last one is repeated) or "recovered"
+    #: "started", "tracked", "lost" (the last one is repeated), "recovered", or "searching" (for a known
+    #: object: there is no motion)
+    tracking: str
     since_sequence: int  #: the frame that it is measured from
     translation_mm: NDArray[np.float64]
     rotation_deg: NDArray[np.float64]  #: axis times angle
@@ -71,6 +74,8 @@ class ObjectPose:
     arm_mm: float
     residual_um: float  #: root mean square along the normals
     points: int  #: that count
+    object: str = ""  #: the known object's name; empty: the motion since the contact was made
+    alternatives: int = 0  #: other placements of the known object that explain the contact as well
 
     @classmethod
     def of(cls, m: Message) -> ObjectPose:
@@ -81,7 +86,8 @@ class ObjectPose:
         return cls(name_of("ObjectPose.Tracking", m.tracking, ""), int(m.since_sequence),
                    np.array(vector(m.translation_mm)), np.array(vector(m.rotation_deg)),
                    np.array(hidden).reshape(-1, 6), np.array(vector(m.centre_mm)),
-                   float(m.arm_mm), float(m.residual_um), int(m.points))
+                   float(m.arm_mm), float(m.residual_um), int(m.points), str(m.object),
+                   int(m.alternatives))
 
     def matrix(self) -> NDArray[np.float64]:
         """4 × 4, millimetres."""

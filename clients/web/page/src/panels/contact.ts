@@ -9,14 +9,18 @@ const TRACKING: Record<number, string> = {
   [ObjectPose_Tracking.STARTED]: "from here",
   [ObjectPose_Tracking.LOST]: "lost",
   [ObjectPose_Tracking.RECOVERED]: "found again",
+  [ObjectPose_Tracking.SEARCHING]: "searching",
 };
 
-/** What moved since the contact was made, as dtact-perceive tells it. */
+/** What moved since the contact was made, or where a known object is, as dtact-perceive tells it. */
 function motion(pose: ObjectPose | undefined): { moved: string; turned: string } {
   if (!pose) return { moved: "–", turned: "–" };
   const told = (vector: Vector3 | undefined, digits: number): string =>
     vector ? [vector.x, vector.y, vector.z].map((part) => fixed(part, digits)).join(", ") : "–";
   const how = TRACKING[pose.tracking];
+  if (pose.tracking === ObjectPose_Tracking.SEARCHING) {
+    return { moved: `${pose.object}: ${how}`, turned: "–" };
+  }
   const unseen = pose.unobservable.length;
   return {
     moved: `${told(pose.translationMm, 2)} mm${how ? `, ${how}` : ""}`,

@@ -129,7 +129,10 @@ export class CloudView {
   }
 
   private place(pose: ObjectPose | undefined): void {
-    const known = pose !== undefined && pose.tracking !== ObjectPose_Tracking.LOST;
+    const known =
+      pose !== undefined &&
+      pose.tracking !== ObjectPose_Tracking.LOST &&
+      pose.tracking !== ObjectPose_Tracking.SEARCHING;
     this.axes.visible = known;
     if (!known) return;
     const turn = toScene(pose.rotationDeg).multiplyScalar(Math.PI / 180);

@@ -1,0 +1,106 @@
+#include "clients/perceive/geometry/mesh_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <stdexcept>
+
+#include "hal/base/atomic_file.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+using testing::HasSubstr;
+
+std::string seed(const std::string& name) {
+  return base::read_file(DTACT_SOURCE_DIR "/tests/fuzz/corpus/mesh/" + name);
+}
+
+std::string error_of(const std::string& bytes) {
+  try {
+    (void)parse_mesh(bytes, "object");
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "none";
+}
+
+/// Six times the volume within, from outward triangles.
+double volume_of(const Mesh& mesh) {
+  double sum = 0;
+  for (const auto& t : mesh.triangles) {
+    const auto& a = mesh.points[t[0]];
+    const auto& b = mesh.points[t[1]];
+    const auto& c = mesh.points[t[2]];
+    sum += a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
+           a[2] * (b[0] * c[1] - b[1] * c[0]);
+  }
+  return sum / 6;
+}
+
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(MeshFile, ACubeOfFourMillimetresInEveryFormat) {
+  for (const char* name : {"ascii.stl", "binary.stl", "ascii.ply", "little.ply", "big.ply"}) {
+    const Mesh mesh = parse_mesh(seed(name), name);
+    EXPECT_EQ(mesh.triangles.size(), 12U) << name;
+    EXPECT_DOUBLE_EQ(volume_of(mesh), 64) << name;
+  }
+}
+
+TEST(MeshFile, ACloudHasNormals) {
+  const Mesh mesh = parse_mesh(seed("cloud.ply"), "cloud");
+  EXPECT_TRUE(mesh.triangles.empty());
+  ASSERT_EQ(mesh.points.size(), 400U);
+  ASSERT_EQ(mesh.normals.size(), 400U);
+  EXPECT_NEAR(mesh.points[7][1], 2 * mesh.normals[7][1], 1e-6);
+}
+
+TEST(MeshFile, FurtherPropertiesAndElementsArePassedOver) {
+  std::string text = seed("ascii.ply");
+  text = with(text, "property float x\n",
+              "property uchar red\nproperty list uchar int extra\nproperty float x\n");
+  text = with(text, "end_header\n0 0 0\n4 0 0\n", "end_header\n9 2 7 7 0 0 0\n9 0 4 0 0\n");
+  for (const char* rest : {"0 4 0\n", "4 4 0\n", "0 0 4\n", "4 0 4\n", "0 4 4\n", "4 4 4\n"}) {
+    text = with(text, std::string("\n") + rest, std::string("\n9 0 ") + rest);
+  }
+  EXPECT_DOUBLE_EQ(volume_of(parse_mesh(text, "object")), 64);
+}
+
+TEST(MeshFile, BrokenFilesAreToldByPlaceAndRemedy) {
+  const std::string stl = seed("ascii.stl");
+  const std::string ply = seed("ascii.ply");
+  EXPECT_THAT(error_of(""), HasSubstr("object, line 1: neither PLY nor STL"));
+  EXPECT_THAT(error_of(std::string(200, 'x')), HasSubstr("object, byte 84: neither PLY nor STL"));
+  EXPECT_THAT(error_of(with(stl, "vertex 0 4 0", "vertex 0 four 0")),
+              HasSubstr("object, line 5: expected a number, not \"four\""));
+  EXPECT_THAT(error_of(with(stl, "endloop", "end")),
+              HasSubstr("expected \"endloop\", not \"end\""));
+  EXPECT_THAT(error_of(stl.substr(0, 60)), HasSubstr("cut off"));
+  EXPECT_THAT(error_of(seed("binary.stl").substr(0, 600)), HasSubstr("684 bytes, there are 600"));
+  EXPECT_THAT(error_of(with(ply, "ascii", "text")),
+              HasSubstr("object, line 2: expected the format"));
+  EXPECT_THAT(error_of(with(ply, "float x", "real x")), HasSubstr("expected a type of PLY"));
+  EXPECT_THAT(error_of(with(ply, "property float z\n", "")), HasSubstr("lack x, y or z"));
+  EXPECT_THAT(error_of(with(ply, "element vertex 8", "element vertex 800000")),
+              HasSubstr("ends before its vertices"));
+  EXPECT_THAT(error_of(with(ply, "4 0 2 3 1", "4 0 2 3 9")),
+              HasSubstr("a face names point 9, of 8"));
+  EXPECT_THAT(error_of(with(ply, "4 0 2 3 1", "4 0 2 3 -1")), HasSubstr("a face's corner"));
+  EXPECT_THAT(error_of(seed("little.ply").substr(0, 320)), HasSubstr("byte 3"));
+  EXPECT_THAT(error_of(with(ply, "0 0 0\n4", "0 0 nan\n4")), HasSubstr("not a finite number"));
+  const std::string points =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float "
+      "z\nend_header\n1 2 3\n";
+  EXPECT_THAT(error_of(points), HasSubstr("neither faces nor normals"));
+  EXPECT_THAT(error_of("solid x\nendsolid x\n"), HasSubstr("no points"));
+  EXPECT_THAT(error_of(std::string(kMostMeshBytes + 1, ' ')), HasSubstr("larger than 64 MiB"));
+}
+
+}  // namespace
+}  // namespace dtact::perceive

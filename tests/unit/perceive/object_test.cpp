@@ -1,0 +1,194 @@
+// Known objects made of balls: their samples, where search() finds them, and how they are followed.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "clients/perceive/pose/object_tracker.hpp"
+#include "tests/unit/perceive/balls.hpp"
+
+namespace dtact::perceive {
+namespace {
+
+using namespace test;
+using Eigen::Vector3d;
+using State = Tracker::State;
+
+/// A cloud of their common surface, millimetres.
+Mesh cloud_of(const Balls& object) {
+  Mesh mesh;
+  for (const auto& ball : object.balls) {
+    for (const Vector3d& out : all_directions(4000)) {
+      const Vector3d point = ball.middle + ball.radius * out;
+      const bool within = std::ranges::any_of(object.balls, [&](const auto& other) {
+        return (point - other.middle).norm() < other.radius - 1e-6;
+      });
+      if (within) continue;
+      mesh.points.push_back({point.x(), point.y(), point.z()});
+      mesh.normals.push_back({out.x(), out.y(), out.z()});
+    }
+  }
+  return mesh;
+}
+
+std::shared_ptr<const ObjectModel> model_of(const Balls& object) {
+  return std::make_shared<const ObjectModel>(make_object(cloud_of(object), 1e-3, "balls"));
+}
+
+Mesh box(double x, double y, double z) {
+  Mesh mesh;
+  for (unsigned i = 0; i < 8; ++i) {
+    mesh.points.push_back({(i & 1U) != 0 ? x : 0, (i & 2U) != 0 ? y : 0, (i & 4U) != 0 ? z : 0});
+  }
+  mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                    {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  return mesh;
+}
+
+std::string error_of(const Mesh& mesh, double metres) {
+  try {
+    (void)make_object(mesh, metres, "object");
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "none";
+}
+
+Error off(const Tracker::Pose& pose, const Motion& truth) {
+  Twist twist =
+      screw_of(pose.alignment.motion * truth.inverse(), pose.alignment.centre, pose.alignment.arm);
+  for (const Twist& hidden : pose.alignment.unobservable) twist -= hidden * hidden.dot(twist);
+  return {twist.head<3>().norm() / pose.alignment.arm * 180 / M_PI, 1e6 * twist.tail<3>().norm()};
+}
+
+TEST(ObjectModel, ABoxIsSampledEvenlyAndRestsOnSixFaces) {
+  const ObjectModel model = make_object(box(4, 5, 6), 1e-3, "box");
+  // 148 mm² at 0.15 mm.
+  EXPECT_GT(model.surfels.size(), 5000U);
+  EXPECT_LT(model.surfels.size(), 9000U);
+  EXPECT_EQ(model.rests.size(), 6U);
+  std::array<int, 3> by_axis{};
+  for (const Surfel& surfel : model.surfels) {
+    Eigen::Index axis = 0;
+    EXPECT_NEAR(surfel.normal.cwiseAbs().maxCoeff(&axis), 1, 1e-12);
+    ++by_axis.at(static_cast<std::size_t>(axis));
+    // Into it.
+    EXPECT_GT(surfel.normal.dot(Vector3d(0.002, 0.0025, 0.003) - surfel.point), 0);
+  }
+  // Faces of 30, 24 and 20 mm².
+  EXPECT_NEAR(by_axis[0] / 30.0 / by_axis[2] * 20, 1, 0.15);
+  EXPECT_NEAR(by_axis[1] / 24.0 / by_axis[2] * 20, 1, 0.15);
+}
+
+TEST(ObjectModel, LargeOnesAreSampledLess) {
+  const ObjectModel model = make_object(box(100, 100, 20), 1e-3, "box");
+  EXPECT_LE(model.surfels.size(), kMostSurfels);
+  EXPECT_GT(model.surfels.size(), kMostSurfels / 3);
+}
+
+TEST(ObjectModel, AWrongUnitAndAnInsideOutShapeAreTold) {
+  EXPECT_THAT(error_of(box(4, 5, 6), 1), testing::HasSubstr("is its unit another one?"));
+  EXPECT_THAT(error_of(box(0.004, 0.005, 0.006), 1e-3), testing::HasSubstr("unit"));
+  Mesh turned = box(4, 5, 6);
+  for (auto& triangle : turned.triangles) std::swap(triangle[0], triangle[1]);
+  EXPECT_THAT(error_of(turned, 1e-3), testing::HasSubstr("looks inwards"));
+  Mesh few = cloud_of({{{{0, 0, 0}, 4}}});
+  few.points.resize(20);
+  few.normals.resize(20);
+  few.points.push_back({4, 4, 4});
+  few.normals.push_back({0, 0, 1});
+  EXPECT_THAT(error_of(few, 1e-3), testing::HasSubstr("are needed"));
+}
+
+TEST(SearchPlacement, FindsBumpsWhereverTheyAre) {
+  const auto model = model_of(bumps());
+  std::vector<recon::Surface> surfaces = curved();
+  surfaces.insert(surfaces.begin(), recon::Surface{});
+  for (const recon::Surface& surface : surfaces) {
+    for (const Motion& truth :
+         {moved({0.3, -0.2, 0}, Vector3d::UnitZ(), 100), moved({0, 0, 0}, {0.2, -0.1, 1}, -40)}) {
+      const Frame frame(bumps(), truth, 5, 1, surface);
+      const auto found = search(*model, make_patch(frame.view()));
+      ASSERT_TRUE(found.has_value());
+      EXPECT_TRUE(found->hidden.empty());
+      EXPECT_EQ(found->alternatives, 0U);
+      Tracker::Pose pose;
+      pose.alignment.motion = found->pose;
+      pose.alignment.centre = found->centre;
+      pose.alignment.arm = found->arm;
+      EXPECT_LT(off(pose, truth).um, 60);
+      EXPECT_LT(off(pose, truth).degrees, 3);
+    }
+  }
+}
+
+TEST(SearchPlacement, ABallIsFoundOnceAndItsTurnsAreHidden) {
+  const Balls ball{{{{0, 0, 3.0}, 4.0}}};
+  const Frame frame(ball, moved({0.5, 0.2, 0}), 5);
+  const auto found = search(*model_of(ball), make_patch(frame.view()));
+  ASSERT_TRUE(found.has_value());
+  EXPECT_EQ(found->hidden.size(), 3U);
+  EXPECT_EQ(found->alternatives, 0U);
+  EXPECT_LT((found->pose * Vector3d(0, 0, 0.003) - Vector3d(0.0005, 0.0002, 0.003)).norm(), 3e-5);
+}
+
+TEST(SearchPlacement, AnotherObjectIsNotFound) {
+  const Frame frame({{{{0, 0, 3.0}, 4.0}}}, {}, 5);
+  EXPECT_FALSE(search(*model_of(bumps()), make_patch(frame.view())).has_value());
+  const Frame nothing({}, {});
+  EXPECT_FALSE(search(*model_of(bumps()), make_patch(nothing.view())).has_value());
+}
+
+TEST(ObjectTracker, SearchesFindsAndFollowsWithoutWaiting) {
+  ObjectTracker tracker(model_of(bumps()));
+  Frame frame(bumps(), moved({0, 0, 0}, Vector3d::UnitZ(), 60), 5);
+  EXPECT_EQ(tracker.follow(frame.view(), 10).state, State::searching);
+  EXPECT_TRUE(tracker.is_searching());
+  // It moves on while it is searched for.
+  const Motion next = moved({0.1, 0, 0}, Vector3d::UnitZ(), 62);
+  const Frame second(bumps(), next, 5, 2);
+  (void)tracker.follow(second.view(), 11);
+  tracker.wait();
+  (void)tracker.follow(second.view(), 12);
+  EXPECT_GE(tracker.pose().since, 11U);
+  EXPECT_LT(off(tracker.pose(), next).um, 15);
+  for (unsigned i = 0; i < 20; ++i) {
+    const Motion truth = moved({0.1 + 0.05 * i, 0, 0}, Vector3d::UnitZ(), 62 + i);
+    const Frame later(bumps(), truth, 5, 3 + i);
+    EXPECT_EQ(tracker.follow(later.view(), 13 + i).state, State::tracked);
+    EXPECT_LT(off(tracker.pose(), truth).um, 15);
+    EXPECT_LT(off(tracker.pose(), truth).degrees, 0.8);
+  }
+}
+
+TEST(ObjectTracker, ALossIsToldAndEndsWithASearch) {
+  const auto model = model_of(bumps());
+  ObjectTracker tracker(model);
+  const Frame frame(bumps(), {}, 5);
+  (void)tracker.follow(frame.view(), 1);
+  tracker.wait();
+  EXPECT_EQ(tracker.follow(frame.view(), 2).state, State::started);
+  const Motion away = moved({0.5, 1.2, 0}, Vector3d::UnitZ(), 90);
+  const Frame jumped(bumps(), away, 5);
+  EXPECT_EQ(tracker.follow(jumped.view(), 3).state, State::lost);
+  tracker.wait();
+  EXPECT_EQ(tracker.follow(jumped.view(), 4).state, State::recovered);
+  EXPECT_LT(off(tracker.pose(), away).um, 15);
+  EXPECT_EQ(tracker.follow(jumped.view(), 5).state, State::tracked);
+}
+
+TEST(ObjectTracker, AnotherContactBeginsWithASearch) {
+  ObjectTracker tracker(model_of(bumps()));
+  const Frame frame(bumps(), {}, 5);
+  (void)tracker.follow(frame.view(), 1);
+  tracker.release();
+  EXPECT_EQ(tracker.pose().state, State::idle);
+  tracker.wait();
+  // What was found belongs to the contact before.
+  EXPECT_EQ(tracker.follow(frame.view(), 2).state, State::searching);
+  tracker.wait();
+  EXPECT_EQ(tracker.follow(frame.view(), 3).state, State::started);
+}
+
+}  // namespace
+}  // namespace dtact::perceive
