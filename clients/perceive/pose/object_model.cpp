@@ -230,7 +230,9 @@ ObjectModel make_object(const Mesh& mesh, double metres_per_unit, std::string na
   for (;; model.spacing *= 1.2) {
     model.surfels = cloud ? thin(mesh, metres_per_unit, model.spacing, box.min())
                           : sample(mesh, metres_per_unit, model.spacing, box.min());
-    if (model.surfels.size() <= kMostSurfels) break;
+    // Nor may a cloud's own gaps be holes: two of its points for each that is left.
+    const bool sparse = cloud && mesh.points.size() < 2 * model.surfels.size();
+    if (model.surfels.size() <= kMostSurfels && !sparse) break;
   }
   constexpr std::size_t kFewest = 50;
   if (model.surfels.size() < kFewest) {

@@ -21,8 +21,9 @@ struct ObjectModel {
 
 /// Samples `mesh`, whose unit is `metres_per_unit`: triangles alike densely whatever their size,
 /// then one surfel of a direction in each cell of a grid. Surfels are 0.15 mm apart, or as far as
-/// kMostSurfels of them allow. Throws std::runtime_error with a sentence that says what is wrong
-/// with the shape: its size in this unit, or that its surface looks inwards.
+/// kMostSurfels of them or a cloud's own density allow. Throws std::runtime_error with a sentence
+/// that says what is wrong with the shape: its size in this unit, or that its surface looks
+/// inwards.
 [[nodiscard]] ObjectModel make_object(const Mesh& mesh, double metres_per_unit, std::string name);
 
 /// Unit vectors evenly all over the sphere (Fibonacci's lattice): of 1600 the next is 5° away.

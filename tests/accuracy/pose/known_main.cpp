@@ -3,6 +3,8 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <exception>
 #include <string>
 #include <vector>
@@ -73,6 +75,7 @@ void study(const std::string& only) {
     };
     print(thing.name, row, std::to_string(alternatives));
     if (&thing == &kThings.back()) print("all", all, "");
+    std::fflush(stdout);
   }
   fmt::print(
       "\nA search takes {:.0f} ms (median, at most {:.0f}), a frame {:.2f} ms (95 %: {:.2f}).\n",

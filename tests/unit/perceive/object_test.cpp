@@ -18,7 +18,7 @@ using State = Tracker::State;
 Mesh cloud_of(const Balls& object) {
   Mesh mesh;
   for (const auto& ball : object.balls) {
-    for (const Vector3d& out : all_directions(4000)) {
+    for (const Vector3d& out : all_directions(20000)) {
       const Vector3d point = ball.middle + ball.radius * out;
       const bool within = std::ranges::any_of(object.balls, [&](const auto& other) {
         return (point - other.middle).norm() < other.radius - 1e-6;
@@ -106,7 +106,7 @@ TEST(SearchPlacement, FindsBumpsWhereverTheyAre) {
   surfaces.insert(surfaces.begin(), recon::Surface{});
   for (const recon::Surface& surface : surfaces) {
     for (const Motion& truth :
-         {moved({0.3, -0.2, 0}, Vector3d::UnitZ(), 100), moved({0, 0, 0}, {0.2, -0.1, 1}, -40)}) {
+         {moved({0.3, -0.2, 0}, Vector3d::UnitZ(), 100), moved({0, 0, 0}, {0.03, -0.02, 1}, -40)}) {
       const Frame frame(bumps(), truth, 5, 1, surface);
       const auto found = search(*model, make_patch(frame.view()));
       ASSERT_TRUE(found.has_value());
