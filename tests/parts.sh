@@ -60,7 +60,7 @@ test_dev() {
 check_format() {
   sources | xargs clang-format-19 --dry-run --Werror
   git ls-files '*.sh' | xargs shellcheck dev .ci/run debian/*.{postinst,postrm,prerm} tests/kernel/{umlrun,selftest,guest-init} \
-    tests/install/guest/dtact-test
+    tests/install/guest/{dtact-test,initrd-init}
 }
 
 # test_sanitized PRESET LABELS TESTS: all tests but those with such labels or names.
@@ -117,10 +117,15 @@ run_tests() {
   part 'the packages, built twice' test_compiled_packages
   part 'Debian 13' test_platform debian13
   part arm64 test_platform arm64
+  part "Debian 13's packages for arm64" run_package --debian 13 --arch arm64
   part 'installation, faults and power cuts' test_installed --all --cuts 20
   # Of what the part "Debian 13" has built.
   part 'installation on Debian 13' test_installed --suite trixie --all \
     --packages "build/dev/packages-debian13-$(dpkg --print-architecture)"
+  # Of what the parts for arm64 have built.
+  part 'installation on arm64' test_installed --architecture arm64 --all
+  part 'installation on Debian 13 for arm64' test_installed --architecture arm64 --suite trixie --all \
+    --packages build/packages-debian13-arm64
   end_of_parts
   echo "dev: all$( ((${#skipped_parts[@]})) && echo ' others') passed in $SECONDS s"
 }

@@ -1,4 +1,5 @@
-"""A Debian guest on User Mode Linux: a disc, a folder that both sides see, and a power switch."""
+"""A Debian guest on User Mode Linux, or in an emulated arm64 machine: a disc, a folder that both sides see,
+and a power switch."""
 
 import os
 import signal
@@ -6,6 +7,7 @@ import subprocess
 import time
 from pathlib import Path
 
+HERE = Path(__file__).resolve().parent
 KERNEL = Path(os.environ.get('KERNEL_CACHE', Path.home() / '.cache/dtactd-kernel'))
 
 
@@ -14,30 +16,33 @@ class GuestError(Exception):
 
 
 class Guest:
-    """A running guest. It ends with the block that holds it, at the latest.
+    """A running guest, on User Mode Linux. It ends with the block that holds it, at the latest.
 
-    disc: an ext4 image. Without `changes` the guest writes into it; with it, what the guest writes
-    goes into that file (UML's copy-on-write), made where it is not there yet.
+    disc: an ext4 image. What the guest writes goes into the file `changes` (copy on write), made where it
+    is not there yet.
     check_disc: e2fsck has a look before the disc is mounted for writing.
     job: the folder that the guest sees as /job; its `run` is executed there, as root, by bash.
     """
 
-    def __init__(self, disc: Path, job: Path, changes: Path | None = None, check_disc: bool = False):
+    def __init__(self, disc: Path, job: Path, changes: Path, check_disc: bool = False):
         self.job = job
         for name in ('rc', 'log', 'journal'):
             (job / name).unlink(missing_ok=True)
         console = open(job / 'console', 'wb')
-        # Every write reaches the host's file when the guest is told so: a kill is a power cut of a
-        # disc without a cache that forgets.
         # It ends with this process, however that ends: the namespace's first process takes all with it.
         tied = ['setpriv', '--pdeathsig', 'KILL', 'unshare', '--pid', '--fork', '--kill-child=KILL']
         self._process = subprocess.Popen(
-            [*tied, KERNEL / 'linux', 'mem=768M', f'ubd0={changes},{disc}' if changes else f'ubd0={disc}',
-             'root=/dev/ubda', *(('ro', 'fsck.mode=force') if check_disc else ('rw',)), 'init=/sbin/init',
-             f'hostfs={job}', f'uml_dir={job}/uml/', 'ssl=null', 'con=null', 'con0=fd:0,fd:1', 'quiet',
-             'systemd.show_status=false'],
+            [*tied, *self._command(disc, changes, check_disc)],
             stdin=subprocess.DEVNULL, stdout=console, stderr=console, start_new_session=True)
         console.close()
+
+    def _command(self, disc: Path, changes: Path, check_disc: bool) -> list[str | Path]:
+        # Every write reaches the host's file when the guest is told so: a kill is a power cut of a
+        # disc without a cache that forgets.
+        return [KERNEL / 'linux', 'mem=768M', f'ubd0={changes},{disc}', 'root=/dev/ubda',
+                *(('ro', 'fsck.mode=force') if check_disc else ('rw',)), 'init=/sbin/init',
+                f'hostfs={self.job}', f'uml_dir={self.job}/uml/', 'ssl=null', 'con=null', 'con0=fd:0,fd:1', 'quiet',
+                'systemd.show_status=false']
 
     def __enter__(self):
         return self
@@ -81,3 +86,16 @@ class Guest:
                 lines = file.read_text(errors='replace').splitlines()[-40:]
                 words += f'\n--- {file}\n' + '\n'.join(lines)
         return words
+
+
+class EmulatedGuest(Guest):
+    """A running guest in QEMU's software emulation, with the kernel beside its disc.
+
+    Its disc has a cache that forgets, so that there is nothing to check after a power cut.
+    """
+
+    def _command(self, disc: Path, changes: Path, check_disc: bool) -> list[str | Path]:
+        assert not check_disc
+        if not changes.exists():
+            subprocess.run(['qemu-img', 'create', '-q', '-f', 'qcow2', '-b', disc, '-F', 'raw', changes], check=True)
+        return [HERE / 'qemu.sh', disc.parent, changes, 'qcow2', self.job, 'systemd.show_status=false']
