@@ -59,17 +59,18 @@ make_boot_files() {
 in_emulation() {
   rm -rf "$root.emulated/rc"
   echo "$2" > "$root.emulated/run"
-  timeout 7200 "$here/qemu.sh" "$root.emulated" "$1" raw "$root.emulated" setup=1 > "$root.emulated/console" < /dev/null || true
+  # It ends with this script, however that ends.
+  setpriv --pdeathsig TERM timeout 7200 "$here/qemu.sh" "$root.emulated" "$1" raw "$root.emulated" setup=1 \
+    > "$root.emulated/console" < /dev/null || true
   [ "$(cat "$root.emulated/rc" 2> /dev/null)" = 0 ] || { tail -n 20 "$root.emulated"/{console,log}; return 1; }
 }
 
 # prepare_emulated WANTED: makes the Debian in $root, with packages that satisfy a list of dependencies.
 # Kept until that list changes.
 prepare_emulated() {
-  local stamp
-  [ "$(id -u)" = 0 ] || skip "a Debian in a folder needs root"
+  local stamp tool
+  [ "$(id -u)" = 0 ] || skip "a Debian in a folder needs root: sudo $0"
   [ "$(uname -m)" = x86_64 ] || skip "this machine is $(uname -m)"
-  local tool
   for tool in debootstrap:debootstrap qemu-system-aarch64:qemu-system-arm qemu-img:qemu-utils cpio:cpio depmod:kmod; do
     command -v "${tool%:*}" > /dev/null || skip "run: apt-get install ${tool#*:}"
   done
