@@ -26,6 +26,7 @@
 #include "daemon/app/watchdog.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/metrics/endpoint.hpp"
+#include "daemon/metrics/heap.hpp"
 #include "daemon/metrics/temperatures.hpp"
 #include "daemon/metrics/text.hpp"
 #include "daemon/net/calibration_store.hpp"
@@ -118,7 +119,7 @@ std::optional<metrics::Endpoint> serve_metrics(asio::io_context& io,
   if (config.port == 0) return std::nullopt;
   spdlog::info("metrics on http://{}:{}/metrics", config.address, config.port);
   return std::optional<metrics::Endpoint>(std::in_place, io, config, [&server] {
-    return metrics::text(server.overview(), metrics::temperatures(),
+    return metrics::text(server.overview(), metrics::temperatures(), metrics::heap(),
                          base::system_clock().monotonic_ns());
   });
 }

@@ -171,7 +171,7 @@ void add_clients(Families& to, const net::Overview& overview) {
 }
 
 void add_machine(Families& to, const v1::Status& status,
-                 const std::vector<Temperature>& temperatures) {
+                 const std::vector<Temperature>& temperatures, const Heap& heap) {
   const v1::ThreadUsage& usage = status.capture_thread();
   to.begin("dtactd_capture_thread_page_faults_total",
            "The capture thread's page faults: major ones read a disk.", MetricType::Counter);
@@ -185,6 +185,13 @@ void add_machine(Families& to, const v1::Status& status,
   to.add(static_cast<double>(usage.preemptions()), {{"kind", "preempted"}});
   to.gauge("dtactd_realtime_settings_refused", "Real-time settings that the system refused.",
            status.realtime_refused_size());
+  to.begin("dtactd_heap_bytes",
+           "Memory of the allocator: in use, of which mapped are the large blocks, and kept for "
+           "later.",
+           MetricType::Gauge);
+  to.add(static_cast<double>(heap.used - heap.mapped), {{"kind", "used"}});
+  to.add(static_cast<double>(heap.mapped), {{"kind", "mapped"}});
+  to.add(static_cast<double>(heap.free), {{"kind", "kept"}});
   if (temperatures.empty()) return;
   to.begin("dtactd_board_temperature_celsius", "The board's own thermal zones.", MetricType::Gauge);
   for (const auto& one : temperatures) {
@@ -195,14 +202,14 @@ void add_machine(Families& to, const v1::Status& status,
 }  // namespace
 
 std::string text(const net::Overview& overview, const std::vector<Temperature>& temperatures,
-                 std::int64_t now_ns) {
+                 const Heap& heap, std::int64_t now_ns) {
   Families families;
   add_state(families, overview.status);
   add_frames(families, overview);
   add_camera(families, overview.status.camera());
   add_light(families, overview, now_ns);
   add_clients(families, overview);
-  add_machine(families, overview.status, temperatures);
+  add_machine(families, overview.status, temperatures, heap);
   return families.text();
 }
 

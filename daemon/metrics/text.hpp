@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/metrics/heap.hpp"
 #include "daemon/metrics/temperatures.hpp"
 #include "daemon/net/overview.hpp"
 
@@ -12,6 +13,7 @@ namespace dtact::metrics {
 /// Everything in Prometheus' text format 0.0.4, each metric with its help, in base units; counters
 /// end with _total. `now_ns`: CLOCK_MONOTONIC.
 [[nodiscard]] std::string text(const net::Overview& overview,
-                               const std::vector<Temperature>& temperatures, std::int64_t now_ns);
+                               const std::vector<Temperature>& temperatures, const Heap& heap,
+                               std::int64_t now_ns);
 
 }  // namespace dtact::metrics

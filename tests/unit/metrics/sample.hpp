@@ -53,7 +53,8 @@ inline net::Overview overview() {
 }
 
 inline std::string sample() {
-  return text(overview(), {{"thermal_zone0", "cpu-thermal", 48.312}}, 5'500'000'000);
+  return text(overview(), {{"thermal_zone0", "cpu-thermal", 48.312}},
+              {.used = 3000, .free = 500, .mapped = 2000}, 5'500'000'000);
 }
 
 }  // namespace dtact::metrics::test

@@ -5,6 +5,8 @@
 
 #include <filesystem>
 #include <fstream>
+#include <string>
+#include <vector>
 
 #include "tests/fakes/own_path.hpp"
 #include "tests/unit/metrics/sample.hpp"
@@ -55,8 +57,31 @@ TEST(MetricsText, IsInBaseUnits) {
             HasSubstr("_temperature_celsius{zone=\"thermal_zone0\",type=\"cpu-thermal\"} 48.312")));
 }
 
+TEST(MetricsText, TellsLeakedFromKeptMemory) {
+  EXPECT_THAT(test::sample(), AllOf(HasSubstr("dtactd_heap_bytes{kind=\"used\"} 1000\n"),
+                                    HasSubstr("dtactd_heap_bytes{kind=\"mapped\"} 2000\n"),
+                                    HasSubstr("dtactd_heap_bytes{kind=\"kept\"} 500\n")));
+}
+
+TEST(Heap, CountsWhatIsInUse) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers bring an allocator of their own";
+#endif
+  constexpr std::size_t kSmall = 1000;
+  constexpr std::size_t kCount = 1000;
+  constexpr std::size_t kLarge = std::size_t{64} << 20U;
+  const Heap before = heap();
+  std::vector<std::string> blocks(kCount, std::string(kSmall, 'x'));
+  blocks.emplace_back(kLarge, 'x');
+  const Heap now = heap();
+  EXPECT_GE(now.used - now.mapped, before.used - before.mapped + kCount * kSmall);
+  EXPECT_GE(now.mapped, before.mapped + kLarge);
+  EXPECT_GE(now.used, before.used + kLarge + kCount * kSmall);
+  EXPECT_GT(now.free, 0U);
+}
+
 TEST(MetricsText, LeavesOutWhatIsNotKnown) {
-  const std::string text = metrics::text({}, {}, 0);
+  const std::string text = metrics::text({}, {}, {}, 0);
   EXPECT_THAT(text, AllOf(Not(HasSubstr("reference_age")), Not(HasSubstr("calibration_info")),
                           Not(HasSubstr("temperature"))));
 }
