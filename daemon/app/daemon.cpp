@@ -176,7 +176,8 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   name_sensor(net.name);
   const fs::path state = make_state_folder(config);
   net::FolderCalibrationStore store(state, config.calibration);
-  const auto calibration = load_calibration(store.current(), config.calibration);
+  auto calibration = load_calibration(store.current(), config.calibration);
+  const bool uncalibrated = calibration == nullptr;
 
   hal::Devices devices = hal::open_devices(config.hal);
   const hal::RingReport ring = devices.ring->report();
@@ -187,6 +188,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;
   pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), calibration,
                               settings);
+  calibration.reset();  // its megabytes go when another one comes into use
   if (net.fifo_priority > 0) {
     net.realtime_refused = base::make_fifo("network", net.fifo_priority).value_or("");
     if (!net.realtime_refused.empty()) spdlog::warn("{}", net.realtime_refused);
@@ -198,7 +200,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   for (const std::string& refused : pipeline.status().realtime) spdlog::warn("{}", refused);
 
   pipeline::HealthSet told;
-  told.set(pipeline::Health::uncalibrated, calibration == nullptr);
+  told.set(pipeline::Health::uncalibrated, uncalibrated);
   told.set(pipeline::Health::ring_trouble, ring.away);
   told.set(pipeline::Health::not_realtime, !pipeline.status().realtime.empty());
   StatusTeller teller(
