@@ -89,9 +89,9 @@ class DTACT_EXPORT Client {
   /// The files of one calibration; without a number, of the current one.
   [[nodiscard]] v1::CalibrationFiles calibration(
       std::optional<std::uint64_t> number = std::nullopt);
-  /// All that the daemon has: the configured one, then the uploaded ones, oldest first. Each is
-  /// read and checked for this; may take a few seconds. Of an older daemon, which does not say what
-  /// is in use, the current one is taken to be.
+  /// All that the daemon has: the configured one, then the uploaded ones, oldest first. The
+  /// daemon reads and checks those that it does not know yet; may take a few seconds. Of an older
+  /// daemon, which does not say what is in use, the current one is taken to be.
   [[nodiscard]] std::vector<v1::StoredCalibration> calibrations();
   /// Returns once the daemon uses and has stored it, with its number; nothing from a daemon that is
   /// too old to say it. May take a few seconds.

@@ -180,14 +180,44 @@ std::vector<StoredCalibration> FolderCalibrationStore::list() {
       }
       const fs::path folder = folder_of(number);
       stored.name = name_of(folder);
-      stored.summary = summarise(calibration::load(folder));
+      stored.summary = summary_of(number, folder);
     } catch (const std::exception& e) {
       stored.damage = e.what();
     }
   };
   if (!configured_.empty()) add(kConfiguredCalibration);
   for (const std::uint64_t number : numbers_in(state_ / kFolders)) add(number);
+  // Those that were removed.
+  std::erase_if(known_, [&](const auto& known) {
+    return std::ranges::find(all, known.first, &StoredCalibration::number) == all.end();
+  });
   return all;
+}
+
+FolderCalibrationStore::Stamp FolderCalibrationStore::stamp_of(const fs::path& file) {
+  struct stat about{};
+  if (::stat(file.c_str(), &about) != 0) return {};  // whoever reads it says why not
+  const auto ns_of = [](const timespec& time) {
+    return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+  };
+  return {.inode = about.st_ino,
+          .size = about.st_size,
+          .modified_ns = ns_of(about.st_mtim),
+          .changed_ns = ns_of(about.st_ctim)};
+}
+
+CalibrationSummary FolderCalibrationStore::summary_of(std::uint64_t number,
+                                                      const fs::path& folder) {
+  // Taken before the files are read: one that changes meanwhile is read again the next time.
+  const Stamps now{stamp_of(folder / kToml), stamp_of(folder / kPng)};
+  const auto found = known_.find(number);
+  if (found != known_.end() && found->second.folder == folder && found->second.stamps == now) {
+    return found->second.summary;
+  }
+  known_.erase(number);
+  const CalibrationSummary summary = summarise(calibration::load(folder));
+  known_.emplace(number, Known{folder, now, summary});
+  return summary;
 }
 
 std::shared_ptr<const calibration::Calibration> FolderCalibrationStore::load(std::uint64_t number) {

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -56,7 +58,8 @@ class CalibrationStore {
       const CalibrationFiles& files) = 0;
   /// Stores checked files under a new number, which it returns, and makes them current.
   virtual std::uint64_t keep(const CalibrationFiles& files) = 0;
-  /// All there are: the configured one, then by number. Reads and checks every one.
+  /// All there are: the configured one, then by number. Each is read and checked before it is
+  /// listed for the first time, and again when its files have changed.
   [[nodiscard]] virtual std::vector<StoredCalibration> list() = 0;
   /// One, read and checked. Throws as check() does.
   [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> load(
@@ -102,11 +105,32 @@ class FolderCalibrationStore : public CalibrationStore {
   [[nodiscard]] CalibrationFiles read(std::optional<std::uint64_t> number) override;
 
  private:
+  /// By what a change of a file is told without reading it. Nanoseconds are the system clock's.
+  struct Stamp {
+    std::uint64_t inode = 0;
+    std::int64_t size = 0;
+    std::int64_t modified_ns = 0;
+    std::int64_t changed_ns = 0;  ///< Cannot be set back by a program.
+    bool operator==(const Stamp&) const = default;
+  };
+  using Stamps = std::array<Stamp, 2>;  ///< Of the two files of a calibration.
+  /// What list() has read and found good.
+  struct Known {
+    std::filesystem::path folder;
+    Stamps stamps{};
+    CalibrationSummary summary;
+  };
+
+  [[nodiscard]] static Stamp stamp_of(const std::filesystem::path& file);
   /// STATE/calibrations/NUMBER/NAME of an uploaded one, or the configured folder.
   [[nodiscard]] std::filesystem::path folder_of(std::uint64_t number) const;
+  /// As load() finds it, which takes tens of milliseconds; a copy when nothing has changed since.
+  [[nodiscard]] CalibrationSummary summary_of(std::uint64_t number,
+                                              const std::filesystem::path& folder);
 
   std::filesystem::path state_;
   std::filesystem::path configured_;
+  std::map<std::uint64_t, Known> known_;
 };
 
 }  // namespace dtact::net

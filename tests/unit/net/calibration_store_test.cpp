@@ -2,12 +2,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/inotify.h>
+#include <unistd.h>
 
+#include <array>
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/base/unique_fd.hpp"
 #include "tests/fakes/file_log.hpp"
 #include "tests/unit/calibration/sample.hpp"
 #include "tests/unit/net/sample_files.hpp"
@@ -210,6 +215,63 @@ TEST_F(Store, ListsADamagedOneWithTheReason) {
   EXPECT_EQ(all[2].damage, "");
   EXPECT_TRUE(all[3].current);
   EXPECT_THAT(all[3].damage, HasSubstr("calibrations/4: holds 0 folders"));
+}
+
+/// Counts how often files of one folder are opened.
+class Opened {
+ public:
+  explicit Opened(const fs::path& folder) : fd_(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK)) {
+    EXPECT_GE(::inotify_add_watch(fd_.get(), folder.c_str(), IN_OPEN), 0) << folder;
+  }
+  /// Since the last time, folders left out.
+  [[nodiscard]] int files() const {
+    int count = 0;
+    alignas(inotify_event) std::array<char, 4096> events{};
+    for (ssize_t size = 0; (size = ::read(fd_.get(), events.data(), events.size())) > 0;) {
+      for (ssize_t at = 0; at < size;) {
+        const auto* event = reinterpret_cast<const inotify_event*>(events.data() + at);
+        if ((event->mask & IN_ISDIR) == 0) ++count;
+        at += static_cast<ssize_t>(sizeof *event + event->len);
+      }
+    }
+    return count;
+  }
+
+ private:
+  base::UniqueFd fd_;
+};
+
+// Whoever asks for the list again and again must not keep the processor from the frames.
+TEST_F(Store, ReadsForTheListWhatHasChanged) {
+  const fs::path configured = make_configured();
+  FolderCalibrationStore store(state_, configured);
+  store.keep(whole("ball"));
+  const fs::path toml = numbered(1) / "ball/calibration.toml";
+  const Opened uploaded(numbered(1) / "ball");
+  const Opened factory(configured);
+  const auto first = store.list();
+  EXPECT_EQ(uploaded.files(), 2);
+  EXPECT_EQ(factory.files(), 2);
+  const auto second = store.list();
+  EXPECT_EQ(uploaded.files(), 0);
+  EXPECT_EQ(factory.files(), 0);
+  ASSERT_EQ(second.size(), 2U);
+  EXPECT_EQ(second[0].summary, first[0].summary);
+  EXPECT_EQ(second[1].summary, first[1].summary);
+
+  // In place, of the same size and with the time set back: a program cannot hide that.
+  const auto time = fs::last_write_time(toml);
+  std::string text = base::read_file(toml);
+  text.replace(text.find("version = 1"), 11, "version = 9");
+  std::ofstream(toml) << text;
+  fs::last_write_time(toml, time);
+  (void)uploaded.files();
+  EXPECT_THAT(store.list()[1].damage, HasSubstr("version"));
+  EXPECT_GT(uploaded.files(), 0);
+  // One that is damaged is looked at each time.
+  EXPECT_THAT(store.list()[1].damage, HasSubstr("version"));
+  EXPECT_GT(uploaded.files(), 0);
+  EXPECT_EQ(factory.files(), 0);
 }
 
 TEST_F(Store, RefusesToLoadADamagedOne) {
