@@ -15,7 +15,8 @@ HOUR = 3600
 
 
 def held(**changes):
-    return Held(**{"descriptors": 20, "threads": 6, "resident_kib": 50_000, "cpu_s": 1.0,
+    return Held(**{"descriptors": 20, "threads": 6, "resident_kib": 50_000,
+                   "anonymous_kib": 40_000, "heap_kib": 30_000, "kept_kib": 5_000, "cpu_s": 1.0,
                    "state_files": 4, "state_kib": 900, "log_kib": 3.0, **changes})
 
 
@@ -96,6 +97,15 @@ class Checks(unittest.TestCase):
             rest.held = held(resident_kib=50_000 + (0, 700, -300, 500)[i % 4])
         self.finds(record)
 
+    def test_a_leak_shows_before_the_resident_size_does(self):
+        record = healthy()  # what is kept for later takes it up
+        for i, rest in enumerate(record.rests):
+            rest.held = held(heap_kib=30_000 + i * 20, kept_kib=5_000 - i * 20)
+        self.finds(record, "memory in use grows by 200 kB an hour")
+        for rest in record.rests[10:]:
+            rest.held = held(heap_kib=31_200)
+        self.finds(record, "memory in use grew from 30080 to 31200 kB", "an hour")
+
     def test_state_folder(self):
         record = healthy()
         record.rests[-1].held = held(state_files=61)
@@ -132,6 +142,9 @@ class Checks(unittest.TestCase):
         self.finds(record, "image_repeated was never told", "no light event came")
         record.seen[1].late = True
         self.finds(record)
+        record.seen[0].late = True
+        self.finds(record, "the commands of 2 episodes came too late")
+        record.seen[0].late = False
         record.seen[0].conditions.add("light_drifted")
         self.finds(record, "light_drifted was told without a reason")
         record = healthy()
@@ -139,6 +152,17 @@ class Checks(unittest.TestCase):
         record.take("frames", [frame(plan.EPISODE * 2 - 1)])
         record.seen[0].left.add("reference_stale")
         self.finds(record, "reference_stale was left at its end")
+
+    def test_what_a_late_command_does_reaches_into_the_next_episode_only(self):
+        record = healthy(["light", "quiet", "quiet"] * 10)
+        record.seen[0].episode.must = frozenset({"light_unsettled"})
+        record.seen[0].conditions = {"light_unsettled"}
+        record.seen[0].left = record.seen[1].conditions = {"light_unsettled"}
+        self.finds(record, "left at its end", "told without a reason")
+        record.seen[0].late = True
+        self.finds(record)
+        record.seen[2].conditions = {"light_unsettled"}
+        self.finds(record, "episode 2 (quiet): light_unsettled was told without a reason")
 
     def test_what_a_busy_machine_does_is_no_fault(self):
         record = healthy()
@@ -195,6 +219,15 @@ class Plan(unittest.TestCase):
         self.assertEqual(kinds[0], "quiet")
         for a in (1, 1 + len(plan.KINDS)):
             self.assertEqual(sorted(kinds[a:a + len(plan.KINDS)]), sorted(plan.KINDS))
+
+    def test_every_command_has_its_time(self):
+        for episode in plan.episodes(4, 1 + len(plan.KINDS)):
+            times = [time for step in episode.steps for time in (step.sequence, step.latest)]
+            if len(episode.steps) == 2:  # what is undone is to be seen until then
+                self.assertLess(episode.steps[0].sequence, episode.steps[1].sequence)
+            for step in episode.steps:
+                self.assertLess(step.sequence, step.latest)
+            self.assertLessEqual(max(times, default=0), episode.at(plan.REST))
 
     def test_places(self):
         episode = plan.Episode(2, "quiet")  # from frame 1920 on

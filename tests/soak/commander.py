@@ -35,19 +35,24 @@ class Commander:
         # While the camera is away no frame comes, but the events tell.
         self.sequence = max(self.sequence, event.sequence)
 
-    def do(self, step) -> bool:
-        """False: too late to be judged."""
+    def in_time(self, step) -> bool:
+        return self.sequence < step.latest
+
+    def do(self, step) -> tuple[bool, float]:
+        """Whether it was answered in time to be judged, and the seconds that the answer took."""
         refused = None
+        began = time.monotonic()
         try:
             getattr(self, step.verb)(step)
         except dtact.Refused as problem:
             refused = problem
+        took = time.monotonic() - began
         self.answers += 1
         self.listen(0.05)
-        in_time = step.latest is None or self.sequence < step.latest
+        in_time = self.in_time(step)
         if refused and in_time:
             self._note(f"{step.verb} at frame {step.sequence} was refused: {refused}")
-        return in_time
+        return in_time, took
 
     def light(self, step):
         shown = self._client.set_light(brightness=step.value)
@@ -63,7 +68,7 @@ class Commander:
         except dtact.Touched:
             return
         self.listen(0.1)
-        if self.sequence < step.latest:
+        if self.in_time(step):
             self._note(f"a re-zero at frame {step.sequence} was not refused although something touches")
 
     def upload(self, _step):

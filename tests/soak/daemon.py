@@ -6,8 +6,10 @@ import os
 import pathlib
 import re
 import shutil
+import socket
 import subprocess
 import time
+import urllib.request
 from dataclasses import dataclass
 
 SCENES = pathlib.Path(__file__).resolve().parents[2] / "config/scenes"
@@ -52,6 +54,9 @@ class Held:
     descriptors: int
     threads: int
     resident_kib: int
+    anonymous_kib: int  #: of it; the rest are pages of files, which come and go as the kernel likes
+    heap_kib: int  #: blocks of the allocator that are in use
+    kept_kib: int  #: and what it keeps for later ones
     cpu_s: float  #: used since its start
     state_files: int
     state_kib: int
@@ -65,8 +70,10 @@ class Daemon:
                  scene: pathlib.Path):
         self.log_file = folder / "dtactd.log"
         self.state = folder / "state"
-        settings = ["net.port=0", f"calibration={calibration}", f"state_dir={self.state}",
-                    f"camera.sim.scene={scene}"]
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self._metrics = free.getsockname()[1]
+        settings = ["net.port=0", f"metrics.port={self._metrics}", f"calibration={calibration}",
+                    f"state_dir={self.state}", f"camera.sim.scene={scene}"]
         with open(self.log_file, "w", encoding="utf-8") as out:
             self._process = subprocess.Popen(
                 [str(programs.dtactd), *(word for s in settings for word in ("--set", s))],
@@ -103,11 +110,21 @@ class Daemon:
         fields = dict(line.split(":", 1) for line in status.splitlines())
         times = pathlib.Path(f"/proc/{self.pid}/stat").read_text().rsplit(")", 1)[1].split()
         files = [f for f in self.state.rglob("*") if f.is_file()]
-        return Held(len(self.descriptors()), int(fields["Threads"]),
-                    int(fields["VmRSS"].split()[0]),
+        descriptors = len(self.descriptors())
+        heap = self._heap()  # last: the daemon lets go of this connection a moment later
+        return Held(descriptors, int(fields["Threads"]),
+                    int(fields["VmRSS"].split()[0]), int(fields["RssAnon"].split()[0]),
+                    heap["used"] + heap["mapped"], heap["kept"],
                     (int(times[11]) + int(times[12])) / os.sysconf("SC_CLK_TCK"), len(files),
                     sum(f.stat().st_size for f in files) // 1024,
                     self.log_file.stat().st_size / 1024)
+
+    def _heap(self) -> dict[str, int]:
+        """Of the daemon's metrics: kind → kB."""
+        with urllib.request.urlopen(f"http://127.0.0.1:{self._metrics}/metrics", timeout=120) as answer:
+            text = answer.read().decode()
+        return {kind: int(float(value)) // 1024 for kind, value in
+                re.findall(r'^dtactd_heap_bytes{kind="(\w+)"} (\S+)$', text, re.MULTILINE)}
 
     def end(self) -> int:
         """SIGTERM. Its exit status; 128 + 9 when it did not end within a minute."""

@@ -39,9 +39,10 @@ class Step:
 
     sequence: int
     verb: str  #: a method of commander.Commander
+    #: The episode is not judged when the answer comes later than this frame. The first step is not even
+    #: begun after it.
+    latest: int
     value: int | bool | None = None
-    #: Not judged when its answer comes later than this frame.
-    latest: int | None = None
 
 
 @dataclass
@@ -82,7 +83,7 @@ class Episode:
 
 _EARLY = 0.5  # untouched
 _TOUCHED = 3.3  # A is held
-_UNDO = 6.0  # untouched again
+_UNDO, _UNDONE = 6.0, 7.5  # untouched again
 
 
 def _camera(kind, condition, *, touched=False, frames=(20, 100), may=BEGUN_ANEW):
@@ -98,8 +99,10 @@ def _light(*, touched=False, dark=False):
     def make(episode, rng):
         at = episode.at(_TOUCHED if touched else _EARLY)
         level = 0 if dark else rng.randint(110, 235)
-        episode.steps = [Step(at, "light", level, episode.at(HOLD_A[1]) if touched else None),
-                         Step(episode.at(1.5 if dark else _UNDO), "light", 255)]
+        until = episode.at(HOLD_A[1] if touched else 1.4 if dark else UNTOUCHED[1])
+        undo, undone = (1.5, UNTOUCHED[1]) if dark else (_UNDO, _UNDONE)
+        episode.steps = [Step(at, "light", until, level),
+                         Step(episode.at(undo), "light", episode.at(undone), 255)]
         episode.must = frozenset({"light_unsettled"} | ({"reference_stale"} if touched else set()))
         episode.may = BEGUN_ANEW | {"image_dark"}
         episode.events = frozenset({"light", "reference"})
@@ -107,18 +110,18 @@ def _light(*, touched=False, dark=False):
 
 
 def _rezero(episode, _rng):
-    episode.steps = [Step(episode.at(_EARLY), "rezero", False, episode.at(2.0))]
+    episode.steps = [Step(episode.at(_EARLY), "rezero", episode.at(2.0), False)]
     episode.events = frozenset({"reference"})
 
 
 def _rezero_touched(episode, _rng):
-    episode.steps = [Step(episode.at(_TOUCHED), "rezero_refused", None, episode.at(HOLD_A[1]))]
+    episode.steps = [Step(episode.at(_TOUCHED), "rezero_refused", episode.at(HOLD_A[1]))]
 
 
 def _rezero_forced(episode, _rng):
     """The pressed picture is taken for untouched, as was asked, until the next one is."""
-    episode.steps = [Step(episode.at(_TOUCHED), "rezero", True),
-                     Step(episode.at(_UNDO), "rezero", True, episode.at(7.5))]
+    episode.steps = [Step(episode.at(_TOUCHED), "rezero", episode.at(HOLD_A[1]), True),
+                     Step(episode.at(_UNDO), "rezero", episode.at(_UNDONE), True)]
     episode.events = frozenset({"reference"})
     episode.blind = (episode.at(_TOUCHED - 0.1), episode.at(HOLD_B[0]))
     episode.may = BEGUN_ANEW | {"light_drifted", "beyond_calibration", "camera_moved",
@@ -128,13 +131,14 @@ def _rezero_forced(episode, _rng):
 def _calibration(*, touched=False):
     def make(episode, _rng):
         at = (_TOUCHED, HOLD_B[0] + 0.3) if touched else (_EARLY, _UNDO)
-        episode.steps = [Step(episode.at(at[0]), "upload"), Step(episode.at(at[1]), "activate", 0)]
+        episode.steps = [Step(episode.at(at[0]), "upload", episode.at(REST)),
+                         Step(episode.at(at[1]), "activate", episode.at(REST), 0)]
         episode.events = frozenset({"calibration"})
     return make
 
 
 def _calibration_broken(episode, _rng):
-    episode.steps = [Step(episode.at(_EARLY), "upload_broken")]
+    episode.steps = [Step(episode.at(_EARLY), "upload_broken", episode.at(REST))]
 
 
 def _quiet(_episode, _rng):

@@ -18,6 +18,7 @@ class Seen:
     cleared_frames: int = 0  #: in the episode's last seconds,
     left: set[str] = field(default_factory=set)  #: and the conditions in them
     late: bool = False  #: a command came too late for what it was to meet
+    answer_s: float = 0.0  #: the longest that a command waited for its answer
     client_ms: list[float] = field(default_factory=list)
     daemon_ms: list[float] = field(default_factory=list)
     #: Of frames against which nothing speaks: place, inside, outside, untrusted.
@@ -32,6 +33,7 @@ class Rest:
     held: Held
     descriptors: list[str]
     load: float  #: the machine's, 1 minute
+    late_s: float = 0.0  #: of the camera, after plan.REST
 
 
 class Record:

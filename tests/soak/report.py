@@ -43,8 +43,9 @@ def _csv(file, record):
         table = csv.writer(out)
         table.writerow(["episode", "kind", "frames", "client_p50_ms", "client_p99_ms", "daemon_p50_ms",
                         "daemon_p99_ms", "error_A_mm", "error_B_mm", "error_untouched_mm",
-                        "descriptors", "threads", "resident_kib", "cpu_s", "state_kib", "log_kib",
-                        "load", "conditions"])
+                        "descriptors", "threads", "resident_kib", "anonymous_kib", "heap_kib",
+                        "kept_kib", "cpu_s", "state_kib", "log_kib", "load", "rest_late_s",
+                        "answer_s", "late", "conditions"])
         for s in record.seen:
             rest = rests.get(s.episode.index)
             held = rest.held if rest else None
@@ -54,9 +55,11 @@ def _csv(file, record):
             table.writerow([s.episode.index, s.episode.kind, s.frames,
                             *(f"{_quantile(values, share):.3f}"
                               for values in (s.client_ms, s.daemon_ms) for share in (0.5, 0.99)),
-                            *worst, *([held.descriptors, held.threads, held.resident_kib, held.cpu_s,
-                                       held.state_kib, held.log_kib, rest.load] if held else [""] * 7),
-                            " ".join(sorted(s.conditions))])
+                            *worst, *([held.descriptors, held.threads, held.resident_kib,
+                                       held.anonymous_kib, held.heap_kib, held.kept_kib, held.cpu_s,
+                                       held.state_kib, held.log_kib, rest.load,
+                                       f"{rest.late_s:.2f}"] if held else [""] * 11),
+                            f"{s.answer_s:.3f}", int(s.late), " ".join(sorted(s.conditions))])
 
 
 def _plots(folder, record):
@@ -71,8 +74,11 @@ def _plots(folder, record):
     fig, axes = plt.subplots(5, 1, figsize=(11, 14), sharex=True, constrained_layout=True)
     memory, counts, latency, frames, depth = axes
     at = [_minutes(rest.episode, plan.REST) for rest in record.rests]
-    memory.plot(at, [rest.held.resident_kib / 1024 for rest in record.rests], "o-", ms=3)
-    memory.set_ylabel("resident, MiB")
+    for name, label in (("resident", "resident"), ("anonymous", "of it anonymous"),
+                        ("heap", "blocks in use")):
+        memory.plot(at, [getattr(rest.held, f"{name}_kib") / 1024 for rest in record.rests], "o-",
+                    ms=3, label=label)
+    memory.set_ylabel("memory, MiB")
     for name, mark in (("descriptors", "o-"), ("threads", "s-")):
         counts.plot(at, [getattr(rest.held, name) for rest in record.rests], mark, ms=3, label=name)
     counts.plot(at, [rest.load for rest in record.rests], ":", label="machine's load")

@@ -99,10 +99,16 @@ class Soak:
 
     def play(self, episode):
         self._open.set()
+        seen = self.record.seen[episode.index]
         for step in episode.steps:
             self.wait(self.reached(step.sequence))
-            if not self.commander.do(step):
-                self.record.seen[episode.index].late = True
+            # The episode before has not come to rest in time: what is not begun is not to be undone.
+            if step is episode.steps[0] and not self.commander.in_time(step):
+                seen.late = True
+                break
+            in_time, took = self.commander.do(step)
+            seen.late |= not in_time
+            seen.answer_s = max(seen.answer_s, took)
         self.wait(self.reached(episode.at(plan.VISITORS_LEAVE)))
         self._open.clear()
         self.wait(self.reached(episode.at(plan.REST)))
@@ -114,9 +120,11 @@ class Soak:
         if time.monotonic() > until:
             self.record.faults.append(f"episode {episode.index}: clients that have left are still "
                                       "connected, or did not leave")
+        late_s = (self.commander.sequence - episode.at(plan.REST)) / plan.FPS
+        names = self.daemon.descriptors()
         self.record.rests.append(record.Rest(
-            time.monotonic() - self.began, episode.index, self.daemon.held(),
-            self.daemon.descriptors(), os.getloadavg()[0]))
+            time.monotonic() - self.began, episode.index, self.daemon.held(), names,
+            os.getloadavg()[0], late_s))
 
     def run(self):
         try:
