@@ -22,10 +22,6 @@ Weights weights_at(double s) {
           {s * (2 - 1.5 * s) - 0.5, s * (4.5 * s - 5), s * (4 - 4.5 * s) + 0.5, s * (1.5 * s - 1)}};
 }
 
-Vector along(const Vector& from, double t, const Vector& direction) {
-  return {from[0] + t * direction[0], from[1] + t * direction[1], from[2] + t * direction[2]};
-}
-
 }  // namespace
 
 HeightMap::HeightMap(const recon::SurfaceHeights& heights)

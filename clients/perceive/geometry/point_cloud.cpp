@@ -13,7 +13,6 @@ namespace dtact::perceive {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr double kMetre = 1e-3;  // of a millimetre
 
 /// The first pixel of the whole map that is taken, as of blocks that leave both sides out alike.
 int first_of(int full, int stride) { return full % stride / 2 + stride / 2; }

@@ -13,13 +13,7 @@ namespace {
 
 using Kind = recon::Surface::Kind;
 
-constexpr double kMetre = 1e-3;  // of a millimetre
-
 double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-
-Vector along(const Vector& from, double t, const Vector& direction) {
-  return {from[0] + t * direction[0], from[1] + t * direction[1], from[2] + t * direction[2]};
-}
 
 /// How far from the axis the ray enters the gel that crosses z = 0 at `radius`: sin(in air) =
 /// refraction · sin(in the gel), whose difference falls with the place of entry.

@@ -17,24 +17,21 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// A contact of fewer pixels has no shape.
-constexpr std::size_t kFewestPixels = 300;
-/// One that has grown so many times may tell apart what was alike: it is searched again.
-constexpr double kGrown = 2;
+/// A contact that has grown so many times may tell apart what was alike: it is searched again.
+constexpr double kGrownMuch = 2;
 /// After a search that found nothing the next one waits for so many frames, or for so much growth.
 constexpr int kPause = 30;
 constexpr double kGrownInVain = 1.25;
 /// Surfels that are looked at and compared, of those that may touch.
 constexpr std::size_t kLookedAt = 3000;
-constexpr std::size_t kSurfels = 600;
+constexpr std::size_t kCompared = 600;
 /// What lies against the gel is so near to it, metres, and looks the same way within this cosine.
 constexpr double kTouching = 1.5e-4;
 constexpr double kSameWay = 0.7;
 constexpr double kUpright = 0.1;
-/// What a good alignment has at least and at most.
-constexpr double kGoodOverlap = 0.5;
-constexpr double kGoodRms = 4e-5;  // metres
-constexpr double kGoodArea = 0.1;  // of the contact
+/// What a good alignment has at least, beside kGoodRms.
+constexpr double kOverlap = 0.5;
+constexpr double kArea = 0.1;  // of the contact
 
 /// The surfels that touch where `place` puts the object, those that lie around the view.
 std::vector<Surfel> touching(const ObjectModel& object, const ContactView& view,
@@ -59,7 +56,7 @@ std::vector<Surfel> touching(const ObjectModel& object, const ContactView& view,
   }
   const double area = object.spacing * object.spacing * static_cast<double>(found.size() * every);
   const double contact = view.px() * view.px() * static_cast<double>(view.pixels());
-  if (area < kGoodArea * contact) found.clear();
+  if (area < kArea * contact) found.clear();
   return found;
 }
 
@@ -82,10 +79,10 @@ std::optional<Alignment> ObjectTracker::align_object(const ContactView& view,
   normals.reserve(near.size());
   for (const Surfel& surfel : near) normals.push_back(start.rotation * surfel.normal);
   std::vector<Surfel> chosen;
-  for (const std::size_t i : spread(normals, kSurfels)) chosen.push_back(near[i]);
+  for (const std::size_t i : spread(normals, kCompared)) chosen.push_back(near[i]);
   if (chosen.empty()) return std::nullopt;
   Alignment found = align(chosen, view, start);
-  if (found.overlap < kGoodOverlap || found.rms > kGoodRms) return std::nullopt;
+  if (found.overlap < kOverlap || found.rms > kGoodRms) return std::nullopt;
   if (!is_near(start, found.motion, found.centre)) return std::nullopt;
   return found;
 }
@@ -199,7 +196,7 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
     return static_cast<double>(view.pixels()) >= factor * static_cast<double>(searched_pixels_);
   };
   if (pause_ > 0) --pause_;
-  const bool again = unknown_place ? pause_ == 0 || times(kGrownInVain) : times(kGrown);
+  const bool again = unknown_place ? pause_ == 0 || times(kGrownInVain) : times(kGrownMuch);
   if (!search_ && again && view.pixels() >= kFewestPixels) begin_search(view);
   return pose_;
 }

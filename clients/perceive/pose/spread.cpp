@@ -7,17 +7,17 @@ namespace dtact::perceive {
 namespace {
 
 /// Normals are told apart by their x and y, in so many steps each.
-constexpr int kDirections = 12;
+constexpr int kStepsEach = 12;
 
 }  // namespace
 
 std::vector<std::size_t> spread(std::span<const Eigen::Vector3d> normals, std::size_t most) {
-  std::array<std::vector<std::size_t>, std::size_t{kDirections} * kDirections> by_direction;
+  std::array<std::vector<std::size_t>, std::size_t{kStepsEach} * kStepsEach> by_direction;
   const auto step = [](double component) {
-    return std::clamp(static_cast<int>((component + 1) / 2 * kDirections), 0, kDirections - 1);
+    return std::clamp(static_cast<int>((component + 1) / 2 * kStepsEach), 0, kStepsEach - 1);
   };
   for (std::size_t i = 0; i < normals.size(); ++i) {
-    const int direction = step(normals[i].y()) * kDirections + step(normals[i].x());
+    const int direction = step(normals[i].y()) * kStepsEach + step(normals[i].x());
     by_direction.at(static_cast<std::size_t>(direction)).push_back(i);
   }
   // Those with few give all they have, and leave more to the others.

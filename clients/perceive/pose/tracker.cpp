@@ -11,13 +11,10 @@ namespace {
 
 /// Surfels of a keyframe.
 constexpr std::size_t kSurfels = 600;
-/// A contact of fewer pixels has no shape.
-constexpr std::size_t kFewestPixels = 300;
 /// A contact that has grown so many times shows what its keyframe lacks.
 constexpr std::size_t kGrown = 2;
-/// What a good alignment has at least and at most.
+/// What a good alignment has at least, beside kGoodRms.
 constexpr double kGoodOverlap = 0.4;
-constexpr double kGoodRms = 4e-5;  // metres
 /// Sharing less with every keyframe, a frame becomes one.
 constexpr double kSharedOverlap = 0.7;
 constexpr std::size_t kMostKeyframes = 16;

@@ -1,11 +1,17 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "clients/perceive/pose/alignment.hpp"
 
 namespace dtact::perceive {
+
+/// A contact of fewer pixels has no shape.
+constexpr std::size_t kFewestPixels = 300;
+/// What a good alignment has at most, metres.
+constexpr double kGoodRms = 4e-5;
 
 /// From one frame to the next what is followed may go from `a` to `b`: no more than a millimetre
 /// and 14°, about `at`.
