@@ -5,10 +5,12 @@
 #include <cmath>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <random>
 #include <vector>
 
 #include "clients/perceive/pose/contact_view.hpp"
+#include "clients/perceive/pose/object_model.hpp"
 #include "clients/perceive/pose/tracker.hpp"
 
 namespace dtact::perceive::test {
@@ -28,6 +30,28 @@ inline Balls bumps() {
            {{1.2, -1.1, 1.5}, 2.0},
            {{0.2, 1.3, 1.9}, 2.5},
            {{2.2, 1.2, 1.1}, 1.5}}};
+}
+
+/// A cloud of their common surface, millimetres.
+inline Mesh cloud_of(const Balls& object) {
+  Mesh mesh;
+  for (const auto& ball : object.balls) {
+    for (const Eigen::Vector3d& out : all_directions(20000)) {
+      const Eigen::Vector3d point = ball.middle + ball.radius * out;
+      const bool within = std::ranges::any_of(object.balls, [&](const auto& other) {
+        return (point - other.middle).norm() < other.radius - 1e-6;
+      });
+      if (within) continue;
+      mesh.points.push_back({point.x(), point.y(), point.z()});
+      mesh.normals.push_back({out.x(), out.y(), out.z()});
+    }
+  }
+  return mesh;
+}
+
+/// Of that cloud, named "balls".
+inline std::shared_ptr<const ObjectModel> model_of(const Balls& object) {
+  return std::make_shared<const ObjectModel>(make_object(cloud_of(object), 1e-3, "balls"));
 }
 
 /// Fingers whose field of 8 mm falls away by half a millimetre and more.

@@ -14,27 +14,6 @@ using namespace test;
 using Eigen::Vector3d;
 using State = Tracker::State;
 
-/// A cloud of their common surface, millimetres.
-Mesh cloud_of(const Balls& object) {
-  Mesh mesh;
-  for (const auto& ball : object.balls) {
-    for (const Vector3d& out : all_directions(20000)) {
-      const Vector3d point = ball.middle + ball.radius * out;
-      const bool within = std::ranges::any_of(object.balls, [&](const auto& other) {
-        return (point - other.middle).norm() < other.radius - 1e-6;
-      });
-      if (within) continue;
-      mesh.points.push_back({point.x(), point.y(), point.z()});
-      mesh.normals.push_back({out.x(), out.y(), out.z()});
-    }
-  }
-  return mesh;
-}
-
-std::shared_ptr<const ObjectModel> model_of(const Balls& object) {
-  return std::make_shared<const ObjectModel>(make_object(cloud_of(object), 1e-3, "balls"));
-}
-
 Mesh box(double x, double y, double z) {
   Mesh mesh;
   for (unsigned i = 0; i < 8; ++i) {
@@ -45,7 +24,7 @@ Mesh box(double x, double y, double z) {
   return mesh;
 }
 
-std::string error_of(const Mesh& mesh, double metres) {
+std::string message_of(const Mesh& mesh, double metres) {
   try {
     (void)make_object(mesh, metres, "object");
   } catch (const std::runtime_error& e) {
@@ -87,17 +66,17 @@ TEST(ObjectModel, LargeOnesAreSampledLess) {
 }
 
 TEST(ObjectModel, AWrongUnitAndAnInsideOutShapeAreTold) {
-  EXPECT_THAT(error_of(box(4, 5, 6), 1), testing::HasSubstr("is its unit another one?"));
-  EXPECT_THAT(error_of(box(0.004, 0.005, 0.006), 1e-3), testing::HasSubstr("unit"));
+  EXPECT_THAT(message_of(box(4, 5, 6), 1), testing::HasSubstr("is its unit another one?"));
+  EXPECT_THAT(message_of(box(0.004, 0.005, 0.006), 1e-3), testing::HasSubstr("unit"));
   Mesh turned = box(4, 5, 6);
   for (auto& triangle : turned.triangles) std::swap(triangle[0], triangle[1]);
-  EXPECT_THAT(error_of(turned, 1e-3), testing::HasSubstr("looks inwards"));
+  EXPECT_THAT(message_of(turned, 1e-3), testing::HasSubstr("looks inwards"));
   Mesh few = cloud_of({{{{0, 0, 0}, 4}}});
   few.points.resize(20);
   few.normals.resize(20);
   few.points.push_back({4, 4, 4});
   few.normals.push_back({0, 0, 1});
-  EXPECT_THAT(error_of(few, 1e-3), testing::HasSubstr("are needed"));
+  EXPECT_THAT(message_of(few, 1e-3), testing::HasSubstr("are needed"));
 }
 
 TEST(SearchPlacement, FindsBumpsWhereverTheyAre) {
