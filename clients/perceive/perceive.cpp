@@ -39,6 +39,12 @@ void serve(const cli::Context& context, const Settings& settings) {
     config.log(
         {net::LogLevel::info, fmt::format("following {}: {} places {:.2f} mm apart", object->name,
                                           object->surfels.size(), 1e3 * object->spacing)});
+    if (object->spacing > kCoarse) {
+      config.log({net::LogLevel::warning,
+                  fmt::format("{} is large: its places are more than {} mm apart, and it may be "
+                              "found where it is not; give the part of it that touches",
+                              object->name, 1e3 * kCoarse)});
+    }
   }
   boost::asio::io_context io;
   const auto server = std::make_shared<Server>(io, config, context.target, object);

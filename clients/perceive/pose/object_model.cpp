@@ -233,6 +233,14 @@ ObjectModel make_object(const Mesh& mesh, double metres_per_unit, std::string na
     // Nor may a cloud's own gaps be holes: two of its points for each that is left.
     const bool sparse = cloud && mesh.points.size() < 2 * model.surfels.size();
     if (model.surfels.size() <= kMostSurfels && !sparse) break;
+    if (sparse && model.spacing > kCoarse) {
+      const double each =
+          static_cast<double>(model.surfels.size()) / static_cast<double>(mesh.points.size());
+      throw std::runtime_error(
+          fmt::format("the cloud's points are about {:.2g} mm apart, at most {} mm is needed: a "
+                      "denser cloud, or a mesh",
+                      1e3 * model.spacing * std::sqrt(each), 1e3 * kSpacing));
+    }
   }
   constexpr std::size_t kFewest = 50;
   if (model.surfels.size() < kFewest) {

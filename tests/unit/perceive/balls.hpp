@@ -32,11 +32,11 @@ inline Balls bumps() {
            {{2.2, 1.2, 1.1}, 1.5}}};
 }
 
-/// A cloud of their common surface, millimetres.
-inline Mesh cloud_of(const Balls& object) {
+/// A cloud of their common surface, millimetres, of so many points on each ball.
+inline Mesh cloud_of(const Balls& object, int points = 20000) {
   Mesh mesh;
   for (const auto& ball : object.balls) {
-    for (const Eigen::Vector3d& out : all_directions(20000)) {
+    for (const Eigen::Vector3d& out : all_directions(points)) {
       const Eigen::Vector3d point = ball.middle + ball.radius * out;
       const bool within = std::ranges::any_of(object.balls, [&](const auto& other) {
         return (point - other.middle).norm() < other.radius - 1e-6;

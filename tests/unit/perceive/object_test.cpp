@@ -71,12 +71,17 @@ TEST(ObjectModel, AWrongUnitAndAnInsideOutShapeAreTold) {
   Mesh turned = box(4, 5, 6);
   for (auto& triangle : turned.triangles) std::swap(triangle[0], triangle[1]);
   EXPECT_THAT(message_of(turned, 1e-3), testing::HasSubstr("looks inwards"));
-  Mesh few = cloud_of({{{{0, 0, 0}, 4}}});
-  few.points.resize(20);
-  few.normals.resize(20);
-  few.points.push_back({4, 4, 4});
-  few.normals.push_back({0, 0, 1});
-  EXPECT_THAT(message_of(few, 1e-3), testing::HasSubstr("are needed"));
+  Mesh flat = box(4, 5, 6);
+  flat.triangles = {{0, 0, 1}};
+  EXPECT_THAT(message_of(flat, 1e-3), testing::HasSubstr("50 are needed"));
+}
+
+TEST(ObjectModel, ASparseCloudIsRefused) {
+  const Balls ball{{{{0, 0, 3.0}, 4.0}}};
+  // 201 mm² by so many points.
+  EXPECT_THAT(message_of(cloud_of(ball, 4000), 1e-3),
+              testing::HasSubstr("at most 0.15 mm is needed"));
+  EXPECT_EQ(message_of(cloud_of(ball, 12000), 1e-3), "none");
 }
 
 TEST(SearchPlacement, FindsBumpsWhereverTheyAre) {
