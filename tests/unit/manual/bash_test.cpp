@@ -54,6 +54,11 @@ TEST(Bash, OffersLevels) {
   EXPECT_THAT(offered(kDtactd, "dtactd --log-level w"), testing::ElementsAre("warn"));
 }
 
+TEST(Bash, OffersUnits) {
+  EXPECT_THAT(offered(kPerceive, "dtact-perceive serve --object-unit \"\""),
+              testing::UnorderedElementsAre("mm", "m"));
+}
+
 /// Of a program and each of its commands.
 void expect_every_option(const Completion& completion, const Command& program) {
   EXPECT_EQ(offered(completion, program.name + " --"), options_of(program));
