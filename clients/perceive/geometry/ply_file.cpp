@@ -210,11 +210,13 @@ class Body {
   }
 
   void pass(const Property& property) {
-    const std::size_t values = property.count ? length(property) : 1;
+    const std::size_t values = length(property);
     for (std::size_t i = 0; i < values; ++i) (void)value_of(property.type, format_, reader_);
   }
 
+  /// Of a list; 1 of what is none.
   std::size_t length(const Property& property) {
+    if (!property.count) return 1;
     return whole(value_of(*property.count, format_, reader_), static_cast<double>(reader_.left()),
                  "a list's length (as far as the file goes)", reader_);
   }

@@ -78,7 +78,9 @@ std::vector<Surfel> sample(const Mesh& mesh, double scale, double spacing, const
     const double twice = across.norm();
     if (!(twice > 0)) continue;
     const Vector3d inwards = -across / twice;
-    for (owed += kSamplesPerSurfel * twice / 2 / (spacing * spacing); owed >= 1; --owed) {
+    owed += kSamplesPerSurfel * twice / 2 / (spacing * spacing);
+    while (owed >= 1) {
+      owed -= 1;
       u = std::fmod(u + kFirst, 1.0);
       v = std::fmod(v + kSecond, 1.0);
       const bool beyond = u + v > 1;

@@ -116,7 +116,7 @@ std::vector<Twist> ObjectTracker::unknown(const Alignment& alignment) const {
 }
 
 void ObjectTracker::begin_search(const ContactView& view) {
-  Search& search = search_.emplace();
+  SearchUnderWay& search = search_.emplace();
   search.contact = contact_.pose().alignment.motion;
   search.pixels = view.pixels();
   std::optional<Motion> present;
@@ -133,7 +133,7 @@ std::optional<Placement> ObjectTracker::finished() {
     return std::nullopt;
   }
   std::optional<Placement> found = search_->result.get();
-  const Search search = std::move(*search_);
+  const SearchUnderWay search = std::move(*search_);
   search_.reset();
   if (!search.wanted) return std::nullopt;
   searched_pixels_ = search.pixels;
@@ -171,7 +171,8 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
   const bool was_lost = pose_.state == State::lost;
   std::optional<Alignment> aligned;
   if (const std::optional<Placement> found = finished()) {
-    if ((aligned = align_object(view, found->pose))) {
+    aligned = align_object(view, found->pose);
+    if (aligned) {
       if (!placement_) pose_.since = sequence;
       pose_.state = placement_ ? State::recovered : State::started;
       if (placement_ && !was_lost && is_near(place_, aligned->motion, aligned->centre)) {
@@ -180,8 +181,9 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
       placement_ = found;
     }
   }
-  if (!aligned && placement_ && (aligned = align_object(view, place_))) {
-    pose_.state = was_lost ? State::recovered : State::tracked;
+  if (!aligned && placement_) {
+    aligned = align_object(view, place_);
+    if (aligned) pose_.state = was_lost ? State::recovered : State::tracked;
   }
   if (aligned) {
     place_ = aligned->motion;

@@ -11,6 +11,14 @@
 
 namespace dtact::perceive {
 
+/// What an ObjectTracker waits for.
+struct SearchUnderWay {
+  std::future<std::optional<Placement>> result;
+  Motion contact;          ///< The contact's motion at its frame.
+  std::size_t pixels = 0;  ///< Of the contact then.
+  bool wanted = true;      ///< The contact is still the same.
+};
+
 /// Follows a known object: where it is, in the surface frame. A Tracker follows the contact from
 /// frame to frame. Beside it, on another thread, the object is searched for in what one frame
 /// showed; what the contact has moved by since then is added to what is found. From there on each
@@ -35,13 +43,6 @@ class ObjectTracker {
   }
 
  private:
-  struct Search {
-    std::future<std::optional<Placement>> result;
-    Motion contact;          ///< The contact's motion at its frame.
-    std::size_t pixels = 0;  ///< Of the contact then.
-    bool wanted = true;      ///< The contact is still the same.
-  };
-
   /// Moves the place as the contact moved.
   void follow_contact(const ContactView& view, std::uint64_t sequence);
   void begin_search(const ContactView& view);
@@ -55,7 +56,7 @@ class ObjectTracker {
 
   std::shared_ptr<const ObjectModel> object_;
   Tracker contact_;
-  std::optional<Search> search_;
+  std::optional<SearchUnderWay> search_;
   std::optional<Placement> placement_;  ///< Its centre and hidden twists in the object's frame.
   Motion place_;                        ///< Where the object is, as far as its contact tells.
   std::size_t searched_pixels_ = 0;

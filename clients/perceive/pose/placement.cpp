@@ -87,8 +87,9 @@ Underside::Low Underside::below(double height) const {
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     const std::int32_t held = cells_[i];
     if (held < 0 || surfels_[static_cast<std::size_t>(held)].point.z() > height) continue;
-    low.middle += Eigen::Vector2d(static_cast<double>(i % static_cast<std::size_t>(width_)),
-                                  static_cast<double>(i / static_cast<std::size_t>(width_)));
+    const std::size_t row = i / static_cast<std::size_t>(width_);
+    const std::size_t column = i % static_cast<std::size_t>(width_);
+    low.middle += Eigen::Vector2d(static_cast<double>(column), static_cast<double>(row));
     ++count;
   }
   if (count == 0) return low;

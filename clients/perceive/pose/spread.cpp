@@ -21,8 +21,7 @@ std::vector<std::size_t> spread(std::span<const Eigen::Vector3d> normals, std::s
     by_direction.at(static_cast<std::size_t>(direction)).push_back(i);
   }
   // Those with few give all they have, and leave more to the others.
-  std::sort(by_direction.begin(), by_direction.end(),
-            [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  std::ranges::sort(by_direction, [](const auto& a, const auto& b) { return a.size() < b.size(); });
   std::vector<std::size_t> chosen;
   for (std::size_t bin = 0; bin < by_direction.size(); ++bin) {
     const auto& alike = by_direction.at(bin);
