@@ -95,7 +95,7 @@ std::vector<perceive::Motion> symmetries_of(const perceive::ObjectModel& object)
   constexpr std::size_t kProbes = 250;
   const std::size_t every = std::max<std::size_t>(1, object.surfels.size() / kProbes);
   const auto stays = [&](const perceive::Motion& motion) {
-    const double limit = std::max(1e-4, 0.8 * object.spacing);
+    const double limit = 1.2 * object.spacing;
     std::size_t off = 0;
     for (std::size_t i = 0; i < object.surfels.size(); i += every) {
       const Eigen::Vector3d moved = motion * object.surfels[i].point;
