@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 
 namespace dtact::perceive {
 namespace {
@@ -21,11 +22,14 @@ std::vector<std::size_t> spread(std::span<const Eigen::Vector3d> normals, std::s
     by_direction.at(static_cast<std::size_t>(direction)).push_back(i);
   }
   // Those with few give all they have, and leave more to the others.
-  std::ranges::sort(by_direction, [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  std::array<std::size_t, by_direction.size()> order{};
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t bin) { return by_direction.at(bin).size(); });
   std::vector<std::size_t> chosen;
-  for (std::size_t bin = 0; bin < by_direction.size(); ++bin) {
+  std::size_t left = order.size();
+  for (const std::size_t bin : order) {
     const auto& alike = by_direction.at(bin);
-    const std::size_t share = (most - chosen.size()) / (by_direction.size() - bin);
+    const std::size_t share = (most - chosen.size()) / left--;
     const std::size_t count = std::min(share, alike.size());
     for (std::size_t k = 0; k < count; ++k) chosen.push_back(alike[k * alike.size() / count]);
   }
