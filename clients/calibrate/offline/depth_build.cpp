@@ -153,6 +153,7 @@ calibration::Calibration build_list(const PressImages& images, ListMethod method
     made = free_list(images, found);
   } else {
     calibration::FittedCalibration fitted = calibration::build_model(images.set, images.gain);
+    found.note = fitted.describe_press();
     found.left_out = std::move(fitted.left_out);
     for (const auto& press : fitted.presses) found.presses.push_back({press.name, press.depth_mm});
     made = std::move(fitted.calibration);

@@ -1,5 +1,5 @@
 // What the model makes of a real ball press, beside the free list: residual, layer, half-disc
-// error.
+// error, the press's own gain taken off.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -8,7 +8,9 @@
 #include <exception>
 #include <numbers>
 
+#include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/model/model_list.hpp"
+#include "clients/calibrate/fit/press_gain.hpp"
 #include "clients/calibrate/offline/folder_evaluation.hpp"
 
 namespace {
@@ -22,7 +24,7 @@ double look_up_mm(const recon::DepthList& list, double level) {
 }
 
 /// Mean distance from the sphere over the pixels that `use` leaves out, the median taken off.
-double left_out_mm(const calibration::SettledPress& press, const recon::DepthList& list,
+double left_out_mm(const calibration::LevelledPress& press, const recon::DepthList& list,
                    const calibration::PixelFilter& use) {
   const calibration::Contact& contact = press.contact;
   std::vector<double> errors;
@@ -56,7 +58,12 @@ void look(const std::string& folder) {
       if (!pins) model.gain = {};
       model.gain.shape = uniform ? recon::GainShape::uniform : recon::GainShape::none;
       const auto frames = e.ball_images.frames();
-      const auto press = calibration::settle(model, e.ball_reference.mean_q8().pixels, frames, 4.0);
+      const auto settled =
+          calibration::settle(model, e.ball_reference.mean_q8().pixels, frames, 4.0);
+      const auto chosen = calibration::choose_press_gain(
+          calibration::sure_samples(settled.map, settled.contact), 4.0);
+      const calibration::LevelledPress press =
+          calibration::levelled(settled.map, settled.contact, chosen.gain);
       double light = 0;
       const auto reference =
           calibration::rectified_reference(model.rectify, e.ball_reference.mean_q8());

@@ -21,7 +21,8 @@ constexpr double kMostResidual = 0.5;  // grey levels
 /// Grey levels themselves are taken for shares of the light where that leaves so much less: on
 /// sensor_a 0.7 of the error, on sensor_b 1.02 (half-disc); in the simulator it is a share.
 constexpr double kRounder = 0.8;
-constexpr double kDeepest = 0.92;  // of the thickness
+constexpr double kDeepest = 0.92;     // of the thickness
+constexpr double kWorthSaying = 0.5;  // grey levels of a press's offset
 
 /// Mean of the reference over what is not dark: what GainShape::uniform brings darkening to.
 double light_of(const recon::RectifyTable& table, const image::Grey16& reference_q8) {
@@ -105,8 +106,12 @@ Layer describe(const ModelFit& fit, double light_levels) {
   Layer layer;
   layer.thickness_mm = {fit.layer.thickness_mm,
                         fit.layer.thickness_mm * deviation(ModelFit::kThickness)};
-  layer.narrow_mm = {scattering.narrow_mm, scattering.narrow_mm * deviation(ModelFit::kNarrow)};
-  layer.wide_mm = {scattering.wide_mm, scattering.wide_mm * deviation(ModelFit::kWide)};
+  // The fit does not mind which of its two widths is the narrow one; layer_of() does.
+  const bool crossed = fit.parameters[ModelFit::kNarrow] > fit.parameters[ModelFit::kWide];
+  const auto narrow = crossed ? ModelFit::kWide : ModelFit::kNarrow;
+  const auto wide = crossed ? ModelFit::kNarrow : ModelFit::kWide;
+  layer.narrow_mm = {scattering.narrow_mm, scattering.narrow_mm * deviation(narrow)};
+  layer.wide_mm = {scattering.wide_mm, scattering.wide_mm * deviation(wide)};
   layer.narrow_weight = {weight, weight * (1 - weight) * deviation(ModelFit::kOdds)};
   for (std::size_t i = 0; i < layer.slope.size(); ++i) {
     const double slope = fit.layer.response.slopes[i];
@@ -119,6 +124,19 @@ Layer describe(const ModelFit& fit, double light_levels) {
 }
 
 }  // namespace
+
+std::string FittedCalibration::describe_press() const {
+  if (press_gains.size() != 1) return {};
+  std::string text = press_gains.front().describe();
+  const double darker = fit.presses.front().offset * light_levels;
+  if (std::abs(darker) > kWorthSaying) {
+    text += fmt::format(
+        "\nlight: far from the ball the picture is {:.1f} grey levels {} than untouched, which no "
+        "layer does; the list was made without them",
+        std::abs(darker), darker > 0 ? "darker" : "brighter");
+  }
+  return text;
+}
 
 FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& gain) {
   FittedCalibration made;
@@ -147,7 +165,10 @@ FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& 
   std::vector<PressProfile> profiles;
   profiles.reserve(seen.presses.size());
   for (const SettledPress& press : seen.presses) {
-    profiles.push_back(profile_of(press, optics.light_levels, optics.smoothing_mm));
+    made.press_gains.push_back(
+        choose_press_gain(sure_samples(press.map, press.contact), set.ball_radius_mm));
+    profiles.push_back(profile_of(levelled(press.map, press.contact, made.press_gains.back().gain),
+                                  optics.light_levels, optics.smoothing_mm));
   }
   // What does not fit one press fits several even less, and costs as much for each.
   const auto deepest = std::ranges::max_element(

@@ -245,7 +245,7 @@ LayerModel layer_of(const Eigen::VectorXd& parameters) {
   return layer_from(std::span(parameters.data(), static_cast<std::size_t>(parameters.size())));
 }
 
-PressProfile profile_of(const SettledPress& press, double light_levels, double smoothing_mm,
+PressProfile profile_of(const LevelledPress& press, double light_levels, double smoothing_mm,
                         const PixelFilter& use) {
   const Contact& contact = press.contact;
   const double reach = kFarField * contact.ball_radius_mm;

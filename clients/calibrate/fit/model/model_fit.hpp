@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/list_fit.hpp"
 #include "clients/calibrate/fit/model/layer_model.hpp"
+#include "clients/calibrate/fit/press_gain.hpp"
 
 namespace dtact::calibration {
 
@@ -31,7 +31,7 @@ struct PressProfile {
 /// `light_levels`: the grey level that the press's map counts as all of the light: the mean of the
 /// reference where the gain is uniform. Rings of which the map, or `use`, leaves less than a third
 /// are left out.
-[[nodiscard]] PressProfile profile_of(const SettledPress& press, double light_levels,
+[[nodiscard]] PressProfile profile_of(const LevelledPress& press, double light_levels,
                                       double smoothing_mm, const PixelFilter& use = {});
 
 /// A layer fitted to presses.
