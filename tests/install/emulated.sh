@@ -90,12 +90,13 @@ prepare_emulated() {
   mkdir "$root/job"
   mv "$root.apt/archives" "$root/more"
   logged mke2fs -q -t ext4 -d "$root" "$root.emulated/disc" 4G
+  # At last few and large writes, for each waits until this machine has done it.
   logged in_emulation "$root.emulated/disc" 'set -e
     /debootstrap/debootstrap --second-stage
     apt-get install -y --no-install-recommends /more/*.deb
     apt-get clean
     rm -rf /more /var/lib/apt/lists/*
-    tar --one-file-system -C / -cf /job/root.tar .'
+    tar --blocking-factor 1000 --one-file-system -C / -cf /job/root.tar .'
   rm -rf "$root" "$root.emulated/disc"
   mkdir "$root"
   logged tar --numeric-owner -C "$root" -xpf "$root.emulated/root.tar"
