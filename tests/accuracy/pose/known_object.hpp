@@ -15,8 +15,8 @@ namespace dtact::pose {
 [[nodiscard]] perceive::Mesh cloud_of(const hal::sim::Object& object);
 
 /// The turns about the object's z, in steps of 10, 15 and 72°, and about its x by half a turn with
-/// them, after which its surface lies where it did, within 1.2 times the surfels' distance (the rows
-/// that a cloud ends with need not be alike): the first is none.
+/// them, after which its surface lies where it did, within 1.2 times the surfels' distance (the
+/// rows that a cloud ends with need not be alike): the first is none.
 [[nodiscard]] std::vector<perceive::Motion> symmetries_of(const perceive::ObjectModel& object);
 
 /// How a known object is found and followed while it moves.
