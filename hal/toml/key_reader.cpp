@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
@@ -113,11 +114,12 @@ std::vector<std::vector<double>> KeyReader::rows(const std::string& key, double 
     std::vector<double> row;
     row.reserve(entries->size());
     for (const toml::node& entry : *entries) {
-      const auto value = entry.is_number() ? entry.value<double>() : std::nullopt;
-      if (!value || !(*value >= low && *value <= high)) {
+      const double none = std::numeric_limits<double>::quiet_NaN();
+      const double value = entry.is_number() ? entry.value_or(none) : none;
+      if (!(value >= low && value <= high)) {
         refuse(entry, fmt::format(", entry {} is not allowed", row.size() + 1));
       }
-      row.push_back(*value);
+      row.push_back(value);
     }
     rows.push_back(std::move(row));
   }
