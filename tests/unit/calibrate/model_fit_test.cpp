@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -59,6 +60,40 @@ TEST(ModelFit, FindsTheLayerThatMadeAPress) {
   const double thickness_error = std::sqrt(fit.covariance(0, 0));
   EXPECT_GT(thickness_error, 1e-4);
   EXPECT_LT(std::abs(std::log(fit.layer.thickness_mm / 2.2)), 3 * thickness_error);
+}
+
+/// A map of a press that is darker on one side and across, about (120, 118).
+DifferenceMap lopsided(const Eigen::VectorXd& seen) {
+  DifferenceMap map{240, 240, 0.08, {}};
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const double right = map.mm_per_px * (x - 120);
+      const double down = map.mm_per_px * (y - 118);
+      const double r = std::hypot(right, down);
+      const auto place =
+          std::min<Eigen::Index>(seen.size() - 1, std::lround(r / RadialTransform::kStepMm));
+      const double held = std::min(1.0, 2.8 / std::max(1e-9, r));
+      const double gain =
+          1 + 0.04 * held * right + 0.03 * held * held * (right * right - down * down);
+      map.levels.push_back(static_cast<float>(seen[place] / gain));
+    }
+  }
+  return map;
+}
+
+TEST(ModelFit, LooksAtALopsidedPressAboutItsMiddle) {
+  const BallContact pressed = press_ball(4, 2.8, 2.2);
+  const DifferenceMap map = lopsided(levels(pressed, 0));
+  const Contact contact = find_contact(map, 4);
+  const ChosenPressGain chosen = choose_press_gain(sure_samples(map, contact), 4);
+  ASSERT_EQ(chosen.gain.order, GainOrder::quadratic);
+  const auto depth_of = [&](const PressGain& gain) {
+    const PressProfile profile = profile_of(levelled(map, contact, gain), kLight, kSmoothing);
+    return fit_model({&profile, 1}).deepest_mm();
+  };
+  const double off = std::abs(depth_of(chosen.gain) - pressed.depth_mm);
+  EXPECT_LT(off, 0.04);
+  EXPECT_LT(off, std::abs(depth_of({}) - pressed.depth_mm));
 }
 
 TEST(ModelList, ReadsABallThroughEveryFilter) {
