@@ -37,6 +37,15 @@ class Names : public GuestCamera {
       "/dev/v4l/by-path/platform-vhci_hcd.0-usb-0:1:1.0-video-index0";
   static constexpr const char* kById = "/dev/v4l/by-id/usb-Test_Fake_UVC_camera_0001-video-index0";
 
+  /// udev takes a camera's links away after its node, and a name that is still there from the
+  /// camera before would be taken for the next one's.
+  void TearDown() override {
+    GuestCamera::TearDown();
+    EXPECT_TRUE(eventually(kPatience, [] {
+      return !std::filesystem::is_symlink(kByPath) && !std::filesystem::is_symlink(kById);
+    }));
+  }
+
   static void wait_for_links() {
     ASSERT_TRUE(eventually(kPatience, [] {
       const auto cameras = hal::v4l2::list_attached();
