@@ -87,19 +87,19 @@ std::optional<Alignment> ObjectTracker::align_object(const ContactView& view,
   return found;
 }
 
-std::vector<Twist> ObjectTracker::unknown(const Alignment& alignment) const {
+std::vector<Twist> ObjectTracker::unknown(const Alignment& alignment, const Placement& placement) {
   const std::vector<Twist>& by_shape = alignment.unobservable;
-  const std::vector<Twist>& by_outline = placement_->hidden;
+  const std::vector<Twist>& by_outline = placement.hidden;
   if (by_shape.empty() || by_outline.empty()) return {};
   const Motion& pose = alignment.motion;
-  const Vector3d shift = alignment.centre - pose * placement_->centre;
+  const Vector3d shift = alignment.centre - pose * placement.centre;
   Eigen::MatrixXd shape(6, by_shape.size());
   for (std::size_t i = 0; i < by_shape.size(); ++i) {
     shape.col(static_cast<Eigen::Index>(i)) = by_shape[i];
   }
   Eigen::MatrixXd outline(6, by_outline.size());
   for (std::size_t i = 0; i < by_outline.size(); ++i) {
-    const Vector3d turn = pose.rotation * by_outline[i].head<3>() / placement_->arm;
+    const Vector3d turn = pose.rotation * by_outline[i].head<3>() / placement.arm;
     const Vector3d slide = pose.rotation * by_outline[i].tail<3>() + turn.cross(shift);
     outline.col(static_cast<Eigen::Index>(i)) << alignment.arm * turn, slide;
   }
@@ -185,10 +185,10 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
     aligned = align_object(view, place_);
     if (aligned) pose_.state = was_lost ? State::recovered : State::tracked;
   }
-  if (aligned) {
+  if (aligned && placement_) {
     place_ = aligned->motion;
     pose_.alignment = *std::move(aligned);
-    pose_.alignment.unobservable = unknown(pose_.alignment);
+    pose_.alignment.unobservable = unknown(pose_.alignment, *placement_);
     pose_.alternatives = placement_->alternatives;
   } else {
     pose_.state = placement_ ? State::lost : State::searching;

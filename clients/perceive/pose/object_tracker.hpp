@@ -52,7 +52,8 @@ class ObjectTracker {
   [[nodiscard]] std::optional<Alignment> align_object(const ContactView& view,
                                                       const Motion& start) const;
   /// What neither the touched shape nor, at the search, the outline shows.
-  [[nodiscard]] std::vector<Twist> unknown(const Alignment& alignment) const;
+  [[nodiscard]] static std::vector<Twist> unknown(const Alignment& alignment,
+                                                  const Placement& placement);
 
   std::shared_ptr<const ObjectModel> object_;
   Tracker contact_;
