@@ -4,36 +4,14 @@
 
 #include <chrono>
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "tests/e2e/program.hpp"
 #include "tests/fakes/notify_socket.hpp"
 
 namespace dtact::e2e {
-
-/// A folder of the test's own, removed with it.
-class TempFolder {
- public:
-  TempFolder();
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-  ~TempFolder();
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
-/// Runs a program to its end. Returns its exit status (128 + signal when it was killed); `output`
-/// receives what it printed on both streams; `input` is what it reads.
-int run_program(const std::vector<std::string>& arguments, std::string* output = nullptr,
-                const std::string& input = "");
-
-/// Variables beside those of this program.
-using Environment = std::vector<std::pair<std::string, std::string>>;
 
 /// A dtactd of the test's own on a port that the system chose. Started the way systemd
 /// starts it: ready when it says READY=1 on its notify socket.
@@ -42,28 +20,24 @@ class DaemonProcess {
   /// `arguments` follow the program's name, `environment` adds to this program's. Throws
   /// std::runtime_error with the log when the daemon ends or is not ready within 60 s (kSlower).
   explicit DaemonProcess(const std::vector<std::string>& arguments, Environment environment = {});
-  DaemonProcess(const DaemonProcess&) = delete;
-  DaemonProcess& operator=(const DaemonProcess&) = delete;
-  ~DaemonProcess();
 
   [[nodiscard]] std::uint16_t port() const { return port_; }
-  [[nodiscard]] pid_t pid() const { return pid_; }
-  [[nodiscard]] std::string log() const;
+  [[nodiscard]] pid_t pid() const { return program_.pid(); }
+  [[nodiscard]] std::string log() const { return program_.log(); }
   /// What the daemon tells systemd next; none when nothing comes in time.
   [[nodiscard]] std::optional<std::string> next_notification(
       std::chrono::milliseconds timeout) const {
     return notify_.next(timeout);
   }
-  /// Sends `signal` and waits. Returns the exit status, 128 + signal when it was killed, or −1 when
-  /// it did not end within 20 s (it is killed then).
-  int stop(int signal);
+  /// As Program::stop().
+  int stop(int signal) { return program_.stop(signal); }
 
  private:
   void wait_until_ready();
 
   TempFolder folder_;
   fakes::NotifySocket notify_;
-  pid_t pid_ = -1;
+  Program program_;
   std::uint16_t port_ = 0;
 };
 
