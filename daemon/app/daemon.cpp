@@ -105,9 +105,12 @@ net::NetConfig make_net_config(const Config& config) {
 /// Memory of large messages and of frames goes back when they are done with, be it in the middle of
 /// the heap. Without this glibc keeps up to twice the largest block that ever came (mallopt(3),
 /// dynamic mmap threshold), locked into memory with the rest. Frames' buffers are used again, so
-/// that a frame costs no page faults.
-void give_large_blocks_back() {
+/// that a frame costs no page faults. What is free in one thread's arena is of no use to another's;
+/// two are enough, as the capture thread, which must not wait for another's lock, allocates
+/// nothing.
+void keep_little_memory() {
   constexpr int kLarge = 256 << 10;
+  (void)::mallopt(M_ARENA_MAX, 2);
   (void)::mallopt(M_MMAP_THRESHOLD, kLarge);
   (void)::mallopt(M_TRIM_THRESHOLD, 4 << 20);
 }
@@ -166,7 +169,7 @@ std::string reload(Config& running, const std::function<Config()>& load, net::Se
 }  // namespace
 
 void run_daemon(const Config& config, const std::function<Config()>& load) {
-  give_large_blocks_back();
+  keep_little_memory();
   asio::io_context io(1);
   // Before any thread starts, so that every thread leaves the signals to this one.
   asio::signal_set signals(io, SIGTERM, SIGINT);

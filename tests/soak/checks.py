@@ -14,7 +14,7 @@ from record import Record, Rest, Seen
 MOST_DESCRIPTORS_MORE = 0
 MOST_THREADS_MORE = 0
 #: Rests before the figures count: by then every kind of client has come once, and the allocator has
-#: an arena for each thread. In a run that has time for it, every kind of episode as well.
+#: its arenas. In a run that has time for it, every kind of episode as well.
 WARM_UP_RESTS = 3
 LONG_WARM_UP_RESTS = 1 + len(plan.KINDS)
 #: Fewer say nothing of memory, which sanitizers hold back for a while as well.
