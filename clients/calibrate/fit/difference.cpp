@@ -11,12 +11,12 @@ namespace dtact::calibration {
 
 std::vector<float> mean_depth_um(const recon::Model& model,
                                  std::span<const std::uint16_t> reference_q8,
-                                 std::span<const image::Grey8> frames) {
+                                 std::span<const image::Grey8> frames, int sharpen_steps) {
   if (frames.empty()) throw std::invalid_argument("no frame to reconstruct");
   if (reference_q8.size() != model.reference_q8.size()) {
     throw std::invalid_argument("the reference has not the size of the calibration's frame");
   }
-  recon::Reconstructor reconstructor(std::make_shared<recon::Model>(model));
+  recon::Reconstructor reconstructor(std::make_shared<recon::Model>(model), sharpen_steps);
   reconstructor.set_reference(reference_q8);
   std::vector<std::int16_t> depth(model.rectify.entries.size());
   std::vector<float> mean(depth.size());

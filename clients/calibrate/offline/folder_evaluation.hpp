@@ -6,23 +6,11 @@
 #include <vector>
 
 #include "clients/calibrate/fit/evaluate.hpp"
-#include "clients/calibrate/lens/pin_gain.hpp"
-#include "clients/calibrate/lens/pins.hpp"
 #include "clients/calibrate/offline/images.hpp"
+#include "clients/calibrate/offline/pin_depths.hpp"
 #include "daemon/calibration/calibration.hpp"
 
 namespace dtact::ctl {
-
-/// How evenly a calibration reads the pins of a board, which are all of one length.
-struct PinDepths {
-  /// Of each pin inside the trusted map, at its centre (a paraboloid about it), under the gain that
-  /// the others chose.
-  std::vector<double> mm;
-  double mean_mm = 0;
-  double tilt_x_um_per_mm = 0;  ///< Of the plane through them that is taken off below.
-  double tilt_y_um_per_mm = 0;
-  double spread = 0;  ///< Standard deviation without the tilt over the mean.
-};
 
 /// What a folder of a sensor's images tells: `board_reference.png` and `board.png`,
 /// `ball_reference.png` and `ball.png`. What could not be done is empty and has its reason.

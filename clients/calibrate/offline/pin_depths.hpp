@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "clients/calibrate/lens/pin_gain.hpp"
+#include "clients/calibrate/lens/pins.hpp"
+#include "daemon/calibration/calibration.hpp"
+#include "hal/image/png.hpp"
+
+namespace dtact::ctl {
+
+/// How evenly a calibration reads the pins of a board, which are all of one length.
+struct PinDepths {
+  /// Of each pin inside the trusted map, at its centre (a paraboloid about it), under the gain that
+  /// the others chose.
+  std::vector<double> mm;
+  double mean_mm = 0;
+  double tilt_x_um_per_mm = 0;  ///< Of the plane through them that is taken off below.
+  double tilt_y_um_per_mm = 0;
+  double spread = 0;  ///< Standard deviation without the tilt over the mean.
+};
+
+/// `calibration`: on the image that the pins' lens rectifies; `gain`: as the pins chose it;
+/// `reference_q8`, `frames`: of the board. Throws std::runtime_error when fewer than three in four
+/// pins lie inside the trusted map or they read no depth; else as mean_depth_um().
+[[nodiscard]] PinDepths read_pins(const PinPress& pins, const PinGain& gain,
+                                  const calibration::Calibration& calibration,
+                                  std::span<const std::uint16_t> reference_q8,
+                                  std::span<const image::Grey8> frames, const Board& board,
+                                  int sharpen_steps = 0);
+
+}  // namespace dtact::ctl
