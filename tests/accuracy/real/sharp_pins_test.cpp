@@ -1,0 +1,215 @@
+// What the filter against scattering makes of the pins of a board on real sensors.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/model/model_build.hpp"
+#include "clients/calibrate/offline/folder_evaluation.hpp"
+#include "tests/accuracy/real/press_images.hpp"
+
+namespace dtact::ctl {
+namespace {
+
+using calibration::Calibration;
+
+/// A pin as the depth map shows it, the mean of those that lie wholly inside of it. Pins are 2.5 mm
+/// apart, 0.6 mm in radius, with a hemisphere as tip.
+struct MeanPin {
+  /// From the pin's axis, millimetres, where the depth has fallen by half from the tip's to the
+  /// least.
+  double half_mm = 0;
+  /// Greatest fall, millimetres a millimetre.
+  double slope = 0;
+  /// Of the tip above the least depth about it, millimetres.
+  double height_mm = 0;
+  /// How much deeper than halfway to the next pin (along the rows and columns) the least depth
+  /// nearer to the pin lies, a share of the height. What is pressed aside rises evenly towards
+  /// there; a filter that rings leaves a trough round the pin.
+  double trough = 0;
+};
+
+constexpr double kStepMm = 0.05;
+constexpr double kHalfwayMm = 1.25;
+
+/// Depth against the distance from the pins' axes, millimetres, steps of kStepMm up to halfway.
+std::vector<double> mean_profile(const std::vector<float>& um, const PinPress& pins,
+                                 const Calibration& calibration) {
+  const recon::Model& model = *calibration.model;
+  const int width = model.rectify.width;
+  const int height = model.rectify.height;
+  const recon::Point corner = surface_point(
+      pins.lens.lens, {calibration.crop_col, calibration.crop_row, width, height, model.mm_per_px},
+      0, 0);
+  constexpr int kDirections = 32;
+  const int steps = static_cast<int>(std::lround(kHalfwayMm / kStepMm)) + 1;
+  std::vector<double> mean(static_cast<std::size_t>(steps));
+  int count = 0;
+  for (const Mark& mark : pins.marks) {
+    std::vector<double> one(mean.size());
+    for (std::size_t i = 0; i < one.size(); ++i) {
+      for (int k = 0; k < kDirections; ++k) {
+        const double angle = 2 * std::numbers::pi * k / kDirections;
+        const double r = kStepMm * static_cast<double>(i);
+        const double x = (mark.mm.x + r * std::cos(angle) - corner.x) / model.mm_per_px;
+        const double y = (mark.mm.y + r * std::sin(angle) - corner.y) / model.mm_per_px;
+        const int col = static_cast<int>(std::floor(x));
+        const int row = static_cast<int>(std::floor(y));
+        if (col < 0 || row < 0 || col + 1 >= width || row + 1 >= height) {
+          one[i] = std::nan("");
+          break;
+        }
+        const auto at = [&](int dx, int dy) {
+          return 0.001 * um[static_cast<std::size_t>(row + dy) * static_cast<std::size_t>(width) +
+                            static_cast<std::size_t>(col + dx)];
+        };
+        const double right = x - col;
+        const double down = y - row;
+        one[i] += ((1 - down) * ((1 - right) * at(0, 0) + right * at(1, 0)) +
+                   down * ((1 - right) * at(0, 1) + right * at(1, 1))) /
+                  kDirections;
+      }
+    }
+    if (std::ranges::any_of(one, [](double v) { return std::isnan(v); })) continue;
+    ++count;
+    for (std::size_t i = 0; i < one.size(); ++i) mean[i] += one[i];
+  }
+  EXPECT_GE(4 * count, 3 * static_cast<int>(pins.marks.size()));
+  for (double& depth : mean) depth /= std::max(1, count);
+  return mean;
+}
+
+MeanPin look(const std::vector<double>& profile) {
+  MeanPin pin;
+  const double least = *std::ranges::min_element(profile);
+  pin.height_mm = profile.front() - least;
+  pin.trough = (profile.back() - least) / pin.height_mm;
+  for (std::size_t i = 0; i + 1 < profile.size(); ++i) {
+    pin.slope = std::max(pin.slope, (profile[i] - profile[i + 1]) / kStepMm);
+    const double half = least + pin.height_mm / 2;
+    if (pin.half_mm == 0 && profile[i + 1] < half) {
+      const double part = (profile[i] - half) / (profile[i] - profile[i + 1]);
+      pin.half_mm = kStepMm * (static_cast<double>(i) + part);
+    }
+  }
+  return pin;
+}
+
+/// The board of one sensor read with lists for levels that are not sharpened, once and twice.
+struct Pins {
+  std::vector<MeanPin> mean;
+  std::vector<double> spread;  ///< Of their depths.
+};
+
+Pins read_board(const std::string& name, const FolderEvaluation& e, const Calibration& calibration,
+                int most_steps) {
+  Pins read;
+  const auto reference = e.board_reference.mean_q8().pixels;
+  const auto frames = e.board.frames();
+  for (int steps = 0; steps <= most_steps; ++steps) {
+    const std::vector<float> um =
+        calibration::mean_depth_um(*calibration.model, reference, frames, steps);
+    read.mean.push_back(look(mean_profile(um, *e.pins, calibration)));
+    read.spread.push_back(
+        read_pins(*e.pins, e.gain, calibration, reference, frames, {}, steps).spread);
+    const MeanPin& pin = read.mean.back();
+    fmt::print(
+        "{}, {} steps: {:.3f} mm high, half of it at {:.3f} mm, steepest {:.2f}, trough {:.1f} %, "
+        "spread {:.1f} %\n",
+        name, steps, pin.height_mm, pin.half_mm, pin.slope, 100 * pin.trough,
+        100 * read.spread.back());
+  }
+  return read;
+}
+
+/// By the layer that was fitted to the sensor's own ball.
+Calibration by_layer(const FolderEvaluation& e) {
+  calibration::BallPresses presses;
+  presses.reference_q8 = e.ball_reference.mean_q8();
+  presses.presses = {{"ball.png", e.ball_images.frames(), {}}};
+  presses.ball_radius_mm = 4;
+  presses.lens = e.pins->lens.lens;
+  presses.mm_per_px = recon::central_mm_per_px(e.pins->lens.lens);
+  const calibration::FittedCalibration made = calibration::build_model(presses, e.gain.gain);
+  const calibration::LayerModel& layer = made.fit.layer;
+  fmt::print("layer {:.2f} mm, scattering {:.2f} and {:.2f} mm, {:.2f} of it narrow\n",
+             layer.thickness_mm, layer.scattering.narrow_mm, layer.scattering.wide_mm,
+             layer.scattering.narrow_weight);
+  return made.calibration;
+}
+
+/// With the lists and the scattering of another sensor's.
+Calibration by_layer_of(const Calibration& other, const FolderEvaluation& e) {
+  const recon::Lens& lens = e.pins->lens.lens;
+  Calibration made = calibration::empty_calibration(e.board_reference.mean_q8(), std::nullopt,
+                                                    recon::central_mm_per_px(lens), lens);
+  recon::Model model = *made.model;
+  model.list = other.model->list;
+  model.scattering = other.model->scattering;
+  model.sharpened = other.model->sharpened;
+  model.gain = e.gain.gain;
+  made.model = std::make_shared<const recon::Model>(std::move(model));
+  return made;
+}
+
+std::optional<FolderEvaluation> evaluated(const char* sensor) {
+  const auto folder = sensor_folder(sensor);
+  if (!folder) return std::nullopt;
+  return evaluate_folder(*folder, {}, 4.0);
+}
+
+/// Each step makes edges steeper, and no trough comes. Pins are not alike, and what they differ by
+/// grows with the height that a step gives back; `spread`: greatest growth, by one step and by two.
+void expect_sharper(const Pins& read, double once, double twice) {
+  for (std::size_t i = 0; i + 1 < read.mean.size(); ++i) {
+    EXPECT_GT(read.mean[i + 1].slope, 1.15 * read.mean[i].slope);
+    EXPECT_LT(read.mean[i + 1].half_mm, read.mean[i].half_mm);
+  }
+  for (const MeanPin& pin : read.mean) EXPECT_LT(pin.trough, 0.01);
+  EXPECT_LT(read.spread[1], read.spread[0] + once);
+  EXPECT_LT(read.spread[2], read.spread[0] + twice);
+}
+
+TEST(SharpPins, SensorA) {
+  const auto e = evaluated("sensor_a");
+  if (!e) GTEST_SKIP() << "the real images are not beside the repository";
+  ASSERT_TRUE(e->pins && e->calibration);
+  expect_sharper(read_board("sensor_a", *e, by_layer(*e), 2), 0.005, 0.015);
+}
+
+// Its lopsided press asks for light that is scattered farther than a filter on this map reaches.
+TEST(SharpPins, SensorBIsNotSharpened) {
+  const auto e = evaluated("sensor_b");
+  if (!e) GTEST_SKIP() << "the real images are not beside the repository";
+  ASSERT_TRUE(e->pins && e->calibration);
+  const Calibration calibration = by_layer(*e);
+  EXPECT_LT(read_board("sensor_b", *e, calibration, 0).mean[0].trough, 0.01);
+  try {
+    read_board("sensor_b", *e, calibration, 1);
+    FAIL() << "sharpened";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), testing::HasSubstr("scattering.wide_mm"));
+  }
+}
+
+TEST(SharpPins, SensorCByTheLayerOfSensorA) {
+  const auto a = evaluated("sensor_a");
+  const auto c = evaluated("sensor_c");
+  if (!a || !c) GTEST_SKIP() << "the real images are not beside the repository";
+  ASSERT_TRUE(a->pins && a->calibration && c->pins);
+  expect_sharper(read_board("sensor_c", *c, by_layer_of(by_layer(*a), *c), 2), 0.005, 0.015);
+}
+
+}  // namespace
+}  // namespace dtact::ctl
