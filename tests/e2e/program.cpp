@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/base/unique_fd.hpp"
 #include "tests/e2e/patience.hpp"
 
 namespace dtact::e2e {

@@ -16,6 +16,7 @@
 #include "clients/recording/channels.hpp"
 #include "clients/recording/read_recording.hpp"
 #include "hal/base/atomic_file.hpp"
+#include "tests/e2e/patience.hpp"
 #include "tests/e2e/sensor.hpp"
 
 extern char** environ;
@@ -150,7 +151,10 @@ TEST_F(Record, AFileIsNotReplacedUnasked) {
   EXPECT_EQ(run_program(command({"--seconds", "1"}), &said), 1);
   EXPECT_THAT(said, HasSubstr("add --force"));
   EXPECT_EQ(base::read_file(file), "mine");
-  EXPECT_EQ(run_program(command({"--seconds", "1", "--force", "--progress"}), &said), 0) << said;
+  EXPECT_EQ(
+      run_program(command({"--seconds", std::to_string(kSlower), "--force", "--progress"}), &said),
+      0)
+      << said;
   EXPECT_EQ(mcap::Reader(file).damage(), "");
   EXPECT_THAT(said, HasSubstr(" frames in "));
 }
@@ -223,7 +227,11 @@ TEST_F(Record, WithoutJpegsDepthCannotBeMadeAnew) {
     return frame != nullptr && frame->has_depth();
   }));
   std::string said;
-  ASSERT_EQ(run_program(command({"--seconds", "1", "--no-jpeg", "--pictures-hz", "0"}), &said), 0);
+  ASSERT_EQ(run_program(command({"--seconds", std::to_string(2 * kSlower), "--no-jpeg",
+                                 "--pictures-hz", "0"}),
+                        &said),
+            0)
+      << said;
   const mcap::Reader reader(file);
   for (const auto& [id, channel] : reader.channels()) {
     EXPECT_NE(channel.topic, "/camera/jpeg");

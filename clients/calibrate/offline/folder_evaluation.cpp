@@ -7,6 +7,7 @@
 
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/plausibility.hpp"
+#include "clients/calibrate/offline/board_images.hpp"
 
 namespace dtact::ctl {
 namespace {

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/difference.hpp"
-#include "clients/calibrate/offline/board_images.hpp"
+#include "daemon/recon/lens.hpp"
 
 namespace dtact::ctl {
 namespace {
