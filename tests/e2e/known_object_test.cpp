@@ -116,7 +116,7 @@ TEST(KnownObject, IsFoundAndFollowedByTheProgram) {
         if (frame == nullptr || !frame->has_pose()) return false;
         const v1::ObjectPose& pose = frame->pose();
         EXPECT_EQ(pose.object(), "known_ball");
-        const double t = press.scene.time_s(frame->sequence());
+        const double t = press.time_s(frame->sequence());
         // Pressed in, held and slid.
         if (t < 4.2 || t > 11.9 || pose.tracking() == v1::ObjectPose::SEARCHING) return false;
         if (pose.tracking() != v1::ObjectPose::TRACKED) {

@@ -37,7 +37,7 @@ TEST(Perceive, FollowsASlidingBallWithoutItsRotation) {
         if (pose.tracking() == v1::ObjectPose::STARTED) since = frame->sequence();
         if (since == 0 || pose.since_sequence() != since) return false;
         // The slide, from where it was held on.
-        const double t = press.scene.time_s(frame->sequence());
+        const double t = press.time_s(frame->sequence());
         if (t < 4.2 || t > 11.9) return false;
         ++(pose.tracking() == v1::ObjectPose::TRACKED ? tracked : others);
         const auto now = press.middle(frame->sequence());

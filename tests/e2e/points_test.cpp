@@ -126,7 +126,7 @@ TEST_P(PointsOfABall, LieOnIt) {
       [&](const Item& item) {
         const auto* frame = std::get_if<v1::Frame>(&item);
         if (frame == nullptr || !frame->has_cloud()) return false;
-        const double t = press.scene.time_s(frame->sequence());
+        const double t = press.time_s(frame->sequence());
         if (t < 4.2 || t > 7.9) return false;
         const PointsError error = points_error(*frame, truth);
         std::printf("%s: %.4f mm off, normals %.2f degrees\n", GetParam().name, error.mm,
