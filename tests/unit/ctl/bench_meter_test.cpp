@@ -9,7 +9,6 @@ namespace dtact::ctl {
 namespace {
 
 using testing::HasSubstr;
-using testing::Not;
 
 constexpr std::int64_t kMs = 1'000'000;
 
