@@ -8,6 +8,7 @@
 #include <string>
 
 #include "hal/base/atomic_file.hpp"
+#include "tests/e2e/patience.hpp"
 #include "tests/e2e/sensor.hpp"
 
 namespace dtact::e2e {
@@ -21,14 +22,15 @@ std::filesystem::path write_scene(const TempFolder& folder, const std::string& t
   return file;
 }
 
-// Something covers a part of the picture from the fifth second on.
+// Something covers a part of the picture from the fifth second on, with sanitizers later: the
+// daemon has to have seen it without.
 TEST(Exposure, ThatFollowsThePictureIsNamedThoughTheCameraCallsItLocked) {
   const TempFolder folder;
-  const Sensor sensor(write_scene(folder,
-                                  "[[fault]]\nkind = \"covered\"\nframe = 300\n"
-                                  "frames = 100000\n"
-                                  "[[fault]]\nkind = \"auto_exposure\"\nframe = 0\n"
-                                  "frames = 100000\n"));
+  const Sensor sensor(write_scene(
+      folder, "[[fault]]\nkind = \"covered\"\nframe = " + std::to_string(300 * kSlower) +
+                  "\nframes = 100000\n"
+                  "[[fault]]\nkind = \"auto_exposure\"\nframe = 0\n"
+                  "frames = 100000\n"));
   client::Client client = sensor.connect();
   v1::Subscribe summary;
   summary.set_summary(true);
