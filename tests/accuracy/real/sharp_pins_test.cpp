@@ -169,8 +169,8 @@ std::optional<FolderEvaluation> evaluated(const char* sensor) {
   return evaluate_folder(*folder, {}, 4.0);
 }
 
-/// Each step makes edges steeper, and no trough comes. Pins are not alike, and what they differ by
-/// grows with the height that a step gives back; `spread`: greatest growth, by one step and by two.
+/// Each step makes edges steeper, and no trough comes. `once`, `twice`: how much more of their mean
+/// the depths may differ by after one step and two; the goal is no more, which two steps miss.
 void expect_sharper(const Pins& read, double once, double twice) {
   for (std::size_t i = 0; i + 1 < read.mean.size(); ++i) {
     EXPECT_GT(read.mean[i + 1].slope, 1.15 * read.mean[i].slope);
