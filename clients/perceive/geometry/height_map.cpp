@@ -56,7 +56,9 @@ HeightMap::HeightMap(const recon::SurfaceHeights& heights)
   constexpr double kMostWeight = 1.25 * 1.25;
   const auto [low, high] = std::ranges::minmax(z_mm_);
   const double middle = (low + high) / 2;
-  const double reach = kMostWeight * (high - low) / 2;
+  // Rounding must not put a level surface beyond them.
+  constexpr double kRoundingMm = 1e-6;
+  const double reach = kMostWeight * (high - low) / 2 + kRoundingMm;
   low_mm_ = middle - reach;
   high_mm_ = middle + reach;
 }

@@ -133,6 +133,20 @@ TEST(HeightMap, ARayEndsWhereItFirstLeavesTheGel) {
   EXPECT_FALSE(map.reached({0, 0, -4}, {0, 9, 1}).has_value()) << "leaves beside the grid";
 }
 
+// Of a level surface the lowest and the highest place are one, so that rounding alone decides on
+// which side of them a ray meets it.
+TEST(HeightMap, ALevelSurfaceIsReachedAtEveryHeight) {
+  for (int z_um = -4990; z_um <= 4990; z_um += 97) {
+    const HeightMap map(
+        {.width = 4, .height = 5, .spacing_mm = 3, .z_um = std::vector<std::int32_t>(20, z_um)});
+    for (const double x : {-0.7, 0.0, 0.9}) {
+      const auto found = map.reached({x, 0.1, -5.5}, {x / 7, 0.02, 5.5});
+      ASSERT_TRUE(found.has_value()) << z_um << " um at " << x;
+      EXPECT_NEAR(-5.5 + 5.5 * *found, 1e-3 * z_um, 1e-9);
+    }
+  }
+}
+
 /// The worst distance between what rays meet of both, and the worst angle between the normals,
 /// over a map's pixels within `reach_mm` of the middle.
 struct Apart {
