@@ -101,6 +101,11 @@ Point surface_point(const Lens& lens, const MapPlace& place, double x, double y)
           (place.row + y - origin.y) * place.mm_per_px};
 }
 
+Point map_pixel(const Lens& lens, const MapPlace& place, Point mm) {
+  const Point corner = surface_point(lens, place, 0, 0);
+  return {(mm.x - corner.x) / place.mm_per_px, (mm.y - corner.y) / place.mm_per_px};
+}
+
 RectifyTable make_lens_table(const Lens& lens, int frame_width, int frame_height,
                              const MapPlace& place, std::vector<std::uint8_t>& outside) {
   if (frame_width < 2 || frame_height < 2 || frame_width > INT16_MAX || frame_height > INT16_MAX) {

@@ -54,6 +54,8 @@ struct MapPlace {
 
 /// The surface's point at a (fractional) pixel of the depth map.
 [[nodiscard]] Point surface_point(const Lens& lens, const MapPlace& place, double x, double y);
+/// The (fractional) pixel of the depth map that shows a point of the surface, millimetres.
+[[nodiscard]] Point map_pixel(const Lens& lens, const MapPlace& place, Point mm);
 
 /// Evaluates the lens at each pixel of the depth map, to 1/128 pixel. Where the frame does not show
 /// a pixel, `outside` (depth-map sized) is 1 and the entry is a place at the frame's edge. Throws

@@ -75,11 +75,8 @@ std::string grid_png(const FolderEvaluation& e, const PinPress& pins) {
                             : levels(at.y + (at.fy + 64) / 128, at.x + (at.fx + 64) / 128));
   }
   Picture picture = grey_of(place.width, place.height, rectified);
-  const recon::Point corner = surface_point(lens, place, 0, 0);
   for (const Mark& mark : pins.marks) {
-    cross(picture,
-          {(mark.mm.x - corner.x) / place.mm_per_px, (mark.mm.y - corner.y) / place.mm_per_px}, 7,
-          kIdeal);
+    cross(picture, map_pixel(lens, place, mark.mm), 7, kIdeal);
   }
   return image::encode_png(to_image(picture));
 }

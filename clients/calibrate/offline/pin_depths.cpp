@@ -67,18 +67,15 @@ PinDepths read_pins(const PinPress& pins, const PinGain& gain,
   const int width = model.rectify.width;
   const std::vector<float> um =
       calibration::mean_depth_um(model, reference_q8, frames, sharpen_steps);
-  const recon::Point corner = surface_point(
-      pins.lens.lens,
-      {calibration.crop_col, calibration.crop_row, width, model.rectify.height, model.mm_per_px}, 0,
-      0);
+  const recon::MapPlace place{calibration.crop_col, calibration.crop_row, width,
+                              model.rectify.height, model.mm_per_px};
   const double reach = board.pitch_mm / 5 / model.mm_per_px;
   PinDepths depths;
   std::vector<Mark> read;  // Those inside the trusted map.
   for (std::size_t i = 0; i < pins.marks.size(); ++i) {
     const Mark& mark = pins.marks[i];
-    const double col = (mark.mm.x - corner.x) / model.mm_per_px;
-    const double row = (mark.mm.y - corner.y) / model.mm_per_px;
-    const double peak = peak_um(um, width, model.rectify.height, col, row, reach);
+    const recon::Point at = map_pixel(pins.lens.lens, place, mark.mm);
+    const double peak = peak_um(um, width, model.rectify.height, at.x, at.y, reach);
     if (std::isnan(peak)) continue;
     depths.mm.push_back(0.001 * peak * gain.left_out_ratio[i]);
     read.push_back(mark);

@@ -49,9 +49,8 @@ std::vector<double> mean_profile(const std::vector<float>& um, const PinPress& p
   const recon::Model& model = *calibration.model;
   const int width = model.rectify.width;
   const int height = model.rectify.height;
-  const recon::Point corner = surface_point(
-      pins.lens.lens, {calibration.crop_col, calibration.crop_row, width, height, model.mm_per_px},
-      0, 0);
+  const recon::MapPlace place{calibration.crop_col, calibration.crop_row, width, height,
+                              model.mm_per_px};
   constexpr int kDirections = 32;
   const int steps = static_cast<int>(std::lround(kHalfwayMm / kStepMm)) + 1;
   std::vector<double> mean(static_cast<std::size_t>(steps));
@@ -62,10 +61,11 @@ std::vector<double> mean_profile(const std::vector<float>& um, const PinPress& p
       for (int k = 0; k < kDirections; ++k) {
         const double angle = 2 * std::numbers::pi * k / kDirections;
         const double r = kStepMm * static_cast<double>(i);
-        const double x = (mark.mm.x + r * std::cos(angle) - corner.x) / model.mm_per_px;
-        const double y = (mark.mm.y + r * std::sin(angle) - corner.y) / model.mm_per_px;
-        const int col = static_cast<int>(std::floor(x));
-        const int row = static_cast<int>(std::floor(y));
+        const recon::Point pixel =
+            map_pixel(pins.lens.lens, place,
+                      {mark.mm.x + r * std::cos(angle), mark.mm.y + r * std::sin(angle)});
+        const int col = static_cast<int>(std::floor(pixel.x));
+        const int row = static_cast<int>(std::floor(pixel.y));
         if (col < 0 || row < 0 || col + 1 >= width || row + 1 >= height) {
           one[i] = std::nan("");
           break;
@@ -74,8 +74,8 @@ std::vector<double> mean_profile(const std::vector<float>& um, const PinPress& p
           return 0.001 * um[static_cast<std::size_t>(row + dy) * static_cast<std::size_t>(width) +
                             static_cast<std::size_t>(col + dx)];
         };
-        const double right = x - col;
-        const double down = y - row;
+        const double right = pixel.x - col;
+        const double down = pixel.y - row;
         one[i] += ((1 - down) * ((1 - right) * at(0, 0) + right * at(1, 0)) +
                    down * ((1 - right) * at(0, 1) + right * at(1, 1))) /
                   kDirections;
