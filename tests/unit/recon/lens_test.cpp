@@ -53,6 +53,15 @@ TEST(Lens, CentralScaleIsTheRootOfTheArea) {
   EXPECT_NEAR(central_mm_per_px(lens), 0.025, 1e-9);
 }
 
+TEST(Lens, APointIsSeenByThePixelThatShowsIt) {
+  const MapPlace place{7, -3, 40, 30, 0.04};
+  const Point mm = surface_point(sample(), place, 11.5, 2.25);
+  const Point pixel = map_pixel(sample(), place, mm);
+  EXPECT_NEAR(pixel.x, 11.5, 1e-9);
+  EXPECT_NEAR(pixel.y, 2.25, 1e-9);
+  EXPECT_NEAR(map_pixel(sample(), place, {mm.x + 0.04, mm.y}).x, 12.5, 1e-9);
+}
+
 TEST(Lens, TableHoldsPlaceAndWeights) {
   // A map of 0.1 mm a pixel reads every second pixel of the frame; the origin stays at (5, 4).
   std::vector<std::uint8_t> outside;
