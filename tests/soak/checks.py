@@ -1,6 +1,7 @@
 """What of all that a soak has seen is a fault. Every limit stands here, with its reason."""
 from __future__ import annotations
 
+import math
 import statistics
 from dataclasses import dataclass
 
@@ -82,7 +83,7 @@ def ends(values: list[float]) -> tuple[float, float]:
 def verdicts(record: Record) -> list[Verdict]:
     long = record.seconds >= LEAST_S_FOR_DRIFT
     return [*_held(record.rests, long), *_latency(record.seen, long), _frames(record),
-            _conditions(record.seen), *_depth(record.seen, long), _answers(record),
+            _conditions(record.seen), _camera(record), *_depth(record.seen, long), _answers(record),
             _log(record.log), _end(record.ended)]
 
 
@@ -175,7 +176,7 @@ def _conditions(seen: list[Seen]) -> Verdict:
             faults.append(f"{where}: {name} was left at its end")
     judged = sum(1 for s in seen if s.episode.must and not s.late)
     # A machine so busy that the camera skips more than a second: the next episodes tell.
-    unseen = sum(1 for s in seen if s.cleared_frames == 0)
+    unseen = sum(1 for s in seen if not s.cleared)
     if unseen > max(1, len(seen) // 10):
         faults.append(f"no frame came at the end of {unseen} episodes")
     late = sum(1 for s in seen if s.late)
@@ -183,6 +184,52 @@ def _conditions(seen: list[Seen]) -> Verdict:
         faults.append(f"the commands of {late} episodes came too late")
     return Verdict("conditions", f"{judged} scripted faults, {unseen} ends unseen, {late} late",
                    "each told, and cleared", tuple(faults))
+
+
+def _camera(record: Record) -> Verdict:
+    """Of frames_lost and camera_trouble, which a busy machine raises as well: that they are told of what
+    was scripted, and of nothing that did not happen. The daemon's times on both sides, so that it does
+    not matter how late the frames were."""
+    faults = []
+    judged = unseen = 0
+    trouble = _trouble(record.states)
+    for s in record.seen:
+        where = f"episode {s.episode.index} ({s.episode.kind})"
+        for struck in s.struck:
+            what = f"{where}, {struck.kind} of frames {struck.frame} to {struck.frame + struck.frames - 1}"
+            if struck.came:
+                faults.append(f"{what}: {struck.came} of them came")
+            if struck.before is None or struck.after is None:
+                unseen += 1
+                continue
+            span = (struck.before.taken, struck.after.published)
+            if "camera_trouble" in s.episode.must:
+                judged += 1
+                if not any(span[0] < at < span[1] and "camera_trouble" in health
+                           for at, health in record.states):
+                    faults.append(f"{what}: camera_trouble was not told meanwhile")
+            elif span[1] - span[0] < plan.LOST_NS:
+                judged += 1
+                if "frames_lost" not in struck.after.health:
+                    faults.append(f"{what}: frame {struck.after.sequence} does not tell frames_lost")
+            else:
+                unseen += 1
+        if s.lost_unseen:
+            faults.append(f"{where}: {s.lost_unseen} frames tell frames_lost, and none was lost in the "
+                          "second before")
+        if any(begin < frame.taken and frame.published < end
+               for frame in s.cleared for begin, end in trouble):
+            faults.append(f"{where}: camera_trouble went on while frames came")
+    if unseen > max(1, len(record.seen) // 10):
+        faults.append(f"no frame came soon before or after {unseen} faults of the camera")
+    return Verdict("what the camera swallows", f"{judged} faults, {unseen} with no frame near",
+                   "each told as its frames are missing, nothing told beyond", tuple(faults))
+
+
+def _trouble(states: list[tuple[int, tuple[str, ...]]]) -> list[tuple[float, float]]:
+    """From when to when the daemon told camera_trouble."""
+    ends = [float(at) for at, _ in states[1:]] + [math.inf]
+    return [(at, end) for (at, health), end in zip(states, ends) if "camera_trouble" in health]
 
 
 def _depth(seen: list[Seen], long: bool) -> list[Verdict]:

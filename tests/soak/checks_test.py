@@ -3,15 +3,18 @@ one in a healthy run."""
 import pathlib
 import sys
 import unittest
+from types import SimpleNamespace
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1] / "clients/python/src")]
 import checks  # noqa: E402
 import plan  # noqa: E402
 from daemon import Held, log_lines  # noqa: E402
-from record import Record, Rest  # noqa: E402
+from record import Record, Rest, Struck  # noqa: E402
 
 HOUR = 3600
+PERIOD = 16_666_667  # of the camera, ns
+MS = 1_000_000
 
 
 def held(**changes):
@@ -22,22 +25,40 @@ def held(**changes):
 
 def healthy(kinds=("quiet", "unplug"), rests=20):
     """A run of two hours in which all is well; the rests stand for its whole length."""
-    episodes = [plan.Episode(i, kind) for i, kind in enumerate(kinds)]
+    return run_of([plan.Episode(i, kind) for i, kind in enumerate(kinds)],
+                  [frame(n) for n in range(0, plan.EPISODE * len(kinds), 10)], rests)
+
+
+def run_of(episodes, frames, rests=20):
     record = Record(episodes)
     record.seconds = 2 * HOUR
     names = ["socket:"] * 3 + ["/state"]
     record.rests = [Rest(i * 2 * HOUR / rests, i, held(), names, 0.5) for i in range(rests)]
+    record.take("frames", frames)
     for seen in record.seen:
-        first = seen.episode.first
-        record.take("frames", [frame(first + n) for n in range(0, plan.EPISODE, 10)])
         for place in ("A", "B", "untouched"):
             seen.depths.append((place, 0.02 if place != "untouched" else 0.0, 0.002, 0.0))
     return record
 
 
 def frame(sequence, health=(), late_ns=0):
-    taken = sequence * 16_666_667
+    taken = sequence * PERIOD
     return (sequence, taken, taken, taken + 1_000_000, taken + 3_000_000 + late_ns, health)
+
+
+def struck(kind, condition, *, came=(), told=(), late_ns=0, states=()):
+    """The camera swallows the frames 1000 to 1003; 1004 tells `told`. `states`: since when, ns, and the
+    conditions of the daemon's events."""
+    episodes = [plan.Episode(0, "quiet"),
+                plan.Episode(1, kind, [(kind, 1000, 4)], must=frozenset({condition}))]
+    frames = [frame(n, told if n == 1004 else ()) for n in range(2 * plan.EPISODE)
+              if n not in range(1000, 1004) or n in came]
+    late = [(n, taken, ready, published + late_ns, received + late_ns, health)
+            for n, taken, ready, published, received, health in frames if n == 1004]
+    record = run_of(episodes, [late[0] if f[0] == 1004 else f for f in frames])
+    for at, health in states:
+        record.event(at // PERIOD, "state", SimpleNamespace(monotonic_s=at / 1e9, health=health))
+    return record
 
 
 def faults(record):
@@ -130,9 +151,9 @@ class Checks(unittest.TestCase):
     def test_no_frames(self):
         record = healthy()
         record.seen[1].frames = 0
-        record.seen[1].cleared_frames = 0
+        record.seen[1].cleared = []
         self.finds(record, "no frame in episode 1")
-        record.seen[0].cleared_frames = 0
+        record.seen[0].cleared = []
         self.finds(record, "no frame in episode 1", "no frame came at the end of 2 episodes")
 
     def test_conditions(self):
@@ -168,6 +189,52 @@ class Checks(unittest.TestCase):
         record = healthy()
         record.seen[0].conditions |= {"frames_lost", "not_realtime", "camera_slow"}
         self.finds(record)
+
+    def test_lost_frames_are_told_by_the_frame_behind_them(self):
+        self.finds(struck("drop", "frames_lost", told=("frames_lost",)))
+        # That the machine loses frames by itself proves nothing.
+        record = struck("drop", "frames_lost")
+        record.seen[1].conditions.add("frames_lost")
+        self.finds(record, "frames 1000 to 1003: frame 1004 does not tell frames_lost")
+        # So late that the daemon need not tell any more.
+        record = struck("drop", "frames_lost", late_ns=plan.LOST_NS)
+        record.seen[1].conditions.add("frames_lost")
+        self.finds(record)
+        self.finds(struck("drop", "frames_lost", told=("frames_lost",), came=[1002]), "1 of them came")
+
+    def test_lost_frames_are_told_for_a_second(self):
+        def steady(seconds):  # from frame 1000 on; before it ten are missing
+            frames = [frame(n) for n in range(990)]
+            for n in range(1000, 2 * plan.EPISODE):
+                told = n * PERIOD - frame(1000)[3] < seconds * 1e9
+                frames.append(frame(n, ("frames_lost",) if told else ()))
+            return run_of([plan.Episode(i, "quiet") for i in range(2)], frames)
+
+        self.finds(steady(1))
+        self.finds(steady(1.1), "episode 1 (quiet): 6 frames tell frames_lost, and none was lost")
+
+    def test_camera_trouble_is_told_while_the_camera_is_away(self):
+        def stall(*states):
+            return struck("stall", "camera_trouble", states=[(0, ()), *states])
+
+        trouble = ("camera_trouble",)
+        away, back = (1002 * PERIOD, trouble), (1004 * PERIOD + 1, ())
+        self.finds(stall(away, back))
+        self.finds(stall(), "camera_trouble was never told", "camera_trouble was not told meanwhile")
+        # A busy machine raises it at any time.
+        self.finds(stall((970 * PERIOD, trouble), (971 * PERIOD + 1, ())), "not told meanwhile")
+        # Frames end it, of which the episode's last seconds are looked at.
+        self.finds(stall(away), "camera_trouble went on while frames came")
+        last = 2 * plan.EPISODE - 30
+        begins = (last * PERIOD + 2 * MS, trouble)
+        self.finds(stall(away, back, begins, ((last + 1) * PERIOD + 1, ())))
+        self.finds(stall(away, back, begins, ((last + 2) * PERIOD, ())),
+                   "camera_trouble went on while frames came")
+
+    def test_no_frame_near_the_cameras_faults(self):
+        record = struck("drop", "frames_lost", told=("frames_lost",))
+        record.seen[1].struck = [Struck("drop", 1000, 4)] * 2
+        self.finds(record, "no frame came soon before or after 2 faults")
 
     def test_depth(self):
         record = healthy()

@@ -7,6 +7,36 @@ import plan
 from daemon import Held
 
 
+@dataclass(frozen=True)
+class Arrived:
+    """A frame: nanoseconds of the daemon's clock, and the conditions it tells."""
+
+    sequence: int
+    taken: int
+    published: int
+    health: tuple[str, ...]
+
+
+@dataclass
+class Struck:
+    """A fault under which frames do not come: what the honest client got around it."""
+
+    kind: str
+    frame: int
+    frames: int
+    before: Arrived | None = None
+    came: int = 0  #: although they could not
+    after: Arrived | None = None
+
+    def take(self, frame: Arrived):
+        if frame.sequence < self.frame:
+            self.before = frame
+        elif frame.sequence < self.frame + self.frames:
+            self.came += 1
+        elif self.after is None:
+            self.after = frame
+
+
 @dataclass
 class Seen:
     """Of one episode."""
@@ -15,8 +45,10 @@ class Seen:
     frames: int = 0
     conditions: set[str] = field(default_factory=set)
     events: set[str] = field(default_factory=set)
-    cleared_frames: int = 0  #: in the episode's last seconds,
+    cleared: list[Arrived] = field(default_factory=list)  #: the frames of the episode's last seconds,
     left: set[str] = field(default_factory=set)  #: and the conditions in them
+    struck: list[Struck] = field(default_factory=list)
+    lost_unseen: int = 0  #: frames that tell of lost ones, and none is missing
     late: bool = False  #: a command came too late for what it was to meet
     answer_s: float = 0.0  #: the longest that a command waited for its answer
     client_ms: list[float] = field(default_factory=list)
@@ -40,7 +72,9 @@ class Record:
     """Collects what the clients tell."""
 
     def __init__(self, episodes: list[plan.Episode]):
-        self.seen = [Seen(episode) for episode in episodes]
+        self.seen = [Seen(episode, struck=[Struck(*fault) for fault in episode.faults
+                                           if fault[0] in plan.SWALLOWING])
+                     for episode in episodes]
         self.rests: list[Rest] = []
         self.faults: list[str] = []
         self.answered = 0
@@ -48,7 +82,9 @@ class Record:
         self.log = ""
         self.ended = 0  #: the daemon's exit status
         self.seconds = 0.0
+        self.states: list[tuple[int, tuple[str, ...]]] = []  #: since when, ns, and the conditions
         self._last = (-1, -1)  # sequence and stamp
+        self._gap_ns = -1  # when the frame after the last gap was published
 
     def at(self, sequence: int) -> Seen | None:
         index = sequence // plan.EPISODE
@@ -73,16 +109,24 @@ class Record:
             if not taken <= ready <= published <= received:
                 self._fault(f"frame {sequence} was taken at {taken}, ready at {ready}, published at "
                             f"{published} and received at {received} ns")
+            if sequence != self._last[0] + 1:
+                self._gap_ns = published
             self._last = (sequence, taken)
             seen = self.at(sequence)
             if seen is None:
                 continue
+            frame = Arrived(sequence, taken, published, health)
+            for struck in seen.struck:
+                struck.take(frame)
+            # The daemon noticed the loss at the latest in the frame that followed it.
+            if "frames_lost" in health and taken - self._gap_ns >= plan.LOST_NS:
+                seen.lost_unseen += 1
             seen.frames += 1
             seen.conditions.update(health)
             seen.client_ms.append((received - ready) / 1e6)
             seen.daemon_ms.append((published - ready) / 1e6)
             if seen.episode.within(sequence, plan.CLEARED):
-                seen.cleared_frames += 1
+                seen.cleared.append(frame)
                 seen.left.update(health)
 
     def _depth(self, sequence, health, place, inside, outside, untrusted, _stated):
@@ -95,6 +139,8 @@ class Record:
             seen.depths.append((place, inside, outside, untrusted))
 
     def event(self, sequence, kind, event):
+        if kind == "state":
+            self.states.append((round(event.monotonic_s * 1e9), event.health))
         seen = self.at(sequence)
         if seen is None:
             return
