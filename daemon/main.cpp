@@ -8,6 +8,7 @@
 #include "daemon/app/daemon.hpp"
 #include "daemon/app/doctor/doctor.hpp"
 #include "daemon/app/journal.hpp"
+#include "daemon/app/net_files.hpp"
 #include "daemon/app/options.hpp"
 #include "daemon/app/service.hpp"
 
@@ -24,6 +25,7 @@ int main(int argc, char** argv) {
     is_service = !options.check_config;
     const LoadedConfig loaded = load_config(options.config, options.settings);
     if (options.print_config) print_config(loaded, std::cout);
+    if (options.check_config) check_net_files(loaded.config.net);
     if (options.print_config || options.check_config) return 0;
     if (options.report) {
       report(loaded.config.hal, std::cout);

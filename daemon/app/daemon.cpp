@@ -20,6 +20,7 @@
 #include "daemon/announce/announcer.hpp"
 #include "daemon/app/give_way.hpp"
 #include "daemon/app/journal.hpp"
+#include "daemon/app/net_files.hpp"
 #include "daemon/app/reload.hpp"
 #include "daemon/app/service.hpp"
 #include "daemon/app/status_teller.hpp"
@@ -92,9 +93,7 @@ net::NetConfig make_net_config(const Config& config) {
   net.version = DTACT_VERSION;
   boost::system::error_code nameless;
   if (net.name.empty()) net.name = asio::ip::host_name(nameless);
-  net.tls_certificate = resolve_credential("net.tls_certificate", net.tls_certificate);
-  net.tls_key = resolve_credential("net.tls_key", net.tls_key);
-  net.token_file = resolve_credential("net.token_file", net.token_file);
+  resolve_credentials(net);
   net.log = [](const net::LogLine& line) {
     log_line(line.level == net::LogLevel::info ? spdlog::level::info : spdlog::level::warn,
              line.text, {{"DTACT_CLIENT", line.client}});

@@ -94,6 +94,11 @@ std::filesystem::path resolve_credential(const std::string& key,
       key, text, name, name));
 }
 
+bool has_credentials() {
+  const std::string folder = folder_in("CREDENTIALS_DIRECTORY");
+  return !folder.empty() && ::access(folder.c_str(), X_OK) == 0;
+}
+
 bool under_systemd() { return std::getenv("INVOCATION_ID") != nullptr; }
 std::string state_directory() { return folder_in("STATE_DIRECTORY"); }
 std::string runtime_directory() { return folder_in("RUNTIME_DIRECTORY"); }

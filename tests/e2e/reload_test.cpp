@@ -154,6 +154,62 @@ TEST(Check, TellsTheServiceManagerNothing) {
   EXPECT_THAT(output, HasSubstr("camera.width"));
 }
 
+class CheckOfFiles : public testing::Test {
+ protected:
+  ~CheckOfFiles() override { ::unsetenv("CREDENTIALS_DIRECTORY"); }
+
+  [[nodiscard]] std::string write(const std::string& name, const std::string& text) const {
+    const fs::path file = folder_.path() / name;
+    std::ofstream(file) << text;
+    fs::permissions(file, fs::perms::owner_read | fs::perms::owner_write);
+    return file.string();
+  }
+  /// What `dtactd --check-config` says of [net]; empty when all is well.
+  [[nodiscard]] static std::string check(const std::vector<std::string>& settings) {
+    std::vector<std::string> command = {DTACTD_PROGRAM, "--check-config"};
+    for (const std::string& setting : settings) {
+      command.insert(command.end(), {"--set", "net." + setting});
+    }
+    std::string output;
+    const int status = run_program(command, &output);
+    EXPECT_EQ(status, output.empty() ? 0 : 1);
+    return output;
+  }
+
+  TempFolder folder_;
+};
+
+// Otherwise `systemctl reload` would succeed where the daemon keeps what it has.
+TEST_F(CheckOfFiles, FindsBrokenTokens) {
+  const std::string tokens = write("tokens", std::string("view ") + kNewToken + "\n");
+  EXPECT_EQ(check({"token_file=" + tokens}), "");
+  (void)write("tokens", "view short\n");
+  EXPECT_THAT(check({"token_file=" + tokens}), HasSubstr(tokens + ":1: the token has 5 bytes"));
+  EXPECT_THAT(check({"token_file=" + tokens + "-gone"}), HasSubstr("tokens-gone: No such file"));
+}
+
+TEST_F(CheckOfFiles, FindsAKeyOfAnotherCertificate) {
+  for (const char* name : {"left", "right"}) {
+    ASSERT_EQ(run_program({DTACTCTL_PROGRAM, "cert", "-o", (folder_.path() / name).string()}), 0);
+  }
+  const std::string certificate = (folder_.path() / "left/dtactd.crt").string();
+  const std::string key = (folder_.path() / "left/dtactd.key").string();
+  const std::string other = (folder_.path() / "right/dtactd.key").string();
+  EXPECT_EQ(check({"tls_certificate=" + certificate, "tls_key=" + key}), "");
+  EXPECT_THAT(check({"tls_certificate=" + certificate, "tls_key=" + other}), HasSubstr(other));
+  EXPECT_THAT(check({"tls_certificate=" + certificate}), HasSubstr("set both or none"));
+}
+
+TEST_F(CheckOfFiles, LooksAtCredentialsWhereThereAreAny) {
+  const std::vector<std::string> all = {"token_file=credential:tokens", "tls_key=credential:key",
+                                        "tls_certificate=credential:certificate"};
+  EXPECT_EQ(check(all), "");
+  ::setenv("CREDENTIALS_DIRECTORY", folder_.path().c_str(), 1);
+  EXPECT_THAT(check({all[0]}), HasSubstr("/etc/credstore/dtactd.tokens"));
+  (void)write("tokens", "view short\n");
+  EXPECT_THAT(check({all[0]}), HasSubstr("tokens:1: the token has 5 bytes"));
+}
+
 TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {
   std::string output;
   const auto status = told_by_failing({"--set", "net.token_file=credential:tokens", "--set",
