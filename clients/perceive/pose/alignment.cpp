@@ -19,10 +19,11 @@ constexpr double kNormalArm = 1e-4;
 /// Eigenvalues are mean squares of what the residuals change for a unit of motion. Below this a
 /// direction is not told from what normals err by, 3° at least, whose square is 0.003.
 constexpr double kSeen = 0.003;
-/// And below so many times the square of what the normals compared differ by, each one's share:
-/// what noise seems to show in a contact of few hundred pixels, which are not independent of each
-/// other. 3 lets a ball that has just touched turn by noise once in some 70 presses.
-constexpr double kSeenInNoise = 5;
+/// And below so many times the square of what the normals compared differ by, each one's share.
+constexpr double kSeenInNoise = 3;
+/// Pixels whose noise is alike, since depth is smoothed over 7×7 of them: of so many one tells
+/// something that the others do not.
+constexpr double kAlike = 49;
 /// Tukey's limit in median absolute residuals: 4.685 standard deviations of 1.48 medians.
 constexpr double kTukey = 4.685 * 1.4826;
 /// The least and the first limit of distances, metres.
@@ -109,6 +110,17 @@ Equations equations_of(const std::vector<Pair>& pairs, const Eigen::Vector3d& ce
   return sum;
 }
 
+/// Eigenvalues below this are of directions that are not seen. What noise alone makes of one is a
+/// mean of squares, which scatters by √(2/n) of itself where n of them are independent: a ball that
+/// has just touched would otherwise be turned by noise once in 50 presses.
+double least_seen(const Equations& sum, const ContactView& view) {
+  const double places = static_cast<double>(view.pixels()) / kAlike;
+  const double independent = std::clamp(places, 1.0, static_cast<double>(sum.points));
+  // Two components of two normals.
+  const double noise = sum.normal_squares / sum.weight / 4;
+  return std::max(kSeen, kSeenInNoise * (1 + std::sqrt(2 / independent)) * noise);
+}
+
 /// Of the steps that do the same to what is seen, the one that turns least.
 Twist least_turn(const Twist& step, const std::vector<Twist>& unobservable) {
   if (unobservable.empty()) return step;
@@ -189,8 +201,7 @@ Alignment align(std::span<const Surfel> surfels, const ContactView& view, const 
     result.rms = std::sqrt(sum.squares / sum.weight);
     const Eigen::SelfAdjointEigenSolver<Matrix6> spectrum(sum.matrix / sum.weight);
     const Twist right = sum.vector / sum.weight;
-    // Two components of two normals.
-    const double seen = std::max(kSeen, kSeenInNoise * sum.normal_squares / sum.weight / 4);
+    const double seen = least_seen(sum, view);
     Twist step = Twist::Zero();
     result.unobservable.clear();
     for (int k = 0; k < 6; ++k) {
