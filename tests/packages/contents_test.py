@@ -157,7 +157,11 @@ class Contents(unittest.TestCase):
 
     def test_what_stands_beside_the_daemon_waits_to_be_wanted(self) -> None:
         postinst = control("dtact-tools", "postinst")
-        self.assertNotIn("deb-systemd-invoke", postinst)
+        both = r"'?dtact-perceive\.service'? '?dtact-web\.service'?"
+        # Not started, but an upgrade leaves none that runs with the program of before, and a removal none.
+        self.assertRegex(postinst, f"deb-systemd-invoke try-restart {both}")
+        self.assertNotRegex(postinst, "deb-systemd-invoke (?!try-restart )")
+        self.assertRegex(control("dtact-tools", "prerm"), f"deb-systemd-invoke stop {both}")
         for unit in ("dtact-perceive.service", "dtact-web.service"):
             # Enabled again where somebody had enabled it, and nowhere else.
             self.assertIn(f"deb-systemd-helper debian-installed '{unit}'", postinst)

@@ -1,10 +1,18 @@
 # shellcheck shell=bash disable=SC2154
-# Purged, nothing is left of the packages: no file, no process, no unit.
-rm -f /etc/dtactd/{left,right}.toml
+# Purged, nothing is left of the packages: no file, no process, no unit; nor of a second sensor and of the page,
+# which run when they are removed.
+instance left 7401
+systemctl enable -q --now dtact-web
+within 120 bash -c 'ss -ltn | grep -q 127.0.0.1:7380'
+running() { pgrep -l -x dtactd || pgrep -l -x dtact-web; }
+apt_get remove dtactd dtact-tools
+running && fail "it runs from programs that are gone"
+[ -e "$config" ] || fail "a removal took the configuration"
 apt_get purge dtactd dtact-tools libdtact1 libdtact-dev python3-dtact
 files > /tmp/after
+# With them /etc/credstore, whose secrets are the administrator's.
 diff /tmp/before /tmp/after || fail "files are left or gone, see above"
-pgrep dtactd && fail "it runs"
+running && fail "it runs"
 [ ! -e /run/dtactd ] || fail "left: $(find /run/dtactd)"
 systemctl list-unit-files --no-legend | grep dtact | grep -v dtact-test && fail "units are left"
 dpkg-query -W -f '${Status} ${Package}\n' | grep dtact && fail "dpkg remembers"

@@ -1,14 +1,27 @@
 # shellcheck shell=bash disable=SC2154
-# A newer version over this one, whose configuration the administrator has edited and the newer one too.
+# A newer version over this one, whose configuration the administrator has edited and the newer one too; a
+# second sensor and the page are enabled beside it.
 within 120 serving
 echo '# kept by the administrator' >> "$config"
 cp "$config" /tmp/edited.toml
 dtactctl calibration upload /job/calibrations/old --name kept
-before=$(pid)
+instance left 7401
+systemctl enable -q --now dtact-web
+units=(dtactd dtactd@left dtact-web)
+program() { readlink "/proc/$(pid "$1")/exe"; }
+for unit in "${units[@]}"; do say "$unit: $(program "$unit")"; done
 apt_get -o Dpkg::Options::=--force-confdef -o Dpkg::Options::=--force-confold install /job/newer/*.deb
 cmp "$config" /tmp/edited.toml || fail "the edited configuration was not kept"
 [ -e "$config.dpkg-dist" ] || fail "the newer configuration is not beside it: $(ls /etc/dtactd)"
 [[ $(dpkg-query -W -f '${Version}' dtactd) == *.newer ]] || fail "not upgraded"
 within 120 serving
-other_pid "$before" || fail "the old program still runs"
+within 120 dtactctl --port 7401 status
+for unit in "${units[@]}"; do
+  # Of a file that was replaced the kernel says "(deleted)".
+  [[ $(program "$unit") =~ ^/usr/bin/[a-z-]+$ ]] || fail "$unit: the old program still runs: $(program "$unit")"
+done
+# Nobody wanted this one.
+[ "$(property ActiveState dtact-perceive)" = inactive ] || fail "dtact-perceive was started"
+systemctl disable -q --now dtactd@left dtact-web
+rm /etc/dtactd/left.toml
 expect kept dtactctl calibration list

@@ -25,6 +25,22 @@ within() {
     sleep 0.3
   done
 }
+# instance NAME PORT: a configuration of its own for dtactd@NAME, which is enabled and serves.
+instance() {
+  sed "s/^port = 7377 .*/port = $2/" "$config" > "/etc/dtactd/$1.toml"
+  systemctl enable -q --now "dtactd@$1"
+  within 300 dtactctl --port "$2" status
+}
+# export_calibration: the one in use, into /tmp/export. same NAME: that is /job/calibrations/NAME, byte for
+# byte.
+export_calibration() {
+  rm -rf /tmp/export
+  dtactctl calibration export -o /tmp/export
+}
+same() {
+  cmp -s "/job/calibrations/$1/calibration.toml" /tmp/export/calibration.toml \
+    && cmp -s "/job/calibrations/$1/reference.png" /tmp/export/reference.png
+}
 property() { systemctl show --value -p "$1" "${2:-dtactd}"; }
 pid() { property MainPID "${1:-dtactd}"; }
 other_pid() { [ "$(pid dtactd)" != "$1" ] && [ "$(pid dtactd)" != 0 ]; }
