@@ -12,6 +12,9 @@ frames 60 10
 systemctl status --no-pager dtactd | sed -n 's/^ *Status: /status: /p'
 systemd-analyze security --no-pager dtactd | tail -n 1
 [ "$(property NRestarts)" = 0 ] || fail "restarted: $(journalctl -b -u dtactd)"
+# Drivers that this kernel has not keep nothing from running.
+[ "$(systemctl show -p Result --value modprobe@{videodev,spidev,ws2812_pio_rp1}.service | sort -u | xargs)" = success ] \
+  || fail "a driver's absence counts: $(systemctl list-units --all 'modprobe@*')"
 # Nothing of it runs as root.
 [ "$(ps -o user= -p "$(pid)")" = dtactd ] || fail "runs as $(ps -o user= -p "$(pid)")"
 # For the other cases a scene without gel mechanics, which starts in a tenth of the time.

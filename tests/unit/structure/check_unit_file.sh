@@ -28,6 +28,13 @@ for unit in dtactd.service dtactd@.service dtact-perceive.service dtact-web.serv
   ! grep -qE '^[^#]*network-online' "$source/$unit" || fail "$unit waits for the network"
 done
 for unit in dtactd.service dtactd@.service; do
+  # The drivers that are modules, by the kind of device that systemd has to know.
+  for driver in video4linux:videodev spi:spidev ws2812-pio-rp1:ws2812_pio_rp1; do
+    for line in "DeviceAllow=char-${driver%:*} rw" "Wants=.*modprobe@${driver#*:}\.service.*" \
+      "After=.*modprobe@${driver#*:}\.service.*"; do
+      grep -qx "$line" "$source/$unit" || fail "$unit has no $line"
+    done
+  done
   # These would let the units score better, and the capture thread run worse.
   ! grep -qE '^(RestrictRealtime=yes|SystemCallFilter=~.*@resources)' "$source/$unit" || fail "$unit forbids FIFO"
 done
