@@ -1,6 +1,7 @@
 # shellcheck shell=bash disable=SC2154
 # A configuration with an error: a reload is refused with the reason and disturbs nothing; a restart fails
-# with the reason, and the daemon is there once the file is mended, without another command.
+# with the reason, and the daemon is there once the file is mended, without another command. Likewise a
+# reload where the error is in the tokens, which lie in a file of their own.
 before=$(pid)
 cp "$config" /tmp/good.toml
 sed -i 's/^fps = .*/fps = "many"/' "$config"
@@ -14,3 +15,19 @@ within 60 journal_says 'Failed with result'
 cp /tmp/good.toml "$config"
 within 120 serving
 journalctl --no-pager -o cat -b -u dtactd --since "$since" | grep -F fps | tail -n 1
+say "tokens"
+tokens=/etc/dtactd/tokens
+dtactctl token --new view > $tokens
+chown dtactd: $tokens
+cut -d ' ' -f 2 $tokens > /tmp/token
+chmod 600 $tokens /tmp/token
+sed -i "/^\[net\]/,/^\[metrics\]/s|^token_file = \"\"|token_file = \"$tokens\"|" "$config"
+systemctl restart dtactd
+within 120 dtactctl --token-file /tmp/token status
+before=$(pid)
+echo "view short" > $tokens
+systemctl reload dtactd && fail "broken tokens were taken"
+within 10 journal_says "$tokens:1: the token has 5 bytes"
+is_still "$before"
+dtactctl --token-file /tmp/token status > /dev/null || fail "the tokens in use are gone"
+rm $tokens /tmp/token
