@@ -29,8 +29,9 @@ bool is_good(const Alignment& alignment) {
 }  // namespace
 
 bool is_near(const Motion& a, const Motion& b, const Eigen::Vector3d& at) {
-  const double turn = Eigen::AngleAxisd(a.rotation.transpose() * b.rotation).angle();
-  return (a * at - b * at).norm() <= kMostSlide && turn <= kMostTurn;
+  const Motion back = a * b.inverse();
+  return (back * at - at).norm() <= kMostSlide &&
+         Eigen::AngleAxisd(back.rotation).angle() <= kMostTurn;
 }
 
 void Tracker::release() {

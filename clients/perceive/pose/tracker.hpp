@@ -14,7 +14,7 @@ constexpr std::size_t kFewestPixels = 300;
 constexpr double kGoodRms = 4e-5;
 
 /// From one frame to the next what is followed may go from `a` to `b`: no more than a millimetre
-/// and 14°, about `at`.
+/// and 14° about `at`, where the contact is after `b`, surface frame.
 [[nodiscard]] bool is_near(const Motion& a, const Motion& b, const Eigen::Vector3d& at);
 
 /// Follows an object from the frame in which it is first touched. What is seen of it then, and at

@@ -174,5 +174,24 @@ TEST(ObjectTracker, AnotherContactBeginsWithASearch) {
   EXPECT_EQ(tracker.follow(frame.view(), 3).state, State::started);
 }
 
+// As files of large assemblies have it: a degree of a first correction is 1.7 mm there.
+TEST(ObjectTracker, TheFilesOriginMayLieFarFromWhatTouches) {
+  const Vector3d far(100, 0, 0);
+  Balls object = bumps();
+  for (auto& ball : object.balls) ball.middle += far;
+  ObjectTracker tracker(model_of(object));
+  const Motion truth = moved({0, 0, 0}, Vector3d::UnitZ(), 60) * moved(-far);
+  const Frame frame(object, truth, 5);
+  (void)tracker.follow(frame.view(), 1);
+  tracker.wait();
+  EXPECT_EQ(tracker.follow(frame.view(), 2).state, State::started);
+  for (unsigned i = 1; i <= 10; ++i) {
+    const Motion next = moved({0, 0, 0}, Vector3d::UnitZ(), 60 + i) * moved(-far);
+    const Frame later(object, next, 5, i);
+    EXPECT_EQ(tracker.follow(later.view(), 2 + i).state, State::tracked) << i;
+    EXPECT_LT(off(tracker.pose(), next).um, 15);
+  }
+}
+
 }  // namespace
 }  // namespace dtact::perceive
