@@ -54,37 +54,51 @@ Tracker::Keyframe Tracker::keyframe_of(const ContactView& view) const {
 }
 
 void Tracker::add_keyframe(const ContactView& view) {
-  // The first stays: what is nearest to the beginning has the least error.
-  if (keyframes_.size() == kMostKeyframes) keyframes_.erase(keyframes_.begin() + 1);
+  if (keyframes_.size() == kMostKeyframes) {
+    // The one of the object's furthest part; the first stays, which has no error.
+    const Eigen::Vector3d here = pose_.alignment.motion.inverse() * view.centre();
+    const auto distance = [&here](const Keyframe& key) {
+      return (key.motion.inverse() * key.centre - here).norm();
+    };
+    keyframes_.erase(
+        std::ranges::max_element(keyframes_.begin() + 1, keyframes_.end(), {}, distance));
+  }
   keyframes_.push_back(keyframe_of(view));
   current_ = keyframes_.size() - 1;
 }
 
-/// By the present keyframe, or by an older one that shares as much.
-Alignment Tracker::best(const ContactView& view, const Motion& from) {
-  Alignment found = align(keyframes_[current_].surfels, view, from);
-  if (is_good(found) && found.overlap >= kSharedOverlap && current_ == 0) return found;
-  // Those that lay nearest to where the contact is in the object.
-  const Eigen::Vector3d here = from.rotation.transpose() * (view.centre() - from.translation);
-  std::size_t nearest = current_;
-  double least = INFINITY;
+std::size_t Tracker::oldest_shared(const ContactView& view, const Motion& from) const {
+  constexpr std::size_t kProbes = 60;
+  std::size_t chosen = current_;
+  double most = 0;
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
-    const Motion& motion = keyframes_[i].motion;
-    const Eigen::Vector3d there =
-        motion.rotation.transpose() * (keyframes_[i].centre - motion.translation);
-    const double turn = Eigen::AngleAxisd(motion.rotation.transpose() * from.rotation).angle();
-    const double distance = (there - here).norm() + 1e-3 * turn;
-    if (distance < least) {
-      least = distance;
-      nearest = i;
+    const std::vector<Surfel>& surfels = keyframes_[i].surfels;
+    const std::size_t every = 1 + surfels.size() / kProbes;
+    std::size_t probes = 0;
+    std::size_t met = 0;
+    for (std::size_t k = 0; k < surfels.size(); k += every, ++probes) {
+      if (view.at(from * surfels[k].point)) ++met;
+    }
+    const double part = static_cast<double>(met) / static_cast<double>(probes);
+    if (part >= kSharedOverlap) return i;
+    if (part > most) {
+      most = part;
+      chosen = i;
     }
   }
-  if (nearest == current_) return found;
-  Alignment other = align(keyframes_[nearest].surfels, view, from);
-  const bool better = is_good(other) && (!is_good(found) || other.overlap >= found.overlap);
-  if (!better) return found;
-  current_ = nearest;
-  return other;
+  return chosen;
+}
+
+Alignment Tracker::best(const ContactView& view, const Motion& from) {
+  const std::size_t chosen = oldest_shared(view, from);
+  Alignment found = align(keyframes_[chosen].surfels, view, from);
+  if (chosen == current_) return found;
+  if (!is_good(found) || found.overlap < kSharedOverlap) {
+    const Alignment other = align(keyframes_[current_].surfels, view, from);
+    if (is_good(other) && (!is_good(found) || other.overlap > found.overlap)) return other;
+  }
+  current_ = chosen;
+  return found;
 }
 
 bool Tracker::recover(const ContactView& view) {

@@ -19,7 +19,8 @@ constexpr double kGoodRms = 4e-5;
 
 /// Follows an object from the frame in which it is first touched. What is seen of it then, and at
 /// keyframes later, is kept as surfels where they lay in that first frame; a frame is aligned with
-/// the keyframe that it shares most with, so that errors add up over keyframes and not over frames.
+/// the oldest keyframe that it shares enough with, so that errors add up over keyframes and not
+/// over frames, and are gone where it comes back.
 class Tracker {
  public:
   enum class State : std::uint8_t {
@@ -54,6 +55,9 @@ class Tracker {
   /// What is seen now, laid back by the present motion.
   [[nodiscard]] Keyframe keyframe_of(const ContactView& view) const;
   void add_keyframe(const ContactView& view);
+  /// The oldest keyframe of which most is in view, since errors have added up least until then;
+  /// where there is none, the one of which most is.
+  [[nodiscard]] std::size_t oldest_shared(const ContactView& view, const Motion& from) const;
   [[nodiscard]] Alignment best(const ContactView& view, const Motion& from);
   [[nodiscard]] bool recover(const ContactView& view);
 

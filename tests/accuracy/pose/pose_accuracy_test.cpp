@@ -88,6 +88,25 @@ TEST(PoseOnTheSimulatedLayer, ABallShowsThreeDirections) {
   }
 }
 
+// Slid and twisted for ten seconds, so far that other frames are compared with than the first.
+TEST(PoseOnTheSimulatedLayer, ACubeThatComesBackIsWhereItWas) {
+  constexpr int kEachSecond = 10;
+  Sequence frames("object = \"cube\"\nside_mm = 5.0", keys_of_a_minute(60 * kEachSecond));
+  Tracker tracker;
+  CloudMaker maker;
+  PointCloud cloud;
+  constexpr std::uint64_t kBack = std::uint64_t{10} * Sequence::kFps;
+  for (std::uint64_t sequence = 0; sequence <= kBack; sequence += Sequence::kFps / kEachSecond) {
+    const Map map = frames.map(sequence);
+    maker.make(map.grid, 1, cloud);
+    const auto& pose = tracker.follow(ContactView(map.grid, cloud, maker.table(), 10), sequence);
+    ASSERT_NE(pose.state, Tracker::State::lost) << sequence;
+  }
+  const Error error = perceive::test::error_of(tracker.pose().alignment, frames.motion(kBack));
+  EXPECT_LT(error.um, 2);
+  EXPECT_LT(error.degrees, 0.05);
+}
+
 class PoseOnAFinger : public testing::TestWithParam<recon::Surface> {};
 
 TEST_P(PoseOnAFinger, M4Nut) {
