@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <span>
+#include <system_error>
 #include <utility>
 
 #include "clients/perceive/pose/contact_patch.hpp"
@@ -19,8 +20,10 @@ using Eigen::Vector3d;
 
 /// A contact that has grown so many times may tell apart what was alike: it is searched again.
 constexpr double kGrownMuch = 2;
-/// After a search that found nothing the next one waits for so many frames, or for so much growth.
+/// After a search that found nothing the next one waits for so many frames, twice as many each
+/// time, or for so much growth.
 constexpr int kPause = 30;
+constexpr int kLongestPause = 600;
 constexpr double kGrownInVain = 1.25;
 /// Surfels that are looked at and compared, of those that may touch.
 constexpr std::size_t kLookedAt = 3000;
@@ -32,6 +35,42 @@ constexpr double kUpright = 0.1;
 /// What a good alignment has at least, beside kGoodRms.
 constexpr double kOverlap = 0.5;
 constexpr double kArea = 0.1;  // of the contact
+
+/// What a twist's rotation is about, and what makes a length of it.
+struct Frame {
+  Vector3d centre;
+  double arm = 0;
+};
+
+/// The same motion as a twist of another frame.
+Twist seen_from(const Twist& twist, const Frame& from, const Frame& to) {
+  const Vector3d turn = twist.head<3>() / from.arm;
+  Twist seen;
+  seen << to.arm * turn, twist.tail<3>() + turn.cross(to.centre - from.centre);
+  return seen;
+}
+
+/// What both have in common: the principal angles between the two. `a` is orthonormal.
+std::vector<Twist> in_both(const std::vector<Twist>& a, const std::vector<Twist>& b) {
+  if (a.empty() || b.empty()) return {};
+  const auto columns = [](const std::vector<Twist>& twists) {
+    Eigen::MatrixXd matrix(6, twists.size());
+    for (std::size_t i = 0; i < twists.size(); ++i) {
+      matrix.col(static_cast<Eigen::Index>(i)) = twists[i];
+    }
+    return matrix;
+  };
+  const Eigen::MatrixXd all = columns(a);
+  const Eigen::MatrixXd base = Eigen::HouseholderQR<Eigen::MatrixXd>(columns(b)).householderQ() *
+                               Eigen::MatrixXd::Identity(6, static_cast<Eigen::Index>(b.size()));
+  const Eigen::JacobiSVD<Eigen::MatrixXd> angles(all.transpose() * base, Eigen::ComputeThinU);
+  constexpr double kCommon = 0.9;
+  std::vector<Twist> common;
+  for (Eigen::Index k = 0; k < angles.singularValues().size(); ++k) {
+    if (angles.singularValues()[k] > kCommon) common.emplace_back(all * angles.matrixU().col(k));
+  }
+  return common;
+}
 
 /// The surfels that touch where `place` puts the object, those that lie around the view.
 std::vector<Surfel> touching(const ObjectModel& object, const ContactView& view,
@@ -65,10 +104,10 @@ std::vector<Surfel> touching(const ObjectModel& object, const ContactView& view,
 void ObjectTracker::release() {
   contact_.release();
   placement_.reset();
-  // Its thread goes on to its end; what it finds is another contact's.
-  if (search_) search_->wanted = false;
+  stop_search();
   searched_pixels_ = 0;
-  pause_ = 0;
+  pause_ = next_pause_ = 0;
+  forgot_ = false;
   pose_ = {};
 }
 
@@ -88,43 +127,63 @@ std::optional<Alignment> ObjectTracker::align_object(const ContactView& view,
 }
 
 std::vector<Twist> ObjectTracker::unknown(const Alignment& alignment, const Placement& placement) {
-  const std::vector<Twist>& by_shape = alignment.unobservable;
-  const std::vector<Twist>& by_outline = placement.hidden;
-  if (by_shape.empty() || by_outline.empty()) return {};
   const Motion& pose = alignment.motion;
-  const Vector3d shift = alignment.centre - pose * placement.centre;
-  Eigen::MatrixXd shape(6, by_shape.size());
-  for (std::size_t i = 0; i < by_shape.size(); ++i) {
-    shape.col(static_cast<Eigen::Index>(i)) = by_shape[i];
+  const Frame here{alignment.centre, alignment.arm};
+  const Frame then{pose * placement.centre, placement.arm};
+  std::vector<Twist> hidden;
+  for (const Twist& one : placement.hidden) {
+    Twist turned;
+    turned << pose.rotation * one.head<3>(), pose.rotation * one.tail<3>();
+    hidden.push_back(seen_from(turned, then, here));
   }
-  Eigen::MatrixXd outline(6, by_outline.size());
-  for (std::size_t i = 0; i < by_outline.size(); ++i) {
-    const Vector3d turn = pose.rotation * by_outline[i].head<3>() / placement.arm;
-    const Vector3d slide = pose.rotation * by_outline[i].tail<3>() + turn.cross(shift);
-    outline.col(static_cast<Eigen::Index>(i)) << alignment.arm * turn, slide;
+  return in_both(alignment.unobservable, hidden);
+}
+
+bool ObjectTracker::forget(const Alignment& alignment) {
+  const Alignment& contact = contact_.pose().alignment;
+  const Frame here{alignment.centre, alignment.arm};
+  std::vector<Twist> of_contact;
+  for (const Twist& one : contact.unobservable) {
+    of_contact.push_back(seen_from(one, {contact.centre, contact.arm}, here));
   }
-  // What both have in common: the principal angles between the two.
-  const Eigen::MatrixXd base = Eigen::HouseholderQR<Eigen::MatrixXd>(outline).householderQ() *
-                               Eigen::MatrixXd::Identity(6, outline.cols());
-  const Eigen::JacobiSVD<Eigen::MatrixXd> angles(shape.transpose() * base, Eigen::ComputeThinU);
-  constexpr double kCommon = 0.9;
-  std::vector<Twist> common;
-  for (Eigen::Index k = 0; k < angles.singularValues().size(); ++k) {
-    if (angles.singularValues()[k] > kCommon) common.emplace_back(shape * angles.matrixU().col(k));
+  const Motion& pose = alignment.motion;
+  const Frame then{pose * placement_->centre, placement_->arm};
+  bool more = false;
+  for (const Twist& one : in_both(alignment.unobservable, of_contact)) {
+    const Twist there = seen_from(one, here, then);
+    Twist back;
+    back << pose.rotation.transpose() * there.head<3>(),
+        pose.rotation.transpose() * there.tail<3>();
+    for (const Twist& known : placement_->hidden) back -= known * known.dot(back);
+    constexpr double kAnother = 0.3;
+    if (back.norm() < kAnother * there.norm()) continue;
+    placement_->hidden.push_back(back.normalized());
+    more = true;
   }
-  return common;
+  return more;
+}
+
+void ObjectTracker::in_vain() {
+  pause_ = std::max(kPause, next_pause_);
+  next_pause_ = std::min(2 * pause_, kLongestPause);
 }
 
 void ObjectTracker::begin_search(const ContactView& view) {
-  SearchUnderWay& search = search_.emplace();
+  SearchUnderWay search;
   search.contact = contact_.pose().alignment.motion;
   search.pixels = view.pixels();
   std::optional<Motion> present;
   if (placement_) present = place_;
-  search.result =
-      std::async(std::launch::async, [object = object_, patch = make_patch(view), present] {
-        return perceive::search(*object, patch, present);
-      });
+  try {
+    search.result = std::async(std::launch::async, [object = object_, patch = make_patch(view),
+                                                    present, stop = search.stop.get_token()] {
+      return perceive::search(*object, patch, present, stop);
+    });
+  } catch (const std::system_error&) {
+    // No thread is to be had now.
+    return in_vain();
+  }
+  search_ = std::move(search);
 }
 
 std::optional<Placement> ObjectTracker::finished() {
@@ -135,10 +194,10 @@ std::optional<Placement> ObjectTracker::finished() {
   std::optional<Placement> found = search_->result.get();
   const SearchUnderWay search = std::move(*search_);
   search_.reset();
-  if (!search.wanted) return std::nullopt;
+  if (search.stop.stop_requested()) return std::nullopt;
   searched_pixels_ = search.pixels;
   if (!found) {
-    pause_ = kPause;
+    in_vain();
     return std::nullopt;
   }
   const Motion since = contact_.pose().alignment.motion * search.contact.inverse();
@@ -161,7 +220,7 @@ void ObjectTracker::follow_contact(const ContactView& view, std::uint64_t sequen
   contact_.release();
   (void)contact_.follow(view, sequence);
   // What has moved since it began is not known.
-  if (search_) search_->wanted = false;
+  stop_search();
 }
 
 const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_t sequence) {
@@ -179,6 +238,11 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
         pose_.state = State::tracked;
       }
       placement_ = found;
+      forgot_ = false;
+      pause_ = kPause;
+      next_pause_ = 0;
+    } else {
+      in_vain();
     }
   }
   if (!aligned && placement_) {
@@ -188,9 +252,11 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
   if (aligned && placement_) {
     place_ = aligned->motion;
     pose_.alignment = *std::move(aligned);
+    forgot_ |= forget(pose_.alignment);
     pose_.alignment.unobservable = unknown(pose_.alignment, *placement_);
     pose_.alternatives = placement_->alternatives;
   } else {
+    if (placement_ && !was_lost) pause_ = 0;
     pose_.state = placement_ ? State::lost : State::searching;
   }
   const bool unknown_place = pose_.state == State::lost || pose_.state == State::searching;
@@ -198,7 +264,8 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
     return static_cast<double>(view.pixels()) >= factor * static_cast<double>(searched_pixels_);
   };
   if (pause_ > 0) --pause_;
-  const bool again = unknown_place ? pause_ == 0 || times(kGrownInVain) : times(kGrownMuch);
+  const bool again = unknown_place ? pause_ == 0 || times(kGrownInVain)
+                                   : times(kGrownMuch) || (forgot_ && pause_ == 0);
   if (!search_ && again && view.pixels() >= kFewestPixels) begin_search(view);
   return pose_;
 }

@@ -4,6 +4,7 @@
 #include <future>
 #include <memory>
 #include <optional>
+#include <stop_token>
 
 #include "clients/perceive/pose/object_model.hpp"
 #include "clients/perceive/pose/placement_search.hpp"
@@ -13,20 +14,24 @@ namespace dtact::perceive {
 
 /// What an ObjectTracker waits for.
 struct SearchUnderWay {
+  std::stop_source stop;  ///< Asked for once the contact is another one.
   std::future<std::optional<Placement>> result;
   Motion contact;          ///< The contact's motion at its frame.
   std::size_t pixels = 0;  ///< Of the contact then.
-  bool wanted = true;      ///< The contact is still the same.
 };
 
 /// Follows a known object: where it is, in the surface frame. A Tracker follows the contact from
 /// frame to frame. Beside it, on another thread, the object is searched for in what one frame
 /// showed; what the contact has moved by since then is added to what is found. From there on each
 /// frame is aligned with the object itself, so that nothing adds up, along the directions that its
-/// touched shape shows; along the others the contact's motion is taken.
+/// touched shape shows; along the others the contact's motion is taken. Along those that neither
+/// shows nobody follows it: they are told as unknown until a search has found it again.
 class ObjectTracker {
  public:
   explicit ObjectTracker(std::shared_ptr<const ObjectModel> object) : object_(std::move(object)) {}
+  ~ObjectTracker() { stop_search(); }
+  ObjectTracker(const ObjectTracker&) = delete;
+  ObjectTracker& operator=(const ObjectTracker&) = delete;
 
   /// The next frame, seen as ContactView says. A search that was begun is not waited for, but for
   /// the end of this object's life.
@@ -46,14 +51,24 @@ class ObjectTracker {
   /// Moves the place as the contact moved.
   void follow_contact(const ContactView& view, std::uint64_t sequence);
   void begin_search(const ContactView& view);
+  /// What it finds is another contact's.
+  void stop_search() {
+    if (search_) search_->stop.request_stop();
+  }
+  /// A search or what it found explains nothing: the next one waits, each time for longer.
+  void in_vain();
   /// The end of a search, if it is over: what it found, moved to the present frame.
   [[nodiscard]] std::optional<Placement> finished();
   /// Aligned with the object from `start` on; nothing where that does not explain the frame.
   [[nodiscard]] std::optional<Alignment> align_object(const ContactView& view,
                                                       const Motion& start) const;
-  /// What neither the touched shape nor, at the search, the outline shows.
+  /// What neither the touched shape nor, since the search, anything else has shown; as twists of
+  /// `alignment`.
   [[nodiscard]] static std::vector<Twist> unknown(const Alignment& alignment,
                                                   const Placement& placement);
+  /// Adds to what the placement hides what neither this frame's alignment with the object nor the
+  /// contact's motion shows. True where that is more than before.
+  bool forget(const Alignment& alignment);
 
   std::shared_ptr<const ObjectModel> object_;
   Tracker contact_;
@@ -61,7 +76,9 @@ class ObjectTracker {
   std::optional<Placement> placement_;  ///< Its centre and hidden twists in the object's frame.
   Motion place_;                        ///< Where the object is, as far as its contact tells.
   std::size_t searched_pixels_ = 0;
-  int pause_ = 0;
+  int pause_ = 0;       ///< Frames until the next search may begin.
+  int next_pause_ = 0;  ///< After one in vain; 0: the shortest.
+  bool forgot_ = false;
   Tracker::Pose pose_;
 };
 

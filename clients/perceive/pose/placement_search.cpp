@@ -63,9 +63,10 @@ Matrix3d turn_to(const Vector3d& up) {
 
 class Search {
  public:
-  Search(const ObjectModel& object, const ContactPatch& patch)
+  Search(const ObjectModel& object, const ContactPatch& patch, const std::stop_token& stop)
       : object_(object),
         patch_(patch),
+        stop_(stop),
         some_(thinned(patch, kSamples)),
         few_(thinned(patch, kFirstSamples)) {}
 
@@ -78,6 +79,7 @@ class Search {
     if (present) add_present(*present);
     climb_all(some_, kStep, kLast);
     keep(candidates_.size());
+    if (stop_.stop_requested()) return std::nullopt;
     if (candidates_.empty() || candidates_.front().score < kExplained) return std::nullopt;
     return best();
   }
@@ -117,6 +119,7 @@ class Search {
   }
 
   void look(const Matrix3d& turn) {
+    if (stop_.stop_requested()) return;
     const Underside underside = underside_of(turn);
     const Underside::Low low = underside.below(patch_.highest - patch_.lowest + kLift);
     if (low.area * kAreaFactor < patch_.area || low.area > kAreaFactor * patch_.area) return;
@@ -139,6 +142,7 @@ class Search {
 
   void climb_all(const ContactPatch& patch, double step, double last) {
     for (Candidate& one : candidates_) {
+      if (stop_.stop_requested()) return;
       const Underside underside = underside_of(one.turn);
       const Climbed climbed = climb(underside, patch, one.move, step, last);
       one.move = climbed.move;
@@ -212,6 +216,7 @@ class Search {
 
   const ObjectModel& object_;
   const ContactPatch& patch_;
+  const std::stop_token& stop_;
   ContactPatch some_;
   ContactPatch few_;
   std::vector<Candidate> candidates_;
@@ -220,10 +225,10 @@ class Search {
 }  // namespace
 
 std::optional<Placement> search(const ObjectModel& object, const ContactPatch& patch,
-                                const std::optional<Motion>& present) {
+                                const std::optional<Motion>& present, const std::stop_token& stop) {
   constexpr std::size_t kFewest = 20;
   if (patch.core.size() < kFewest) return std::nullopt;
-  return Search(object, patch).run(present);
+  return Search(object, patch, stop).run(present);
 }
 
 }  // namespace dtact::perceive

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "clients/perceive/pose/contact_patch.hpp"
@@ -25,8 +26,10 @@ struct Placement {
 /// Looks for the object everywhere: its underside in every direction (all over a sphere, 5° apart,
 /// and where it rests on a plane), turned in steps of 10°, its lowest part laid on the contact's
 /// core; the best are climbed from. Nothing where none explains the contact. The whole contact has
-/// to be in view. Takes some tenths of a second.
+/// to be in view. Takes some tenths of a second; ends soon after `stop` is asked for, with nothing.
+/// `present`: where the object is held to be, which stays if it explains the contact as well.
 [[nodiscard]] std::optional<Placement> search(const ObjectModel& object, const ContactPatch& patch,
-                                              const std::optional<Motion>& present = {});
+                                              const std::optional<Motion>& present = {},
+                                              const std::stop_token& stop = {});
 
 }  // namespace dtact::perceive

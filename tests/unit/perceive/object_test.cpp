@@ -193,5 +193,53 @@ TEST(ObjectTracker, TheFilesOriginMayLieFarFromWhatTouches) {
   }
 }
 
+// A ball with a bump, rolled until the bump has left the contact: what turns it from there on is
+// seen neither on the ball nor by the contact's motion.
+TEST(ObjectTracker, WhatNobodyFollowsIsTold) {
+  const Balls object{{{{0, 0, 3.2}, 4.0}, {{2.2, 0, 1.1}, 1.5}}};
+  ObjectTracker tracker(model_of(object));
+  const Vector3d middle(0, 0, 3.2);
+  const auto rolled = [&](double degrees) {
+    return moved(middle) * moved({0, 0, 0}, Vector3d::UnitY(), degrees) * moved(-middle);
+  };
+  const Frame first(object, rolled(0), 2);
+  (void)tracker.follow(first.view(), 1);
+  tracker.wait();
+  EXPECT_EQ(tracker.follow(first.view(), 2).state, State::started);
+  // About the line between the middles.
+  EXPECT_EQ(tracker.pose().alignment.unobservable.size(), 1U);
+  for (unsigned i = 1; i <= 20; ++i) {
+    const Frame frame(object, rolled(-1.0 * i), 2, i);
+    EXPECT_EQ(tracker.follow(frame.view(), 2 + i).state, State::tracked) << i;
+    tracker.wait();
+  }
+  const std::vector<Twist>& unknown = tracker.pose().alignment.unobservable;
+  ASSERT_EQ(unknown.size(), 3U);
+  // Turns about the ball's middle: points of it do not move along the normal.
+  for (const Twist& one : unknown) EXPECT_GT(one.head<3>().norm(), 0.3);
+}
+
+TEST(ObjectTracker, WhatIsNotFoundIsSearchedForEverMoreSeldom) {
+  ObjectTracker tracker(model_of(bumps()));
+  const Frame another({{{{0, 0, 3.0}, 4.0}}}, {}, 5);
+  const ContactView view = another.view();
+  int searches = 0;
+  for (unsigned i = 0; i < 600; ++i) {
+    EXPECT_EQ(tracker.follow(view, i).state, State::searching);
+    if (!tracker.is_searching()) continue;
+    ++searches;
+    tracker.wait();
+  }
+  // The first at once, then 30, 60, 120 and 240 frames after the one before.
+  EXPECT_EQ(searches, 5);
+}
+
+TEST(ObjectTracker, ASearchThatIsNoLongerWantedEndsWithNothing) {
+  const Frame frame(bumps(), {}, 5);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_FALSE(search(*model_of(bumps()), make_patch(frame.view()), {}, stop.get_token()));
+}
+
 }  // namespace
 }  // namespace dtact::perceive
