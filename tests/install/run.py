@@ -55,7 +55,8 @@ def run_cases(disc: Path, folder: Path, job: Path, names: list[str], emulated: b
                      "journalctl --no-pager -b -o cat -u 'dtactd*' | tail -n 12; }")
         lines.append(f'echo "{name} took $((SECONDS - began)) s"')
     lines.append('exit $failed')
-    shutil.copy(HERE / 'guest' / 'lib.sh', job)
+    for name in ('lib.sh', 'stream.py'):
+        shutil.copy(HERE / 'guest' / name, job)
     (job / 'run').write_text('\n'.join(lines) + '\n')
     changes = folder / 'cases.cow'
     changes.unlink(missing_ok=True)

@@ -2,8 +2,6 @@
 # Tokens, key and certificate that only root can read on disk reach the unprivileged daemon as systemd's
 # credentials.
 store=/etc/credstore
-# Debian 13's systemd brings the folder.
-[ -d $store ] || { install -d -m 700 $store; made=1; }
 fingerprint=$(dtactctl cert -o /tmp/keys | sed -n 's/^--fingerprint //p')
 install -m 600 /tmp/keys/dtactd.crt $store/dtactd.tls-certificate
 install -m 600 /tmp/keys/dtactd.key $store/dtactd.tls-key
@@ -22,6 +20,11 @@ within 120 dtactctl "${tls[@]}" --token-file /tmp/token status
 expect token dtactctl "${tls[@]}" status
 frames 30 5 "${tls[@]}" --token-file /tmp/token
 expect 'control' dtactctl "${tls[@]}" --token-file /tmp/token led --brightness 10
+# The check before a reload may not see them.
+before=$(pid)
+sed -i 's/^max_clients = 32 /max_clients = 31 /' "$config"
+systemctl reload dtactd || fail "a reload with credentials is refused: $(journalctl --no-pager -b -u dtactd | tail -n 5)"
+within 60 journal_says 'changed: net.max_clients'
+is_still "$before"
 runuser -u dtactd -- test -r $store/dtactd.tokens && fail "the daemon's user reads the tokens on disk"
 rm -r $store/dtactd.* /tmp/keys /tmp/token /tmp/token-line
-[ -z "${made-}" ] || rmdir $store
