@@ -3,6 +3,7 @@
 
 Exit code: 0 passed; 77 there are no packages; else failed.
 """
+import json
 import pathlib
 import re
 import subprocess
@@ -115,6 +116,12 @@ def triplet(name: str) -> str:
 
 
 class Contents(unittest.TestCase):
+def content(name: str, path: str) -> str:
+    """A file's text."""
+    tree = subprocess.run(["dpkg-deb", "--fsys-tarfile", package(name)], check=True, capture_output=True).stdout
+    return subprocess.run(["tar", "-xO", f".{path}"], check=True, capture_output=True, input=tree).stdout.decode()
+
+
     def test_the_packages_are_these(self) -> None:
         names = sorted(path.name.split("_")[0] for path in FOLDER.glob("*.deb") if "-dbgsym_" not in path.name)
         self.assertEqual(names, ["dtact-tools", "dtactd", "libdtact-dev", "libdtact1", "python3-dtact"])
@@ -198,6 +205,29 @@ class Contents(unittest.TestCase):
         build_depends = {word.split()[0].split(":")[0] for word in needed[1].split(",")}
         self.assertEqual(set(listed[1].split()) - build_depends, {"g++", "ccache"})
         self.assertEqual(
+    def test_the_copyright_names_all_that_is_bundled(self) -> None:
+        paragraphs = content("dtact-tools", "/usr/share/doc/dtact-tools/copyright").split("\n\n")
+        licences = {}  # a folder of files → the names of its licences
+        texts = set()
+        for paragraph in paragraphs:
+            licence = re.search(r"^License: (.*)", paragraph, re.MULTILINE)
+            holders = re.search(r"^Copyright: \S", paragraph, re.MULTILINE)
+            folders = re.search(r"^Files: (.*(?:\n .*)*)", paragraph, re.MULTILINE)
+            if licence and holders and folders:
+                licences.update(dict.fromkeys(folders[1].split(), licence[1].split(" and ")))
+            elif licence:
+                texts.add(licence[1])
+        lock = json.loads((TREE / "clients/web/page/package-lock.json").read_text())
+        bundled = {name: about["license"] for name, about in lock["packages"].items() if name and not about.get("dev")}
+        self.assertIn("node_modules/three", bundled)
+        for name, licence in bundled.items():
+            self.assertIn(f"{name}/*", licences)
+            # As Debian calls them; those of one kind that differ in their words are told apart at the end.
+            wanted = licence.strip("()").replace("MIT", "Expat").split(" AND ")
+            for one, found in zip(wanted, licences[f"{name}/*"], strict=True):
+                self.assertRegex(found, f"(?i)^{one}(-|$)", name)
+                self.assertIn(found, texts)
+
             {word for word in build_depends - set(listed[1].split()) if "python" not in word},
             {"debhelper-compat", "dh-sequence-installsysusers"},
         )
