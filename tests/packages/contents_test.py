@@ -121,6 +121,11 @@ def content(name: str, path: str) -> str:
     return subprocess.run(["tar", "-xO", f".{path}"], check=True, capture_output=True, input=tree).stdout.decode()
 
 
+def triplet(name: str) -> str:
+    return {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu"}[field(name, "Architecture")]
+
+
+class Contents(unittest.TestCase):
     def test_the_packages_are_these(self) -> None:
         names = sorted(path.name.split("_")[0] for path in FOLDER.glob("*.deb") if "-dbgsym_" not in path.name)
         self.assertEqual(names, ["dtact-tools", "dtactd", "libdtact-dev", "libdtact1", "python3-dtact"])
@@ -129,6 +134,9 @@ def content(name: str, path: str) -> str:
         for name, expected in FILES.items():
             present = files(name)
             units = "/lib/systemd/system" if any(path.startswith("/lib/") for path in present) else "/usr/lib/systemd/system"
+            backs_off = name == "dtactd" and units.startswith("/usr/")
+            self.assertEqual(any("back-off" in path for path in present), backs_off)
+            expected += BACK_OFF if backs_off else ""
             for path in expected.split():
                 path = path.replace("LIB", f"/usr/lib/{triplet(name)}").replace("UNITS", units)
                 self.assertIn(path, present)
@@ -151,9 +159,11 @@ def content(name: str, path: str) -> str:
             "deb-systemd-invoke $_dh_action 'dtactd.service'",
         ):
             self.assertIn(snippet, postinst)
-        # The user is there before the folders that belong to it, and both before the start.
-        order = [postinst.index(word) for word in ("systemd-sysusers", "--create", "deb-systemd-invoke")]
-        self.assertEqual(order, sorted(order))
+        # The user is there before the folders that belong to it, its groups before the devices are given to
+        # them, and all before the start.
+        for step in ("udevadm trigger", "--create"):
+            order = [postinst.index(word) for word in ("systemd-sysusers", step, "deb-systemd-invoke")]
+            self.assertEqual(order, sorted(order))
         self.assertIn("deb-systemd-invoke stop 'dtactd.service'", control("dtactd", "prerm"))
         self.assertIn("deb-systemd-helper purge 'dtactd.service'", control("dtactd", "postrm"))
         for script in ("postinst", "prerm", "postrm"):
@@ -188,22 +198,6 @@ def content(name: str, path: str) -> str:
         for name in ("libdtact1", "libdtact-dev"):
             self.assertEqual(field(name, "Multi-Arch"), "same")
 
-    def test_the_tree_says_the_same_elsewhere(self) -> None:
-        project = re.search(r"project\(dtactd VERSION ([\d.]+)", (TREE / "CMakeLists.txt").read_text())
-        assert project
-        for name in FILES:
-            self.assertRegex(field(name, "Version"), f"^{re.escape(project[1])}-", "debian/changelog")
-        self.assertIn(
-            f"/usr/lib/python3/dist-packages/dtact-{project[1]}.egg-info/PKG-INFO", files("python3-dtact"), "pyproject.toml"
-        )
-        # What ./dev installs and what the packages are built with.
-        listed = re.search(r"build_packages=\((.*?)\)", (TREE / "dev").read_text(), re.DOTALL)
-        assert listed
-        needed = re.search(r"Build-Depends: (.*?)\n\n", (TREE / "debian/control").read_text(), re.DOTALL)
-        assert needed
-        build_depends = {word.split()[0].split(":")[0] for word in needed[1].split(",")}
-        self.assertEqual(set(listed[1].split()) - build_depends, {"g++", "ccache"})
-        self.assertEqual(
     def test_the_copyright_names_all_that_is_bundled(self) -> None:
         paragraphs = content("dtact-tools", "/usr/share/doc/dtact-tools/copyright").split("\n\n")
         licences = {}  # a folder of files → the names of its licences
@@ -227,6 +221,22 @@ def content(name: str, path: str) -> str:
                 self.assertRegex(found, f"(?i)^{one}(-|$)", name)
                 self.assertIn(found, texts)
 
+    def test_the_tree_says_the_same_elsewhere(self) -> None:
+        project = re.search(r"project\(dtactd VERSION ([\d.]+)", (TREE / "CMakeLists.txt").read_text())
+        assert project
+        for name in FILES:
+            self.assertRegex(field(name, "Version"), f"^{re.escape(project[1])}-", "debian/changelog")
+        self.assertIn(
+            f"/usr/lib/python3/dist-packages/dtact-{project[1]}.egg-info/PKG-INFO", files("python3-dtact"), "pyproject.toml"
+        )
+        # What ./dev installs and what the packages are built with.
+        listed = re.search(r"build_packages=\((.*?)\)", (TREE / "dev").read_text(), re.DOTALL)
+        assert listed
+        needed = re.search(r"Build-Depends: (.*?)\n\n", (TREE / "debian/control").read_text(), re.DOTALL)
+        assert needed
+        build_depends = {word.split()[0].split(":")[0] for word in needed[1].split(",")}
+        self.assertEqual(set(listed[1].split()) - build_depends, {"g++", "ccache"})
+        self.assertEqual(
             {word for word in build_depends - set(listed[1].split()) if "python" not in word},
             {"debhelper-compat", "dh-sequence-installsysusers"},
         )
