@@ -70,13 +70,18 @@ std::vector<File> all_files(const std::filesystem::path& root) {
       {{"/etc/dtactd/dtactd.toml", "The configuration that the unit dtactd.service names."},
        {"/etc/dtactd/NAME.toml",
         "Of the unit dtactd@NAME.service, for a further sensor; its state and socket lie in "
-        "/var/lib/dtactd/NAME and /run/dtactd/NAME."},
+        "/var/lib/dtactd/NAME and /run/dtactd/NAME. NAME may not be dtactd, calibration or "
+        "calibrations, which are the first one's own there."},
        {"/var/lib/dtactd",
         "Uploaded calibrations and the last good reference, unless `state_dir` or the unit names "
         "another folder."},
        {"/run/dtactd/dtactd.sock",
-        "For programs on this machine, unless `net.unix_socket` names another path."}},
-      {kConfig, kCtl, kCalibrate, {"systemctl", 1}, {"journalctl", 1}}};
+        "For programs on this machine, unless `net.unix_socket` names another path."},
+       {"/etc/credstore/dtactd.tokens, dtactd.tls-key, dtactd.tls-certificate",
+        "Secrets that only root can read, which systemd hands in at a start; of "
+        "dtactd@NAME.service "
+        "dtactd@NAME.tokens and so on. They stay when the package is purged."}},
+      {kConfig, kCtl, kCalibrate, kPerceive, kWeb, {"systemctl", 1}, {"journalctl", 1}}};
   const PageNotes of_ctl{1, kUserCommands, {}, {kCalibrate, kDtactd, kConfig}};
   const PageNotes of_calibrate{1, kUserCommands, {}, {kCtl, kDtactd, kConfig}};
   const PageNotes of_perceive{1, kUserCommands, {}, {kDtactd, kCtl, kWeb}};
