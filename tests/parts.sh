@@ -118,7 +118,8 @@ run_tests() {
   part 'Debian 13' test_platform debian13
   part arm64 test_platform arm64
   part "Debian 13's packages for arm64" run_package --debian 13 --arch arm64
-  part 'installation, faults and power cuts' test_installed --all --cuts 20
+  # Of what the part with the packages has built: what users install, and not the dev build's.
+  part 'installation, faults and power cuts' test_installed --all --cuts 20 --packages build/packages
   # Of what the part "Debian 13" has built.
   part 'installation on Debian 13' test_installed --suite trixie --all \
     --packages "build/dev/packages-debian13-$(dpkg --print-architecture)"

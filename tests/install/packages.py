@@ -5,10 +5,15 @@ import tempfile
 from pathlib import Path
 
 
+def installable(folder: Path) -> list[Path]:
+    """The packages in a folder that one installs: not those of debugging symbols."""
+    return sorted(deb for deb in folder.glob('*.deb') if '-dbgsym_' not in deb.name)
+
+
 def make_newer(debs: Path, out: Path):
     """Copies of the packages whose version ends in .newer and whose conffile says another thing."""
     out.mkdir()
-    for deb in sorted(debs.glob('*.deb')):
+    for deb in installable(debs):
         with tempfile.TemporaryDirectory() as folder:
             tree = Path(folder) / 'tree'
             subprocess.run(['dpkg-deb', '--raw-extract', deb, tree], check=True)

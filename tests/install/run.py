@@ -33,7 +33,7 @@ def job_folder(folder: Path, debs: Path, emulated: bool) -> Path:
     for name in ('packages', 'newer', 'modules'):
         shutil.rmtree(folder / name, ignore_errors=True)
     (folder / 'packages').mkdir(parents=True)
-    for deb in debs.glob('*.deb'):
+    for deb in packages.installable(debs):
         shutil.copy(deb, folder / 'packages')
     if emulated:
         return folder
