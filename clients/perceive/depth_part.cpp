@@ -81,8 +81,9 @@ std::optional<DepthGrid> DepthPart::cut(const net::DepthRegion& region) {
               end(region.y, region.height));
 }
 
-std::optional<DepthGrid> DepthPart::contact() {
-  const auto threshold = static_cast<int>(kContactUm / whole_.um_per_unit);
+std::optional<DepthGrid> DepthPart::contact(double deepest_mm) {
+  const double um = std::min(kContactUm, 1000 * deepest_mm / 2);
+  const auto threshold = static_cast<int>(um / whole_.um_per_unit);
   int left = whole_.width;
   int right = -1;
   int top = whole_.height;

@@ -20,16 +20,22 @@ class DepthPart {
   explicit DepthPart(const v1::DepthMap& map);
 
   [[nodiscard]] const DepthGrid& whole() const noexcept { return whole_; }
+  /// The daemon sent all of the map.
+  [[nodiscard]] bool is_whole() const noexcept {
+    return whole_.width == whole_.full_width && whole_.height == whole_.full_height;
+  }
   [[nodiscard]] int decimation() const noexcept { return decimation_; }
 
   /// The pixels of a region, grown outward to whole pixels of the map; nothing when the region lies
   /// beside it. The values are valid until the next call.
   [[nodiscard]] std::optional<DepthGrid> cut(const net::DepthRegion& region);
-  /// The same of the box around what is pressed deeper than kContactUm, kMarginPx around it.
-  [[nodiscard]] std::optional<DepthGrid> contact();
+  /// The same of the box around what is pressed deeper than kContactUm, or than half of
+  /// `deepest_mm` where that is less, kMarginPx around it.
+  [[nodiscard]] std::optional<DepthGrid> contact(double deepest_mm);
 
-  /// The daemon's own threshold unless it is configured otherwise.
-  static constexpr int kContactUm = 100;
+  /// The daemon's own threshold unless it is configured otherwise; one that lets lighter presses
+  /// count is not told.
+  static constexpr double kContactUm = 100;
   static constexpr int kMarginPx =
       16;  ///< As the daemon's, pixels of the calibration's resolution.
 

@@ -13,6 +13,16 @@ namespace {
 
 // Room for an envelope.
 constexpr std::size_t kMaxBody = wire::kMaxMessage - 256;
+// And for all that a frame holds beside its points.
+constexpr std::size_t kMaxCloud = kMaxBody - (std::size_t{64} << 10);
+
+std::size_t bytes_of(const DepthGrid& grid, int stride, int encoding) {
+  const std::size_t points =
+      std::size_t{static_cast<unsigned>((grid.width + stride - 1) / stride)} *
+      static_cast<unsigned>((grid.height + stride - 1) / stride);
+  return points * PointCloud::kParts *
+         (encoding == v1::CLOUD_FLOAT32 ? sizeof(float) : sizeof(std::int16_t));
+}
 
 /// Runs `work` and returns how long it took, nanoseconds.
 template <typename Work>
@@ -52,7 +62,7 @@ void FrameMaker::release() {
 }
 
 void FrameMaker::follow(DepthPart& depth, double uncertainty_um) {
-  const std::optional<DepthGrid> grid = depth.contact();
+  const std::optional<DepthGrid> grid = depth.contact(frame_.contact().deepest_mm());
   if (!grid) return;
   const std::uint32_t took = timed([&] {
     clouds_.make(*grid, 1, contact_);
@@ -72,11 +82,15 @@ void FrameMaker::follow(DepthPart& depth, double uncertainty_um) {
 }
 
 void FrameMaker::add_cloud(DepthPart& depth, const net::FrameKind& kind, v1::PointCloud& out) {
-  std::optional<DepthGrid> grid = depth.whole();
-  if (kind.contact_box) grid = depth.contact();
-  if (kind.spec.region) grid = depth.cut(*kind.spec.region);
+  std::optional<DepthGrid> grid;
+  if (kind.contact_box) {
+    grid = depth.contact(frame_.contact().deepest_mm());
+  } else if (depth.is_whole()) {
+    grid = kind.spec.region ? depth.cut(*kind.spec.region) : depth.whole();
+  }
   if (!grid) return;
-  const int stride = std::max(1, kind.spec.decimation / depth.decimation());
+  int stride = std::max(1, kind.spec.decimation / depth.decimation());
+  while (bytes_of(*grid, stride, kind.cloud) > kMaxCloud) stride *= 2;
   const std::uint32_t took = timed([&] { clouds_.make(*grid, stride, cloud_); });
   fill(cloud_, kind.cloud, out);
   out.set_decimation(static_cast<std::uint32_t>(stride * depth.decimation()));

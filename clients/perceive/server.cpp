@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "clients/cpp/errors.hpp"
+#include "clients/perceive/demand.hpp"
 #include "daemon/serve/who.hpp"
 #include "hal/base/clock.hpp"
 
@@ -63,34 +64,18 @@ void Server::on_frame() {
     if (!kind) continue;
     if (auto encoded = maker_.make(*kind)) session->send_frame(std::move(encoded));
   }
+  if (maker_.frame().contact().touching() == touching_) return;
+  touching_ = !touching_;
+  update_want();
 }
 
-/// What all clients together need of the daemon.
 void Server::update_want() {
-  v1::Subscribe wanted;
-  wanted.set_events(false);
-  bool contact = true;
-  int decimation = 4;
-  pose_wanted_ = false;
+  Demand demand(touching_);
   for (const auto& session : guests_.all()) {
-    if (!session->greeted()) continue;
-    const auto parts = session->subscription().parts();
-    if (parts != 0) wanted.set_summary(true);
-    if ((parts & Subscription::kPose) != 0) {
-      pose_wanted_ = true;
-      wanted.set_depth(v1::DEPTH_INT16);
-      decimation = 1;
-    }
-    if ((parts & Subscription::kCloud) == 0) continue;
-    const net::FrameKind kind = session->subscription().kind(Subscription::kCloud);
-    wanted.set_depth(v1::DEPTH_INT16);
-    contact = contact && kind.contact_box;
-    decimation = std::min(decimation, kind.spec.decimation);
+    if (session->greeted()) demand.add(session->subscription());
   }
-  if (wanted.depth() != v1::DEPTH_NONE) {
-    if (contact) wanted.set_contact_box(true);
-    if (decimation > 1) wanted.set_decimation(static_cast<std::uint32_t>(decimation));
-  }
+  pose_wanted_ = demand.pose();
+  const v1::Subscribe wanted = demand.subscription();
   if (upstream_ == nullptr || wanted.SerializeAsString() == wanted_.SerializeAsString()) return;
   wanted_ = wanted;
   upstream_->want(wanted);

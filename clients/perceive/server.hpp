@@ -37,6 +37,7 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
 
  private:
   void on_frame();
+  /// Asks the daemon for what the clients need now.
   void update_want();
   void subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
                  const v1::Subscribe& request);
@@ -52,6 +53,7 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
   client::Options daemon_;
   v1::Subscribe wanted_;
   bool pose_wanted_ = false;
+  bool touching_ = false;  ///< In the last frame.
   std::uint64_t frames_ = 0;
   std::uint64_t skipped_ = 0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();

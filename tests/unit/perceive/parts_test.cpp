@@ -67,13 +67,22 @@ TEST(DepthPart, RefusesMapsThatContradictThemselves) {
 TEST(DepthPart, TheContactHasAMargin) {
   std::vector<std::int16_t> values(12, 100);
   DepthPart none(map_of(values));
-  EXPECT_FALSE(none.contact().has_value()) << "not deeper than the threshold";
+  EXPECT_FALSE(none.contact(0.3).has_value()) << "not deeper than the threshold";
   values[5] = 101;
   DepthPart part(map_of(values));
-  const auto contact = part.contact();
+  const auto contact = part.contact(0.3);
   ASSERT_TRUE(contact.has_value());
   EXPECT_EQ(contact->width, 4) << "cut at the map's border";
   EXPECT_EQ(contact->height, 3);
+}
+
+// As where the daemon's contact.made_mm is 0.03.
+TEST(DepthPart, ALightPressHasAContactAsWell) {
+  std::vector<std::int16_t> values(12, 20);
+  values[5] = 42;
+  DepthPart part(map_of(values));
+  EXPECT_TRUE(part.contact(0.042).has_value());
+  EXPECT_FALSE(part.contact(0.2).has_value());
 }
 
 TEST(DepthPart, RefusesADamagedMap) {
@@ -131,12 +140,23 @@ TEST(PoseMessage, MillimetresAndDegrees) {
   EXPECT_EQ(message.unobservable(0).translation().y(), 1);
 }
 
+/// The same as all of a map.
+v1::DepthMap whole(v1::DepthMap map) {
+  map.clear_x();
+  map.clear_y();
+  map.set_full_width(map.width());
+  map.set_full_height(map.height());
+  return map;
+}
+
+/// With a depth map; touching 23 um deep.
 v1::Frame frame_of(bool touching) {
   v1::Frame frame;
   frame.set_sequence(5);
   frame.set_dropped(3);
   frame.mutable_contact()->set_touching(touching);
-  *frame.mutable_depth() = map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23});
+  frame.mutable_contact()->set_deepest_mm(0.023);
+  *frame.mutable_depth() = whole(map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23}));
   return frame;
 }
 
@@ -163,6 +183,40 @@ TEST(FrameMaker, SendsWhatIsDueAndTheSameBufferToEveryone) {
   EXPECT_EQ(made(maker, points).cloud().width(), 2U);
 }
 
+TEST(FrameMaker, OfAPartOfTheMapThereAreNoPointsOfAll) {
+  FrameMaker maker;
+  v1::Frame part = frame_of(true);
+  *part.mutable_depth() = map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23});
+  maker.begin(part, false);
+  net::FrameKind points;
+  points.cloud = v1::CLOUD_FLOAT32;
+  EXPECT_FALSE(made(maker, points).has_cloud());
+  points.contact_box = true;
+  EXPECT_TRUE(made(maker, points).has_cloud());
+}
+
+// 920 × 920 points of 24 bytes are beyond 16 MiB.
+TEST(FrameMaker, PointsThatDoNotFitAMessageAreMadeCoarser) {
+  constexpr std::uint32_t kSide = 920;
+  FrameMaker maker;
+  v1::Frame frame = frame_of(true);
+  v1::DepthMap& map = *frame.mutable_depth();
+  map.set_decimation(1);
+  map.set_width(kSide);
+  map.set_height(kSide);
+  map.set_full_width(kSide);
+  map.set_full_height(kSide);
+  map.set_data(std::string(2 * kSide * kSide, '\0'));
+  maker.begin(frame, false);
+  net::FrameKind points;
+  points.cloud = v1::CLOUD_INT16;
+  EXPECT_EQ(made(maker, points).cloud().decimation(), 1U);
+  points.cloud = v1::CLOUD_FLOAT32;
+  const v1::Frame coarse = made(maker, points);
+  EXPECT_EQ(coarse.cloud().decimation(), 2U);
+  EXPECT_EQ(coarse.cloud().width(), kSide / 2);
+}
+
 TEST(FrameMaker, NothingTouchingNoPoints) {
   FrameMaker maker;
   maker.begin(frame_of(false), true);
@@ -177,6 +231,7 @@ TEST(FrameMaker, NothingTouchingNoPoints) {
 TEST(FrameMaker, KnowsACurvedSurface) {
   FrameMaker maker;
   v1::Frame bent = frame_of(true);
+  *bent.mutable_depth() = map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23});
   auto& surface = *bent.mutable_surface();
   surface.set_shape(v1::Surface::SPHERE);
   surface.set_radius_mm(10);
@@ -186,6 +241,7 @@ TEST(FrameMaker, KnowsACurvedSurface) {
   maker.begin(bent, true);
   net::FrameKind all;
   all.cloud = v1::CLOUD_FLOAT32;
+  all.contact_box = true;
   all.pose = true;
   const v1::Frame frame = made(maker, all);
   ASSERT_TRUE(frame.has_cloud());
