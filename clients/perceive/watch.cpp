@@ -60,10 +60,18 @@ std::string words_of(const v1::ObjectPose& pose) {
   return line;
 }
 
-/// "58.1 fps  12,340 points in 0.21 ms  tracked: moved (1.02, 0.00, -0.10) mm, ...".
+/// "  1.20 N +- 0.03", "  force not calibrated".
+std::string force_words(const v1::Contact& contact) {
+  if (!contact.has_force_n()) return "  force not calibrated";
+  return fmt::format("  {:.2f} N +- {:.2f}", contact.force_n(), contact.force_uncertainty_n());
+}
+
+/// "58.1 fps  1.20 N +- 0.03  12,340 points in 0.21 ms  tracked: moved (1.02, 0.00, -0.10) mm,
+/// ...".
 std::string line_of(const v1::Frame& frame, double fps) {
   std::string line = fmt::format("{:.1f} fps", fps);
   if (!frame.contact().touching()) return line + "  nothing touches\n";
+  line += force_words(frame.contact());
   if (frame.has_cloud()) {
     line += fmt::format("  {} points in {:.2f} ms", frame.cloud().points(),
                         frame.cloud().make_ns() * 1e-6);
@@ -106,7 +114,7 @@ void watch(const cli::Context& context, double seconds) {
 void add_watch(CLI::App& app, cli::Context& context) {
   auto* command = app.add_subcommand(
       "watch",
-      "Show a running dtact-perceive's rate, points and pose, a line a second, until "
+      "Show a running dtact-perceive's rate, points, pose and the force, a line a second, until "
       "Ctrl-C");
   const auto seconds = std::make_shared<double>(0);
   command->add_option("--seconds", *seconds, "End by itself after so long")
