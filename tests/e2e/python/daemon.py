@@ -1,5 +1,5 @@
 """dtactd on the simulated sensor, for the Python package's tests end to end. The programs are named
-by the environment: DTACTD, DTACTCTL, SIM_RENDER, CALIBRATE."""
+by the environment: DTACTD, DTACTCTL, SIM_RENDER, CALIBRATE, DTACT_PERCEIVE."""
 import os
 import pathlib
 import re

@@ -53,6 +53,30 @@ class Cloud(unittest.TestCase):
             _ = dtact.Frame(m).cloud
 
 
+class Surface(unittest.TestCase):
+    def test_plane_unless_said(self):
+        self.assertEqual(dtact.Frame(message()).surface, dtact.Surface("plane"))
+
+    def test_cylinder(self):
+        m = message()
+        m.surface.shape, m.surface.radius_mm, m.surface.axis_deg = 2, 12.5, 90
+        m.surface.air_mm, m.surface.gel_mm, m.surface.refraction = 20, 8, 1.41
+        self.assertEqual(dtact.Frame(m).surface, dtact.Surface("cylinder", 12.5, 90, 20, 8, 1.41))
+
+    def test_heights(self):
+        m = message()
+        m.surface.shape = 3
+        heights = m.surface.heights
+        heights.width, heights.height, heights.spacing_mm = 5, 4, 0.5
+        heights.z_um.extend(range(-10, 10))
+        surface = dtact.Frame(m).surface
+        self.assertEqual((surface.shape, surface.spacing_mm), ("height_map", 0.5))
+        np.testing.assert_array_equal(surface.heights_um[:, 0], [-10, -5, 0, 5])
+        del heights.z_um[0]
+        with self.assertRaises(dtact.ProtocolError):
+            _ = dtact.Frame(m).surface
+
+
 class Pose(unittest.TestCase):
     def test_matrix_and_names(self):
         m = message()
@@ -62,7 +86,9 @@ class Pose(unittest.TestCase):
         m.pose.translation_mm.x = 2
         hidden = m.pose.unobservable.add()
         hidden.translation.y = 1
+        m.pose.track_ns = 500_000
         pose = dtact.Frame(m).pose
+        self.assertAlmostEqual(pose.followed_in_s, 5e-4)
         self.assertEqual((pose.tracking, pose.since_sequence), ("tracked", 7))
         self.assertEqual((pose.object, pose.alternatives), ("", 0))
         m.pose.tracking, m.pose.object, m.pose.alternatives = 5, "nut", 11

@@ -39,7 +39,7 @@ from .event import (
     StateEvent,
 )
 from .frame import Frame
-from .geometry import ObjectPose, PointCloud
+from .geometry import ObjectPose, PointCloud, Surface
 from .mcap import read
 from .recording import Recording
 from .subscription import Subscription
@@ -66,6 +66,6 @@ __all__ = [
     "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Reconnected",
     "Reconstruction", "ReconstructionEvent", "Recording", "ReferenceEvent", "ReferenceImage",
     "Refused", "Server", "StateEvent", "Status", "StorageFailed", "StoredCalibration",
-    "Subscription", "TimeoutError", "Touched", "Uncalibrated", "Unsupported", "aio", "connect",
+    "Subscription", "Surface", "TimeoutError", "Touched", "Uncalibrated", "Unsupported", "aio", "connect",
     "read",
 ]

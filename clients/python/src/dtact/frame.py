@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from .encodings import depth_values
 from .errors import NotInFrame, ProtocolError
-from .geometry import ObjectPose, PointCloud
+from .geometry import ObjectPose, PointCloud, Surface
 from .messages import Message, name_of
 from .values import Contact, Light, condition_names, wall_time
 
@@ -138,6 +138,12 @@ class Frame:
             raise NotInFrame(f"frame {self.sequence} has no JPEG: either Subscription(jpeg=True) was "
                              "not asked for, or the camera delivers another format")
         return bytes(self.message.jpeg.data)
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The untouched gel's, along whose normal depth is; a plane unless the calibration says
+        otherwise. A frame without depth does not say."""
+        return Surface.of(self.message.surface)
 
     # ------------------------------------------------------------ of dtact-perceive
 

@@ -15,12 +15,45 @@ _HOLE = -32768
 
 
 @dataclass(frozen=True)
+class Surface:
+    """The untouched gel's surface, in the surface frame: z towards the object, the surface through
+    the origin. The camera looks along z through air and through the flat back of the gel, where rays
+    are refracted."""
+
+    shape: str  #: "plane", "sphere", "cylinder" or "height_map"
+    radius_mm: float = 0.0  #: of a sphere, its centre at (0, 0, −radius_mm), or a cylinder
+    axis_deg: float = 0.0  #: of a cylinder, from x towards y
+    air_mm: float = 0.0  #: from the camera's pinhole to the gel
+    gel_mm: float = 0.0  #: from there to the surface's origin
+    refraction: float = 1.0  #: of the gel
+    #: Of a height map: (H, W) micrometres towards the object, `spacing_mm` from node to node both
+    #: ways, its middle the origin; None of any other.
+    heights_um: NDArray[np.int32] | None = None
+    spacing_mm: float = 0.0
+
+    @classmethod
+    def of(cls, m: Message) -> Surface:
+        """ProtocolError where there are not as many heights as the sizes say."""
+        shape = name_of("Surface.Shape", m.shape, "")
+        if shape == "plane":
+            return cls(shape)
+        heights = None
+        if shape == "height_map":
+            if len(m.heights.z_um) != m.heights.width * m.heights.height:
+                raise ProtocolError("a surface's heights are damaged: install the same release on both sides")
+            heights = np.array(m.heights.z_um, np.int32).reshape(m.heights.height, m.heights.width)
+        return cls(shape, float(m.radius_mm), float(m.axis_deg), float(m.air_mm), float(m.gel_mm),
+                   float(m.refraction), heights, float(m.heights.spacing_mm))
+
+
+@dataclass(frozen=True)
 class PointCloud:
     """The deformed surface as points with outward normals, on the depth map's grid."""
 
     points: NDArray[np.float32]  #: (H, W, 3) metres in the surface frame; NaN where there is none
     normals: NDArray[np.float32]  #: (H, W, 3) of length 1; NaN where there is no point
     decimation: int  #: one point of so many pixels of the calibration's resolution
+    made_in_s: float = 0.0  #: what making it took
 
     @classmethod
     def of(cls, m: Message) -> PointCloud:
@@ -36,7 +69,8 @@ class PointCloud:
         if m.encoding == 2:
             values[values == _HOLE] = np.nan
             values *= np.array([m.metres_per_unit] * 3 + [1 / 32767] * 3, np.float32)
-        return cls(values[..., :3], values[..., 3:], int(m.decimation) or 1)
+        return cls(values[..., :3], values[..., 3:], int(m.decimation) or 1,
+                   m.make_ns * 1e-9)
 
     @property
     def valid(self) -> NDArray[np.bool_]:
@@ -76,6 +110,7 @@ class ObjectPose:
     points: int  #: that count
     object: str = ""  #: the known object's name; empty: the motion since the contact was made
     alternatives: int = 0  #: other placements of the known object that explain the contact as well
+    followed_in_s: float = 0.0  #: what following took
 
     @classmethod
     def of(cls, m: Message) -> ObjectPose:
@@ -87,7 +122,7 @@ class ObjectPose:
                    np.array(vector(m.translation_mm)), np.array(vector(m.rotation_deg)),
                    np.array(hidden).reshape(-1, 6), np.array(vector(m.centre_mm)),
                    float(m.arm_mm), float(m.residual_um), int(m.points), str(m.object),
-                   int(m.alternatives))
+                   int(m.alternatives), m.track_ns * 1e-9)
 
     def matrix(self) -> NDArray[np.float64]:
         """4 × 4, millimetres."""

@@ -1,0 +1,64 @@
+"""The Python package on dtact-perceive beside dtactd and the simulated sensor."""
+import os
+import re
+import subprocess
+import time
+import unittest
+
+import numpy as np
+
+import dtact
+from daemon import Daemon
+
+
+class Perceive(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.daemon = Daemon()
+        cls.daemon.start()
+        cls.addClassCleanup(cls.daemon.remove)
+        log = cls.daemon.folder / "perceive.log"
+        with open(log, "w", encoding="utf-8") as out:
+            perceive = subprocess.Popen(
+                [os.environ["DTACT_PERCEIVE"], "--port", str(cls.daemon.port), "serve", "--listen-port", "0"],
+                stdout=out, stderr=subprocess.STDOUT)
+        cls.addClassCleanup(perceive.wait)
+        cls.addClassCleanup(perceive.terminate)
+        until = time.monotonic() + 60
+        while not (found := re.search(r"listening on (127\.0\.0\.1:\d+)", log.read_text())):
+            if perceive.poll() is not None or time.monotonic() > until:
+                raise RuntimeError(f"dtact-perceive did not start:\n{log.read_text()}")
+            time.sleep(0.05)
+        cls.address = found[1]
+
+    def test_points_and_pose_of_what_touches(self):
+        with dtact.connect(self.address) as s:
+            s.subscribe(dtact.Subscription(depth=None, cloud="int16", region="contact", pose=True))
+            until = time.monotonic() + 60
+            for f in s.frames():
+                self.assertLess(time.monotonic(), until, "nothing was pressed within a minute")
+                if f.has_cloud and f.pose and f.pose.tracking == "tracked" and f.contact.deepest_mm > 0.3:
+                    break
+        self.assertFalse(f.has_depth)
+        self.assertEqual(f.surface, dtact.Surface("plane"))
+        cloud = f.cloud
+        points = cloud.points[cloud.valid]
+        # Pressed in is below the untouched surface, metres; the deepest is where the summary says.
+        deepest = points[np.argmin(points[:, 2])]
+        self.assertAlmostEqual(-1e3 * deepest[2], f.contact.deepest_mm, delta=0.01)
+        lengths = np.linalg.norm(cloud.normals[cloud.valid], axis=1)
+        np.testing.assert_allclose(lengths, 1, atol=1e-3)
+        self.assertGreater(len(cloud.triangles()), len(points))
+        self.assertGreater(cloud.made_in_s, 0)
+        self.assertGreater(f.pose.followed_in_s, 0)
+        self.assertGreater(f.pose.points, 100)
+        np.testing.assert_allclose(np.linalg.det(f.pose.matrix()), 1, atol=1e-9)
+
+    def test_whole_maps_are_not_to_be_had(self):
+        with dtact.connect(self.address) as s:
+            with self.assertRaises(dtact.Refused):
+                s.subscribe(dtact.Subscription())
+
+
+if __name__ == "__main__":
+    unittest.main()
