@@ -39,26 +39,25 @@ def cut_uploads(disc: Path, installed: Path, job: Path, moments: random.Random, 
 
 
 def cut_upgrades(disc: Path, installed: Path, job: Path, moments: random.Random, cuts: int):
-    """Whatever moment the power goes at, dpkg finishes the upgrade and the daemon is back."""
+    """Whatever moment the power goes at, the daemon is back, and dpkg finishes the upgrade. The moments are
+    steps of dpkg's, so that they lie in the upgrade however long it takes."""
     _install(disc, installed, job)
     changes = installed.with_name('upgrade.cow')
     shutil.copyfile(installed, changes)
     _prepare(job, 'upgrade.sh', '')
     with Guest(disc, job, changes, check_disc=True) as guest:
-        guest.wait_for_file('begun', BOOT_S)
-        began = time.monotonic()
         guest.wait_for_file('done', BOOT_S)
-        whole_s = time.monotonic() - began
         guest.cut()
+    steps = len(list((job / 'steps').iterdir()))
     for number in range(1, cuts + 1):
         shutil.copyfile(installed, changes)
         _prepare(job, 'upgrade.sh', '')
+        step, seconds = moments.randint(1, steps), moments.uniform(0, 0.5)
         with Guest(disc, job, changes, check_disc=True) as guest:
-            guest.wait_for_file('begun', BOOT_S)
-            seconds = moments.uniform(0, whole_s)
+            guest.wait_for_file(f'steps/{step}', BOOT_S)
             time.sleep(seconds)
             guest.cut()
-        print(f'upgrade: power cut {number} after {seconds:.1f} of {whole_s:.1f} s')
+        print(f'upgrade: power cut {number} {seconds:.2f} s after step {step} of {steps}')
         print(run_once(disc, changes, job, 'upgrade.sh', 'repair'), end='')
     changes.unlink()
 
@@ -71,5 +70,7 @@ def _install(disc: Path, installed: Path, job: Path):
 def _prepare(job: Path, script: str, arguments: str):
     for name in ('begun', 'done', 'uploads'):
         (job / name).unlink(missing_ok=True)
+    shutil.rmtree(job / 'steps', ignore_errors=True)
+    (job / 'steps').mkdir()
     text = (HERE / 'guest' / 'lib.sh').read_text() + (HERE / 'guest' / script).read_text()
     (job / 'run').write_text(f'set -- {arguments}\n{text}')

@@ -4,10 +4,7 @@
 [ "$(property Result systemd-fsck-root.service)" = success ] || fail "the file system is broken"
 within 300 serving
 expect '*' dtactctl calibration list
-rm -rf /tmp/export
-dtactctl calibration export -o /tmp/export
-same() { cmp -s "/job/calibrations/$1/calibration.toml" /tmp/export/calibration.toml \
-  && cmp -s "/job/calibrations/$1/reference.png" /tmp/export/reference.png; }
+export_calibration
 if same old; then say "has the old one"; elif same new; then say "has the new one"; else
   fail "neither the old nor the new calibration: $(ls -la /tmp/export; dtactctl calibration list)"
 fi
