@@ -4,8 +4,8 @@
 
 namespace dtact::app {
 
-/// Puts the file that systemd handed in where certificate, key and token file are "credential:NAME".
-/// Throws as resolve_credential().
+/// Puts the file that systemd handed in where certificate, key and token file are
+/// "credential:NAME". Throws as resolve_credential().
 void resolve_credentials(net::NetConfig& config);
 
 /// Reads certificate, key and token file and lets go of them. Throws std::runtime_error with file

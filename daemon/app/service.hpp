@@ -30,7 +30,8 @@ void notify_alive();
 /// there is none of that name.
 [[nodiscard]] std::filesystem::path resolve_credential(const std::string& key,
                                                        const std::filesystem::path& path);
-/// Whether this process may look into the unit's credentials ($CREDENTIALS_DIRECTORY).
+/// Whether this process may look into the unit's credentials ($CREDENTIALS_DIRECTORY): not where
+/// there is no unit, nor, with systemd 252, in a command of ExecReload=.
 [[nodiscard]] bool has_credentials();
 /// The unit's folder below /run ($RUNTIME_DIRECTORY), or empty.
 [[nodiscard]] std::string runtime_directory();
