@@ -156,7 +156,7 @@ TEST(Check, TellsTheServiceManagerNothing) {
 
 class CheckOfFiles : public testing::Test {
  protected:
-  ~CheckOfFiles() override { ::unsetenv("CREDENTIALS_DIRECTORY"); }
+  void TearDown() override { ::unsetenv("CREDENTIALS_DIRECTORY"); }
 
   [[nodiscard]] std::string write(const std::string& name, const std::string& text) const {
     const fs::path file = folder_.path() / name;
