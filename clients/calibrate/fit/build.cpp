@@ -73,17 +73,6 @@ Crop seen(const std::optional<recon::Lens>& lens, int width, int height, double 
   return {left, top, right - left + 1, bottom - top + 1};
 }
 
-/// The press's gain with places from the map's centre.
-recon::SpatialGain gain_of(const BallPress& press, const Calibration& calibration) {
-  if (!press.lens) return press.gain;
-  const recon::RectifyTable& map = calibration.model->rectify;
-  const recon::Point centre = surface_point(
-      *press.lens,
-      {calibration.crop_col, calibration.crop_row, map.width, map.height, press.mm_per_px},
-      0.5 * (map.width - 1), 0.5 * (map.height - 1));
-  return moved(press.gain, centre.x, centre.y);
-}
-
 /// Size of the press's own plane, per mm.
 double lean_of(const SettledPress& press) {
   const PressGain gain = fit_press_gain(sure_samples(press.map, press.contact),
@@ -178,6 +167,17 @@ Calibration empty_calibration(const image::Grey16& reference_q8, const std::opti
   return calibration;
 }
 
+recon::SpatialGain gain_on_map(const recon::SpatialGain& gain, const Calibration& calibration) {
+  if (!calibration.lens) return gain;
+  const recon::Model& model = *calibration.model;
+  const recon::RectifyTable& map = model.rectify;
+  const recon::Point centre = surface_point(
+      *calibration.lens,
+      {calibration.crop_col, calibration.crop_row, map.width, map.height, model.mm_per_px},
+      0.5 * (map.width - 1), 0.5 * (map.height - 1));
+  return moved(gain, centre.x, centre.y);
+}
+
 SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> reference_q8,
                     std::span<const image::Grey8> frames, double ball_radius_mm) {
   SettledPress press;
@@ -211,7 +211,7 @@ Calibration build(const BallPress& press, PressChoices* choices) {
       empty_calibration(press.reference_q8, press.crop, press.mm_per_px, press.lens);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   model->method = press.method;
-  if (press.method == recon::Method::list) model->gain = gain_of(press, calibration);
+  if (press.method == recon::Method::list) model->gain = gain_on_map(press.gain, calibration);
 
   SettledPress settled =
       settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);

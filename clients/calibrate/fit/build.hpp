@@ -74,6 +74,12 @@ struct PressChoices {
                                             const std::optional<Crop>& crop, double mm_per_px,
                                             const std::optional<recon::Lens>& lens);
 
+/// A lens file's gain, whose places are millimetres of the lens's surface, with places from the
+/// middle of the calibration's map, as recon::Model has it. Without a lens they are that already.
+/// Throws std::invalid_argument when the gain is not above zero there.
+[[nodiscard]] recon::SpatialGain gain_on_map(const recon::SpatialGain& gain,
+                                             const Calibration& calibration);
+
 /// The depth map's part of the reference, the nearest pixels, to whole grey levels.
 [[nodiscard]] image::Grey8 rectified_reference(const recon::RectifyTable& table,
                                                const image::Grey16& q8);

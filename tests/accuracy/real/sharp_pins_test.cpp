@@ -158,7 +158,7 @@ Calibration by_layer_of(const Calibration& other, const FolderEvaluation& e) {
   model.list = other.model->list;
   model.scattering = other.model->scattering;
   model.sharpened = other.model->sharpened;
-  model.gain = e.gain.gain;
+  model.gain = calibration::gain_on_map(e.gain.gain, made);
   made.model = std::make_shared<const recon::Model>(std::move(model));
   return made;
 }

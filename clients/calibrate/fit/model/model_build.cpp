@@ -142,7 +142,7 @@ FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& 
   FittedCalibration made;
   made.calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
   auto model = std::make_shared<recon::Model>(*made.calibration.model);
-  model->gain = gain;
+  model->gain = gain_on_map(gain, made.calibration);
   Seen seen = look(*model, set);
   if (gain.shape == recon::GainShape::none && gain.polynomial.empty()) {
     // The loss is a share of the light. Rings do not tell whether a sensor's picture is one, but

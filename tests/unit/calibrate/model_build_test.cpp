@@ -1,0 +1,76 @@
+// Calibrations by the layer's model from images that the model itself makes.
+#include "clients/calibrate/fit/model/model_build.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/unit/calibrate/imagined_press.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+BallPresses presses_of(const ImaginedView& view) {
+  BallPresses set;
+  set.reference_q8 = view.untouched_q8();
+  set.presses = {{.name = "ball", .frames = {view.frame()}, .depth_mm = {}}};
+  set.ball_radius_mm = view.ball_radius_mm;
+  set.mm_per_px = ImaginedView::kMmPerPx;
+  return set;
+}
+
+/// Greatest depth that a calibration reads, the mean over a disc of a quarter of a millimetre.
+double deepest_mm(const Calibration& calibration, const ImaginedView& view) {
+  const std::vector<float> um =
+      mean_depth_um(*calibration.model, view.untouched_q8().pixels, std::vector{view.frame()});
+  const double col = view.col - calibration.crop_col;
+  const double row = view.row - calibration.crop_row;
+  double sum = 0;
+  int count = 0;
+  for (int y = 0; y < calibration.model->rectify.height; ++y) {
+    for (int x = 0; x < calibration.model->rectify.width; ++x) {
+      if (std::hypot(x - col, y - row) > 4) continue;
+      sum += um[static_cast<std::size_t>(y) *
+                    static_cast<std::size_t>(calibration.model->rectify.width) +
+                static_cast<std::size_t>(x)];
+      ++count;
+    }
+  }
+  return 0.001 * sum / count;
+}
+
+TEST(ModelBuild, AGainStaysAtItsPlaceOnTheSurface) {
+  ImaginedView view;
+  view.col = 130;
+  const recon::SpatialGain on_surface{.polynomial = {0, 0, 0.008, 0.002, 0.003}};
+  // Of a lens whose board's middle the camera shows at column 250, row 180.
+  const auto gain_at = [&](double x, double y) {
+    return on_surface.polynomial_at((x - 250) * ImaginedView::kMmPerPx,
+                                    (y - 180) * ImaginedView::kMmPerPx);
+  };
+  view.gain = gain_at;
+  BallPresses set = presses_of(view);
+  set.lens = recon::Lens{};
+  set.lens->homography = {
+      1 / ImaginedView::kMmPerPx, 0, 250, 0, 1 / ImaginedView::kMmPerPx, 180, 0, 0, 1};
+  set.crop = Crop{10, 20, 280, 300};
+  const FittedCalibration made = build_model(set, on_surface);
+  const recon::SpatialGain& gain = made.calibration.model->gain;
+  const auto on_map = [&](double x, double y) {
+    return gain.polynomial_at((x - 10 - 139.5) * ImaginedView::kMmPerPx,
+                              (y - 20 - 149.5) * ImaginedView::kMmPerPx);
+  };
+  for (const double x : {30.0, 130.0, 270.0}) {
+    for (const double y : {40.0, 180.0, 300.0}) {
+      EXPECT_NEAR(on_map(x, y) / on_map(130, 180), gain_at(x, y) / gain_at(130, 180), 1e-3)
+          << x << ", " << y;
+    }
+  }
+  ImaginedView beside = view;
+  beside.col = 210;
+  EXPECT_NEAR(deepest_mm(made.calibration, beside), deepest_mm(made.calibration, view), 0.02);
+}
+
+}  // namespace
+}  // namespace dtact::calibration
