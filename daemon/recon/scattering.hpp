@@ -19,6 +19,10 @@ inline constexpr double kWidestMm = 20;
 /// Greatest number of Van Cittert's steps (sharpener.hpp): a third sharpens more and costs noise.
 inline constexpr int kMostSharpeningSteps = 2;
 
+/// Levels are sharpened at 1/kSharpenedAt of the calibration's resolution in each direction, which
+/// the layer's own blur leaves enough of.
+inline constexpr int kSharpenedAt = 4;
+
 /// Throws std::invalid_argument, naming the key as in calibration.toml, outside those ranges.
 void check(const Scattering& scattering);
 

@@ -5,7 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "daemon/recon/reconstructor.hpp"
+#include "clients/calibrate/fit/depth_reader.hpp"
 
 namespace dtact::calibration {
 
@@ -16,22 +16,19 @@ std::vector<float> mean_depth_um(const recon::Model& model,
   if (reference_q8.size() != model.reference_q8.size()) {
     throw std::invalid_argument("the reference has not the size of the calibration's frame");
   }
-  recon::Reconstructor reconstructor(std::make_shared<recon::Model>(model), sharpen_steps);
-  reconstructor.set_reference(reference_q8);
-  std::vector<std::int16_t> depth(model.rectify.entries.size());
-  std::vector<float> mean(depth.size());
-  std::vector<std::uint8_t> padded(model.reference_q8.size() + recon::kLumaPadding);
+  DepthReader reader(std::make_shared<recon::Model>(model), sharpen_steps);
+  reader.set_reference(reference_q8);
+  std::vector<float> mean(model.rectify.entries.size());
   const auto share = 1.0F / static_cast<float>(frames.size());
   for (const image::Grey8& frame : frames) {
     if (frame.width != model.rectify.frame_width || frame.height != model.rectify.frame_height) {
       throw std::invalid_argument("a frame has not the size of the calibration's frame");
     }
-    std::ranges::copy(frame.pixels, padded.begin());
-    reconstructor.run(padded.data(), frame.width, depth);
-    std::ranges::transform(mean, depth, mean.begin(), [share](float sum, std::int16_t um) {
-      return um == recon::kUntrusted ? std::numeric_limits<float>::quiet_NaN()
-                                     : sum + share * static_cast<float>(um);
-    });
+    std::ranges::transform(
+        mean, reader.read(frame), mean.begin(), [share](float sum, std::int16_t um) {
+          return um == recon::kUntrusted ? std::numeric_limits<float>::quiet_NaN()
+                                         : sum + share * static_cast<float>(um);
+        });
   }
   return mean;
 }

@@ -34,8 +34,8 @@ void answer_darkening(recon::Model& model);
                                                 std::span<const std::uint16_t> reference_q8,
                                                 std::span<const image::Grey8> frames);
 
-/// Reconstructs each frame and averages, micrometres; NaN where any was untrusted. Throws
-/// std::invalid_argument as above and as the Reconstructor's constructor.
+/// Reconstructs each frame as a DepthReader does and averages, micrometres; NaN where any was
+/// untrusted. Throws std::invalid_argument as above and as the DepthReader's constructor.
 [[nodiscard]] std::vector<float> mean_depth_um(const recon::Model& model,
                                                std::span<const std::uint16_t> reference_q8,
                                                std::span<const image::Grey8> frames,

@@ -11,7 +11,6 @@
 namespace dtact::calibration {
 namespace {
 
-constexpr double kDepthBinMm = 0.2;
 constexpr double kZeroLevels = 1;    // grey levels
 constexpr double kRingShare = 0.15;  // of the ring's level, scattered into the contact
 

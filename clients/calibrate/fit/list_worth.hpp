@@ -7,6 +7,9 @@
 
 namespace dtact::calibration {
 
+/// Indentations whose errors make one row of what a list is uncertain by.
+inline constexpr double kDepthBinMm = 0.2;
+
 /// What a list is uncertain by that no chain of presses vouches for, from the presses that made it.
 /// In squares are added, at each indentation that the list reads in them:
 ///
@@ -22,7 +25,7 @@ namespace dtact::calibration {
 ///   shallow by -0.16 to 0.57 of the ring's level, half of them by 0.08 to 0.28; with 0.15 the mean
 ///   of true over stated is 1.01. On 27 presses of nine other sensors it is 0.71.
 ///
-/// Rows of 0.2 mm. Empty when no press says anything.
+/// Rows of kDepthBinMm. Empty when no press says anything.
 [[nodiscard]] std::vector<recon::Model::Uncertainty> uncertainty_by_zero(
     const recon::DepthList& list, std::span<const SettledPress> presses);
 

@@ -17,7 +17,6 @@
 namespace dtact::calibration {
 namespace {
 
-constexpr double kDepthBinMm = 0.2;
 /// Presses of one ball agree among themselves within a micrometre or two however the layer scatters
 /// light; a ball of another radius is off by more: 0.012 to 0.036 mm on depths about 0.8 in layers
 /// of 1.5 to 3 mm (simulator). The share that covers them.

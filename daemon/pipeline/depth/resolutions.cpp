@@ -10,12 +10,10 @@
 
 #include "daemon/pipeline/depth/uncertainty.hpp"
 #include "daemon/recon/decimate.hpp"
+#include "daemon/recon/scattering.hpp"
 
 namespace dtact::pipeline {
 namespace {
-
-/// Resolution of sharpened levels: 1/4.
-constexpr int kSharpenedAt = 4;
 
 void require_sharpening(const recon::Model& model, int steps) {
   const auto found = std::ranges::find(model.sharpened, steps, &recon::Model::Sharpened::steps);
@@ -35,10 +33,10 @@ Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
       mean_grey_(std::accumulate(model->reference_q8.begin(), model->reference_q8.end(), 0.0) /
                  256 / static_cast<double>(model->reference_q8.size())) {
   // Where nothing else is asked for a sharpened map stays as coarse as it is made.
-  const int map = rules.decimation == 0 ? kSharpenedAt : rules.decimation;
+  const int map = rules.decimation == 0 ? recon::kSharpenedAt : rules.decimation;
   if (rules.sharpen > 0) {
     require_sharpening(*model, rules.sharpen);
-    add(lattice, kSharpenedAt, rules.sharpen, map);
+    add(lattice, recon::kSharpenedAt, rules.sharpen, map);
     return;
   }
   const bool filters = rules.sharpen == ReconstructionRules::kAutoSharpen;
@@ -50,7 +48,7 @@ Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
   }
   if (!filtered) return;
   for (const recon::Model::Sharpened& sharpened : model->sharpened) {
-    add(lattice, kSharpenedAt, sharpened.steps, map);
+    add(lattice, recon::kSharpenedAt, sharpened.steps, map);
   }
 }
 

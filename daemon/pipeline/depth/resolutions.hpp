@@ -16,8 +16,7 @@
 namespace dtact::pipeline {
 
 /// One way to turn frames into depth: at a resolution, plain or sharpened. Sharpened levels are
-/// made at a quarter of the calibration's resolution, which the layer's own blur leaves enough of,
-/// and interpolated to the map that was asked for.
+/// made at recon::kSharpenedAt and interpolated to the map that was asked for.
 struct Resolution {
   recon::Reconstructor reconstructor;
   recon::TileReaders readers;

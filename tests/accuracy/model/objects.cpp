@@ -8,9 +8,9 @@
 #include <numeric>
 #include <span>
 
+#include "clients/calibrate/fit/depth_reader.hpp"
 #include "clients/calibrate/fit/model/model_fit.hpp"
 #include "hal/sim/scene.hpp"
-#include "tests/accuracy/table/depth_reader.hpp"
 #include "tests/accuracy/table/judge.hpp"
 #include "tests/accuracy/table/methods.hpp"
 #include "tests/accuracy/table/sensor.hpp"
@@ -55,7 +55,7 @@ void judge(std::uint64_t seed, const std::shared_ptr<const hal::sim::Truth>& obj
       ++errors[m].refused;
       continue;
     }
-    table::DepthReader reader(model, method.sharpen_steps);
+    calibration::DepthReader reader(model, method.sharpen_steps);
     for (std::size_t i = 0; i < presses.size(); ++i) {
       const std::uint64_t sequence = held(objects->scene(), presses[i]);
       const table::TruePress truth = table::true_press(*objects, sequence);

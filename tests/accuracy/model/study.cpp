@@ -7,7 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "tests/accuracy/table/depth_reader.hpp"
+#include "clients/calibrate/fit/depth_reader.hpp"
 #include "tests/accuracy/table/judge.hpp"
 #include "tests/accuracy/table/methods.hpp"
 #include "tests/accuracy/table/sensor.hpp"
@@ -42,7 +42,7 @@ class Reader {
   [[nodiscard]] double bias_mm() const { return bias_ / static_cast<double>(error_.pixels); }
 
  private:
-  table::DepthReader reader_;
+  calibration::DepthReader reader_;
   table::Error error_;
   double bias_ = 0;
 };

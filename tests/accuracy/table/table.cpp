@@ -8,10 +8,10 @@
 #include <memory>
 #include <set>
 
+#include "clients/calibrate/fit/depth_reader.hpp"
 #include "clients/calibrate/fit/model/model_fit.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/accuracy/table/another_law.hpp"
-#include "tests/accuracy/table/depth_reader.hpp"
 #include "tests/accuracy/table/methods.hpp"
 
 namespace dtact::table {
@@ -98,7 +98,7 @@ std::vector<Cell> run_trial(const Trial& trial, std::size_t configuration_count,
       } catch (const calibration::ModelRefused&) {
         continue;  // no calibration is no error of depth; the table counts them
       }
-      DepthReader reader(model, methods()[m].sharpen_steps);
+      calibration::DepthReader reader(model, methods()[m].sharpen_steps);
       Cell cell{trial.seed, c, m, law, {}, {}};
       for (std::size_t t = 0; t < tests.size(); ++t) {
         const auto depth = reader.read(tests[t].frame);

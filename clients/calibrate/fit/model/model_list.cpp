@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "clients/calibrate/fit/list_shape.hpp"
+#include "clients/calibrate/fit/list_worth.hpp"
 #include "clients/calibrate/fit/model/radial_transform.hpp"
 
 namespace dtact::calibration {
@@ -23,7 +24,6 @@ constexpr double kMostOfLayer = 0.92;
 constexpr double kKnotLevels = 2;
 constexpr double kVouchedBeyond = 2;  // grey levels
 constexpr int kDraws = 20;
-constexpr double kDepthBinMm = 0.2;
 
 /// A ball as the maps of all lists show it, on RadialTransform's grid.
 struct Shown {

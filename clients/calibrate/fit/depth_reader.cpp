@@ -1,18 +1,16 @@
-#include "tests/accuracy/table/depth_reader.hpp"
+#include "clients/calibrate/fit/depth_reader.hpp"
 
 #include <algorithm>
 
 #include "daemon/recon/decimate.hpp"
 
-namespace dtact::table {
+namespace dtact::calibration {
 namespace {
-
-constexpr int kQuarter = 4;
 
 std::shared_ptr<const recon::Model> made_with(const std::shared_ptr<const recon::Model>& model,
                                               int sharpen_steps) {
   if (sharpen_steps == 0) return model;
-  return std::make_shared<const recon::Model>(recon::decimate(*model, kQuarter));
+  return std::make_shared<const recon::Model>(recon::decimate(*model, recon::kSharpenedAt));
 }
 
 }  // namespace
@@ -23,7 +21,7 @@ DepthReader::DepthReader(const std::shared_ptr<const recon::Model>& model, int s
   made_um_.resize(static_cast<std::size_t>(made.width) * static_cast<std::size_t>(made.height));
   if (sharpen_steps == 0) return;
   const recon::RectifyTable& fine = model->rectify;
-  upsampler_.emplace(fine.width, fine.height, kQuarter, 1);
+  upsampler_.emplace(fine.width, fine.height, recon::kSharpenedAt, 1);
   fine_um_.resize(static_cast<std::size_t>(fine.width) * static_cast<std::size_t>(fine.height));
 }
 
@@ -36,4 +34,4 @@ std::span<const std::int16_t> DepthReader::read(const image::Grey8& frame) {
   return fine_um_;
 }
 
-}  // namespace dtact::table
+}  // namespace dtact::calibration
