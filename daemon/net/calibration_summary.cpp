@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "daemon/recon/reconstructor.hpp"
+
 namespace dtact::net {
 
 CalibrationSummary summarise(const calibration::Calibration& calibration) {
@@ -24,9 +26,7 @@ CalibrationSummary summarise(const calibration::Calibration& calibration) {
   summary.covered_to_mm = depth_at(model.list.covered_to_q6);
   summary.frame_width = model.rectify.frame_width;
   summary.frame_height = model.rectify.frame_height;
-  for (const recon::Model::Sharpened& sharpened : model.sharpened) {
-    summary.sharpen_steps.push_back(sharpened.steps);
-  }
+  summary.sharpen_steps = recon::sharpening_steps(model);
   return summary;
 }
 

@@ -19,7 +19,7 @@ struct CalibrationSummary {
   std::string created;  ///< ISO 8601, or empty.
   int frame_width = 0;  ///< Of the camera's image, pixels.
   int frame_height = 0;
-  std::vector<int> sharpen_steps;  ///< It has lists for levels sharpened by so many.
+  std::vector<int> sharpen_steps;  ///< As recon::sharpening_steps().
   bool operator==(const CalibrationSummary&) const = default;
 };
 

@@ -27,7 +27,9 @@ struct ReconstructionRules {
   /// 0: chosen for every frame, the coarsest whose expected error stays within max_error_um.
   int decimation = 1;
   /// Steps of the filter that undoes the layer's scattering (recon/sharpener.hpp): 0 … 2, or
-  /// kAutoSharpen: for every frame the fewest whose expected error stays within max_error_um.
+  /// kAutoSharpen: for every frame the fewest whose expected error stays within max_error_um, all
+  /// at recon::kSharpenedAt and interpolated to `decimation` (0: left so); as 0 where the
+  /// calibration has none (recon::sharpening_steps()).
   int sharpen = 0;
   double max_error_um = 50;  ///< kLeastErrorUm … kMostErrorUm, micrometres.
 

@@ -5,8 +5,18 @@
 #include <utility>
 
 #include "daemon/recon/reconstructor_impl.hpp"
+#include "daemon/recon/sharpener.hpp"
 
 namespace dtact::recon {
+
+std::vector<int> sharpening_steps(const Model& model) {
+  std::vector<int> steps;
+  if (!model.scattering || !Sharpener::reaches(*model.scattering, kSharpenedAt * model.mm_per_px)) {
+    return steps;
+  }
+  for (const Model::Sharpened& sharpened : model.sharpened) steps.push_back(sharpened.steps);
+  return steps;
+}
 
 Reconstructor::Reconstructor(std::shared_ptr<const Model> model, int sharpen_steps) {
   if (!model) throw std::invalid_argument("model: missing");

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "daemon/recon/depth_sums.hpp"
 #include "daemon/recon/model.hpp"
@@ -29,6 +30,11 @@ struct DrawnTiles {
 /// Bytes that must be readable after the last pixel of a luma image, for vector loads. The HAL's
 /// frames have as many (hal::kLumaPadding).
 inline constexpr std::size_t kLumaPadding = 64;
+
+/// By how many steps a calibration's levels can be sharpened, ascending: those that it has lists
+/// for; none where its light is scattered wider than the filter reaches. `model`: at full
+/// resolution.
+[[nodiscard]] std::vector<int> sharpening_steps(const Model& model);
 
 /// Turns luma into depth, in fixed point (formats and ranges in kernels.hpp: Q6 luma, Q12 gain,
 /// int16 micrometres). Holds its scratch rows, so run() never allocates. One thread at a time.

@@ -17,35 +17,50 @@ constexpr double kWidestSigmaPx = 10;  // gaussian_taps()
 constexpr int divide_up(int a, int b) { return (a + b - 1) / b; }
 constexpr int even_up(int a) { return (a + 1) / 2 * 2; }
 
-[[noreturn]] void too_wide(const char* key, double mm, double most_mm, double mm_per_px) {
-  throw std::invalid_argument("scattering." + std::string(key) + ": " + std::to_string(mm) +
-                              " mm is more than the " + std::to_string(most_mm) +
-                              " mm that a map of " + std::to_string(mm_per_px) +
-                              " mm per pixel can be sharpened by; set reconstruction.sharpen = "
-                              "\"off\" or calibrate with a coarser mm_per_px");
+/// Standard deviation of the narrow Gaussian on the map, pixels.
+double narrow_px(const Scattering& scattering, double mm_per_px) {
+  return scattering.narrow_mm / mm_per_px;
 }
 
-}  // namespace
-
-std::vector<std::int16_t> Sharpener::narrow_taps(const Scattering& scattering, double mm_per_px) {
-  const double most_mm = kWidestSigmaPx * mm_per_px;
-  if (scattering.narrow_mm > most_mm) {
-    too_wide("narrow_mm", scattering.narrow_mm, most_mm, mm_per_px);
-  }
-  return gaussian_taps(scattering.narrow_mm / mm_per_px);
-}
-
-std::vector<std::int16_t> Sharpener::wide_taps(const Scattering& scattering, double mm_per_px) {
+/// Of the wide one on the coarse grid, coarse pixels.
+double wide_px(const Scattering& scattering, double mm_per_px) {
   constexpr double kSquare = kCoarse * kCoarse;
   // Variances add: of n equal steps (n² − 1) / 12, of bilinear reading n² / 6, averaged over
   // places.
   constexpr double kOwn = (kSquare - 1) / 12 + kSquare / 6;
   const double sigma_px = scattering.wide_mm / mm_per_px;
-  const double coarse_px = std::sqrt(std::max(0.0, sigma_px * sigma_px - kOwn)) / kCoarse;
-  if (coarse_px > kWidestSigmaPx) {
+  return std::sqrt(std::max(0.0, sigma_px * sigma_px - kOwn)) / kCoarse;
+}
+
+[[noreturn]] void too_wide(const char* key, double mm, double most_mm, double mm_per_px) {
+  throw std::invalid_argument("scattering." + std::string(key) + ": " + std::to_string(mm) +
+                              " mm is more than the " + std::to_string(most_mm) +
+                              " mm that a map of " + std::to_string(mm_per_px) +
+                              " mm per pixel can be sharpened by; set reconstruction.sharpen = "
+                              "\"auto\" or \"off\", or calibrate with a coarser mm_per_px");
+}
+
+}  // namespace
+
+std::vector<std::int16_t> Sharpener::narrow_taps(const Scattering& scattering, double mm_per_px) {
+  const double sigma_px = narrow_px(scattering, mm_per_px);
+  if (sigma_px > kWidestSigmaPx) {
+    too_wide("narrow_mm", scattering.narrow_mm, kWidestSigmaPx * mm_per_px, mm_per_px);
+  }
+  return gaussian_taps(sigma_px);
+}
+
+std::vector<std::int16_t> Sharpener::wide_taps(const Scattering& scattering, double mm_per_px) {
+  const double sigma_px = wide_px(scattering, mm_per_px);
+  if (sigma_px > kWidestSigmaPx) {
     too_wide("wide_mm", scattering.wide_mm, kCoarse * kWidestSigmaPx * mm_per_px, mm_per_px);
   }
-  return gaussian_taps(coarse_px);
+  return gaussian_taps(sigma_px);
+}
+
+bool Sharpener::reaches(const Scattering& scattering, double mm_per_px) noexcept {
+  return narrow_px(scattering, mm_per_px) <= kWidestSigmaPx &&
+         wide_px(scattering, mm_per_px) <= kWidestSigmaPx;
 }
 
 std::int16_t Sharpener::wide_share_q15(const Scattering& scattering) noexcept {

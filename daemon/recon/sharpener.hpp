@@ -46,6 +46,9 @@ class Sharpener {
   /// Values from one such row to the next.
   [[nodiscard]] std::ptrdiff_t stride() const noexcept { return sharpened_.stride(); }
 
+  /// Whether neither Gaussian is too wide for a map of that scale.
+  [[nodiscard]] static bool reaches(const Scattering& scattering, double mm_per_px) noexcept;
+
   /// Taps of the two Gaussians, Q14 from the centre outwards; of the wide one on the coarse grid,
   /// narrower by what means and bilinear reading blur by themselves.
   [[nodiscard]] static std::vector<std::int16_t> narrow_taps(const Scattering& scattering,

@@ -39,16 +39,16 @@ Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
     add(lattice, recon::kSharpenedAt, rules.sharpen, map);
     return;
   }
-  const bool filters = rules.sharpen == ReconstructionRules::kAutoSharpen;
-  const bool filtered = filters && !model->sharpened.empty();
-  if (rules.decimation != 0 || filtered) {
-    add(lattice, map, 0, map);
+  std::vector<int> steps;
+  if (rules.sharpen == ReconstructionRules::kAutoSharpen) steps = recon::sharpening_steps(*model);
+  if (!steps.empty()) {
+    // The rung without steps is as coarse as the others: plain at full resolution costs more.
+    add(lattice, recon::kSharpenedAt, 0, map);
+    for (const int each : steps) add(lattice, recon::kSharpenedAt, each, map);
+  } else if (rules.decimation != 0) {
+    add(lattice, rules.decimation, 0, rules.decimation);
   } else {
     for (const int decimation : {4, 2, 1}) add(lattice, decimation, 0, decimation);
-  }
-  if (!filtered) return;
-  for (const recon::Model::Sharpened& sharpened : model->sharpened) {
-    add(lattice, recon::kSharpenedAt, sharpened.steps, map);
   }
 }
 
