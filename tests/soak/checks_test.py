@@ -118,6 +118,15 @@ class Checks(unittest.TestCase):
             rest.held = held(resident_kib=50_000 + (0, 700, -300, 500)[i % 4])
         self.finds(record)
 
+    def test_what_the_allocator_keeps_may_rise_to_its_end_and_no_further(self):
+        record = healthy()
+        for i, rest in enumerate(record.rests):
+            rest.held = held(resident_kib=50_000 + 200 * i, kept_kib=5_000 + 200 * i)
+        self.finds(record)
+        for i, rest in enumerate(record.rests):
+            rest.held = held(resident_kib=50_000 + 600 * i, kept_kib=5_000 + 600 * i)
+        self.finds(record, "resident memory grew from")
+
     def test_a_leak_shows_before_the_resident_size_does(self):
         record = healthy()  # what is kept for later takes it up
         for i, rest in enumerate(record.rests):

@@ -62,6 +62,11 @@ class Held:
     state_kib: int
     log_kib: float
 
+    @property
+    def taken_kib(self) -> int:
+        """Of what is resident, all but what the allocator keeps."""
+        return self.resident_kib - self.kept_kib
+
 
 class Daemon:
     """Runs from here until end()."""
