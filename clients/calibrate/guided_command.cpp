@@ -82,10 +82,17 @@ void add_guided(CLI::App& app, cli::Context& context) {
       ->add_option("--patience", plan->patience_s, "Seconds to wait for a surface that holds still")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
+  const auto method = std::make_shared<std::string>("auto");
+  guided->add_option("--method", *method, "How the list is made, as of dtact-calibrate depth")
+      ->check(CLI::IsMember({"auto", "list", "model"}))
+      ->capture_default_str();
   guided->add_flag("--force", plan->force,
                    "Make the calibration although list and ball disagree: a wrong scale or radius, "
                    "another light, a contact that is cut off");
-  guided->callback([&context, plan] { run_guided(context, *plan); });
+  guided->callback([&context, plan, method] {
+    plan->method = list_method(*method);
+    run_guided(context, *plan);
+  });
 }
 
 }  // namespace dtact::ctl

@@ -43,7 +43,7 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty,
   } else {
     try {
       coverage.made = std::make_shared<const calibration::Calibration>(
-          build_list(images, ListMethod::free, &coverage.report));
+          build_list(images, ListMethod::alone, &coverage.report));
       coverage.doubts = calibration::doubts_about(*coverage.made, images.set);
       if (!coverage.doubts.empty() && !force) {
         coverage.made = nullptr;

@@ -9,7 +9,8 @@
 
 namespace dtact::ctl::guided {
 
-/// What the presses so far come to.
+/// What the presses so far come to by themselves, which is quick to say: what they lack for that is
+/// worth pressing however the list is made in the end.
 struct Coverage {
   /// Null where they determine no list, or one that is doubted.
   std::shared_ptr<const calibration::Calibration> made;

@@ -308,6 +308,10 @@ void Session::judge() {
 }
 
 Outcome Session::finish() {
+  if (plan_.method != ListMethod::alone) {
+    coverage_.made = std::make_shared<const calibration::Calibration>(
+        build_list(images_, plan_.method, &coverage_.report));
+  }
   calibration::save(*coverage_.made, folder_.path() / kCalibration);
   console_.say(report_text(coverage_.report) + list_text(*coverage_.made->model) + "saved in " +
                folder_.at(kCalibration));

@@ -22,7 +22,8 @@ struct Plan {
   int press_frames = 16;
   double patience_s = 60;  ///< For each take.
   bool force = false;      ///< A doubtful list is taken, too.
-  std::string again;       ///< The command that goes on with the work folder.
+  ListMethod method = ListMethod::automatic;
+  std::string again;  ///< The command that goes on with the work folder.
 };
 
 enum class Outcome {

@@ -18,7 +18,7 @@ struct DepthOptions {
   std::vector<std::string> presses;
   double radius_mm = 0;
   MapOptions map;
-  std::string method = "list";
+  std::string method = "auto";
   std::vector<double> gain_centre{0, 0};  ///< x, y in millimetres from the map's centre.
   std::string output;
   bool force = false;
@@ -66,9 +66,8 @@ Made make_list(const DepthOptions& options) {
     std::vector<std::string> doubts = calibration::doubts_about(made, images.set);
     return {std::move(made), std::move(doubts)};
   }
-  const ListMethod method = options.method == "model" ? ListMethod::model : ListMethod::free;
   calibration::PressReport report;
-  calibration::Calibration made = build_list(images, method, &report);
+  calibration::Calibration made = build_list(images, list_method(options.method), &report);
   fmt::print("{}", report_text(report));
   std::vector<std::string> doubts = calibration::doubts_about(made, images.set);
   return {std::move(made), std::move(doubts)};
@@ -129,10 +128,11 @@ void add_calibrate(CLI::App& app) {
   depth
       ->add_option(
           "--method", options->method,
-          "list (default): from the known sphere alone; model: the list of a layer that is fitted "
-          "to the whole image of the presses; to compare with: published (one press), "
-          "regression (several)")
-      ->check(CLI::IsMember({"list", "model", "published", "regression"}));
+          "auto (default): a layer is fitted to the whole image of the presses; where it explains "
+          "all but noise, its list, else what the presses show at the depths of the layer; model: "
+          "the layer's list anyhow; list: from the known sphere alone; to compare with: published "
+          "(one press), regression (several)")
+      ->check(CLI::IsMember({"auto", "list", "model", "published", "regression"}));
   depth
       ->add_option("--gain-centre", options->gain_centre,
                    "Where the regression's distance is taken from, mm right and down of the middle")

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "clients/calibrate/fit/model/layered_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/sensor_file.hpp"
@@ -53,24 +54,6 @@ std::pair<std::string, std::optional<double>> split_press(const std::string& tex
     throw std::runtime_error("--press " + text + ": after @ comes a depth in millimetres");
   }
   return {text.substr(0, at), depth_mm};
-}
-
-calibration::Calibration free_list(const PressImages& images, calibration::PressReport& report) {
-  const calibration::BallPresses& set = images.set;
-  if (set.presses.size() != 1) return calibration::build(set, &report);
-  calibration::PressChoices choices;
-  calibration::Calibration made = calibration::build({.reference_q8 = set.reference_q8,
-                                                      .frames = set.presses.front().frames,
-                                                      .ball_radius_mm = set.ball_radius_mm,
-                                                      .mm_per_px = set.mm_per_px,
-                                                      .lens = set.lens,
-                                                      .crop = set.crop,
-                                                      .gain = images.gain,
-                                                      // A lens file says what its pins ask for.
-                                                      .may_share_light = !set.lens},
-                                                     &choices);
-  report.note = choices.describe();
-  return made;
 }
 
 }  // namespace
@@ -145,17 +128,24 @@ void add_press(PressImages& images, const std::string& press) {
   images.set.presses.back().depth_mm = depth_mm;
 }
 
+ListMethod list_method(const std::string& name) {
+  if (name == "list") return ListMethod::alone;
+  return name == "model" ? ListMethod::model : ListMethod::automatic;
+}
+
 calibration::Calibration build_list(const PressImages& images, ListMethod method,
                                     calibration::PressReport* report) {
   calibration::PressReport found;
   calibration::Calibration made;
-  if (method == ListMethod::free) {
-    made = free_list(images, found);
+  if (method == ListMethod::automatic) {
+    made = calibration::build_layered(images.set, images.gain, found);
+  } else if (method == ListMethod::alone) {
+    made = calibration::build_alone(images.set, images.gain, found);
   } else {
     calibration::FittedCalibration fitted = calibration::build_model(images.set, images.gain);
     found.note = fitted.describe_press();
     found.left_out = std::move(fitted.left_out);
-    for (const auto& press : fitted.presses) found.presses.push_back({press.name, press.depth_mm});
+    found.presses = std::move(fitted.presses);
     made = std::move(fitted.calibration);
   }
   made.origin = images.origin;

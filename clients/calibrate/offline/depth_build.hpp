@@ -52,16 +52,19 @@ void add_press(PressImages& images, const std::string& press);
 
 /// What the darkening of a ball's presses is turned into a list by.
 enum class ListMethod : std::uint8_t {
-  model,  ///< A layer fitted to the presses (calibration::build_model()).
-  free    ///< The known sphere alone: calibration::build().
+  automatic,  ///< What is best for what the presses show: calibration::build_layered().
+  alone,      ///< The known sphere alone: calibration::build_alone().
+  model       ///< A layer fitted to the presses: calibration::build_model().
 };
+/// By its name on the command line: "auto", "list" or "model".
+[[nodiscard]] ListMethod list_method(const std::string& name);
 
 /// Adds one press: PNG files or folders. Throws as load_images(), and std::runtime_error naming the
 /// option when they have not the reference's size.
 void add_press(PressImages& images, const std::vector<std::string>& paths, const char* option);
 
-/// The calibration of one press or several, its origin filled in. Throws as calibration::build()
-/// and build_model().
+/// The calibration of one press or several, its origin filled in. Throws as
+/// calibration::build_layered() and build_model().
 [[nodiscard]] calibration::Calibration build_list(const PressImages& images, ListMethod method,
                                                   calibration::PressReport* report);
 

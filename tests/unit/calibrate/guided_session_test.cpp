@@ -99,7 +99,7 @@ TEST_F(GuidedSession, TheBatchCommandReadsTheWorkFolder) {
     add_press(images, (plan_.folder / name).string());
   }
   calibration::PressReport report;
-  const calibration::Calibration batch = build_list(images, ListMethod::free, &report);
+  const calibration::Calibration batch = build_list(images, ListMethod::automatic, &report);
   const calibration::Calibration guided = calibration::load(plan_.folder / "calibration");
   EXPECT_EQ(batch.model->list.um, guided.model->list.um);
   EXPECT_EQ(batch.origin.leds, guided.origin.leds);

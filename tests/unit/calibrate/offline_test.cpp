@@ -79,7 +79,7 @@ class Offline : public testing::Test {
 
 TEST_F(Offline, CalibratesAndSaysWhatItFound) {
   const std::string said = run(calibrate());
-  EXPECT_THAT(said, AllOf(HasSubstr("method list"), HasSubstr("260x240 at column 0, row 0")));
+  EXPECT_THAT(said, AllOf(HasSubstr("method auto"), HasSubstr("260x240 at column 0, row 0")));
   const calibration::Calibration made = calibration::load(at("cal"));
   EXPECT_EQ(made.model->mm_per_px, 0.05);
   EXPECT_EQ(made.model->reference_q8[0], 200 * 256);
@@ -97,7 +97,7 @@ TEST_F(Offline, RefusesADoubtfulCalibrationUnlessForced) {
                         HasSubstr("--radius-mm"), HasSubstr("--force"))));
   EXPECT_FALSE(fs::exists(at("cal")));
   EXPECT_THAT(run(with(arguments, "--force")),
-              AllOf(HasSubstr("doubtful: a grey level is 0.3 um"), HasSubstr("method list")));
+              AllOf(HasSubstr("doubtful: a grey level is 0.3 um"), HasSubstr("method auto")));
   EXPECT_EQ(calibration::load(at("cal")).model->mm_per_px, 0.005);
   // One press or several, ours or not.
   EXPECT_THAT([&] { run(with(arguments, "--method", "published")); },

@@ -241,6 +241,8 @@ double ModelFit::deepest_mm() const {
   return deepest;
 }
 
+bool ModelFit::explains() const noexcept { return residual <= 2 * kLeastDoubt; }
+
 LayerModel layer_of(const Eigen::VectorXd& parameters) {
   return layer_from(std::span(parameters.data(), static_cast<std::size_t>(parameters.size())));
 }
