@@ -3,8 +3,9 @@
 
 SEQUENCES is what pose_sequences wrote. Open3D's ICP, point-to-plane and generalised, follows the same
 frames on one core: the first frame's points against each frame's, begun where the frame before ended.
-Errors are of the contact's centre and of the rotation, without the directions that the shape does not
-show, which are the same for all. Writes pose.csv, pose.md and pose.svg into OUT.
+Errors are of the contact's centre and of the rotation, those of the one screw that leads from the truth to
+what was found, without the directions that the shape does not show, which are the same for all. Writes
+pose.csv, pose.md and pose.svg into OUT.
 """
 
 import argparse
@@ -64,12 +65,26 @@ def rotation_vector(matrix):
     return axis * (0.5 if angle < 1e-6 else angle / (2 * np.sin(angle)))
 
 
+def screw(rotation, shift):
+    """The rotation vector, and the shift of the origin along it: the logarithm of the motion."""
+    turn = rotation_vector(rotation)
+    angle = np.linalg.norm(turn)
+    if angle < 1e-6:
+        return turn, shift
+    # The inverse of the left Jacobian of SO(3): Barfoot, State Estimation for Robotics, 7.1.3.
+    axis, half = turn / angle, angle / 2
+    cotangent = half / np.tan(half)
+    along = cotangent * shift + (1 - cotangent) * axis * axis.dot(shift) - half * np.cross(axis, shift)
+    return turn, along
+
+
 def error(found, true, seen):
     """Micrometres of the contact's centre and degrees, in what is seen."""
     turned, moved = found[:9].reshape(3, 3), found[9:12]
     centre, arm, hidden = seen[:3], seen[3], seen[4:].reshape(6, 6)
-    there = true[:9].reshape(3, 3) @ (turned.T @ (centre - moved)) + true[9:12]
-    twist = np.concatenate([arm * rotation_vector(turned @ true[:9].reshape(3, 3).T), centre - there])
+    off = turned @ true[:9].reshape(3, 3).T
+    turn, shift = screw(off, off @ (centre - true[9:12]) + moved - centre)
+    twist = np.concatenate([arm * turn, shift])
     for one in hidden[np.isfinite(hidden[:, 0])]:
         twist -= one * one.dot(twist)
     return np.linalg.norm(twist[3:]) * 1e6, np.degrees(np.linalg.norm(twist[:3]) / arm)
@@ -82,7 +97,8 @@ def judge(folder, method):
     lost = rows[:, 12] > 0
     known = errors[~lost]
     return {
-        "object": folder.parent.name, "way": folder.name, "method": method, "frames": len(rows),
+        "surface": folder.parent.parent.name, "object": folder.parent.name, "way": folder.name,
+        "method": method, "frames": len(rows),
         "lost": int(lost.sum()),
         "success": int(not lost.any() and (known.max(axis=0) <= GOOD).all()),
         "median_um": np.median(known[:, 0]), "median_deg": np.median(known[:, 1]),
@@ -92,14 +108,12 @@ def judge(folder, method):
     }
 
 
-def page(rows):
-    methods = [*FILES, *ICPS]
-    moves = [row for row in rows if row["way"] != "minute"]
-    lines = [f"{len(moves) // len(methods)} sequences of two seconds, 30 frames a second:", "",
-             "| | median error | 95th percentile of the worst | succeeded | a frame, one core |",
+def summary(rows, methods):
+    """A line for each method."""
+    lines = ["| | median error | 95th percentile of the worst | succeeded | a frame, one core |",
              "| --- | --- | --- | --- | --- |"]
     for method in methods:
-        own = [row for row in moves if row["method"] == method]
+        own = [row for row in rows if row["method"] == method]
         column = lambda name: np.array([row[name] for row in own])  # noqa: E731
         lines.append(
             f"| {method} | {np.median(column('median_um')):.1f} µm, {np.median(column('median_deg')):.2f}° "
@@ -110,8 +124,16 @@ def page(rows):
         failed = [f"{row['object']} ({row['way']}"
                   + (f", {row['lost']} of {row['frames']} frames lost)" if row["lost"]
                      else f", {row['worst_um']:.0f} µm, {row['worst_deg']:.1f}°)")
-                  for row in moves if row["method"] == method and not row["success"]]
+                  for row in rows if row["method"] == method and not row["success"]]
         lines.append(f"- {method}: {', '.join(failed) or 'none'}.")
+    return lines
+
+
+def page(rows):
+    methods = [*FILES, *ICPS]
+    moves = [row for row in rows if row["way"] != "minute" and row["surface"] == "plane"]
+    lines = [f"{len(moves) // len(methods)} sequences of two seconds on a plane, 30 frames a second:", "",
+             *summary(moves, methods)]
     lines += ["", "By way, median error of the contact's centre and of the rotation:", "",
               "| | " + " | ".join(WAYS) + " |", "| --- |" + " --- |" * len(WAYS)]
     for method in methods:
@@ -131,6 +153,11 @@ def page(rows):
         lines.append(f"| {thing} | " + " | ".join(
             f"{by[m]['end_um']:.1f} µm, {by[m]['end_deg']:.2f}° (worst {by[m]['worst_um']:.0f} µm, "
             f"{by[m]['worst_deg']:.2f}°; lost {by[m]['lost']})" for m in methods) + " |")
+    for surface in ("sphere", "cylinder"):
+        own = [row for row in rows if row["surface"] == surface]
+        with_it = [method for method in methods if any(row["method"] == method for row in own)]
+        lines += ["", f"{len(own) // len(with_it)} sequences on a {surface} of 30 mm of radius:", "",
+                  *summary(own, with_it)]
     return "\n".join(lines) + "\n"
 
 
@@ -158,15 +185,16 @@ def main():
     parser.add_argument("sequences", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     arguments = parser.parse_args()
-    folders = sorted(file.parent for file in arguments.sequences.glob("*/*/truth.npy"))
-    rows = [judge(folder, method) for folder in folders for method in [*FILES, *ICPS]]
+    folders = sorted(file.parent for file in arguments.sequences.glob("*/*/*/truth.npy"))
+    rows = [judge(folder, method) for folder in folders for method in [*FILES, *ICPS]
+            if method in ICPS or (folder / f"{FILES[method]}.npy").exists()]
     with open(arguments.out / "pose.csv", "w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, rows[0], lineterminator="\n")
         writer.writeheader()
         writer.writerows({key: f"{value:.4g}" if isinstance(value, float) else value
                           for key, value in row.items()} for row in rows)
     (arguments.out / "pose.md").write_text(page(rows), encoding="utf-8")
-    plot(rows, arguments.out / "pose.svg")
+    plot([row for row in rows if row["surface"] == "plane"], arguments.out / "pose.svg")
     print(page(rows))
 
 

@@ -91,14 +91,14 @@ std::vector<float> points_of(const PointCloud& cloud, const ContactView& view) {
   return rows;
 }
 
-/// `steps` of `every` frames each.
+/// `steps` of `every` frames each. NormalFlow's method knows a plane alone.
 void follow(const std::string& object, const std::string& keys, int steps, int every,
-            const std::filesystem::path& folder) {
+            const std::filesystem::path& folder, const recon::Surface& surface = {}) {
   std::filesystem::create_directories(folder);
-  Sequence frames(object, keys);
+  Sequence frames(object, keys, surface);
   Tracker tracker;
   NormalFlow flow;
-  perceive::CloudMaker maker;
+  perceive::CloudMaker maker(surface);
   PointCloud cloud;
   std::vector<double> truth;  // 12 of the motion, 40 of what is seen
   std::vector<double> ours;   // 12 of the motion, lost, microseconds
@@ -106,6 +106,7 @@ void follow(const std::string& object, const std::string& keys, int steps, int e
   for (int step = 0; step <= steps; ++step) {
     const auto sequence = static_cast<std::uint64_t>(step) * static_cast<std::uint64_t>(every);
     const Map clean = frames.map(sequence, 0);
+    if (clean.values.empty()) break;  // what rolls on a finger may leave it
     maker.make(clean.grid, 1, cloud);
     append(truth, frames.motion(sequence));
     const ContactView clear(clean.grid, cloud, maker.table(), kUncertaintyUm);
@@ -119,18 +120,21 @@ void follow(const std::string& object, const std::string& keys, int steps, int e
     const double made = bench::thread_us();
     const auto& pose = tracker.follow(view, sequence);
     const double followed = bench::thread_us();
-    const auto& flown = flow.follow(map.grid, cloud, view);
-    const double end = bench::thread_us();
     append(ours, pose.alignment.motion);
     ours.insert(ours.end(), {pose.state == Tracker::State::lost ? 1.0 : 0.0, followed - before});
-    append(flows, flown.motion);
-    flows.insert(flows.end(), {flown.lost ? 1.0 : 0.0, end - followed + (made - before)});
+    if (surface.kind == recon::Surface::Kind::plane) {
+      const double begun = bench::thread_us();
+      const auto& flown = flow.follow(map.grid, cloud, view);
+      const double end = bench::thread_us();
+      append(flows, flown.motion);
+      flows.insert(flows.end(), {flown.lost ? 1.0 : 0.0, end - begun + (made - before)});
+    }
     save(folder / fmt::format("points_{:04}.npy", step), points_of(cloud, view),
          PointCloud::kParts);
   }
   save(folder / "truth.npy", truth, 52);
   save(folder / "tracker.npy", ours, 14);
-  save(folder / "normal_flow.npy", flows, 14);
+  if (!flows.empty()) save(folder / "normal_flow.npy", flows, 14);
 }
 
 }  // namespace
@@ -145,12 +149,24 @@ int main(int argc, char** argv) {
     app.add_option("--out", out, "Folder, a folder in it for each sequence")->required();
     app.add_option("--only", only, "One object");
     CLI11_PARSE(app, argc, argv);
-    for (const Thing& thing : kThings) {
-      if (!only.empty() && only != thing.name) continue;
+    const auto along_all_ways = [&](const Thing& thing, const char* name,
+                                    const dtact::recon::Surface& surface) {
       for (const Way& way : {kSlide, kTwist, kRoll, kDeeper}) {
         constexpr int kSteps = 2 * Sequence::kFps / kEvery;
-        follow(thing.lines, keys_of(way, kSteps), kSteps, kEvery, out / thing.name / way.name);
+        follow(thing.lines, keys_of(way, kSteps), kSteps, kEvery,
+               out / name / thing.name / way.name, surface);
       }
+    };
+    for (const Thing& thing : kThings) {
+      if (!only.empty() && only != thing.name) continue;
+      along_all_ways(thing, "plane", {});
+    }
+    for (const Thing& thing : kThings) {
+      const std::string_view name = thing.name;
+      if (name != "M4 nut" && name != "cube" && name != "ball array" && name != "key") continue;
+      if (!only.empty() && only != name) continue;
+      along_all_ways(thing, "sphere", kSphere);
+      along_all_ways(thing, "cylinder", kCylinder);
     }
     for (const Thing& thing : kThings) {
       const std::string_view name = thing.name;
@@ -158,7 +174,7 @@ int main(int argc, char** argv) {
       if (!only.empty() && only != name) continue;
       constexpr int kSteps = 60 * Sequence::kFps / kEveryOfAMinute;
       follow(thing.lines, keys_of_a_minute(kSteps), kSteps, kEveryOfAMinute,
-             out / thing.name / "minute");
+             out / "plane" / thing.name / "minute");
     }
     return 0;
   } catch (const std::exception& e) {

@@ -108,6 +108,7 @@ Map Sequence::map(std::uint64_t sequence, double noise_um) {
       bottom = std::max(bottom, std::min(kSide - 1, row + kMargin));
     }
   }
+  if (right < 0) return {};
   map.grid.width = right - map.grid.x + 1;
   map.grid.height = bottom - map.grid.y + 1;
   map.grid.full_width = map.grid.full_height = kSide;

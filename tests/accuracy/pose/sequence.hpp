@@ -52,7 +52,8 @@ class Sequence {
   /// and rays are straight (refraction 1), as in the simulator.
   Sequence(const std::string& object, const std::string& keys, const recon::Surface& surface = {});
 
-  /// The map of a frame; `noise_um`: the deviation of its noise, another with every call.
+  /// The map of a frame, of no values where nothing is pressed any more; `noise_um`: the deviation
+  /// of its noise, another with every call.
   [[nodiscard]] Map map(std::uint64_t sequence, double noise_um = kNoiseUm);
   /// What has happened to the object's points since the first frame, metres.
   [[nodiscard]] perceive::Motion motion(std::uint64_t sequence) const;
