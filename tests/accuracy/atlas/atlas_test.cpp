@@ -20,11 +20,12 @@
 namespace dtact::atlas {
 namespace {
 
-// The list from one press, whose nominal error (0.036 mm) is about a grey level: the limits of the
-// conditions are set to that. The list from many presses is better, and so leaves twice its nominal
-// error before a light that drifted by less than a grey level can be told; the page has its rows.
+// The list from one press alone, whose nominal error (0.036 mm) is about a grey level: the limits
+// of the conditions are set to that. The list from many presses is better, and so leaves twice its
+// nominal error before a light that drifted by less than a grey level can be told; the page has its
+// rows.
 const Method& ours() {
-  const auto found = std::ranges::find(methods(), "ours, one press", &Method::name);
+  const auto found = std::ranges::find(methods(), "sphere alone, one press", &Method::name);
   if (found == methods().end()) throw std::logic_error("no such method");
   return *found;
 }

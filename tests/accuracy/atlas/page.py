@@ -13,7 +13,7 @@ matplotlib.rcParams["svg.hashsalt"] = "dtact"  # the same picture from the same 
 import matplotlib.pyplot as plt  # noqa: E402  (the back end is chosen first)
 
 GROUPS = ["light", "image", "scene", "reference"]
-COLOURS = ["#9a6324", "#1f77b4", "#2ca02c", "#7b3fa0", "#d1495b", "#444444"]
+COLOURS = ["#9a6324", "#1f77b4", "#2ca02c", "#7b3fa0", "#d1495b", "#444444", "#17becf"]
 
 
 def number(text):
@@ -135,7 +135,7 @@ def main():
     nominal = {m: rows["noise"]["runs"][m][0].error for m in methods}
     text = (pathlib.Path(__file__).parent / "page.in.md").read_text(encoding="utf-8")
     parts = []
-    ours = [m for m in methods if m.startswith("ours")]
+    ours = [m for m in methods if not m.startswith("published")]
     for group in GROUPS:
         draw(group, rows, methods, nominal, arguments.folder)
         parts.append(f"## {group.capitalize()}\n\n![{group}]({group}.svg)\n")

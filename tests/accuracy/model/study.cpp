@@ -8,6 +8,8 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/depth_reader.hpp"
+#include "clients/calibrate/fit/model/layered_build.hpp"
+#include "tests/accuracy/table/another_law.hpp"
 #include "tests/accuracy/table/judge.hpp"
 #include "tests/accuracy/table/methods.hpp"
 #include "tests/accuracy/table/sensor.hpp"
@@ -108,6 +110,7 @@ std::vector<Specimen> specimens() {
                              .narrow_weight = 0.55,
                              .knots = {},
                              .slopes = {}}));
+  all.push_back({"another law", table::another_law()});
   return all;
 }
 
@@ -148,10 +151,13 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
     result.refused = e.what();
   }
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  calibration::PressReport report;
+  Reader by_ours(calibration::build_layered(set, {}, report).model);
+  result.note = report.note;
   std::unique_ptr<Reader> by_free;
   try {
-    by_free = std::make_unique<Reader>(presses == 1 ? table::ours_single(material)
-                                                    : table::ours_many(material));
+    by_free = std::make_unique<Reader>(presses == 1 ? table::alone_single(material)
+                                                    : table::alone_many(material));
   } catch (const std::runtime_error&) {
     by_free.reset();  // a chain of presses asks for a light one; result.free_mm stays NaN
   }
@@ -162,9 +168,11 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
     const table::TruePress truth =
         table::true_press(sensor.truth(), table::first_still_frame(sensor.truth(), press));
     for (Reader& reader : by_model) reader.read(frame, truth);
+    by_ours.read(frame, truth);
     if (by_free) by_free->read(frame, truth);
     depth += trial.tests[i].depth_mm / static_cast<double>(trial.tests.size());
   }
+  result.ours_mm = by_ours.mean_mm();
   if (by_free) result.free_mm = by_free->mean_mm();
   if (!by_model.empty()) {
     result.model_mm = by_model[0].mean_mm();

@@ -24,7 +24,8 @@ int main(int argc, char** argv) {
     if (!only.empty() && std::ranges::find(only, i) == only.end()) continue;
     for (const std::uint64_t seed : seeds) {
       const auto r = dtact::model_study::measure(all[i], seed, presses, tests);
-      fmt::print("{:8} seed {} ({:.1f} s): free {:.4f}", all[i].name, seed, r.seconds, r.free_mm);
+      fmt::print("{:8} seed {} ({:.1f} s): free {:.4f} ours {:.4f}", all[i].name, seed, r.seconds,
+                 r.free_mm, r.ours_mm);
       if (r.fit) {
         const auto& layer = r.fit->layer;
         fmt::print(

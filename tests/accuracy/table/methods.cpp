@@ -4,6 +4,7 @@
 #include <string>
 
 #include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/model/layered_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
 
 namespace dtact::table {
@@ -43,10 +44,14 @@ calibration::BallPresses many_presses(const Material& material) {
   return set;
 }
 
-std::shared_ptr<const recon::Model> layer_model(const Material& material) {
+calibration::BallPresses centre_press(const Material& material) {
   calibration::BallPresses set = no_presses(material);
   set.presses.push_back({.name = "centre", .frames = material.centre, .depth_mm = {}});
-  return calibration::build_model(set).calibration.model;
+  return set;
+}
+
+std::shared_ptr<const recon::Model> layer_model(const Material& material) {
+  return calibration::build_model(centre_press(material)).calibration.model;
 }
 
 std::shared_ptr<const recon::Model> published_regression(const Material& material) {
@@ -55,12 +60,13 @@ std::shared_ptr<const recon::Model> published_regression(const Material& materia
       .model;
 }
 
-constexpr std::array<Method, 6> kMethods = {{
+constexpr std::array<Method, 7> kMethods = {{
     {"published single image", published_single},
     {"published regression", published_regression},
+    {"sphere alone, one press", alone_single},
+    {"sphere alone, many presses", [](const Material& material) { return alone_many(material); }},
     {"ours, one press", ours_single},
-    {"ours, many presses", [](const Material& material) { return ours_many(material); }},
-    {"ours, layer model of one press", layer_model},
+    {"ours, many presses", ours_many},
     {"ours, layer model of one press, sharpened", layer_model, 2},
 }};
 
@@ -78,13 +84,23 @@ Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& cent
   return material;
 }
 
-std::shared_ptr<const recon::Model> ours_single(const Material& material) {
+std::shared_ptr<const recon::Model> alone_single(const Material& material) {
   return from_one(material, recon::Method::list);
 }
 
-std::shared_ptr<const recon::Model> ours_many(const Material& material,
-                                              calibration::PressReport* report) {
+std::shared_ptr<const recon::Model> alone_many(const Material& material,
+                                               calibration::PressReport* report) {
   return calibration::build(many_presses(material), report).model;
+}
+
+std::shared_ptr<const recon::Model> ours_single(const Material& material) {
+  calibration::PressReport report;
+  return calibration::build_layered(centre_press(material), {}, report).model;
+}
+
+std::shared_ptr<const recon::Model> ours_many(const Material& material) {
+  calibration::PressReport report;
+  return calibration::build_layered(many_presses(material), {}, report).model;
 }
 
 std::span<const Method> methods() { return kMethods; }

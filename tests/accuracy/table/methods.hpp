@@ -29,10 +29,13 @@ inline constexpr std::size_t kReferenceFrames = 32;
 
 [[nodiscard]] Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& centre);
 
-/// Ours from the press near the centre, and from those anywhere.
-[[nodiscard]] std::shared_ptr<const recon::Model> ours_single(const Material& material);
-[[nodiscard]] std::shared_ptr<const recon::Model> ours_many(
+/// From the known sphere alone: from the press near the centre, and from those anywhere.
+[[nodiscard]] std::shared_ptr<const recon::Model> alone_single(const Material& material);
+[[nodiscard]] std::shared_ptr<const recon::Model> alone_many(
     const Material& material, calibration::PressReport* report = nullptr);
+/// As dtact-calibrate makes it unless it is told otherwise.
+[[nodiscard]] std::shared_ptr<const recon::Model> ours_single(const Material& material);
+[[nodiscard]] std::shared_ptr<const recon::Model> ours_many(const Material& material);
 
 /// A row of the table.
 struct Method {

@@ -90,7 +90,7 @@ SeveralPresses measure_several(const Specimen& specimen, std::uint64_t seed,
   calibration::PressReport report;
   std::shared_ptr<const recon::Model> several;
   try {
-    several = table::ours_many(material, &report);
+    several = table::alone_many(material, &report);
   } catch (const std::runtime_error&) {
     result.gain = "refused";
     return result;
@@ -99,7 +99,7 @@ SeveralPresses measure_several(const Specimen& specimen, std::uint64_t seed,
     if (gain.chosen) result.gain = gain.name;
   }
   Reader by_several(several);
-  Reader by_one(table::ours_single(material));
+  Reader by_one(table::alone_single(material));
   table::Error error;
   table::Error one;
   for (std::size_t i = 0; i < trial.tests.size(); ++i) {
