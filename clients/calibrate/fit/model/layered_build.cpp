@@ -69,8 +69,7 @@ std::string left_by(const FittedCalibration& fitted) {
 std::string not_believed(double moved_mm) {
   return fmt::format(
       "list: what the presses show alone, since a layer would put them {:+.2f} mm deeper, and "
-      "{:.2f} "
-      "mm are believed",
+      "{:.2f} mm are believed",
       moved_mm, kMostMoved);
 }
 

@@ -151,7 +151,7 @@ FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& 
     uniform.gain.shape = recon::GainShape::uniform;
     Seen shares = look(uniform, set);
     if (shares.presses.size() >= seen.presses.size() && !shares.presses.empty() &&
-        lopsided(seen.presses) > kRounder * lopsided(shares.presses)) {
+        (seen.presses.empty() || lopsided(seen.presses) > kRounder * lopsided(shares.presses))) {
       model->gain = uniform.gain;
       seen = std::move(shares);
     }

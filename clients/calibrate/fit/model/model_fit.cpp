@@ -250,7 +250,7 @@ LayerModel layer_of(const Eigen::VectorXd& parameters) {
 PressProfile profile_of(const LevelledPress& press, double light_levels, double smoothing_mm,
                         const PixelFilter& use) {
   const Contact& contact = press.contact;
-  const double reach = kFarField * contact.ball_radius_mm;
+  const double reach = std::min(kFarField * contact.ball_radius_mm, RadialTransform::kReachMm);
   const double step = 2 * press.map.mm_per_px;
   struct Ring {
     double loss = 0;

@@ -78,7 +78,8 @@ inline constexpr double kFrameNoise = 1;
 /// own contact radius and offset, by Levenberg and Marquardt (Ceres) from several thicknesses. The
 /// priors are wide (model_fit.cpp): thickness 2 mm ± 35 %, widths 0.3 and 1.5 mm ± 50 %. A kink of
 /// the response at zero is held narrower (± 30 %): one press hardly tells it from thickness.
-/// Throws ModelRefused when the fit does not end.
+/// A fit that is still creeping after 30 steps is taken as it is then; its residual says what it is
+/// worth. Throws ModelRefused when no fit begins to explain anything.
 [[nodiscard]] ModelFit fit_model(std::span<const PressProfile> presses);
 /// The same from the parameters of another fit, as of one of the presses.
 [[nodiscard]] ModelFit fit_model(std::span<const PressProfile> presses, const ModelFit& from);

@@ -159,6 +159,7 @@ recon::DepthList tabulate(const Knots& knots, double deepest_mm) {
   constexpr int kFirst = kListFirstLevel * recon::kEntriesPerLevel;
   constexpr int kLast = kListLastLevel * recon::kEntriesPerLevel;
   const double low = knots.first * kKnotLevels;
+  const double high = low + static_cast<double>(knots.depth_mm.size() - 1) * kKnotLevels;
   recon::DepthList list{kFirst, {}, 0, 0};
   list.covered_from_q6 =
       std::max(kFirst, static_cast<int>(std::lround(low * recon::kEntriesPerLevel)));
@@ -167,7 +168,7 @@ recon::DepthList tabulate(const Knots& knots, double deepest_mm) {
     const double depth_mm = knots.at(std::max(level, low));
     list.um.push_back(
         static_cast<std::int16_t>(std::lround(std::clamp(1000 * depth_mm, -16383.0, 16383.0))));
-    if (depth_mm <= deepest_mm) list.covered_to_q6 = q6;
+    if (level <= high && depth_mm <= deepest_mm) list.covered_to_q6 = q6;
   }
   list.covered_to_q6 = std::min(
       kLast, list.covered_to_q6 + static_cast<int>(kVouchedBeyond * recon::kEntriesPerLevel));

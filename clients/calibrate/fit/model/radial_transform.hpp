@@ -13,6 +13,7 @@ class RadialTransform {
  public:
   static constexpr double kStepMm = 0.03;
   static constexpr Eigen::Index kPoints = 467;
+  static constexpr double kReachMm = kStepMm * (kPoints - 1);
 
   /// The one instance: 5 MB of matrices, made on first use.
   [[nodiscard]] static const RadialTransform& instance();
