@@ -76,6 +76,12 @@ TEST(Completion, OffersValues) {
   EXPECT_THAT(complete("dtactctl calibrate depth --method p"), UnorderedElementsAre("published"));
   EXPECT_THAT(complete("dtact-calibrate depth --method p"), UnorderedElementsAre("published"));
   EXPECT_THAT(complete("dtact-calibrate depth --method m"), UnorderedElementsAre("model"));
+  EXPECT_THAT(complete("dtact-calibrate guided --method \"\""),
+              UnorderedElementsAre("auto", "list", "model"));
+  EXPECT_THAT(complete("dtactctl calibrate --method \"\""),
+              UnorderedElementsAre("auto", "list", "model"));
+  EXPECT_THAT(complete("dtactctl calibrate --method auto --rad"),
+              UnorderedElementsAre("--radius-mm"));
   EXPECT_THAT(complete("dtactctl led --brightness \"\""), UnorderedElementsAre());
   EXPECT_THAT(complete("dtactctl export press.mcap --to p"),
               UnorderedElementsAre("pcd", "ply", "png"));
