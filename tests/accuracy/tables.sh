@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Makes the tables, plots and pages that lie beside this file from the simulated sensor:
-# tables.sh BIN [table|objects|atlas|thickness|study|pose ...], all of them without a name. BIN: where the accuracy
+# tables.sh BIN [table|objects|model|atlas|thickness|study|pose ...], all of them without a name. BIN: where the accuracy
 # tests were built.
 set -euo pipefail
 here=$(dirname "$(readlink -f "$0")")
 bin=$1
 shift
-(($#)) || set -- table objects atlas thickness study pose
+(($#)) || set -- table objects model atlas thickness study pose
 for part in "$@"; do
   case $part in
     table)
@@ -14,6 +14,9 @@ for part in "$@"; do
       ;;
     objects)
       "$bin/model/model_objects" --out "$here/model"
+      ;;
+    model)
+      "$bin/model/model_study" --out "$here/model"
       ;;
     atlas)
       "$bin/atlas/stability_atlas" --out "$here/atlas" >/dev/null
@@ -39,7 +42,7 @@ for part in "$@"; do
       echo "pose: tests/accuracy/pose/README.md"
       ;;
     *)
-      echo "tables.sh: '$part' is none of table, objects, atlas, thickness, study, pose" >&2
+      echo "tables.sh: '$part' is none of table, objects, model, atlas, thickness, study, pose" >&2
       exit 2
       ;;
   esac

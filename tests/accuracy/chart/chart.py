@@ -147,9 +147,8 @@ def mark_pareto(rows):
             for other in rows))
 
 
-COLOURS = {"published": "#b2182b", "regression": "#d98200", "list": "#2166ac", "ours": "#1b7837",
-           "virtual balls": "#8e44ad",
-           "paper": "#222222"}
+COLOURS = {"published": "#b2182b", "regression": "#d98200", "list": "#2166ac", "several": "#1b7837",
+           "ours": "#d6409f", "virtual balls": "#8e44ad", "paper": "#222222"}
 # The wider the smoothing, the paler.
 SHADES = {0.05: 1.0, 0.1: 0.8, 0.2: 0.5, 0.4: 0.28}
 MARKS = {"1/1": "o", "1/2": "s", "1/4": "D"}
@@ -211,8 +210,9 @@ def plot(rows, shots, file, label):
     from matplotlib.lines import Line2D
     have = {r["method"] for r in rows}
     names = {"published": "published list", "regression": "published regression",
-             "list": "ours, one press", "ours": "ours, several presses",
-             "virtual balls": "virtual balls, sharpened 0 to 2x",
+             "list": "sphere alone, one press", "several": "sphere alone, several presses",
+             "ours": "ours, one press, sharpened 0 to 2x",
+             "virtual balls": "virtual balls (a bound), sharpened 0 to 2x",
              "paper": "paper's pipeline, Python + OpenCV"}
     legend = [Line2D([], [], marker="o", linestyle="", color=COLOURS[m], label=names[m])
               for m in names if m in have]

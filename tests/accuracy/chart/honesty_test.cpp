@@ -17,12 +17,14 @@
 #include <vector>
 
 #include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/model/layered_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
 #include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/depth/uncertainty.hpp"
 #include "hal/sim/objects.hpp"
+#include "tests/accuracy/table/another_law.hpp"
 #include "tests/accuracy/table/judge.hpp"
 #include "tests/accuracy/table/sensor.hpp"
 #include "tests/accuracy/table/trial.hpp"
@@ -64,7 +66,8 @@ std::vector<Specimen> specimens() {
   return {{"1.75 mm, side-lit", thickness::sensor_of(1.75), 5, 4.0, 1.15},
           {"as sensor_a, four LEDs", fitted_to("sensor_a"), 4, 3.5, 1.35},
           {"as sensor_b", fitted_to("sensor_b"), 0, 5.0, 1.0},
-          {"2.75 mm", thickness::sensor_of(2.75), 0, 4.5, 1.25}};
+          {"2.75 mm", thickness::sensor_of(2.75), 0, 4.5, 1.25},
+          {"of another law", table::another_law(), 0, 4.0, 1.4}};
 }
 
 /// Seven presses that calibrate where several are taken, 0.55 to 1.15 mm deep, after the first.
@@ -121,25 +124,37 @@ calibration::Calibration of_one(const calibration::BallPresses& set, recon::Meth
                              .method = method});
 }
 
+calibration::BallPresses first_of(const calibration::BallPresses& set) {
+  calibration::BallPresses first = set;
+  first.presses.resize(1);
+  return first;
+}
+
+calibration::Calibration layered(const calibration::BallPresses& set) {
+  calibration::PressReport report;
+  return calibration::build_layered(set, {}, report);
+}
+
 struct Method {
   const char* name;
   Calibrate calibrate;
   bool of_all = false;  ///< Presses, not of the first alone.
 };
 constexpr Method kMethods[] = {
-    {"one press",
+    {"sphere alone, one press",
      [](const calibration::BallPresses& set) { return of_one(set, recon::Method::list); }},
     {"published",
      [](const calibration::BallPresses& set) { return of_one(set, recon::Method::published); }},
     {"regression",
      [](const calibration::BallPresses& set) { return calibration::build_regression(set); }, true},
-    {"several presses", [](const calibration::BallPresses& set) { return calibration::build(set); },
-     true},
-    {"layer model of one press", [](const calibration::BallPresses& set) {
-       calibration::BallPresses first = set;
-       first.presses.resize(1);
-       return calibration::build_model(first).calibration;
-     }}};
+    {"sphere alone, several presses",
+     [](const calibration::BallPresses& set) { return calibration::build(set); }, true},
+    {"layer model of one press",
+     [](const calibration::BallPresses& set) {
+       return calibration::build_model(first_of(set)).calibration;
+     }},
+    {"ours, one press", [](const calibration::BallPresses& set) { return layered(first_of(set)); }},
+    {"ours, several presses", layered, true}};
 
 /// True over stated, of one frame as the daemon works it at full resolution.
 double ratio(const pipeline::ActiveCalibration& active, const image::Grey8& frame,
@@ -206,8 +221,7 @@ class Honesty : public testing::Test {
     hal::CameraInfo camera;
     camera.width = table::kFrameWidth;
     camera.height = table::kFrameHeight;
-    calibration::BallPresses first = set;
-    first.presses.resize(1);
+    const calibration::BallPresses first = first_of(set);
     for (std::size_t m = 0; m < std::size(kMethods); ++m) {
       const auto made =
           std::make_shared<const calibration::Calibration>(kMethods[m].calibrate(set));
@@ -236,6 +250,8 @@ TEST_F(Honesty, OfThePublishedList) { expect_honest(1); }
 TEST_F(Honesty, OfThePublishedRegression) { expect_honest(2); }
 TEST_F(Honesty, OfSeveralPresses) { expect_honest(3); }
 TEST_F(Honesty, OfTheLayerModel) { expect_honest(4); }
+TEST_F(Honesty, OfOurs) { expect_honest(5); }
+TEST_F(Honesty, OfOursFromSeveralPresses) { expect_honest(6); }
 
 }  // namespace
 }  // namespace dtact::chart

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/model/layered_build.hpp"
 #include "daemon/recon/decimate.hpp"
 #include "tests/accuracy/chart/virtual_balls.hpp"
 
@@ -48,18 +49,22 @@ std::optional<double> bilinear(const std::vector<std::int16_t>& map, int width, 
   return sum;
 }
 
-}  // namespace
-
-calibration::BallPresses several_presses(const image::Grey16& reference) {
+calibration::BallPresses press_set(const image::Grey16& reference, const std::vector<Shot>& shots) {
   calibration::BallPresses set;
   set.reference_q8 = reference;
-  for (const Shot& shot : make_calibration_presses()) {
+  for (const Shot& shot : shots) {
     set.presses.push_back({.name = shot.name, .frames = shot.frames, .depth_mm = {}});
   }
   set.ball_radius_mm = 4.0;
   set.mm_per_px = kMmPerPx;
   set.crop = calibration::Crop{kCropCol, kCropRow, kSide, kSide};
   return set;
+}
+
+}  // namespace
+
+calibration::BallPresses several_presses(const image::Grey16& reference) {
+  return press_set(reference, make_calibration_presses());
 }
 
 std::vector<Setting> make_settings(const image::Grey16& reference) {
@@ -72,7 +77,7 @@ std::vector<Setting> make_settings(const image::Grey16& reference) {
       {"regression full", "regression", 1, false, 0, calibration::build_regression(presses).model});
   const auto list = calibrate(reference, calibration_press, recon::Method::list);
   constexpr std::array<const char*, 5> kShare{"", "full", "half", "", "quarter"};
-  const auto ours = calibration::build(presses).model;
+  const auto several = calibration::build(presses).model;
   for (const double smoothing_mm : {0.05, 0.1, 0.2, 0.4}) {
     recon::Model smoothed = *list;
     smoothed.smoothing_px = smoothing_mm / kMmPerPx;
@@ -89,18 +94,25 @@ std::vector<Setting> make_settings(const image::Grey16& reference) {
   }
   const auto balls = std::make_shared<const recon::Model>(
       recon::decimate(with_lists_of_virtual_balls(*list, reference), 4));
+  calibration::PressReport report;
+  const auto ours =
+      calibration::build_layered(press_set(reference, {calibration_press}), {}, report).model;
+  const auto ours_quarter = std::make_shared<const recon::Model>(recon::decimate(*ours, 4));
   for (const bool tiles : {false, true}) {
     for (const int steps : {0, 1, 2}) {
-      settings.push_back({fmt::format("virtual balls quarter{} 0.10{}", tiles ? " tiles" : "",
-                                      steps == 0 ? "" : fmt::format(" sharpened {}x", steps)),
-                          "virtual balls", 4, tiles, 0.1, balls, steps});
+      const std::string rest = fmt::format("quarter{} 0.10{}", tiles ? " tiles" : "",
+                                           steps == 0 ? "" : fmt::format(" sharpened {}x", steps));
+      settings.push_back({"virtual balls " + rest, "virtual balls", 4, tiles, 0.1, balls, steps});
+      settings.push_back({"ours " + rest, "ours", 4, tiles, 0.1, ours_quarter, steps});
     }
+    settings.push_back(
+        {tiles ? "ours full tiles 0.10" : "ours full 0.10", "ours", 1, tiles, 0.1, ours});
   }
   for (const int decimation : {1, 2, 4}) {
-    const auto model = std::make_shared<const recon::Model>(recon::decimate(*ours, decimation));
+    const auto model = std::make_shared<const recon::Model>(recon::decimate(*several, decimation));
     settings.push_back(
-        {fmt::format("ours {} tiles 0.10", kShare.at(static_cast<std::size_t>(decimation))), "ours",
-         decimation, true, 0.1, model});
+        {fmt::format("several {} tiles 0.10", kShare.at(static_cast<std::size_t>(decimation))),
+         "several", decimation, true, 0.1, model});
   }
   return settings;
 }

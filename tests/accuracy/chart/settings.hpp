@@ -15,18 +15,19 @@ namespace dtact::chart {
 
 /// One way to reconstruct.
 struct Setting {
-  std::string name;           ///< "list full tiles 0.10", unique.
-  std::string method;         ///< "published", "regression", "list", "ours", "virtual balls".
-  int decimation = 1;         ///< 1, 2 or 4.
-  bool tiles = false;         ///< Only what changed.
+  std::string name;    ///< "list full tiles 0.10", unique.
+  std::string method;  ///< "published", "regression", "list", "several", "ours", "virtual balls".
+  int decimation = 1;  ///< 1, 2 or 4.
+  bool tiles = false;  ///< Only what changed.
   double smoothing_mm = 0.1;  ///< Standard deviation; 0: the method's own.
   std::shared_ptr<const recon::Model> model;
   int steps = 0;  ///< Of sharpening.
 };
 
-/// All of them, calibrated with make_calibration_press() or, "regression" and "ours", with
+/// All of them, calibrated with make_calibration_press() or, "regression" and "several", with
 /// make_calibration_presses(), "virtual balls" as with_lists_of_virtual_balls() says, and nothing
-/// else.
+/// else. "list" and "several" are of the known sphere alone, "ours" is what dtact-calibrate makes
+/// of the one press unless it is told otherwise.
 [[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference);
 
 struct Error {

@@ -11,6 +11,7 @@
 #include "clients/calibrate/fit/depth_reader.hpp"
 #include "clients/calibrate/fit/model/model_fit.hpp"
 #include "hal/sim/scene.hpp"
+#include "tests/accuracy/table/another_law.hpp"
 #include "tests/accuracy/table/judge.hpp"
 #include "tests/accuracy/table/methods.hpp"
 #include "tests/accuracy/table/sensor.hpp"
@@ -18,8 +19,16 @@
 namespace dtact::model_study {
 namespace {
 
-hal::sim::Scene all_objects() {
-  return hal::sim::load_scene(DTACT_SOURCE_DIR "/config/scenes/all_objects.toml");
+hal::sim::Scene all_objects(table::Law law = table::Law::built_in) {
+  hal::sim::Scene scene = hal::sim::load_scene(DTACT_SOURCE_DIR "/config/scenes/all_objects.toml");
+  if (law == table::Law::another) {
+    const hal::sim::Scene other = table::another_law();
+    const double solve_step_mm = scene.layer.solve_step_mm;
+    scene.layer = other.layer;
+    scene.layer.solve_step_mm = solve_step_mm;
+    scene.optics = other.optics;
+  }
+  return scene;
 }
 
 double mean(const std::vector<double>& values) {
@@ -38,11 +47,12 @@ std::uint64_t held(const hal::sim::Scene& scene, const hal::sim::Press& press) {
   return static_cast<std::uint64_t>(std::lround(middle * scene.camera.fps));
 }
 
-void judge(std::uint64_t seed, const std::shared_ptr<const hal::sim::Truth>& objects,
+void judge(std::uint64_t seed, const hal::sim::Scene& untouched,
+           const std::shared_ptr<const hal::sim::Truth>& objects,
            std::vector<ObjectErrors>& errors) {
   const table::Configuration& light = table::configurations()[0];
   const table::Trial trial = table::draw(seed, {.test_presses = 0});
-  table::Sensor sensor(table::solve(hal::sim::default_scene(), trial.all()), light, seed);
+  table::Sensor sensor(table::solve(untouched, trial.all()), light, seed);
   const table::Material material = table::gather(sensor, trial, light.regression_centre);
   table::Sensor tested(objects, light, seed + 1000);
   const auto& presses = objects->scene().presses;
@@ -82,17 +92,20 @@ std::vector<std::string> object_names() {
   return names;
 }
 
-std::vector<ObjectErrors> read_objects(int seeds) {
-  const auto objects = std::make_shared<const hal::sim::Truth>(all_objects());
+std::vector<ObjectErrors> read_objects(int seeds, table::Law law) {
+  const auto objects = std::make_shared<const hal::sim::Truth>(all_objects(law));
+  const hal::sim::Scene untouched =
+      law == table::Law::built_in ? hal::sim::default_scene() : table::another_law();
   std::vector<ObjectErrors> errors(table::methods().size());
   for (ObjectErrors& each : errors) each.in_contact_mm.resize(objects->scene().presses.size());
   for (int seed = 1; seed <= seeds; ++seed) {
-    judge(static_cast<std::uint64_t>(seed), objects, errors);
+    judge(static_cast<std::uint64_t>(seed), untouched, objects, errors);
   }
   return errors;
 }
 
-std::string to_markdown(const std::vector<ObjectErrors>& errors, int seeds) {
+std::string to_markdown(const std::vector<ObjectErrors>& errors, int seeds,
+                        const std::string& sensor) {
   std::string out = "| mean absolute error in contact, mm |";
   std::string rule = "\n| --- |";
   for (const table::Method& method : table::methods()) {
@@ -114,8 +127,8 @@ std::string to_markdown(const std::vector<ObjectErrors>& errors, int seeds) {
   const auto refused = [](int sum, const ObjectErrors& each) { return sum + each.refused; };
   return out + fmt::format(
                    "\n\nMeans over {} seeds; {} presses were refused by the model. One frame each. "
-                   "Simulated sensor, layer of 2 mm.\n",
-                   seeds, std::accumulate(errors.begin(), errors.end(), 0, refused));
+                   "Simulated sensor, {}.\n",
+                   seeds, std::accumulate(errors.begin(), errors.end(), 0, refused), sensor);
 }
 
 }  // namespace dtact::model_study

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/accuracy/table/table.hpp"
+
 namespace dtact::model_study {
 
 /// Errors of one method of the paper's table on objects, a value each seed, mm.
@@ -21,9 +23,11 @@ struct ObjectErrors {
 /// config/scenes/all_objects.toml's objects, each as it is held.
 [[nodiscard]] std::vector<std::string> object_names();
 /// Every method of the paper's table, calibrated for each of the seeds 1 … `seeds` as the table
-/// does it.
-[[nodiscard]] std::vector<ObjectErrors> read_objects(int seeds);
-/// The table, Markdown.
-[[nodiscard]] std::string to_markdown(const std::vector<ObjectErrors>& errors, int seeds);
+/// does it, on a sensor of the law.
+[[nodiscard]] std::vector<ObjectErrors> read_objects(int seeds,
+                                                     table::Law law = table::Law::built_in);
+/// The table, Markdown; `sensor` says in a word or two what was pressed.
+[[nodiscard]] std::string to_markdown(const std::vector<ObjectErrors>& errors, int seeds,
+                                      const std::string& sensor);
 
 }  // namespace dtact::model_study

@@ -18,8 +18,13 @@ int main(int argc, char** argv) {
     app.add_option("--seeds", seeds, "Repetitions")->check(CLI::Range(1, 100));
     app.add_option("--out", out, "Folder of objects.md; without it, only printed");
     CLI11_PARSE(app, argc, argv);
-    const std::string page =
-        dtact::model_study::to_markdown(dtact::model_study::read_objects(seeds), seeds);
+    using dtact::table::Law;
+    const auto page_of = [&](Law law, const char* sensor) {
+      return dtact::model_study::to_markdown(dtact::model_study::read_objects(seeds, law), seeds,
+                                             sensor);
+    };
+    const std::string page = page_of(Law::built_in, "layer of 2 mm") + "\n" +
+                             page_of(Law::another, "of another law of layer and light, 2.5 mm");
     fmt::print("{}", page);
     if (!out.empty()) dtact::base::write_file_atomically(out / "objects.md", page);
     return 0;
