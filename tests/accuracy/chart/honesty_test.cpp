@@ -13,6 +13,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -193,7 +194,7 @@ class Honesty : public testing::Test {
   }
   static void expect_honest(std::size_t method) {
     const std::vector<double>& ratios = all_.at(method);
-    ASSERT_GE(ratios.size(), 24U);
+    ASSERT_GE(ratios.size(), 48U) << "refused on more than one of five sensors";
     std::printf("%s: true over stated 5 %% %.2f, median %.2f, 95 %% %.2f, most %.2f (%zu frames)\n",
                 kMethods[method].name, share_of(ratios, 0.05), share_of(ratios, 0.5),
                 share_of(ratios, 0.95), ratios.back(), ratios.size());
@@ -223,8 +224,14 @@ class Honesty : public testing::Test {
     camera.height = table::kFrameHeight;
     const calibration::BallPresses first = first_of(set);
     for (std::size_t m = 0; m < std::size(kMethods); ++m) {
-      const auto made =
-          std::make_shared<const calibration::Calibration>(kMethods[m].calibrate(set));
+      std::shared_ptr<const calibration::Calibration> made;
+      try {
+        made = std::make_shared<const calibration::Calibration>(kMethods[m].calibrate(set));
+      } catch (const std::runtime_error& e) {
+        // Says so instead of stating anything; expect_honest() counts what is left.
+        std::printf("%s, %s: refused: %s\n", specimen.name, kMethods[m].name, e.what());
+        continue;
+      }
       EXPECT_THAT(calibration::doubts_about(*made, kMethods[m].of_all ? set : first),
                   testing::IsEmpty())
           << specimen.name << ", " << kMethods[m].name;
