@@ -103,7 +103,7 @@ TEST_P(PointsOfABall, LieOnIt) {
   const Press press(folder, GetParam().scene);
   const hal::sim::Truth truth(press.scene);
   const std::filesystem::path calibration = folder.path() / "calibration";
-  std::filesystem::copy(calibration_folder("model"), calibration);
+  std::filesystem::copy(calibration_folder(), calibration);
   const std::filesystem::path file = calibration / "calibration.toml";
   std::string text = base::read_file(file, 1 << 20);
   text.insert(text.find('\n', text.find("\n[surface]") + 1) + 1, GetParam().calibration);

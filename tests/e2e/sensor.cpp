@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <csignal>
-#include <map>
 #include <stdexcept>
 
 #include "tests/e2e/patience.hpp"
@@ -18,15 +17,15 @@ void run_or_throw(const std::vector<std::string>& command) {
 }
 
 /// Untouched until frame 120 of the scene, pressed and still from frame 180 on.
-void calibrate(const fs::path& folder, const std::string& method, const fs::path& calibration) {
+void calibrate(const fs::path& folder, const fs::path& calibration) {
   const std::string scene = scene_file("calibrate_ball.toml").string();
   const std::string reference = (folder / "reference").string();
   const std::string ball = (folder / "ball").string();
   run_or_throw({SIM_RENDER_PROGRAM, "--scene", scene, "--frames", "0:32", "-o", reference});
   run_or_throw({SIM_RENDER_PROGRAM, "--scene", scene, "--frames", "200:232", "-o", ball});
   run_or_throw({CALIBRATE_PROGRAM, "depth", "--reference", reference, "--ball", ball, "--radius-mm",
-                "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400", "--crop", "580,580",
-                "--method", method, "-o", calibration.string()});
+                "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400", "--crop", "580,580", "-o",
+                calibration.string()});
 }
 
 }  // namespace
@@ -35,15 +34,14 @@ fs::path scene_file(const std::string& name) {
   return fs::path(DTACT_SOURCE_DIR) / "config/scenes" / name;
 }
 
-const fs::path& calibration_folder(const std::string& method) {
+const fs::path& calibration_folder() {
   static const TempFolder folder;
-  static std::map<std::string, fs::path> made;
-  const auto [at, missing] = made.try_emplace(method, folder.path() / method / "calibration");
-  if (missing) {
-    fs::create_directory(folder.path() / method);
-    calibrate(folder.path(), method, at->second);
-  }
-  return at->second;
+  static const fs::path made = [] {
+    fs::path calibration = folder.path() / "calibration";
+    calibrate(folder.path(), calibration);
+    return calibration;
+  }();
+  return made;
 }
 
 Sensor::Sensor(const fs::path& scene, bool calibrated, const std::vector<std::string>& settings) {

@@ -19,8 +19,8 @@ inline constexpr int kCropSide = 580;
 
 /// A calibration folder of the simulated sensor, made once in a test program the way a user makes
 /// it: images of the scene calibrate_ball.toml and `dtact-calibrate depth`. The simulator's
-/// truth has no part in it. `method`: the program's option.
-const std::filesystem::path& calibration_folder(const std::string& method = "list");
+/// truth has no part in it.
+const std::filesystem::path& calibration_folder();
 
 std::filesystem::path scene_file(const std::string& name);
 

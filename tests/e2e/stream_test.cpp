@@ -59,7 +59,7 @@ TEST(Stream, SixHundredFramesOfTheRightDepth) {
       "ball of 5 mm, simulated sensor: mean absolute error inside the true contact "
       "%.4f mm (median of %d frames), worst frame %.4f mm; untouched %.4f mm\n",
       inside[inside.size() / 2], pressed, worst, worst_untouched);
-  EXPECT_LE(worst, 0.05);
+  EXPECT_LE(worst, 0.03);
   EXPECT_LE(worst_untouched, 0.01);
 }
 
