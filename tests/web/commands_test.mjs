@@ -10,7 +10,8 @@ let view;
 let pane;
 
 before(async () => {
-  left = await startDaemon("left");
+  // A list that is made from the known ball alone comes without those for sharpened levels.
+  left = await startDaemon("left", 0, [`calibration=${calibration("list")}`]);
   view = await open(await startGateway({ left: left.port }));
   pane = view.page.locator('[data-sensor="left"]');
 });
@@ -114,7 +115,6 @@ test("depth is made as the panel says, and its worth and time are on the chart",
     (count) => count === 1,
     10_000,
   );
-  // A list that is made from the known ball alone comes without those for sharpened levels.
   await panel
     .getByRole("radiogroup", { name: "Sharpen" })
     .getByRole("radio", { name: "2" })

@@ -18,9 +18,9 @@ export const work = mkdtempSync(
   path.join(FOLDER, `run-${path.basename(process.argv[1]).split("_")[0]}-`),
 );
 
-/** Made by a press of a known ball, as ./dev run does; kept until a program changes. */
-export function calibration() {
-  const folder = path.join(FOLDER, "calibrated");
+/** Made by a press of a known ball, as ./dev run does unless told a method; kept until a program changes. */
+export function calibration(method = "auto") {
+  const folder = path.join(FOLDER, `calibrated-${method}`);
   const made = path.join(folder, "calibration");
   const changed = (program) => statSync(program).mtimeMs > statSync(made).mtimeMs;
   if (existsSync(path.join(made, "reference.png")) && ![CALIBRATE, SIM_RENDER].some(changed))
@@ -36,7 +36,8 @@ export function calibration() {
   }
   const depth = ["depth", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400"];
   const from = ["--reference", path.join(folder, "reference"), "--ball", path.join(folder, "ball")];
-  execFileSync(CALIBRATE, [...depth, ...from, "--crop", "580,580", "-o", made]);
+  const how = ["--crop", "580,580", "--method", method];
+  execFileSync(CALIBRATE, [...depth, ...from, ...how, "-o", made]);
   return made;
 }
 

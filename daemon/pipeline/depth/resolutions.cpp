@@ -20,8 +20,8 @@ void require_sharpening(const recon::Model& model, int steps) {
   if (found != model.sharpened.end()) return;
   throw std::invalid_argument(
       "reconstruction.sharpen is " + std::to_string(steps) +
-      ", but the calibration has no list for levels sharpened so often: calibrate again, or set "
-      "reconstruction.sharpen to \"auto\" or \"off\"");
+      ", but the calibration has no list for levels sharpened so often: calibrate with --method "
+      "model, or set reconstruction.sharpen to \"auto\" or \"off\"");
 }
 
 }  // namespace
