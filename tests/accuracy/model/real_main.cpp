@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "clients/calibrate/fit/list_shape.hpp"
+#include "clients/calibrate/fit/model/depth_spread.hpp"
 #include "clients/calibrate/fit/model/model_list.hpp"
 #include "clients/calibrate/fit/model/radial_transform.hpp"
 #include "clients/calibrate/offline/folder_evaluation.hpp"
@@ -150,6 +151,8 @@ void look(const LevelledPress& press, const calibration::MapOptics& optics) {
         free_half);
   print("model's list", from_sphere(press, model(fit)), model_half);
   print("model's own press", from_sphere(press, own(fit)), own_half);
+  fmt::print("    depth of the press by parts of its picture: within {:.3f}\n",
+             calibration::depth_spread_mm(press, optics, fit));
 }
 
 /// The press as it is, and about its middle without its gain.
@@ -210,10 +213,10 @@ void look(const model_study::Specimen& specimen, std::uint64_t seed) {
   look(model, material.reference_q8, material.centre);
 }
 
-/// 2 mm, 3 mm, and the sensors fitted to the real ones.
+/// 2 mm, 3 mm, another law, and the sensors fitted to the real ones.
 std::vector<model_study::Specimen> simulated() {
   const std::vector<model_study::Specimen> all = model_study::specimens();
-  std::vector<model_study::Specimen> some = {all[1], all[3]};
+  std::vector<model_study::Specimen> some = {all[1], all[3], all.back()};
   for (const char* name : {"sensor_a", "sensor_b"}) {
     const hal::sim::Scene like =
         hal::sim::load_scene(std::string(DTACT_SOURCE_DIR "/tests/accuracy/sim/") + name + ".toml");

@@ -19,8 +19,8 @@ namespace dtact::calibration {
 ///   presses themselves show inside their contacts, as in build_alone(), but how deep they were,
 ///   which they do not show, is the layer's: one press's list is tied to the layer's (tie()),
 ///   several are chained at the layer's depths.
-/// - Where no layer can be fitted, where its depths are too far from what the presses themselves
-///   say to be believed, or where depths were measured, it is build_alone()'s.
+/// - Where no layer can be fitted, where its depth changes with the part of the picture that it is
+///   fitted to (depth_spread_mm()), or where depths were measured, it is build_alone()'s.
 ///
 /// `report.note` says which. Stated for one tied press is, in squares, what the layer's fit says of
 /// its list and by how much the two lists differ in shape. Throws as build().

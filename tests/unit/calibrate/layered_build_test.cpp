@@ -1,0 +1,74 @@
+// What the default calibration takes of a layer that was fitted to a press, and what of the press.
+#include "clients/calibrate/fit/model/layered_build.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/unit/calibrate/imagined_press.hpp"
+
+namespace dtact::calibration {
+namespace {
+
+using testing::HasSubstr;
+
+BallPresses press_of(const ImaginedView& view) {
+  BallPresses set;
+  set.reference_q8 = view.untouched_q8();
+  set.presses = {{.name = "ball", .frames = {view.frame()}, .depth_mm = {}}};
+  set.ball_radius_mm = view.ball_radius_mm;
+  set.mm_per_px = ImaginedView::kMmPerPx;
+  return set;
+}
+
+/// Beside the contact the light falls to the right, by so many grey levels a millimetre, and did
+/// not before the press.
+BallPresses press_in_fallen_light(const ImaginedView& view, double levels_per_mm) {
+  BallPresses set = press_of(view);
+  image::Grey8& frame = set.presses[0].frames[0];
+  for (int y = 0; y < view.height; ++y) {
+    for (int x = 0; x < view.width; ++x) {
+      const double beside_mm = (x - view.col) * ImaginedView::kMmPerPx - view.contact_radius_mm;
+      const auto at = static_cast<std::size_t>(y * view.width + x);
+      frame.pixels[at] -=
+          static_cast<std::uint8_t>(std::lround(levels_per_mm * std::max(0.0, beside_mm)));
+    }
+  }
+  return set;
+}
+
+// One frame's rounding is more than noise for the fit, so this is no layer that explains all.
+TEST(LayeredBuild, TiesTheListToALayerThatIsTheSameInAllParts) {
+  const BallPresses set = press_of({});
+  PressReport report;
+  const Calibration made = build_layered(set, {}, report);
+  EXPECT_THAT(report.note, HasSubstr("list: what the press shows, at the depth of a layer"));
+  EXPECT_TRUE(made.layer);
+  PressReport ignored;
+  EXPECT_NE(made.model->list.um, build_alone(set, {}, ignored).model->list.um);
+}
+
+TEST(LayeredBuild, BelievesNoDepthThatChangesWithThePartLookedAt) {
+  const BallPresses set = press_in_fallen_light({}, 0.6);
+  PressReport report;
+  const Calibration made = build_layered(set, {}, report);
+  EXPECT_THAT(report.note, HasSubstr("list: what the presses show alone: layers fitted to parts"));
+  PressReport ignored;
+  EXPECT_EQ(made.model->list.um, build_alone(set, {}, ignored).model->list.um);
+  EXPECT_FALSE(made.layer);
+}
+
+TEST(LayeredBuild, MeasuredDepthsNeedNoLayer) {
+  BallPresses set = press_of({});
+  set.presses[0].depth_mm = ImaginedView{}.contact().depth_mm;
+  PressReport report;
+  const Calibration made = build_layered(set, {}, report);
+  PressReport ignored;
+  EXPECT_EQ(made.model->list.um, build_alone(set, {}, ignored).model->list.um);
+  EXPECT_FALSE(made.layer);
+}
+
+}  // namespace
+}  // namespace dtact::calibration
