@@ -9,6 +9,7 @@ Exit code: 0 all passed; 77 the guest cannot be had on this machine, which says 
 """
 
 import argparse
+import fcntl
 import random
 import shutil
 import subprocess
@@ -101,6 +102,12 @@ def main() -> int:
         release = {'bookworm': 12, 'trixie': 13}[arguments.suite]
         debs = arguments.packages or arguments.build / f'packages-debian{release}-{arguments.architecture}'
     folder.mkdir(parents=True, exist_ok=True)
+    alone = (folder / 'lock').open('w', encoding='utf-8')
+    try:
+        fcntl.flock(alone, fcntl.LOCK_EX | fcntl.LOCK_NB)  # until the process ends
+    except BlockingIOError:
+        print(f'run.py: another run uses the discs in {folder}: wait for it, or name another --build folder')
+        return 1
     disc = folder / 'disc.ext4'
     made = subprocess.run([HERE / 'root.sh', arguments.suite, arguments.architecture, debs, disc], check=False)
     if made.returncode:
