@@ -139,25 +139,26 @@ std::vector<Twist> ObjectTracker::unknown(const Alignment& alignment, const Plac
   return in_both(alignment.unobservable, hidden);
 }
 
-bool ObjectTracker::forget(const Alignment& alignment) {
-  const Alignment& contact = contact_.pose().alignment;
+bool ObjectTracker::forget(const Alignment& alignment, const Alignment& contact,
+                           Placement& placement) {
   const Frame here{alignment.centre, alignment.arm};
   std::vector<Twist> of_contact;
+  of_contact.reserve(contact.unobservable.size());
   for (const Twist& one : contact.unobservable) {
     of_contact.push_back(seen_from(one, {contact.centre, contact.arm}, here));
   }
   const Motion& pose = alignment.motion;
-  const Frame then{pose * placement_->centre, placement_->arm};
+  const Frame then{pose * placement.centre, placement.arm};
   bool more = false;
   for (const Twist& one : in_both(alignment.unobservable, of_contact)) {
     const Twist there = seen_from(one, here, then);
     Twist back;
     back << pose.rotation.transpose() * there.head<3>(),
         pose.rotation.transpose() * there.tail<3>();
-    for (const Twist& known : placement_->hidden) back -= known * known.dot(back);
+    for (const Twist& known : placement.hidden) back -= known * known.dot(back);
     constexpr double kAnother = 0.3;
     if (back.norm() < kAnother * there.norm()) continue;
-    placement_->hidden.push_back(back.normalized());
+    placement.hidden.push_back(back.normalized());
     more = true;
   }
   return more;
@@ -252,7 +253,7 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
   if (aligned && placement_) {
     place_ = aligned->motion;
     pose_.alignment = *std::move(aligned);
-    forgot_ |= forget(pose_.alignment);
+    forgot_ |= forget(pose_.alignment, contact_.pose().alignment, *placement_);
     pose_.alignment.unobservable = unknown(pose_.alignment, *placement_);
     pose_.alternatives = placement_->alternatives;
   } else {

@@ -68,7 +68,7 @@ class ObjectTracker {
                                                   const Placement& placement);
   /// Adds to what the placement hides what neither this frame's alignment with the object nor the
   /// contact's motion shows. True where that is more than before.
-  bool forget(const Alignment& alignment);
+  static bool forget(const Alignment& alignment, const Alignment& contact, Placement& placement);
 
   std::shared_ptr<const ObjectModel> object_;
   Tracker contact_;

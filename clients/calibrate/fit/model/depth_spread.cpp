@@ -22,6 +22,7 @@ constexpr std::array<std::pair<int, int>, 4> kSides = {{{1, 0}, {0, 1}, {-1, 0},
 std::vector<PixelFilter> parts_of(const LevelledPress& press) {
   const Contact& contact = press.contact;
   std::vector<PixelFilter> parts;
+  parts.reserve(kSides.size() + kReaches.size());
   for (const auto& [right, down] : kSides) {
     parts.emplace_back([&contact, right, down](int x, int y) {
       return right * (x - contact.col) + down * (y - contact.row) > 0;

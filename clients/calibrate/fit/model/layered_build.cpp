@@ -75,7 +75,7 @@ void add_line(std::string& note, const std::string& line) {
 /// "; the layer itself leaves 0.20 grey levels".
 std::string left_by(const FittedCalibration& fitted) {
   return fmt::format("; the layer itself leaves {:.2f} grey levels",
-                     fitted.calibration.layer->residual_levels);
+                     fitted.fit.residual * fitted.light_levels);
 }
 
 Calibration tied_to(const FittedCalibration& fitted, const BallPresses& set,
