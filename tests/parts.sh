@@ -37,11 +37,10 @@ part() {
   echo "dev: $name took $((SECONDS - began)) s$verdict"
 }
 
-# Of every file of the tree as git sees it, uncommitted changes included, but for the pages and tables
-# that say afterwards what was measured: those are looked at in the first part alone.
+# Of every file of the tree as git sees it, uncommitted changes included, but for the page that says
+# afterwards what the tests measured.
 tree_digest() {
-  git ls-files -z --cached --others --exclude-standard -- . ':!README.md' ':!tests/MEASURED.md' \
-    ':!tests/accuracy/*.md' ':!tests/accuracy/*.csv' ':!tests/accuracy/*.svg' | { xargs -0 sha256sum 2>&1 || true; } | sha256sum
+  git ls-files -z --cached --others --exclude-standard -- . ':!tests/MEASURED.md' | { xargs -0 sha256sum 2>&1 || true; } | sha256sum
 }
 
 end_of_parts() {
