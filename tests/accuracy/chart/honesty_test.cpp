@@ -52,6 +52,8 @@ struct Specimen {
   std::size_t light = 0;  ///< Into table::configurations().
   double ball_mm = 0;     ///< Radius.
   double depth_mm = 0;    ///< Of the one press.
+  /// The sphere alone cannot chain its presses: the lightest are not seen.
+  bool leaves_gap = false;
 };
 
 Scene fitted_to(const std::string& sensor) {
@@ -68,7 +70,7 @@ std::vector<Specimen> specimens() {
           {"as sensor_a, four LEDs", fitted_to("sensor_a"), 4, 3.5, 1.35},
           {"as sensor_b", fitted_to("sensor_b"), 0, 5.0, 1.0},
           {"2.75 mm", thickness::sensor_of(2.75), 0, 4.5, 1.25},
-          {"of another law", table::another_law(), 0, 4.0, 1.4}};
+          {"of another law", table::another_law(), 0, 4.0, 1.4, true}};
 }
 
 /// Seven presses that calibrate where several are taken, 0.55 to 1.15 mm deep, after the first.
@@ -140,6 +142,7 @@ struct Method {
   const char* name;
   Calibrate calibrate;
   bool of_all = false;  ///< Presses, not of the first alone.
+  bool chains = false;  ///< From zero upward, and refuses presses that leave a gap.
 };
 constexpr Method kMethods[] = {
     {"sphere alone, one press",
@@ -149,7 +152,7 @@ constexpr Method kMethods[] = {
     {"regression",
      [](const calibration::BallPresses& set) { return calibration::build_regression(set); }, true},
     {"sphere alone, several presses",
-     [](const calibration::BallPresses& set) { return calibration::build(set); }, true},
+     [](const calibration::BallPresses& set) { return calibration::build(set); }, true, true},
     {"layer model of one press",
      [](const calibration::BallPresses& set) {
        return calibration::build_model(first_of(set)).calibration;
@@ -194,7 +197,7 @@ class Honesty : public testing::Test {
   }
   static void expect_honest(std::size_t method) {
     const std::vector<double>& ratios = all_.at(method);
-    ASSERT_GE(ratios.size(), 48U) << "refused on more than one of five sensors";
+    ASSERT_GE(ratios.size(), 48U);
     std::printf("%s: true over stated 5 %% %.2f, median %.2f, 95 %% %.2f, most %.2f (%zu frames)\n",
                 kMethods[method].name, share_of(ratios, 0.05), share_of(ratios, 0.5),
                 share_of(ratios, 0.95), ratios.back(), ratios.size());
@@ -228,7 +231,7 @@ class Honesty : public testing::Test {
       try {
         made = std::make_shared<const calibration::Calibration>(kMethods[m].calibrate(set));
       } catch (const std::runtime_error& e) {
-        // Says so instead of stating anything; expect_honest() counts what is left.
+        if (!specimen.leaves_gap || !kMethods[m].chains) throw;
         std::printf("%s, %s: refused: %s\n", specimen.name, kMethods[m].name, e.what());
         continue;
       }
