@@ -52,7 +52,7 @@ std::string cell(const std::vector<Result>& results, const Value& value) {
 
 std::string row(const std::string& name, const std::vector<Result>& results) {
   if (std::ranges::any_of(results, [](const Result& r) { return !r.fit; })) {
-    return fmt::format("| {} | refused |\n", name);
+    return fmt::format("| {} | refused | | | | |\n", name);
   }
   std::string out = fmt::format("| {} | {} | {} | {} |", name,
                                 cell(results, [](const Result& r) { return r.free_mm; }),
