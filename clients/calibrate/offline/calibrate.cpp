@@ -131,8 +131,7 @@ void add_calibrate(CLI::App& app) {
           "auto (default): a layer is fitted to the whole image of the presses; where it explains "
           "all but noise, its list, else what the presses show, at the layer's depths where all "
           "parts of the picture agree on them; model: the layer's list anyhow; list: from the "
-          "known "
-          "sphere alone; to compare with: published (one press), regression (several)")
+          "known sphere alone; to compare with: published (one press), regression (several)")
       ->check(CLI::IsMember({"auto", "list", "model", "published", "regression"}));
   depth
       ->add_option("--gain-centre", options->gain_centre,

@@ -64,7 +64,8 @@ struct ModelFit {
   [[nodiscard]] double deepest_mm() const;
   /// What is left is what a fit leaves whose layer is right: a hundredth of a grey level of 160, of
   /// noise and of steps of a pixel. On simulated sensors of the same law that nothing was chosen on
-  /// it is half to one of that, on one of another law three; on two real presses six and twenty.
+  /// it is half to two of that, on one of another law three to four; on two real presses six and
+  /// twenty.
   [[nodiscard]] bool explains() const noexcept;
 };
 
