@@ -1,7 +1,12 @@
 #include "clients/calibrate/lens/point_fit.hpp"
 
+#include <ceres/dynamic_numeric_diff_cost_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <stdexcept>
 
@@ -64,17 +69,35 @@ Lens lens_of(const Parameters& p, const Units& u) {
   return lens;
 }
 
-cv::Mat1d errors_of(const Parameters& p, const Units& u, std::span<const Mark> marks) {
-  const Lens lens = lens_of(p, u);
-  cv::Mat1d errors(static_cast<int>(2 * marks.size()), 1);
-  int i = 0;
-  for (const Mark& mark : marks) {
-    const Point at = project(lens, mark.mm);
-    errors(i++) = (at.x - mark.px.x) / u.px_size;
-    errors(i++) = (at.y - mark.px.y) / u.px_size;
+/// Distances of all marks in the picture, in `units`. What is free comes first of the parameters;
+/// the others stay as they are.
+class MarkCost {
+ public:
+  MarkCost(std::span<const Mark> marks, const Units& units, const Parameters& start,
+           std::size_t free)
+      : marks_(marks), units_(units), start_(start), free_(free) {}
+
+  bool operator()(const double* const* free, double* errors) const {
+    Parameters p = start_;
+    std::copy_n(free[0], free_, p.begin());
+    const Lens lens = lens_of(p, units_);
+    for (const Mark& mark : marks_) {
+      const Point at = project(lens, mark.mm);
+      // Where the lens folds it shows no such mark: as wrong as the marks are wide, a step to
+      // refuse.
+      const bool shown = std::isfinite(at.x) && std::isfinite(at.y);
+      *errors++ = shown ? (at.x - mark.px.x) / units_.px_size : 1;
+      *errors++ = shown ? (at.y - mark.px.y) / units_.px_size : 1;
+    }
+    return true;
   }
-  return errors;
-}
+
+ private:
+  std::span<const Mark> marks_;
+  Units units_;
+  Parameters start_;
+  std::size_t free_;
+};
 
 Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t terms) {
   cv::Mat1d a(static_cast<int>(marks.size()), 3);
@@ -105,54 +128,22 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
   return p;
 }
 
-/// By differences, of the first `n` parameters.
-cv::Mat1d jacobian_of(const Parameters& p, const cv::Mat1d& errors, const Units& u,
-                      std::span<const Mark> marks, int n) {
-  constexpr double kStep = 1e-6;  // of parameters of the order of one
-  std::vector<cv::Mat1d> columns;
-  for (std::size_t c = 0; c < static_cast<std::size_t>(n); ++c) {
-    Parameters changed = p;
-    changed[c] += kStep;
-    columns.emplace_back((errors_of(changed, u, marks) - errors) / kStep);
-  }
-  cv::Mat1d jacobian;
-  cv::hconcat(columns, jacobian);
-  return jacobian;
-}
-
+/// Of the model's parameters, the first of `p`.
 void minimise(Parameters& p, const Units& u, std::span<const Mark> marks, LensModel model) {
-  constexpr int kIterations = 60;
-  constexpr double kSettled = 1e-12;  // relative change of the sum of squares
-  const int n = parameters(model);    // the first ones of p
-  double damping = 1e-3;
-  cv::Mat1d errors = errors_of(p, u, marks);
-  double sum = errors.dot(errors);
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const cv::Mat1d jacobian = jacobian_of(p, errors, u, marks, n);
-    const cv::Mat1d normal(jacobian.t() * jacobian);
-    const cv::Mat1d gradient(jacobian.t() * errors);
-    bool lower = false;
-    while (!lower && damping < 1e9) {
-      cv::Mat1d damped = normal.clone();
-      for (int c = 0; c < n; ++c) damped(c, c) += damping * (normal(c, c) + 1e-9);
-      cv::Mat1d step;
-      Parameters tried = p;
-      if (cv::solve(damped, gradient, step, cv::DECOMP_CHOLESKY)) {
-        for (int c = 0; c < n; ++c) tried[static_cast<std::size_t>(c)] -= step(c);
-      }
-      const cv::Mat1d after = errors_of(tried, u, marks);
-      const double after_sum = after.dot(after);  // NaN where the lens folds: not lower
-      lower = after_sum < sum;
-      damping *= lower ? 0.2 : 8;
-      if (!lower) continue;
-      const bool settled = sum - after_sum <= kSettled * sum;
-      p = tried;
-      errors = after;
-      sum = after_sum;
-      if (settled) return;
-    }
-    if (!lower) return;
-  }
+  const int n = parameters(model);
+  auto cost = std::make_unique<ceres::DynamicNumericDiffCostFunction<MarkCost, ceres::CENTRAL>>(
+      new MarkCost(marks, u, p, static_cast<std::size_t>(n)));
+  cost->AddParameterBlock(n);
+  cost->SetNumResiduals(static_cast<int>(2 * marks.size()));
+  ceres::Problem problem;
+  problem.AddResidualBlock(cost.release(), nullptr, p.data());
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.max_num_iterations = 60;
+  options.function_tolerance = 1e-12;  // relative change of the sum of squares
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
 }
 
 /// The best parameters for all marks, in `u`.

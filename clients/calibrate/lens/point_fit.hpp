@@ -24,9 +24,9 @@ enum class LensModel {
 };
 [[nodiscard]] int parameters(LensModel model);
 
-/// The lens that minimises the squared distances in pixels (Levenberg–Marquardt from the best
-/// affine map through the smaller models). Throws std::runtime_error when there are fewer marks
-/// than parameters or they lie on a line.
+/// The lens that minimises the squared distances in pixels (by Ceres, from the best affine map
+/// through the smaller models). Throws std::runtime_error when there are fewer marks than
+/// parameters or they lie on a line.
 [[nodiscard]] recon::Lens fit_lens(std::span<const Mark> marks, LensModel model);
 
 /// Distances in millimetres on the surface from where each mark should lie to where the lens puts
