@@ -12,6 +12,7 @@ void set_up(CLI::App& app, cli::Context& context) {
       ->description(
           "Makes calibrations for dtactd, the daemon for DTact tactile sensors, and judges them.");
   cli::add_global_options(app, context);
+  cli::add_json_option(app, context);
   ctl::add_guided(app, context);
   ctl::add_offline_commands(app, context.json);
   force::add_force(app, context);

@@ -17,8 +17,8 @@ enum ExitCode : int {
 
 inline constexpr const char* kExitCodesHelp =
     "Exit codes: 0 done; 1 failed, or refused by the daemon; 2 wrong usage; 3 no connection to\n"
-    "the daemon; 4 what was asked for did not come about (watch --min-fps; a guided calibration\n"
-    "that ended early).";
+    "the daemon; 4 what was asked for did not come about (dtactctl watch --min-fps;\n"
+    "dtact-calibrate guided that ended early).";
 
 /// A failure with an exit code of its own. Any other exception ends the program with kFailed.
 class Failure : public std::runtime_error {

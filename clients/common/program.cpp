@@ -74,6 +74,9 @@ void add_global_options(CLI::App& app, Context& context) {
       ->type_name("FILE");
   app.add_flag("--insecure", target.insecure,
                "Send the token over plain TCP to another machine, where others may read it");
+}
+
+void add_json_option(CLI::App& app, Context& context) {
   app.add_flag("--json", context.json, "Print JSON, one object a line");
 }
 

@@ -16,10 +16,13 @@ struct Context {
   std::ostream& out;
 };
 
-/// The daemon's address, token and certificate, --json and --version, allowed before and behind the
+/// The daemon's address, token and certificate and --version, allowed before and behind the
 /// command, of which there has to be one; the exit codes below the help. The daemon knows the
 /// program by its name and version.
 void add_global_options(CLI::App& app, Context& context);
+
+/// --json, of a program that prints what it was asked for.
+void add_json_option(CLI::App& app, Context& context);
 
 /// Parses `arguments` (without the program's own name), which runs the command. Help goes to `out`,
 /// what went wrong as a sentence to `error`. Returns an ExitCode.

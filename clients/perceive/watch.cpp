@@ -115,7 +115,7 @@ void add_watch(CLI::App& app, cli::Context& context) {
   auto* command = app.add_subcommand(
       "watch",
       "Show a running dtact-perceive's rate, points, pose and the force, a line a second, until "
-      "Ctrl-C");
+      "Ctrl-C; without --port its own port, 7378");
   const auto seconds = std::make_shared<double>(0);
   command->add_option("--seconds", *seconds, "End by itself after so long")
       ->check(CLI::PositiveNumber);
