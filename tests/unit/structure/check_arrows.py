@@ -12,8 +12,8 @@ ROOMS = {
     "hal/base": [],
     "hal/image": ["hal/base"],
     "hal/toml": [],
-    "hal/luma": ["hal", "hal/base"],
-    "hal/mjpeg": ["hal", "hal/base", "hal/luma"],
+    "hal/luma": ["hal"],
+    "hal/mjpeg": ["hal"],
     "hal/null": ["hal", "hal/base"],
     # A container for recordings: neither devices nor tactile sensing.
     "hal/mcap": ["hal/base"],
@@ -25,7 +25,7 @@ ROOMS = {
     "hal/gpiod": ["hal", "hal/base"],
     "hal/ws2812": ["hal", "hal/base", "hal/gpiod"],
     # The registry is the only file that names backends.
-    "hal": ["hal/base", "hal/null", "hal/replay", "hal/sim", "hal/v4l2", "hal/libcamera", "hal/ws2812"],
+    "hal": ["hal/null", "hal/replay", "hal/sim", "hal/v4l2", "hal/libcamera", "hal/ws2812"],
     "daemon/recon": [],
     "daemon/calibration": ["hal/base", "hal/image", "hal/toml", "daemon/recon"],
     # The two rooms inside know of the pipeline its settings, conditions and the frame it fills.
@@ -35,10 +35,10 @@ ROOMS = {
     "daemon/serve": ["hal/base", "proto"],
     "daemon/net": ["daemon/serve", "hal", "hal/base", "hal/image", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
     # The text alone is made of what the network part gives; nothing includes it but the assembly.
-    "daemon/metrics": ["proto", "daemon/serve", "daemon/pipeline", "daemon/net"],
+    "daemon/metrics": ["daemon/net"],
     "daemon/announce": ["hal/base", "proto"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/v4l2", "hal/ws2812"],
-    "daemon/app": ["daemon/app/doctor", "hal", "hal/base", "hal/toml", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/serve", "daemon/net", "daemon/metrics", "daemon/announce"],
+    "daemon/app": ["hal", "hal/base", "hal/toml", "daemon/calibration", "daemon/pipeline", "daemon/serve", "daemon/net", "daemon/metrics", "daemon/announce"],
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
@@ -48,22 +48,22 @@ ROOMS = {
     "clients/common": ["daemon/serve", "hal/base", "hal/image", "proto", "daemon/recon", "clients/cpp", "clients/perceive/geometry"],
     "clients/recording": ["hal/mcap", "proto", "clients/cpp"],
     "clients/calibrate/fit": ["hal/image", "daemon/recon", "daemon/calibration"],
-    "clients/calibrate/fit/model": ["hal/image", "daemon/recon", "daemon/calibration", "clients/calibrate/fit"],
+    "clients/calibrate/fit/model": ["daemon/recon", "daemon/calibration", "clients/calibrate/fit"],
     "clients/calibrate/lens": ["daemon/recon"],
     "clients/calibrate/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/fit/model", "clients/calibrate/lens"],
     "clients/calibrate/guided": ["hal/base", "hal/image", "hal/toml", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
     # Depth of a recording, made by what makes it in the daemon.
-    "clients/calibrate/reprocess": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mcap", "hal/mjpeg", "proto", "daemon/recon", "daemon/calibration", "daemon/pipeline", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/cpp", "clients/recording"],
+    "clients/calibrate/reprocess": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mjpeg", "proto", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/recording"],
     # Contacts of pictures and of recordings.
-    "clients/calibrate/force": ["hal/base", "hal/image", "hal/mcap", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/offline", "clients/recording"],
-    "clients/calibrate": ["clients/common", "clients/cpp", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
+    "clients/calibrate/force": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/offline", "clients/recording"],
+    "clients/calibrate": ["clients/common", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
     # A client and a server: what serves the wire is the daemon's own.
     "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/perceive/geometry", "clients/perceive/pose"],
     # The same for browsers.
     "clients/web/foxglove": ["proto", "daemon/serve", "clients/cpp", "clients/recording", "clients/web"],
     "clients/web": ["hal/base", "proto", "daemon/serve", "clients/common", "clients/cpp", "clients/web/foxglove"],
     # A daemon's administration: neither a fit nor OpenCV.
-    "clients/ctl": ["hal/base", "hal/image", "hal/mcap", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
+    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
 }
 # Only standard headers and Highway may stand in angle brackets here.
 STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}
