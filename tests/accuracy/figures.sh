@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Reproduces the accuracy figures of tests/MEASURED.md on real images and the picture of README.md
-# with the release programs, as a user would. Real images are read from ../shared/data beside the
+# Reproduces the accuracy figures of tests/MEASURED.md on real images and its picture of a
+# nut with the release programs, as a user would. Real images are read from ../shared/data beside the
 # repository, where they are.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
