@@ -152,13 +152,10 @@ std::string reload(Config& running, const std::function<Config()>& load, net::Se
     server.reload(make_net_config(fresh.config));
     running = std::move(fresh.config);
     spdlog::set_level(spdlog::level::from_str(running.log_level));
-    spdlog::info(
-        "configuration read again, and with it the certificate and tokens; changed: {}",
-        fresh.changed.empty() ? "nothing" : fmt::format("{}", fmt::join(fresh.changed, ", ")));
-    if (fresh.restart.empty()) return {};
-    const std::string later = fmt::format("needs a restart: {}", fmt::join(fresh.restart, ", "));
-    spdlog::warn("{}", later);
-    return later;
+    spdlog::info("{}", what_was_read(fresh));
+    std::string waits = what_waits(fresh);
+    if (!waits.empty()) spdlog::warn("{}", waits);
+    return waits;
   } catch (const std::exception& e) {
     spdlog::error("the configuration stays as it was: {}", e.what());
     return fmt::format("the configuration stays as it was: {}", e.what());

@@ -1,10 +1,13 @@
 #include "daemon/app/reload.hpp"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <toml++/toml.h>
 
 #include <algorithm>
 #include <array>
 #include <string_view>
+#include <utility>
 
 #include "daemon/app/config_keys.hpp"
 
@@ -50,7 +53,36 @@ Reload merge(const Config& running, const Config& fresh) {
     (void)keys[i].assign(*line.get("value"), "/");  // it has passed this check already
     reload.changed.push_back(keys[i].path);
   }
+  const net::NetConfig& net = reload.config.net;
+  for (const auto& [key, file] :
+       {std::pair("net.tls_certificate", &net.tls_certificate),
+        std::pair("net.tls_key", &net.tls_key), std::pair("net.token_file", &net.token_file)}) {
+    if (file->empty()) continue;
+    (file->string().starts_with(kCredential) ? reload.credentials : reload.files).push_back(key);
+  }
   return reload;
+}
+
+std::string what_was_read(const Reload& reload) {
+  std::string read = "configuration read again";
+  if (!reload.files.empty()) {
+    read += fmt::format(", and with it the files of {}", fmt::join(reload.files, ", "));
+  }
+  return fmt::format(
+      "{}; changed: {}", read,
+      reload.changed.empty() ? "nothing" : fmt::format("{}", fmt::join(reload.changed, ", ")));
+}
+
+std::string what_waits(const Reload& reload) {
+  std::string waits;
+  if (!reload.restart.empty()) {
+    waits = fmt::format("needs a restart: {}", fmt::join(reload.restart, ", "));
+  }
+  if (!reload.credentials.empty()) {
+    waits += fmt::format("{}credentials stay until a restart: {}", waits.empty() ? "" : "; ",
+                         fmt::join(reload.credentials, ", "));
+  }
+  return waits;
 }
 
 }  // namespace dtact::app

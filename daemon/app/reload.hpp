@@ -12,10 +12,18 @@ struct Reload {
   Config config;                     ///< To run with from now on.
   std::vector<std::string> changed;  ///< Keys that take their new value in it, …
   std::vector<std::string> restart;  ///< … and those that keep the old one until a restart.
+  std::vector<std::string> files;    ///< Keys whose files are read again with the configuration, …
+  /// … and those whose files systemd hands in at a start alone.
+  std::vector<std::string> credentials;
 };
 
 /// The running configuration with what can change while it runs taken from the fresh one.
 [[nodiscard]] Reload merge(const Config& running, const Config& fresh);
+
+/// What there is to say of a reload: the log's line, …
+[[nodiscard]] std::string what_was_read(const Reload& reload);
+/// … and what waits for a restart; empty when nothing does.
+[[nodiscard]] std::string what_waits(const Reload& reload);
 
 /// Whether a key can change while the daemon runs; TLS and tokens only from file to file.
 [[nodiscard]] bool is_live(const std::string& key);

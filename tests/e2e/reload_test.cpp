@@ -27,7 +27,7 @@ using testing::StartsWith;
 constexpr const char* kOldToken = "0123456789abcdef-old";
 constexpr const char* kNewToken = "0123456789abcdef-new";
 
-/// A daemon with a certificate and a token that systemd hands in, whose configuration is a file.
+/// A daemon with a certificate and tokens, whose configuration is a file.
 class Reload : public testing::Test {
  protected:
   Reload() {
@@ -57,7 +57,7 @@ class Reload : public testing::Test {
   /// `more` begins at line 9 of the file, in [net].
   [[nodiscard]] static std::string configuration(const std::string& pair, const std::string& more) {
     return "state_dir = 'state'\ncamera.backend = 'null'\nring.backend = 'null'\n[net]\nport = 0\n"
-           "token_file = 'credential:tokens'\ntls_certificate = '" +
+           "token_file = 'tokens'\ntls_certificate = '" +
            pair + "/dtactd.crt'\ntls_key = '" + pair + "/dtactd.key'\n" + more;
   }
   /// Sends SIGHUP. Returns the status that the service manager is told when it is done.
@@ -133,6 +133,17 @@ TEST_F(Reload, NamesWhatNeedsARestart) {
               HasSubstr("; needs a restart: contact.debounce_frames, net.name; listening on "));
   EXPECT_THAT(daemon_->log(), HasSubstr("needs a restart: contact.debounce_frames, net.name"));
   EXPECT_EQ(daemon_->stop(SIGTERM), 0);
+}
+
+TEST_F(Reload, SaysThatCredentialsStay) {
+  std::string handed_in = configuration("old", "");
+  handed_in.replace(handed_in.find("'tokens'"), 8, "'credential:tokens'");
+  write("dtactd.toml", handed_in);
+  EXPECT_THAT(reload(), HasSubstr("; credentials stay until a restart: net.token_file; listening"));
+  EXPECT_THAT(daemon_->log(), HasSubstr("configuration read again, and with it the files of "
+                                        "net.tls_certificate, net.tls_key; changed: "
+                                        "net.token_file"));
+  EXPECT_EQ(connect(old_, kOldToken)->server().rights(), v1::RIGHTS_CONTROL);
 }
 
 /// Runs dtactd to its end, which is a failure. Returns what it says to the service manager first.

@@ -44,6 +44,27 @@ TEST(Reload, TokensAndTlsChangeFromFileToFileOnly) {
   EXPECT_EQ(merge(fresh, other).config.net.token_file, "credential:tokens");
 }
 
+// systemd fills $CREDENTIALS_DIRECTORY at a start: a token that was revoked since still counts.
+TEST(Reload, SaysThatCredentialsWereNotReadAgain) {
+  Config config;
+  EXPECT_EQ(what_was_read(merge(config, config)), "configuration read again; changed: nothing");
+  EXPECT_EQ(what_waits(merge(config, config)), "");
+  config.net.tls_certificate = "/etc/dtactd/a.crt";
+  config.net.tls_key = "credential:tls-key";
+  config.net.token_file = "credential:tokens";
+  Config fresh = config;
+  fresh.net.max_clients = 3;
+  EXPECT_EQ(what_was_read(merge(config, fresh)),
+            "configuration read again, and with it the files of net.tls_certificate; changed: "
+            "net.max_clients");
+  EXPECT_EQ(what_waits(merge(config, fresh)),
+            "credentials stay until a restart: net.tls_key, net.token_file");
+  fresh.net.port = 1;
+  EXPECT_EQ(what_waits(merge(config, fresh)),
+            "needs a restart: net.port; credentials stay until a restart: net.tls_key, "
+            "net.token_file");
+}
+
 TEST(Reload, EveryLiveKeyIsAKey) {
   Config config;
   int live = 0;
