@@ -8,7 +8,15 @@ running() { pgrep -l -x dtactd || pgrep -l -x dtact-web; }
 apt_get remove dtactd dtact-tools
 running && fail "it runs from programs that are gone"
 [ -e "$config" ] || fail "a removal took the configuration"
+# What is a disc of its own is emptied, and the purge does not fail for its mount point.
+discs=(/var/lib/dtactd /var/lib/private/dtact-web)
+for disc in "${discs[@]}"; do mount --bind "$disc" "$disc"; done
 apt_get purge dtactd dtact-tools libdtact1 libdtact-dev python3-dtact
+for disc in "${discs[@]}"; do
+  [ -z "$(ls -A "$disc")" ] || fail "left: $(find "$disc")"
+  umount "$disc"
+  rmdir "$disc"
+done
 files > /tmp/after
 # With them /etc/credstore, whose secrets are the administrator's.
 diff /tmp/before /tmp/after || fail "files are left or gone, see above"
