@@ -161,8 +161,8 @@ class Contents(unittest.TestCase):
             self.assertIn(snippet, postinst)
         # The user is there before the folders that belong to it, its groups before the devices are given to
         # them, and all before the start.
-        for step in ("udevadm trigger", "--create"):
-            order = [postinst.index(word) for word in ("systemd-sysusers", step, "deb-systemd-invoke")]
+        for steps in (("udevadm trigger", "udevadm settle"), ("--create",)):
+            order = [postinst.index(word) for word in ("systemd-sysusers", *steps, "deb-systemd-invoke")]
             self.assertEqual(order, sorted(order))
         self.assertIn("deb-systemd-invoke stop 'dtactd.service'", control("dtactd", "prerm"))
         self.assertIn("deb-systemd-helper purge 'dtactd.service'", control("dtactd", "postrm"))
