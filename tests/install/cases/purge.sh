@@ -1,13 +1,20 @@
 # shellcheck shell=bash disable=SC2154
 # Purged, nothing is left of the packages: no file, no process, no unit; nor of a second sensor and of the page,
-# which run when they are removed.
+# which run when they are removed. Installed again before that, what was enabled comes back.
 instance left 7401
 systemctl enable -q --now dtact-web
 within 120 bash -c 'ss -ltn | grep -q 127.0.0.1:7380'
 running() { pgrep -l -x dtactd || pgrep -l -x dtact-web; }
+instance right 7402
+systemctl disable -q dtactd@right
 apt_get remove dtactd dtact-tools
 running && fail "it runs from programs that are gone"
 [ -e "$config" ] || fail "a removal took the configuration"
+apt_get -o Dpkg::Options::=--force-confold install /job/packages/dtact{d,-tools}_*.deb
+within 300 dtactctl --port 7401 status
+[ "$(property ActiveState dtactd@right)" = inactive ] || fail "an instance that was not enabled was started"
+apt_get remove dtactd dtact-tools
+running && fail "it runs from programs that are gone"
 # What is a disc of its own is emptied, and the purge does not fail for its mount point.
 discs=(/var/lib/dtactd /var/lib/private/dtact-web)
 for disc in "${discs[@]}"; do mount --bind "$disc" "$disc"; done
