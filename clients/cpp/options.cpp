@@ -1,9 +1,10 @@
 #include "clients/cpp/options.hpp"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
+#include <cstdlib>
 #include <fstream>
-#include <system_error>
 
 #include "clients/cpp/errors.hpp"
 
@@ -11,11 +12,23 @@ namespace dtact::client {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// The permissions that a token's file may not have. Of a credential (systemd.exec(5)), which may
+/// be root's and readable to the service by an access control list, the mode shows the list's mask
+/// as the rights of root's group.
+mode_t forbidden(const fs::path& file, const struct stat& status) {
+  const char* folder = std::getenv("CREDENTIALS_DIRECTORY");
+  const bool credential =
+      folder != nullptr && file.parent_path() == fs::path(folder) && status.st_gid == 0;
+  return credential ? S_IRWXO : S_IRWXG | S_IRWXO;
+}
+
+}  // namespace
+
 std::string read_token(const fs::path& file) {
-  std::error_code error;
-  const fs::perms permissions = fs::status(file, error).permissions();
-  constexpr fs::perms kOthers = fs::perms::group_all | fs::perms::others_all;
-  if (!error && (permissions & kOthers) != fs::perms::none) {
+  struct stat status{};
+  if (::stat(file.c_str(), &status) == 0 && (status.st_mode & forbidden(file, status)) != 0) {
     throw Error(
         fmt::format("{} can be read by others: chmod 600 {}", file.string(), file.string()));
   }

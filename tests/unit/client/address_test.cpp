@@ -2,7 +2,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 
@@ -97,6 +99,18 @@ TEST_F(Token, IsNotReadWhereOthersMayReadItToo) {
       EXPECT_THAT(e.what(), HasSubstr("chmod 600"));
     }
   }
+}
+
+TEST_F(Token, MayBeACredentialOfRootsGroup) {
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a file to another group";
+  const auto file = write("s3cret\n", kOwner | std::filesystem::perms::group_read);
+  ASSERT_EQ(::chown(file.c_str(), 0, 0), 0);
+  EXPECT_THROW((void)read_token(file), Error);
+  ::setenv("CREDENTIALS_DIRECTORY", file.parent_path().c_str(), 1);
+  EXPECT_EQ(read_token(file), "s3cret");
+  ASSERT_EQ(::chown(file.c_str(), 0, 1), 0);
+  EXPECT_THROW((void)read_token(file), Error);
+  ::unsetenv("CREDENTIALS_DIRECTORY");
 }
 
 TEST_F(Token, HasToBeThere) {
