@@ -16,8 +16,10 @@ verify() {
   grep -F dtact <<<"$output" || true
 }
 
+built() { sed -E "s#/usr/bin/dtact(d|-perceive|-web)#$program#"; }
+
 for unit in dtactd.service dtactd@.service dtact-perceive.service dtact-web.service; do
-  sed -E "s#/usr/bin/dtact(d|-perceive|-web)#$program#" "$source/$unit" >"$folder/$unit"
+  built <"$source/$unit" >"$folder/$unit"
   complaint=$(verify "$unit")
   [[ -z $complaint ]] || fail "$complaint"
   # In tenths: 1.5. What is left is what the sensor needs: its devices, FIFO, the network.
@@ -37,6 +39,15 @@ for unit in dtactd.service dtactd@.service; do
   done
   # These would let the units score better, and the capture thread run worse.
   ! grep -qE '^(RestrictRealtime=yes|SystemCallFilter=~.*@resources)' "$source/$unit" || fail "$unit forbids FIFO"
+done
+
+# The drop-in that a comment shows, with which a token reaches the service's own user.
+for unit in dtact-perceive.service dtact-web.service; do
+  mkdir "$folder/$unit.d"
+  sed -n 's/^#   //p' "$source/$unit" | built >"$folder/$unit.d/token.conf"
+  grep -q '^LoadCredential=token:' "$folder/$unit.d/token.conf" || fail "$unit does not say how it gets a token"
+  complaint=$(verify "$unit")
+  [[ -z $complaint ]] || fail "$unit: its drop-in: $complaint"
 done
 
 # The instances are the one service under other names. It alone keeps its folder in /run, which is
