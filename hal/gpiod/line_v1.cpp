@@ -57,7 +57,7 @@ std::unique_ptr<OutputLine> request_output(const std::string& path, int offset,
   gpiod_line* handle =
       chip == nullptr ? nullptr : ::gpiod_chip_get_line(chip.get(), static_cast<unsigned>(offset));
   if (handle == nullptr ||
-      ::gpiod_line_request_output_flags(handle, "dtactd", flags_of(line), active ? 1 : 0) != 0) {
+      ::gpiod_line_request_output_flags(handle, kConsumer, flags_of(line), active ? 1 : 0) != 0) {
     error = errno;
     return nullptr;
   }

@@ -79,7 +79,7 @@ std::unique_ptr<OutputLine> request_output(const std::string& path, int line_off
     return nullptr;
   }
   ::gpiod_line_settings_set_active_low(settings.get(), line.active_low);
-  ::gpiod_request_config_set_consumer(name.get(), "dtactd");
+  ::gpiod_request_config_set_consumer(name.get(), kConsumer);
   RequestPtr request;
   if (::gpiod_line_settings_set_direction(settings.get(), GPIOD_LINE_DIRECTION_OUTPUT) == 0 &&
       ::gpiod_line_settings_set_bias(settings.get(), bias_of(line)) == 0 &&

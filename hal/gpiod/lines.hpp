@@ -8,6 +8,9 @@
 
 namespace dtact::hal::gpiod {
 
+/// By what name the kernel shows who holds a line that OutputLine drives.
+inline constexpr const char* kConsumer = "dtactd";
+
 /// A line this process drives. Given back on destruction; what level it has then is the GPIO
 /// driver's choice (most keep it, some fall back to the boot-up state).
 class OutputLine {

@@ -34,7 +34,12 @@ Finding check_line(const Machine& machine, const std::string& key,
   if (!place.why.empty()) {
     return {Verdict::wrong, fmt::format("{}: {}", what, place.why), place.mend};
   }
-  if (const std::string holder = machine.gpio_holder(place.chip, place.line); !holder.empty()) {
+  const std::string holder = machine.gpio_holder(place.chip, place.line);
+  if (holder == hal::gpiod::holder_name(hal::gpiod::kConsumer)) {
+    return {Verdict::note, fmt::format("{}: in use by {}, as while it runs", what, holder),
+            "where this is another one's, of the same line: systemctl list-units 'dtactd*'"};
+  }
+  if (!holder.empty()) {
     return {Verdict::wrong, fmt::format("{}: in use by {}", what, holder),
             fmt::format("free it, or choose a free line: gpioinfo {}", place.chip)};
   }

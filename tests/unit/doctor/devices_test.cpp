@@ -225,6 +225,9 @@ TEST(DoctorGpio, WhatCanBeWrongWithALine) {
   ring.ws2812.power = {"gpiochip0", 27, false};
   machine.held_line = 27;
   EXPECT_THAT(only_trouble(check_gpio(machine, ring)).what, HasSubstr("in use by \"lcd-reset\""));
+  // The service that is looked at holds its own line.
+  machine.holder = "\"dtactd\"";
+  EXPECT_EQ(only_trouble(check_gpio(machine, ring)).verdict, Verdict::note);
   machine.held_line = -1;
   machine.file("/dev/gpiochip0");
   machine.denied = {{"/dev/gpiochip0", EACCES}};

@@ -45,7 +45,7 @@ class FakeMachine : public Machine {
   }
   [[nodiscard]] std::vector<hal::gpiod::Chip> gpio_chips() const override { return chips; }
   [[nodiscard]] std::string gpio_holder(const std::string& /*chip*/, int line) const override {
-    return line == held_line ? "\"lcd-reset\"" : "";
+    return line == held_line ? holder : "";
   }
   [[nodiscard]] std::string firmware(const std::string& question) const override {
     const auto found = answers.find(question);
@@ -76,6 +76,7 @@ class FakeMachine : public Machine {
   std::vector<hal::gpiod::Chip> chips{
       {"/dev/gpiochip0", "pinctrl-rp1", 54, {"GPIO0", "GPIO1"}, {}}};
   int held_line = -1;
+  std::string holder = "\"lcd-reset\"";
   std::map<std::string, std::string> answers;  ///< Of the firmware.
   std::vector<hal::v4l2::SurveyedCamera> attached;
 
