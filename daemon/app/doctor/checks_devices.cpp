@@ -21,8 +21,10 @@ std::string join_group(const Machine& machine, const std::string& path,
           ? "sudo cp config/udev/60-dtactd.rules /etc/udev/rules.d/ && sudo udevadm control "
             "--reload && sudo udevadm trigger && "
           : "";
-  return fmt::format("{}sudo usermod -aG {} {}, then log in again", rule,
-                     owner.empty() || owner == "root" ? usual_group : owner, machine.user());
+  return fmt::format(
+      "{}sudo usermod -aG {} {}{}", rule, owner.empty() || owner == "root" ? usual_group : owner,
+      machine.user(),
+      machine.user() == kServiceUser ? " && sudo systemctl restart dtactd" : ", then log in again");
 }
 
 bool is_raspberry_pi(const Machine& machine) { return machine.model().starts_with("Raspberry Pi"); }

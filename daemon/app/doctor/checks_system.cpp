@@ -11,7 +11,13 @@
 namespace dtact::app {
 
 Findings check_realtime(const Machine& machine) {
-  if (machine.privileged()) return {{Verdict::good, "root has no limits", ""}};
+  if (machine.privileged()) {
+    return {{Verdict::good,
+             machine.has_service() ? "dtactd.service sets its own limits" : "root has no limits",
+             ""}};
+  }
+  // The service's limits are its unit's; this user's count for a daemon that the user starts.
+  const Verdict bad = machine.has_service() ? Verdict::note : Verdict::wrong;
   const std::string limits = "/etc/security/limits.d/dtactd.conf";
   const auto mend = [&](const char* what) {
     return fmt::format(
@@ -22,8 +28,7 @@ Findings check_realtime(const Machine& machine) {
   Findings findings;
   const rlim_t priority = machine.limit(RLIMIT_RTPRIO);
   if (priority == 0) {
-    findings.push_back(
-        {Verdict::wrong, "RLIMIT_RTPRIO = 0: no real-time scheduling", mend("rtprio 90")});
+    findings.push_back({bad, "RLIMIT_RTPRIO = 0: no real-time scheduling", mend("rtprio 90")});
   } else {
     findings.push_back({Verdict::good,
                         priority == RLIM_INFINITY ? "RLIMIT_RTPRIO is unlimited"
@@ -35,8 +40,7 @@ Findings check_realtime(const Machine& machine) {
   constexpr rlim_t kEnough = 1U << 30U;
   if (memory < kEnough) {
     findings.push_back(
-        {Verdict::wrong,
-         fmt::format("RLIMIT_MEMLOCK = {} kB: memory cannot be locked", memory / 1024),
+        {bad, fmt::format("RLIMIT_MEMLOCK = {} kB: memory cannot be locked", memory / 1024),
          mend("memlock unlimited")});
   } else {
     findings.push_back({Verdict::good, "RLIMIT_MEMLOCK suffices", ""});

@@ -14,6 +14,7 @@
 #include <cstdio>
 #include <fstream>
 #include <memory>
+#include <span>
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
@@ -25,6 +26,22 @@
 namespace dtact::app {
 
 namespace fs = std::filesystem;
+
+int access_as(const std::string& user, const fs::path& file) {
+  struct stat status{};
+  if (::stat(file.c_str(), &status) != 0) return errno;
+  const struct passwd* entry = ::getpwnam(user.c_str());
+  if (entry == nullptr) return ENOENT;
+  std::array<gid_t, 256> groups{};
+  int count = groups.size();
+  if (::getgrouplist(user.c_str(), entry->pw_gid, groups.data(), &count) < 0) return EOVERFLOW;
+  const std::span<const gid_t> joined(groups.data(), static_cast<std::size_t>(count));
+  const mode_t needed = status.st_uid == entry->pw_uid ? S_IRUSR | S_IWUSR
+                        : std::ranges::find(joined, status.st_gid) != joined.end()
+                            ? S_IRGRP | S_IWGRP
+                            : S_IROTH | S_IWOTH;
+  return (status.st_mode & needed) == needed ? 0 : EACCES;
+}
 
 fs::path Machine::below_root(const std::string& path) const {
   return root_ / fs::path(path).relative_path();
@@ -56,7 +73,17 @@ std::vector<std::string> Machine::list(const std::string& folder, const std::str
   return paths;
 }
 
+bool Machine::has(const std::string& path) const {
+  std::error_code ignored;
+  return fs::exists(below_root(path), ignored);
+}
+
+bool Machine::has_service() const {
+  return has("/etc/systemd/system/dtactd.service") || has("/usr/lib/systemd/system/dtactd.service");
+}
+
 int Machine::access(const std::string& path) const {
+  if (privileged() && user() == kServiceUser) return access_as(kServiceUser, below_root(path));
   // The effective user is asked for: that is who opens it.
   return ::faccessat(AT_FDCWD, below_root(path).c_str(), R_OK | W_OK, AT_EACCESS) == 0 ? 0 : errno;
 }
@@ -69,6 +96,7 @@ std::string Machine::group(const std::string& path) const {
 }
 
 std::string Machine::user() const {
+  if (privileged() && ::getpwnam(kServiceUser) != nullptr) return kServiceUser;
   const struct passwd* entry = ::getpwuid(::geteuid());
   return entry == nullptr ? "<user>" : entry->pw_name;
 }

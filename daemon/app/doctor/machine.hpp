@@ -13,6 +13,12 @@
 
 namespace dtact::app {
 
+/// Whom dtactd.service runs as.
+inline constexpr const char* kServiceUser = "dtactd";
+
+/// 0 when a user may read and write a file, by its mode and the user's groups, else an errno.
+[[nodiscard]] int access_as(const std::string& user, const std::filesystem::path& file);
+
 /// What the doctor asks of a machine. Files are looked up below `root`, so that a test brings a
 /// tree of its own; what files cannot answer is virtual.
 class Machine {
@@ -33,10 +39,17 @@ class Machine {
   /// The board's name of itself, as "Raspberry Pi 5 Model B Rev 1.0"; empty without a device tree.
   [[nodiscard]] std::string model() const { return line("/proc/device-tree/model").value_or(""); }
 
-  /// 0 when this user may read and write it, else an errno.
+  /// Whether there is such a file.
+  [[nodiscard]] bool has(const std::string& path) const;
+  /// Whether dtactd.service is installed.
+  [[nodiscard]] bool has_service() const;
+
+  /// 0 when user() may read and write it, else an errno.
   [[nodiscard]] virtual int access(const std::string& path) const;
   /// The group that owns a file; empty when unknown.
   [[nodiscard]] virtual std::string group(const std::string& path) const;
+  /// Who is to open the devices: this user. For root, who may open any, the service's, if there is
+  /// one.
   [[nodiscard]] virtual std::string user() const;
   /// Root, to whom limits do not apply.
   [[nodiscard]] virtual bool privileged() const;

@@ -1,6 +1,8 @@
 // What the doctor says of cameras, the ring and their nodes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pwd.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <string>
@@ -68,6 +70,42 @@ TEST(DoctorCamera, AForbiddenNodeNamesTheGroup) {
   EXPECT_EQ(finding.mend, "sudo usermod -aG video anna, then log in again");
   // Nobody asked for a camera: worth knowing, not wrong.
   EXPECT_EQ(only_trouble(check_camera(machine, hal::CameraConfig{})).verdict, Verdict::note);
+}
+
+// Root, who may open every node, asks for the service.
+TEST(DoctorCamera, ANodeThatTheServicesUserMayNotOpen) {
+  FakeMachine machine;
+  machine.file("/dev/video0");
+  machine.denied = {{"/dev/video0", EACCES}};
+  machine.owner = "video";
+  machine.opener = kServiceUser;
+  EXPECT_EQ(only_trouble(check_camera(machine, v4l2())).mend,
+            "sudo usermod -aG video dtactd && sudo systemctl restart dtactd");
+}
+
+TEST(DoctorAccess, IsByOwnerGroupAndMode) {
+  FakeMachine machine;
+  const fs::path node = machine.file("/dev/video0");
+  const auto mode = [&node](unsigned bits) { fs::permissions(node, fs::perms(bits)); };
+  EXPECT_EQ(access_as("nobody", node.string() + "-gone"), ENOENT);
+  mode(0660);
+  EXPECT_EQ(access_as("nobody", node), EACCES);
+  mode(0664);
+  EXPECT_EQ(access_as("nobody", node), EACCES);
+  mode(0666);
+  EXPECT_EQ(access_as("nobody", node), 0);
+  if (::geteuid() != 0) GTEST_SKIP() << "only root can give a file away";
+  const struct passwd* const user = ::getpwnam("nobody");
+  ASSERT_NE(user, nullptr);
+  mode(0660);
+  ASSERT_EQ(::chown(node.c_str(), 0, user->pw_gid), 0);
+  EXPECT_EQ(access_as("nobody", node), 0);
+  // The kernel looks at the owner's rights alone where the owner asks.
+  mode(0066);
+  ASSERT_EQ(::chown(node.c_str(), user->pw_uid, 0), 0);
+  EXPECT_EQ(access_as("nobody", node), EACCES);
+  mode(0600);
+  EXPECT_EQ(access_as("nobody", node), 0);
 }
 
 TEST(DoctorUsb, APortOfUsb1IsTooSlow) {

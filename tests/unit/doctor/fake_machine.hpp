@@ -23,9 +23,11 @@ class FakeMachine : public Machine {
   FakeMachine() : Machine(make_folder()) {}
   ~FakeMachine() override { fs::remove_all(below_root("/")); }
 
-  void file(const std::string& path, const std::string& text = "") {
+  /// Returns where it really lies.
+  fs::path file(const std::string& path, const std::string& text = "") {
     fs::create_directories(below_root(path).parent_path());
     std::ofstream(below_root(path)) << text;
+    return below_root(path);
   }
 
   [[nodiscard]] int access(const std::string& path) const override {
@@ -33,7 +35,7 @@ class FakeMachine : public Machine {
     return fs::exists(below_root(path)) ? 0 : ENOENT;
   }
   [[nodiscard]] std::string group(const std::string& /*path*/) const override { return owner; }
-  [[nodiscard]] std::string user() const override { return "anna"; }
+  [[nodiscard]] std::string user() const override { return opener; }
   [[nodiscard]] bool privileged() const override { return root; }
   [[nodiscard]] rlim_t limit(int resource) const override {
     return resource == RLIMIT_RTPRIO ? rtprio : memlock;
@@ -68,6 +70,7 @@ class FakeMachine : public Machine {
 
   std::map<std::string, int> denied;
   std::string owner = "root";
+  std::string opener = "anna";
   bool root = false;
   rlim_t rtprio = 90;
   rlim_t memlock = RLIM_INFINITY;

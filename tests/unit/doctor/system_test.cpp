@@ -79,8 +79,22 @@ TEST(DoctorRealtime, LimitsOfAnUnprivilegedUser) {
   machine.rtprio = 90;
   machine.memlock = 8U << 20U;
   EXPECT_THAT(only_trouble(check_realtime(machine)).what, HasSubstr("8192 kB"));
+  EXPECT_EQ(only_trouble(check_realtime(machine)).verdict, Verdict::wrong);
   machine.root = true;
   EXPECT_TRUE(all_good(check_realtime(machine)));
+}
+
+// The unit has LimitRTPRIO= and LimitMEMLOCK=.
+TEST(DoctorRealtime, AUsersLimitsAreNotTheServices) {
+  FakeMachine machine;
+  machine.file("/usr/lib/systemd/system/dtactd.service");
+  machine.rtprio = 0;
+  EXPECT_EQ(only_trouble(check_realtime(machine)).verdict, Verdict::note);
+  machine.rtprio = 90;
+  machine.memlock = 8U << 20U;
+  EXPECT_EQ(only_trouble(check_realtime(machine)).verdict, Verdict::note);
+  machine.root = true;
+  EXPECT_EQ(check_realtime(machine).at(0).what, "dtactd.service sets its own limits");
 }
 
 TEST(DoctorRealtime, TheShareOfAllRealTimeThreads) {
