@@ -96,7 +96,10 @@ Findings check_groups(const Machine& machine) {
   }
   if (missing.empty()) return {{Verdict::good, "video, spi and gpio are there", ""}};
   return {{Verdict::note, fmt::format("missing: {}; their devices stay root's", missing),
-           "sudo cp systemd/dtactd.sysusers /etc/sysusers.d/dtactd.conf && sudo systemd-sysusers"}};
+           machine.has("/usr/lib/sysusers.d/dtactd.conf")
+               ? "sudo systemd-sysusers"
+               : "sudo cp systemd/dtactd.sysusers /etc/sysusers.d/dtactd.conf && sudo "
+                 "systemd-sysusers"}};
 }
 
 }  // namespace dtact::app

@@ -16,10 +16,12 @@ std::string join_group(const Machine& machine, const std::string& path,
                        const std::string& usual_group) {
   const std::string owner = machine.group(path);
   // Without a rule of udev's the node belongs to root: the rule first, then the group.
+  const std::string copied = machine.has("/usr/lib/udev/rules.d/60-dtactd.rules")
+                                 ? ""
+                                 : "sudo cp config/udev/60-dtactd.rules /etc/udev/rules.d/ && ";
   const std::string rule =
       owner.empty() || owner == "root"
-          ? "sudo cp config/udev/60-dtactd.rules /etc/udev/rules.d/ && sudo udevadm control "
-            "--reload && sudo udevadm trigger && "
+          ? copied + "sudo udevadm control --reload && sudo udevadm trigger && "
           : "";
   return fmt::format(
       "{}sudo usermod -aG {} {}{}", rule, owner.empty() || owner == "root" ? usual_group : owner,
@@ -38,8 +40,10 @@ Finding check_line(const Machine& machine, const std::string& key,
   }
   const std::string holder = machine.gpio_holder(place.chip, place.line);
   if (holder == hal::gpiod::holder_name(hal::gpiod::kConsumer)) {
-    return {Verdict::note, fmt::format("{}: in use by {}, as while it runs", what, holder),
-            "where this is another one's, of the same line: systemctl list-units 'dtactd*'"};
+    return {Verdict::note,
+            fmt::format("{}: in use by {}, as it is while the service runs", what, holder),
+            "if none runs with this configuration, another has the line: systemctl list-units "
+            "'dtactd*'"};
   }
   if (!holder.empty()) {
     return {Verdict::wrong, fmt::format("{}: in use by {}", what, holder),

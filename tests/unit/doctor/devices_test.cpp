@@ -189,6 +189,11 @@ TEST(DoctorSpi, AForbiddenDeviceOfRootsNeedsTheRuleAndTheGroup) {
   EXPECT_THAT(finding.what, HasSubstr("Permission denied"));
   EXPECT_THAT(finding.mend, HasSubstr("60-dtactd.rules"));
   EXPECT_THAT(finding.mend, HasSubstr("usermod -aG spi anna"));
+  // As the package brings it.
+  machine.file("/usr/lib/udev/rules.d/60-dtactd.rules");
+  EXPECT_EQ(only_trouble(check_spi(machine, spi_ring())).mend,
+            "sudo udevadm control --reload && sudo udevadm trigger && sudo usermod -aG spi anna, "
+            "then log in again");
 }
 
 TEST(DoctorSpi, ASpeedOutsideTheWindow) {

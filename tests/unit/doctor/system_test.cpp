@@ -66,7 +66,10 @@ TEST(DoctorGroups, AMissingOneIsNamed) {
   machine.file("/etc/group", "root:x:0:\nvideo:x:44:anna\nspi:x:999:\nnotgpio:x:986:\n");
   const Finding finding = only_trouble(check_groups(machine));
   EXPECT_EQ(finding.what, "missing: gpio; their devices stay root's");
-  EXPECT_THAT(finding.mend, HasSubstr("systemd-sysusers"));
+  EXPECT_THAT(finding.mend, HasSubstr("cp systemd/dtactd.sysusers"));
+  // As the package brings it.
+  machine.file("/usr/lib/sysusers.d/dtactd.conf");
+  EXPECT_EQ(only_trouble(check_groups(machine)).mend, "sudo systemd-sysusers");
   machine.file("/etc/group", "gpio:x:986:\nvideo:x:44:anna\nspi:x:999:\n");
   EXPECT_TRUE(all_good(check_groups(machine)));
 }
