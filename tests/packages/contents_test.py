@@ -195,6 +195,8 @@ class Contents(unittest.TestCase):
         self.assertNotRegex(field("dtactd", "Depends"), "opencv-(calib3d|imgproc)")
         self.assertNotRegex(field("dtact-tools", "Depends"), "libcamera|libgpiod|libdtact1")
         self.assertEqual(control("libdtact1", "shlibs"), "libdtact 1 libdtact1 (>= 0.1.0)\n")
+        # Debian 12's libcamera only suggests it, and finds no CSI camera without.
+        self.assertIn("libcamera-ipa", field("dtactd", "Recommends"))
         for name in ("libdtact1", "libdtact-dev"):
             self.assertEqual(field(name, "Multi-Arch"), "same")
 

@@ -29,6 +29,8 @@ using Findings = std::vector<Finding>;
 [[nodiscard]] Findings check_usb_speed(const Machine& machine, const hal::CameraConfig& camera);
 /// A heap of cached memory for libcamera's frames.
 [[nodiscard]] Findings check_dma_heap(const Machine& machine, const hal::CameraConfig& camera);
+/// libcamera's image processing modules, without one of which it takes no CSI camera.
+[[nodiscard]] Findings check_ipa(const Machine& machine, const hal::CameraConfig& camera);
 /// spidev: there, permitted, a speed inside the WS2812B's window, bufsiz, the true rate.
 [[nodiscard]] Findings check_spi(const Machine& machine, const hal::RingConfig& ring);
 /// What makes the SPI rate of a Raspberry Pi 3 or 4 move: the core clock.

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
@@ -30,6 +32,27 @@ std::string join_group(const Machine& machine, const std::string& path,
 }
 
 bool is_raspberry_pi(const Machine& machine) { return machine.model().starts_with("Raspberry Pi"); }
+
+/// The first with an RP1.
+bool is_raspberry_pi_5(const Machine& machine) {
+  return machine.model().find("Pi 5") != std::string::npos ||
+         machine.model().find("Module 5") != std::string::npos;
+}
+
+/// The names of libcamera's modules, wherever a version of it looks for them.
+std::vector<std::string> ipa_modules(const Machine& machine) {
+  std::vector<std::string> names;
+  for (const char* libraries : {"/usr/lib", "/usr/local/lib"}) {
+    for (const std::string& architecture : machine.list(libraries, "")) {
+      for (const char* folder : {"/libcamera", "/libcamera/ipa"}) {
+        for (const std::string& module : machine.list(architecture + folder, "ipa_")) {
+          if (module.ends_with(".so")) names.push_back(module.substr(module.rfind('/') + 1));
+        }
+      }
+    }
+  }
+  return names;
+}
 
 Finding check_line(const Machine& machine, const std::string& key,
                    const hal::GpioLineConfig& line) {
@@ -155,6 +178,27 @@ Findings check_dma_heap(const Machine& machine, const hal::CameraConfig& camera)
            "a kernel with CONFIG_DMABUF_HEAPS (Raspberry Pi OS has it): ls " + folder}};
 }
 
+Findings check_ipa(const Machine& machine, const hal::CameraConfig& camera) {
+  if (camera.backend != "libcamera") return {};
+  const std::vector<std::string> modules = ipa_modules(machine);
+  // Other pipelines do without, the one of USB cameras among them.
+  const Verdict bad = is_raspberry_pi(machine) ? Verdict::wrong : Verdict::note;
+  if (modules.empty()) {
+    return {{bad, "none of libcamera's modules (ipa_*.so): it finds no CSI camera",
+             "sudo apt install libcamera-ipa"}};
+  }
+  const std::string needed = "ipa_rpi_pisp.so";
+  if (is_raspberry_pi_5(machine) &&
+      std::find(modules.begin(), modules.end(), needed) == modules.end()) {
+    return {{bad,
+             fmt::format("{} is not among libcamera's modules: this version knows no CSI camera of "
+                         "this board",
+                         needed),
+             "build the packages where libcamera has it, as on Raspberry Pi OS"}};
+  }
+  return {{Verdict::good, fmt::format("libcamera has {}", fmt::join(modules, ", ")), ""}};
+}
+
 Findings check_spi(const Machine& machine, const hal::RingConfig& ring) {
   const hal::Ws2812Config& config = ring.ws2812;
   if (ring.backend != "ws2812_spi") {
@@ -226,13 +270,12 @@ Findings check_pio(const Machine& machine, const hal::RingConfig& ring) {
     return {{Verdict::wrong, fmt::format("{}: {}", device, std::strerror(error)),
              join_group(machine, device, "gpio")}};
   }
-  // The RP1, whose PIO it is, came with the Raspberry Pi 5.
-  const bool has_pio = machine.model().find("Pi 5") != std::string::npos ||
-                       machine.model().find("Module 5") != std::string::npos;
+  // It is the RP1's PIO.
   return {{Verdict::wrong, device + " is not there",
-           has_pio ? "echo dtoverlay=ws2812-pio,gpio=18,num_leds=8 | sudo tee -a "
-                     "/boot/firmware/config.txt && sudo reboot (any GPIO of the header)"
-                   : "set ring.backend = \"ws2812_spi\": only a Raspberry Pi 5 has such a PIO"}};
+           is_raspberry_pi_5(machine)
+               ? "echo dtoverlay=ws2812-pio,gpio=18,num_leds=8 | sudo tee -a "
+                 "/boot/firmware/config.txt && sudo reboot (any GPIO of the header)"
+               : "set ring.backend = \"ws2812_spi\": only a Raspberry Pi 5 has such a PIO"}};
 }
 
 Findings check_gpio(const Machine& machine, const hal::RingConfig& ring) {

@@ -20,6 +20,7 @@ std::vector<Subject> examine(const Machine& machine, const hal::Config& config) 
   return {{"camera", check_camera(machine, config.camera)},
           {"usb", check_usb_speed(machine, config.camera)},
           {"dma heap", check_dma_heap(machine, config.camera)},
+          {"ipa", check_ipa(machine, config.camera)},
           {"spi", check_spi(machine, config.ring)},
           {"core clock", check_core_clock(machine, config.ring)},
           {"pio", check_pio(machine, config.ring)},

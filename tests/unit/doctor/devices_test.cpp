@@ -163,6 +163,31 @@ TEST(DoctorDmaHeap, IsForLibcameraAndMayBeMissing) {
   EXPECT_TRUE(all_good(check_dma_heap(machine, camera)));
 }
 
+TEST(DoctorIpa, IsForLibcameraAndMayBeMissing) {
+  PiMachine machine;  // a Raspberry Pi 5
+  EXPECT_THAT(check_ipa(machine, v4l2()), IsEmpty());
+  hal::CameraConfig camera;
+  camera.backend = "libcamera";
+  Finding finding = only_trouble(check_ipa(machine, camera));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_EQ(finding.mend, "sudo apt install libcamera-ipa");
+  // Debian 12's, which is older than the board.
+  const std::string folder = "/usr/lib/aarch64-linux-gnu/libcamera/";
+  machine.file(folder + "ipa_rpi.so");
+  machine.file(folder + "ipa_rpi.so.sign");
+  finding = only_trouble(check_ipa(machine, camera));
+  EXPECT_EQ(finding.verdict, Verdict::wrong);
+  EXPECT_THAT(finding.what, HasSubstr("ipa_rpi_pisp.so is not among"));
+  machine.file("/proc/device-tree/model", "Raspberry Pi 4 Model B Rev 1.4");
+  EXPECT_EQ(check_ipa(machine, camera).at(0).what, "libcamera has ipa_rpi.so");
+  EXPECT_TRUE(all_good(check_ipa(machine, camera)));
+  machine.file("/proc/device-tree/model", "Raspberry Pi 5 Model B Rev 1.0");
+  machine.file(folder + "ipa/ipa_rpi_pisp.so");
+  EXPECT_TRUE(all_good(check_ipa(machine, camera)));
+  const FakeMachine other;
+  EXPECT_EQ(only_trouble(check_ipa(other, camera)).verdict, Verdict::note);
+}
+
 TEST(DoctorSpi, NotNeededWithoutAnSpiRing) {
   const FakeMachine machine;
   EXPECT_TRUE(all_good(check_spi(machine, hal::RingConfig{})));
