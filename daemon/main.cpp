@@ -7,6 +7,7 @@
 #include "daemon/app/config.hpp"
 #include "daemon/app/daemon.hpp"
 #include "daemon/app/doctor/doctor.hpp"
+#include "daemon/app/input_files.hpp"
 #include "daemon/app/journal.hpp"
 #include "daemon/app/net_files.hpp"
 #include "daemon/app/options.hpp"
@@ -25,7 +26,11 @@ int main(int argc, char** argv) {
     is_service = !options.check_config;
     const LoadedConfig loaded = load_config(options.config, options.settings);
     if (options.print_config) print_config(loaded, std::cout);
-    if (options.check_config) check_net_files(loaded.config.net);
+    if (options.check_config) {
+      check_net_files(loaded.config.net);
+      check_readable("calibration", loaded.config.calibration);
+      check_camera_files(loaded.config.hal.camera);
+    }
     if (options.print_config || options.check_config) return 0;
     if (options.report) {
       report(loaded.config.hal, std::cout);

@@ -19,6 +19,7 @@
 
 #include "daemon/announce/announcer.hpp"
 #include "daemon/app/give_way.hpp"
+#include "daemon/app/input_files.hpp"
 #include "daemon/app/journal.hpp"
 #include "daemon/app/net_files.hpp"
 #include "daemon/app/reload.hpp"
@@ -70,6 +71,7 @@ std::shared_ptr<const calibration::Calibration> load_calibration(const fs::path&
     return nullptr;
   }
   try {
+    if (folder == configured) check_readable("calibration", folder);
     auto loaded = std::make_shared<const calibration::Calibration>(calibration::load(folder));
     spdlog::info("calibration {} from {}", loaded->name, folder.string());
     return loaded;
@@ -178,6 +180,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   auto calibration = load_calibration(store.current(), config.calibration);
   const bool uncalibrated = calibration == nullptr;
 
+  check_camera_files(config.hal.camera);
   hal::Devices devices = hal::open_devices(config.hal);
   const hal::RingReport ring = devices.ring->report();
   if (ring.away) spdlog::warn("no LED ring yet, it is looked for: {}", ring.message);

@@ -23,8 +23,7 @@ void set_up(CLI::App& cli, Options& options) {
          "The same as --set log_level=LEVEL: trace, debug, info, warn or error")
       ->type_name("LEVEL");
   cli.add_flag("--check-config", options.check_config,
-               "Check the configuration, and the certificate, key and tokens it names, say what\n"
-               "is wrong, and exit");
+               "Check the configuration, and the files it names, say what is wrong, and exit");
   cli.add_flag("--print-config", options.print_config,
                "Print the effective values and where each came from, and exit");
   CLI::Option* const doctor = cli.add_flag(

@@ -211,6 +211,13 @@ TEST_F(CheckOfFiles, FindsAKeyOfAnotherCertificate) {
   EXPECT_THAT(check({"tls_certificate=" + certificate}), HasSubstr("set both or none"));
 }
 
+TEST(Check, LooksAtTheCalibration) {
+  std::string output;
+  EXPECT_EQ(told_by_failing({"--check-config", "--set", "calibration=/no/such"}, output),
+            std::nullopt);
+  EXPECT_THAT(output, HasSubstr("calibration = \"/no/such\": No such file or directory"));
+}
+
 TEST_F(CheckOfFiles, LooksAtCredentialsWhereThereAreAny) {
   const std::vector<std::string> all = {"token_file=credential:tokens", "tls_key=credential:key",
                                         "tls_certificate=credential:certificate"};

@@ -31,3 +31,11 @@ within 10 journal_says "$tokens:1: the token has 5 bytes"
 is_still "$before"
 dtactctl --token-file /tmp/token status > /dev/null || fail "the tokens in use are gone"
 rm $tokens /tmp/token
+say "a folder that the service does not see"
+cp /tmp/good.toml "$config"
+mkdir /home/calibration
+sed -i 's|^calibration = ""|calibration = "/home/calibration"|' "$config"
+systemctl reload dtactd && fail "a folder in /home was taken"
+within 10 journal_says 'calibration = "/home/calibration": '
+is_still "$before"
+rmdir /home/calibration

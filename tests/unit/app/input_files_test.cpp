@@ -1,0 +1,57 @@
+#include "daemon/app/input_files.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <functional>
+#include <stdexcept>
+
+namespace dtact::app {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+std::string error(const std::function<void()>& check) {
+  try {
+    check();
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+TEST(InputFiles, OneThatCannotBeReadNamesItsKey) {
+  ::unsetenv("INVOCATION_ID");
+  EXPECT_EQ(error([] { check_readable("calibration", ""); }), "no error");
+  EXPECT_EQ(error([] { check_readable("calibration", "/tmp"); }), "no error");
+  EXPECT_EQ(error([] { check_readable("calibration", "/no/such/folder"); }),
+            "calibration = \"/no/such/folder\": No such file or directory");
+}
+
+// ProtectHome= and PrivateTmp= of the unit hide what its administrator sees.
+TEST(InputFiles, TheServiceSaysWhatItDoesNotSee) {
+  ::setenv("INVOCATION_ID", "0123456789abcdef0123456789abcdef", 1);
+  EXPECT_THAT(error([] { check_readable("calibration", "/tmp/no/such"); }),
+              AllOf(StartsWith("calibration = \"/tmp/no/such\": "),
+                    HasSubstr("sees nothing in /home, /root and /tmp")));
+  ::unsetenv("INVOCATION_ID");
+}
+
+TEST(InputFiles, OnlyTheCameraThatIsConfiguredReadsSome) {
+  hal::CameraConfig camera;
+  const auto said = [&camera] { return error([&camera] { check_camera_files(camera); }); };
+  EXPECT_EQ(said(), "no error");
+  camera.sim.scene = "/no/such/scene.toml";
+  EXPECT_THAT(said(), StartsWith("camera.sim.scene = "));
+  camera.backend = "replay";
+  EXPECT_EQ(said(), "no error");
+  camera.replay.folder = "/no/such/press.mcap";
+  EXPECT_THAT(said(), AllOf(StartsWith("camera.replay.folder = "), Not(HasSubstr("service"))));
+}
+
+}  // namespace
+}  // namespace dtact::app
