@@ -6,7 +6,6 @@
 #include <spdlog/spdlog.h>
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/signal_set.hpp>
 #include <csignal>
 #include <filesystem>
@@ -93,8 +92,7 @@ net::NetConfig make_net_config(const Config& config) {
   if (net.unix_socket.empty() && !run.empty()) net.unix_socket = run / "dtactd.sock";
   net.program = "dtactd " DTACT_VERSION;
   net.version = DTACT_VERSION;
-  boost::system::error_code nameless;
-  if (net.name.empty()) net.name = asio::ip::host_name(nameless);
+  if (net.name.empty()) net.name = default_name();
   resolve_credentials(net);
   net.log = [](const net::LogLine& line) {
     log_line(line.level == net::LogLevel::info ? spdlog::level::info : spdlog::level::warn,

@@ -7,8 +7,10 @@
 #include <systemd/sd-daemon.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
+#include <climits>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -100,6 +102,12 @@ bool has_credentials() {
 }
 
 bool under_systemd() { return std::getenv("INVOCATION_ID") != nullptr; }
+std::string default_name() {
+  if (const char* name = std::getenv("DTACTD_NAME"); name != nullptr && *name != '\0') return name;
+  std::array<char, HOST_NAME_MAX + 1> host{};
+  return ::gethostname(host.data(), host.size()) == 0 ? host.data() : "";
+}
+
 std::string state_directory() { return folder_in("STATE_DIRECTORY"); }
 std::string runtime_directory() { return folder_in("RUNTIME_DIRECTORY"); }
 

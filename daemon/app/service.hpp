@@ -23,6 +23,8 @@ void notify_alive();
 
 /// Whether a unit of systemd's started this program ($INVOCATION_ID).
 [[nodiscard]] bool under_systemd();
+/// The name of a sensor that has none of its own: the unit's ($DTACTD_NAME), else the machine's.
+[[nodiscard]] std::string default_name();
 /// The unit's state folder ($STATE_DIRECTORY), or empty.
 [[nodiscard]] std::string state_directory();
 /// The file that "credential:NAME" stands for, one that systemd handed in (LoadCredential= of the

@@ -70,6 +70,18 @@ TEST(Service, TellsThatItReadsItsConfigurationAgain) {
               testing::MatchesRegex("RELOADING=1\nMONOTONIC_USEC=[0-9]+"));
 }
 
+// Instances on one machine would all bear its name.
+TEST(Service, ANameIsTheUnitsBeforeTheMachines) {
+  ::unsetenv("DTACTD_NAME");
+  const std::string machine = default_name();
+  EXPECT_FALSE(machine.empty());
+  ::setenv("DTACTD_NAME", "", 1);
+  EXPECT_EQ(default_name(), machine);
+  ::setenv("DTACTD_NAME", "gripper-left", 1);
+  EXPECT_EQ(default_name(), "gripper-left");
+  ::unsetenv("DTACTD_NAME");
+}
+
 TEST(Service, ACredentialIsTheFileThatSystemdHandedIn) {
   const auto folder = fakes::own_path();
   std::filesystem::create_directories(folder);

@@ -50,10 +50,11 @@ for unit in dtact-perceive.service dtact-web.service; do
   [[ -z $complaint ]] || fail "$unit: its drop-in: $complaint"
 done
 
-# The instances are the one service under other names. It alone keeps its folder in /run, which is
+# The instances are the one service under other names, by which clients know them. It alone keeps its folder in /run, which is
 # theirs, too.
 settings() { grep -vE '^(#|$)' "$source/$1"; }
 difference=$(diff <(settings dtactd.service | sed -E '/^RuntimeDirectoryPreserve=yes$/d
+    s|^ExecStart=|Environment=DTACTD_NAME=%H-%i\n&|
     s|/etc/dtactd/dtactd\.toml|/etc/dtactd/%i.toml|; s|^(Description=.*)|\1, %i|
     s|^(State\|Runtime)Directory=dtactd$|&/%i|; s|^(LoadCredential=.*:dtactd)|\1@%i|') \
   <(settings dtactd@.service)) || fail "the template differs: $difference"
