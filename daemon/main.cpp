@@ -24,6 +24,9 @@ int main(int argc, char** argv) {
     const Options& options = command_line.options;
 
     is_service = !options.check_config;
+    if (is_service) {
+      mend = "; once it is mended, check it: " + command_with(options, "--check-config");
+    }
     const LoadedConfig loaded = load_config(options.config, options.settings);
     if (options.print_config) print_config(loaded, std::cout);
     if (options.check_config) {
@@ -39,7 +42,7 @@ int main(int argc, char** argv) {
     if (options.doctor) return doctor(loaded.config.hal, std::cout);
 
     spdlog::set_level(spdlog::level::from_str(loaded.config.log_level));
-    mend = "; what else this machine lacks: " + doctor_command(options);
+    mend = "; what else this machine lacks: " + command_with(options, "--doctor");
     run_daemon(loaded.config,
                [&options] { return load_config(options.config, options.settings).config; });
     return 0;

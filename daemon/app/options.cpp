@@ -55,9 +55,9 @@ Parsed parse_options(int argc, const char* const* argv) {
   return parsed;
 }
 
-std::string doctor_command(const Options& options) {
-  return options.config ? "dtactd --config " + options.config->string() + " --doctor"
-                        : "dtactd --doctor";
+std::string command_with(const Options& options, const std::string& option) {
+  const std::string config = options.config ? " --config " + options.config->string() : "";
+  return "dtactd" + config + " " + option;
 }
 
 }  // namespace dtact::app

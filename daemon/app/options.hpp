@@ -18,8 +18,8 @@ struct Options {
   bool report = false;  ///< --report: the same for somebody else to read.
 };
 
-/// What checks the machine for the same configuration: "dtactd --config FILE --doctor".
-[[nodiscard]] std::string doctor_command(const Options& options);
+/// What does something else with the same configuration: "dtactd --config FILE --doctor".
+[[nodiscard]] std::string command_with(const Options& options, const std::string& option);
 
 /// Either options to run with, or the exit status after --help, --version or a mistake, whose text
 /// has been printed.

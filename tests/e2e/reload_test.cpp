@@ -165,6 +165,15 @@ TEST(Check, TellsTheServiceManagerNothing) {
   EXPECT_THAT(output, HasSubstr("camera.width"));
 }
 
+// What systemctl status shows of a daemon that cannot start.
+TEST(Start, NamesTheCheckOfAConfigurationWithAMistake) {
+  std::string output;
+  const auto status = told_by_failing({"--set", "camera.width=1"}, output);
+  EXPECT_THAT(output, HasSubstr("once it is mended, check it: dtactd --check-config"));
+  EXPECT_THAT(status.value_or(""),
+              AllOf(StartsWith("STATUS=--set: camera.width"), EndsWith("dtactd --check-config")));
+}
+
 class CheckOfFiles : public testing::Test {
  protected:
   void TearDown() override { ::unsetenv("CREDENTIALS_DIRECTORY"); }
