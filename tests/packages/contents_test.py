@@ -145,6 +145,11 @@ class Contents(unittest.TestCase):
                 self.assertRegex(path, f"^({places})", name)
                 self.assertRegex(rights, "^(-rw-r--r--|-rwxr-xr-x|lrwxrwxrwx) root/root$", path)
 
+    def test_pages_of_one_name_are_both_there(self) -> None:
+        pages = {path.removesuffix(".gz") for path in files("dtact-tools")}
+        for name in ("calibrate", "recording"):
+            self.assertIn(f"/usr/share/doc/dtact-tools/{name}.md", pages)
+
     def test_the_configuration_is_the_only_conffile(self) -> None:
         self.assertEqual(control("dtactd", "conffiles"), "/etc/dtactd/dtactd.toml\n")
         for name in FILES.keys() - {"dtactd"}:
