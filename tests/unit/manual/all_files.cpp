@@ -80,7 +80,9 @@ std::vector<File> all_files(const std::filesystem::path& root) {
        {"/etc/credstore/dtactd.tokens, dtactd.tls-key, dtactd.tls-certificate",
         "Secrets that only root can read, which systemd hands in at a start; of "
         "dtactd@NAME.service "
-        "dtactd@NAME.tokens and so on. They stay when the package is purged."}},
+        "dtactd@NAME.tokens and so on. They stay when the package is purged."},
+       {"/etc/systemd/system/dtactd.service.d",
+        "What `systemctl edit dtactd` has written. It stays when the package is purged."}},
       {kConfig, kCtl, kCalibrate, kPerceive, kWeb, {"systemctl", 1}, {"journalctl", 1}}};
   const PageNotes of_ctl{1, kUserCommands, {}, {kCalibrate, kDtactd, kConfig}};
   const PageNotes of_calibrate{1, kUserCommands, {}, {kCtl, kDtactd, kConfig}};
