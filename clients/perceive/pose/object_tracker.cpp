@@ -107,7 +107,7 @@ void ObjectTracker::release() {
   stop_search();
   searched_pixels_ = 0;
   pause_ = next_pause_ = 0;
-  forgot_ = false;
+  forgot_ = strayed_ = false;
   pose_ = {};
 }
 
@@ -222,6 +222,7 @@ void ObjectTracker::follow_contact(const ContactView& view, std::uint64_t sequen
   (void)contact_.follow(view, sequence);
   // What has moved since it began is not known.
   stop_search();
+  strayed_ = placement_.has_value();
 }
 
 const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_t sequence) {
@@ -239,14 +240,14 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
         pose_.state = State::tracked;
       }
       placement_ = found;
-      forgot_ = false;
+      forgot_ = strayed_ = false;
       pause_ = kPause;
       next_pause_ = 0;
     } else {
       in_vain();
     }
   }
-  if (!aligned && placement_) {
+  if (!aligned && placement_ && !strayed_) {
     aligned = align_object(view, place_);
     if (aligned) pose_.state = was_lost ? State::recovered : State::tracked;
   }

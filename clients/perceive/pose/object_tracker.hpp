@@ -79,6 +79,8 @@ class ObjectTracker {
   int pause_ = 0;       ///< Frames until the next search may begin.
   int next_pause_ = 0;  ///< After one in vain; 0: the shortest.
   bool forgot_ = false;
+  /// The contact was lost since the last search that found it: flat faces fit where it was as well.
+  bool strayed_ = false;
   Tracker::Pose pose_;
 };
 

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -113,6 +114,12 @@ struct Frame {
   /// pixels, as the daemon's smoothing leaves it.
   Frame(const Balls& object, const Motion& motion, double noise_um = 0, unsigned seed = 1,
         const recon::Surface& surface = {})
+      : Frame([&](const SurfacePoint& at) { return indentation_mm(object, motion, at); }, noise_um,
+              seed, surface) {}
+  /// What `depth_mm` says of each pixel's point of the surface.
+  template <std::invocable<const SurfacePoint&> Depth>
+  explicit Frame(Depth depth_mm, double noise_um = 0, unsigned seed = 1,
+                 const recon::Surface& surface = {})
       : gel(gel_of(surface)) {
     values.resize(std::size_t{kSize} * kSize);
     std::mt19937 random(seed);
@@ -121,8 +128,7 @@ struct Frame {
     for (double& one : noise) one = normal(random);
     for (int row = 0; row < kSize; ++row) {
       for (int column = 0; column < kSize; ++column) {
-        double depth = indentation_mm(object, motion,
-                                      gel.pixels[static_cast<std::size_t>(row * kSize + column)]);
+        double depth = depth_mm(gel.pixels[static_cast<std::size_t>(row * kSize + column)]);
         double error = 0;
         int count = 0;
         for (int r = std::max(0, row - 1); r <= std::min(kSize - 1, row + 1); ++r) {

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <stdexcept>
 
 #include "clients/perceive/pose/object_tracker.hpp"
@@ -217,6 +218,49 @@ TEST(ObjectTracker, WhatNobodyFollowsIsTold) {
   ASSERT_EQ(unknown.size(), 3U);
   // Turns about the ball's middle: points of it do not move along the normal.
   for (const Twist& one : unknown) EXPECT_GT(one.head<3>().norm(), 0.3);
+}
+
+/// A box's lower face of `x` × `y` mm about `middle`, pressed 0.4 mm in along the axes; the gel
+/// falls off beside it.
+Frame pressed_face(double x, double y, const Vector3d& middle, unsigned seed) {
+  return Frame(
+      [&](const SurfacePoint& at) {
+        const Vector3d from = 1e3 * Vector3d(at.point.data()) - middle;
+        const double beside = std::hypot(std::max(0.0, std::abs(from.x()) - x / 2),
+                                         std::max(0.0, std::abs(from.y()) - y / 2));
+        return 0.4 * std::exp(-beside / 0.15);
+      },
+      2, seed);
+}
+
+// A third of the face lies where it lay, and a flat face fits a flat place wherever it is.
+TEST(ObjectTracker, AFaceThatJumpsAlongItselfIsLostAndFound) {
+  // A flat face is found by its outline, which the gel rounds: found is what lies within 0.5 mm.
+  constexpr double kFaceUm = 500;
+  ObjectTracker tracker(
+      std::make_shared<const ObjectModel>(make_object(box(4, 3, 2), 1e-3, "box")));
+  const Vector3d middle(-0.8, -0.6, 0);
+  const auto off_um = [&](const Vector3d& truth_mm) {
+    // Its lower side is 0.4 mm in, the middle of the box 1 mm above.
+    const Vector3d found = tracker.pose().alignment.motion * Vector3d(2e-3, 1.5e-3, 1e-3);
+    return 1e6 * (found - 1e-3 * (truth_mm + Vector3d(0, 0, 0.6))).norm();
+  };
+  const Frame first = pressed_face(4, 3, middle, 1);
+  (void)tracker.follow(first.view(), 1);
+  tracker.wait();
+  ASSERT_EQ(tracker.follow(first.view(), 2).state, State::started);
+  EXPECT_TRUE(tracker.pose().alignment.unobservable.empty()) << "its outline was seen";
+  EXPECT_LT(off_um(middle), kFaceUm);
+
+  const Vector3d there = middle + Vector3d(2, 1.2, 0);
+  const Frame jumped = pressed_face(4, 3, there, 2);
+  EXPECT_EQ(tracker.follow(jumped.view(), 3).state, State::lost);
+  EXPECT_TRUE(tracker.is_searching());
+  EXPECT_EQ(tracker.follow(jumped.view(), 4).state, State::lost) << "until it is found";
+  tracker.wait();
+  EXPECT_EQ(tracker.follow(jumped.view(), 5).state, State::recovered);
+  EXPECT_LT(off_um(there), kFaceUm);
+  EXPECT_EQ(tracker.follow(jumped.view(), 6).state, State::tracked);
 }
 
 TEST(ObjectTracker, WhatIsNotFoundIsSearchedForEverMoreSeldom) {
