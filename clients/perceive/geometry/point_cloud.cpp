@@ -6,12 +6,14 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "clients/perceive/geometry/rows.hpp"
 
 namespace dtact::perceive {
 namespace {
 
+constexpr std::size_t kMostTables = 3;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 /// The first pixel of the whole map that is taken, as of blocks that leave both sides out alike.
@@ -84,16 +86,20 @@ void CloudMaker::prepare(const DepthGrid& depth) {
       depth.y + depth.height > depth.full_height || !(depth.mm_per_px > 0)) {
     throw std::invalid_argument("the depth map's sizes contradict each other");
   }
-  if (tables_ != 0 && table_.width == depth.full_width && table_.height == depth.full_height &&
-      table_.mm_per_px == depth.mm_per_px) {
+  const auto known = std::ranges::find_if(tables_, [&depth](const Numbered& one) {
+    return one.table.width == depth.full_width && one.table.height == depth.full_height &&
+           one.table.mm_per_px == depth.mm_per_px;
+  });
+  if (known != tables_.end()) {
+    std::rotate(tables_.begin(), known, known + 1);
     return;
   }
-  if (flat()) {
-    table_ = {depth.full_width, depth.full_height, depth.mm_per_px, {}, {}};
-  } else {
-    table_ = make_surface_table(surface_, depth.full_width, depth.full_height, depth.mm_per_px);
+  if (tables_.size() == kMostTables) tables_.pop_back();
+  SurfaceTable table{depth.full_width, depth.full_height, depth.mm_per_px, {}, {}};
+  if (!flat()) {
+    table = make_surface_table(surface_, depth.full_width, depth.full_height, depth.mm_per_px);
   }
-  tables_ = next_number();
+  tables_.insert(tables_.begin(), {std::move(table), next_number()});
 }
 
 Vector CloudMaker::point(const Work& work, int row, int column) const {
@@ -176,15 +182,15 @@ void CloudMaker::press_row(const Work& work, int row) const {
   const DepthGrid& depth = work.depth;
   const std::uint64_t touched = touched_[static_cast<std::size_t>(row)];
   std::uint64_t& placed = work.drawn(row).placed;
+  const SurfaceTable& table = tables_.front().table;
   const std::size_t from =
       static_cast<std::size_t>(depth.y + row) * static_cast<std::size_t>(depth.full_width) +
       static_cast<std::size_t>(depth.x);
   work.for_each_run(touched | ~placed, [&](int begin, int end) {
     const std::size_t at = from + static_cast<std::size_t>(begin);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      press(table_.point[axis].data() + at, table_.normal[axis].data() + at,
-            work.values(row) + begin, work.unit, end - begin,
-            work.part(static_cast<PointCloud::Part>(axis), row) + begin);
+      press(table.point[axis].data() + at, table.normal[axis].data() + at, work.values(row) + begin,
+            work.unit, end - begin, work.part(static_cast<PointCloud::Part>(axis), row) + begin);
     }
   });
   placed = ~touched;
@@ -239,7 +245,8 @@ void CloudMaker::make_row(const Work& work, int row) {
 void CloudMaker::make_whole(const DepthGrid& depth, PointCloud& out) {
   const Work work(depth, out);
   const auto rows = static_cast<std::size_t>(depth.height);
-  const bool same = out.drawn.tables == tables_ && out.stride == 1 && out.x == depth.x &&
+  const std::uint64_t number = tables_.front().number;
+  const bool same = out.drawn.tables == number && out.stride == 1 && out.x == depth.x &&
                     out.y == depth.y && out.width == depth.width && out.height == depth.height;
   if (!same) {
     out.drawn.tables = 0;
@@ -250,7 +257,7 @@ void CloudMaker::make_whole(const DepthGrid& depth, PointCloud& out) {
     out.stride = 1;
     out.values.resize(PointCloud::kParts * out.size());
     out.drawn.rows.assign(rows, {});
-    out.drawn.tables = tables_;
+    out.drawn.tables = number;
   }
   touched_.resize(rows);
   lone_.clear();

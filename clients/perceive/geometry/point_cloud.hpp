@@ -62,9 +62,10 @@ struct PointCloud {
   }
 };
 
-/// Makes point clouds of depth maps that belong to one surface. Its tables are made at the first
-/// map of a size; it allocates at no later one of it. Where nothing touches, now and when `out` was
-/// made before of the same part of a map, `out` is left as it is.
+/// Makes point clouds of depth maps that belong to one surface. A table is made at the first map of
+/// a size and kept for the next ones, of the three sizes seen last: a sensor's full, half and
+/// quarter resolution, which it may change between two frames. Where nothing touches, now and when
+/// `out` was made before of the same part of a map, `out` is left as it is.
 class CloudMaker {
  public:
   explicit CloudMaker(const recon::Surface& surface = {}) : surface_(surface) {}
@@ -78,8 +79,10 @@ class CloudMaker {
   void make(const DepthGrid& depth, int stride, PointCloud& out);
 
   [[nodiscard]] const recon::Surface& surface() const noexcept { return surface_; }
-  /// Of the maps made last; null for a plane.
-  [[nodiscard]] const SurfaceTable* table() const noexcept { return flat() ? nullptr : &table_; }
+  /// Of the maps made last, until the next of another size; null for a plane.
+  [[nodiscard]] const SurfaceTable* table() const noexcept {
+    return flat() || tables_.empty() ? nullptr : &tables_.front().table;
+  }
 
   /// Less lets the depth's noise into the normals, more blurs edges.
   static constexpr double kReachMm = 0.16;
@@ -87,6 +90,10 @@ class CloudMaker {
  private:
   /// A cloud that is being made.
   struct Work;
+  struct Numbered {
+    SurfaceTable table;        ///< Of a plane the sizes alone.
+    std::uint64_t number = 0;  ///< As PointCloud::Drawn says it.
+  };
 
   [[nodiscard]] bool flat() const noexcept { return surface_.kind == recon::Surface::Kind::plane; }
   void prepare(const DepthGrid& depth);
@@ -101,8 +108,7 @@ class CloudMaker {
   [[nodiscard]] Vector point(const Work& work, int row, int column) const;
 
   recon::Surface surface_;
-  SurfaceTable table_;                  ///< Of a plane the sizes alone.
-  std::uint64_t tables_ = 0;            ///< As PointCloud::Drawn says it.
+  std::vector<Numbered> tables_;        ///< Begins with that of the maps made last.
   std::vector<std::uint64_t> touched_;  ///< Of a row: bits of the tiles with a depth but 0.
   std::vector<std::size_t> lone_;       ///< Points that turned out to have no normal.
   PointCloud whole_;                    ///< That a stride takes some of.

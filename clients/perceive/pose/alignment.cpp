@@ -21,9 +21,9 @@ constexpr double kNormalArm = 1e-4;
 constexpr double kSeen = 0.003;
 /// And below so many times the square of what the normals compared differ by, each one's share.
 constexpr double kSeenInNoise = 3;
-/// Pixels whose noise is alike, since depth is smoothed over 7×7 of them: of so many one tells
-/// something that the others do not.
-constexpr double kAlike = 49;
+/// Where noise is alike, since depth is smoothed over 7×7 pixels of 0.0414 mm, square metres: of so
+/// much one place tells something that the others do not.
+constexpr double kAlike = 8.39e-8;
 /// Tukey's limit in median absolute residuals: 4.685 standard deviations of 1.48 medians.
 constexpr double kTukey = 4.685 * 1.4826;
 /// The least and the first limit of distances, metres.
@@ -114,7 +114,7 @@ Equations equations_of(const std::vector<Pair>& pairs, const Eigen::Vector3d& ce
 /// mean of squares, which scatters by √(2/n) of itself where n of them are independent: a ball that
 /// has just touched would otherwise be turned by noise once in 50 presses.
 double least_seen(const Equations& sum, const ContactView& view) {
-  const double places = static_cast<double>(view.pixels()) / kAlike;
+  const double places = view.area() / kAlike;
   const double independent = std::clamp(places, 1.0, static_cast<double>(sum.points));
   // Two components of two normals.
   const double noise = sum.normal_squares / sum.weight / 4;

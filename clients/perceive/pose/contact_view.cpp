@@ -16,8 +16,8 @@ namespace {
 constexpr double kTouchingPart = 0.3;
 /// And so is what noise alone may press in.
 constexpr double kUncertainties = 3;
-/// Pixels to each side that the normals' change is taken over.
-constexpr int kBendPixels = 3;
+/// The normals' change is taken over so far to each side, metres: 3 pixels of 0.0414 mm.
+constexpr double kBendReach = 1.3e-4;
 
 }  // namespace
 
@@ -27,6 +27,7 @@ ContactView::ContactView(const DepthGrid& depth, const PointCloud& cloud, const 
       table_(table),
       touching_(cloud.size()),
       px_(depth.mm_per_px * 1e-3),
+      reach_(std::max(1, static_cast<int>(std::lround(kBendReach / px_)))),
       x0_((depth.x - 0.5 * (depth.full_width - 1)) * px_),
       y0_((depth.y - 0.5 * (depth.full_height - 1)) * px_) {
   int deepest = 0;
@@ -69,9 +70,8 @@ std::optional<ContactView::Place> ContactView::place_of(const Eigen::Vector3d& p
 
 std::optional<ContactView::Bend> ContactView::bend_at(int column, int row,
                                                       const Eigen::Vector3d& upright) const {
-  const std::array<std::size_t, 4> around{
-      index(column - kBendPixels, row), index(column + kBendPixels, row),
-      index(column, row - kBendPixels), index(column, row + kBendPixels)};
+  const std::array<std::size_t, 4> around{index(column - reach_, row), index(column + reach_, row),
+                                          index(column, row - reach_), index(column, row + reach_)};
   for (const std::size_t one : around) {
     if (touching_[one] == 0) return std::nullopt;
   }
@@ -93,9 +93,9 @@ std::optional<ContactView::Bend> ContactView::bend_at(int column, int row,
 
 std::optional<ContactView::Sample> ContactView::at(const Eigen::Vector3d& point_m) const {
   const std::optional<Place> place = place_of(point_m);
-  if (!place || !(place->column >= kBendPixels && place->row >= kBendPixels &&
-                  place->column < cloud_.width - 1 - kBendPixels &&
-                  place->row < cloud_.height - 1 - kBendPixels)) {
+  if (!place ||
+      !(place->column >= reach_ && place->row >= reach_ &&
+        place->column < cloud_.width - 1 - reach_ && place->row < cloud_.height - 1 - reach_)) {
     return std::nullopt;
   }
   const int c = static_cast<int>(place->column);

@@ -47,7 +47,8 @@ class ContactView {
   [[nodiscard]] const Eigen::Vector3d& centre() const noexcept { return centre_; }
   /// The mean of the untouched surface's normals there, of length 1.
   [[nodiscard]] const Eigen::Vector3d& upright() const noexcept { return upright_; }
-  [[nodiscard]] std::size_t pixels() const noexcept { return pixels_; }
+  /// Of all that touches, square metres; alike at each of the map's resolutions.
+  [[nodiscard]] double area() const noexcept { return static_cast<double>(pixels_) * px_ * px_; }
 
   /// The points that it is of; a pixel's index in them.
   [[nodiscard]] const PointCloud& cloud() const noexcept { return cloud_; }
@@ -83,6 +84,7 @@ class ContactView {
   const SurfaceTable* table_;
   std::vector<std::uint8_t> touching_;
   double px_;  ///< Metres.
+  int reach_;  ///< Pixels to each side that the normals' change is taken over.
   double x0_;  ///< Of the first column of a plane.
   double y0_;
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();

@@ -94,8 +94,7 @@ std::vector<Surfel> touching(const ObjectModel& object, const ContactView& view,
     found.push_back(*around[i]);
   }
   const double area = object.spacing * object.spacing * static_cast<double>(found.size() * every);
-  const double contact = view.px() * view.px() * static_cast<double>(view.pixels());
-  if (area < kArea * contact) found.clear();
+  if (area < kArea * view.area()) found.clear();
   return found;
 }
 
@@ -105,7 +104,7 @@ void ObjectTracker::release() {
   contact_.release();
   placement_.reset();
   stop_search();
-  searched_pixels_ = 0;
+  searched_area_ = 0;
   pause_ = next_pause_ = 0;
   forgot_ = strayed_ = false;
   pose_ = {};
@@ -172,7 +171,7 @@ void ObjectTracker::in_vain() {
 void ObjectTracker::begin_search(const ContactView& view) {
   SearchUnderWay search;
   search.contact = contact_.pose().alignment.motion;
-  search.pixels = view.pixels();
+  search.area = view.area();
   std::optional<Motion> present;
   if (placement_) present = place_;
   try {
@@ -196,7 +195,7 @@ std::optional<Placement> ObjectTracker::finished() {
   const SearchUnderWay search = std::move(*search_);
   search_.reset();
   if (search.stop.stop_requested()) return std::nullopt;
-  searched_pixels_ = search.pixels;
+  searched_area_ = search.area;
   if (!found) {
     in_vain();
     return std::nullopt;
@@ -227,7 +226,7 @@ void ObjectTracker::follow_contact(const ContactView& view, std::uint64_t sequen
 
 const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_t sequence) {
   using State = Tracker::State;
-  if (view.pixels() < kFewestPixels && pose_.state == State::idle) return pose_;
+  if (view.area() < kLeastArea && pose_.state == State::idle) return pose_;
   follow_contact(view, sequence);
   const bool was_lost = pose_.state == State::lost;
   std::optional<Alignment> aligned;
@@ -262,13 +261,11 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
     pose_.state = placement_ ? State::lost : State::searching;
   }
   const bool unknown_place = pose_.state == State::lost || pose_.state == State::searching;
-  const auto times = [&](double factor) {
-    return static_cast<double>(view.pixels()) >= factor * static_cast<double>(searched_pixels_);
-  };
+  const auto times = [&](double factor) { return view.area() >= factor * searched_area_; };
   if (pause_ > 0) --pause_;
   const bool again = unknown_place ? pause_ == 0 || times(kGrownInVain)
                                    : times(kGrownMuch) || (forgot_ && pause_ == 0);
-  if (!search_ && again && view.pixels() >= kFewestPixels) begin_search(view);
+  if (!search_ && again && view.area() >= kLeastArea) begin_search(view);
   return pose_;
 }
 

@@ -16,8 +16,8 @@ namespace dtact::perceive {
 struct SearchUnderWay {
   std::stop_source stop;  ///< Asked for once the contact is another one.
   std::future<std::optional<Placement>> result;
-  Motion contact;          ///< The contact's motion at its frame.
-  std::size_t pixels = 0;  ///< Of the contact then.
+  Motion contact;   ///< The contact's motion at its frame.
+  double area = 0;  ///< Of the contact then, square metres.
 };
 
 /// Follows a known object: where it is, in the surface frame. A Tracker follows the contact from
@@ -75,7 +75,7 @@ class ObjectTracker {
   std::optional<SearchUnderWay> search_;
   std::optional<Placement> placement_;  ///< Its centre and hidden twists in the object's frame.
   Motion place_;                        ///< Where the object is, as far as its contact tells.
-  std::size_t searched_pixels_ = 0;
+  double searched_area_ = 0;
   int pause_ = 0;       ///< Frames until the next search may begin.
   int next_pause_ = 0;  ///< After one in vain; 0: the shortest.
   bool forgot_ = false;

@@ -12,7 +12,7 @@ namespace {
 /// Surfels of a keyframe.
 constexpr std::size_t kSurfels = 600;
 /// A contact that has grown so many times shows what its keyframe lacks.
-constexpr std::size_t kGrown = 2;
+constexpr double kGrown = 2;
 /// What a good alignment has at least, beside kGoodRms.
 constexpr double kGoodOverlap = 0.4;
 /// Sharing less with every keyframe, a frame becomes one.
@@ -42,7 +42,7 @@ void Tracker::release() {
 Tracker::Keyframe Tracker::keyframe_of(const ContactView& view) const {
   Keyframe key;
   key.motion = pose_.alignment.motion;
-  key.pixels = view.pixels();
+  key.area = view.area();
   key.centre = view.centre();
   key.surfels = view.choose(kSurfels);
   const Eigen::Matrix3d back = key.motion.rotation.transpose();
@@ -128,7 +128,7 @@ bool Tracker::recover(const ContactView& view) {
 const Tracker::Pose& Tracker::follow(const ContactView& view, std::uint64_t sequence) {
   if (keyframes_.empty()) {
     pose_ = {};
-    if (view.pixels() < kFewestPixels) return pose_;
+    if (view.area() < kLeastArea) return pose_;
     add_keyframe(view);
     // With itself: which directions it shows.
     pose_ = {State::started, sequence, align(keyframes_[0].surfels, view, {})};
@@ -136,11 +136,11 @@ const Tracker::Pose& Tracker::follow(const ContactView& view, std::uint64_t sequ
     return pose_;
   }
   if (pose_.state == State::lost) {
-    if (view.pixels() >= kFewestPixels && recover(view)) pose_.state = State::recovered;
+    if (view.area() >= kLeastArea && recover(view)) pose_.state = State::recovered;
     return pose_;
   }
   const Motion before = pose_.alignment.motion;
-  const Alignment found = view.pixels() < kFewestPixels ? Alignment{} : best(view, before);
+  const Alignment found = view.area() < kLeastArea ? Alignment{} : best(view, before);
   if (!is_good(found) || !is_near(before, found.motion, found.centre)) {
     pose_.state = State::lost;
     attempt_ = 0;
@@ -148,7 +148,7 @@ const Tracker::Pose& Tracker::follow(const ContactView& view, std::uint64_t sequ
   }
   pose_.state = State::tracked;
   pose_.alignment = found;
-  if (view.pixels() >= kGrown * keyframes_[current_].pixels) {
+  if (view.area() >= kGrown * keyframes_[current_].area) {
     // In its place: the tip of what was just touched lies on all that is touched later, and turns
     // on it as it likes.
     keyframes_[current_] = keyframe_of(view);

@@ -8,8 +8,8 @@
 
 namespace dtact::perceive {
 
-/// A contact of fewer pixels has no shape.
-constexpr std::size_t kFewestPixels = 300;
+/// A smaller contact has no shape, square metres: 300 pixels of 0.0414 mm.
+constexpr double kLeastArea = 5.13e-7;
 /// What a good alignment has at most, metres.
 constexpr double kGoodRms = 4e-5;
 
@@ -48,7 +48,7 @@ class Tracker {
   struct Keyframe {
     std::vector<Surfel> surfels;  ///< As they lay in the first frame.
     Motion motion;
-    std::size_t pixels = 0;                            ///< Of the contact then.
+    double area = 0;                                   ///< Of the contact then, square metres.
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Of the contact then, surface frame.
   };
 

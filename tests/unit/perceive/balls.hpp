@@ -158,6 +158,33 @@ struct Frame {
   PointCloud cloud;
 };
 
+/// The same frame of a plane as a coarser map: means of `times` × `times` pixels.
+struct CoarseFrame {
+  CoarseFrame(const Frame& fine, int times) : size(kSize / times) {
+    for (int row = 0; row < size; ++row) {
+      for (int column = 0; column < size; ++column) {
+        int sum = 0;
+        for (int i = 0; i < times * times; ++i) {
+          const int r = row * times + i / times;
+          const int c = column * times + i % times;
+          sum += fine.values[static_cast<std::size_t>(r * kSize + c)];
+        }
+        values.push_back(static_cast<std::int16_t>(sum / (times * times)));
+      }
+    }
+    grid.width = grid.height = grid.full_width = grid.full_height = size;
+    grid.mm_per_px = kPx * times;
+    grid.values = values;
+    CloudMaker().make(grid, 1, cloud);
+  }
+  [[nodiscard]] ContactView view() const { return ContactView(grid, cloud, nullptr, 10); }
+
+  int size;
+  std::vector<std::int16_t> values;
+  DepthGrid grid;
+  PointCloud cloud;
+};
+
 /// How far `found` is from `truth` about the contact: rotation in degrees and the shift of the
 /// contact's centre in micrometres, without what the shape does not show.
 struct Error {

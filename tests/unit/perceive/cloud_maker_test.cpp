@@ -115,6 +115,33 @@ TEST(CloudMaker, WhatItLeavesIsWhatItWouldMake) {
   }
 }
 
+// A sensor may change its resolution from one frame to the next; of a curved surface a table costs
+// as much as hundreds of frames.
+TEST(CloudMaker, KeepsTheTablesOfThreeSizes) {
+  CloudMaker maker(surfaces()[2]);
+  const std::vector<std::int16_t> values(std::size_t{40} * 40, 100);
+  const auto table_of = [&](double mm_per_px) {
+    const DepthGrid grid{.width = 40,
+                         .height = 40,
+                         .full_width = 40,
+                         .full_height = 40,
+                         .mm_per_px = mm_per_px,
+                         .values = values};
+    PointCloud cloud;
+    maker.make(grid, 1, cloud);
+    EXPECT_EQ(maker.table()->mm_per_px, mm_per_px);
+    return cloud.drawn.tables;
+  };
+  const std::uint64_t full = table_of(0.04);
+  const std::uint64_t half = table_of(0.08);
+  const std::uint64_t quarter = table_of(0.16);
+  EXPECT_EQ(table_of(0.04), full);
+  EXPECT_EQ(table_of(0.16), quarter);
+  EXPECT_NE(table_of(0.1), half) << "a fourth";
+  EXPECT_EQ(table_of(0.04), full);
+  EXPECT_NE(table_of(0.08), half) << "the one that was seen longest ago made way";
+}
+
 TEST(CloudMaker, LeavesACloudOfAnotherMakerAlone) {
   const auto map = map_of(0);
   PointCloud cloud;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "tests/unit/perceive/balls.hpp"
 #include "tests/unit/perceive/sampled.hpp"
 
@@ -109,6 +111,34 @@ TEST(Tracker, StandsStillWithoutDrifting) {
   const Error error = follow(tracker, {0, 0, 0}, Vector3d::UnitZ(), 0, 60, 10);
   EXPECT_LT(error.um, 6);
   EXPECT_LT(error.degrees, 0.3);
+}
+
+// As a daemon does whose map's resolution is "auto": full, a quarter and a half of it in turn.
+TEST(Tracker, FollowsThroughChangesOfResolution) {
+  Tracker tracker;
+  for (unsigned i = 0; i <= 40; ++i) {
+    const Motion truth = moved({0.05 * i, 0, 0}, Vector3d::UnitZ(), 0.3 * i);
+    const Frame fine(bumps(), truth, 5, i);
+    const int times = std::array{1, 4, 2}.at(i / 5 % 3);
+    const CoarseFrame coarse(fine, times);
+    const auto& pose = tracker.follow(times == 1 ? fine.view() : coarse.view(), 100 + i);
+    EXPECT_EQ(pose.state, i == 0 ? State::started : State::tracked) << i;
+    // A quarter's pixels are 0.2 mm.
+    EXPECT_LT(error_of(pose.alignment, truth).um, times == 4 ? 40 : 20) << i;
+  }
+}
+
+// Of 1.5 mm², which are 600 pixels at full resolution and fewer than 40 at a quarter.
+TEST(Tracker, FollowsASmallTipAtAQuarterOfTheResolution) {
+  Tracker tracker;
+  for (unsigned i = 0; i <= 20; ++i) {
+    const Motion truth = moved({0.02 * i, 0, 0});
+    const Frame fine({{{{0, 0, 1.8}, 2}}}, truth, 2, i);
+    const CoarseFrame coarse(fine, 4);
+    const auto& pose = tracker.follow(coarse.view(), 100 + i);
+    EXPECT_EQ(pose.state, i == 0 ? State::started : State::tracked) << i;
+    EXPECT_LT((pose.alignment.motion.translation - truth.translation).norm(), 6e-5) << i;
+  }
 }
 
 // In the first frames the contact is half a millimetre wide and the noise an eighth of its depth.

@@ -162,7 +162,8 @@ class Frame:
 
     @cached_property
     def pose(self) -> ObjectPose | None:
-        """How the touched object has moved; None when it was not subscribed or nothing touches."""
+        """How the touched object has moved; None when it was not subscribed or nothing touches,
+        and until what touches is as large as about half a square millimetre."""
         return ObjectPose.of(self.message.pose) if self.message.HasField("pose") else None
 
     # ------------------------------------------------------------ what was measured
