@@ -44,16 +44,23 @@ void FrameMaker::begin(v1::Frame frame, bool pose) {
   frame_.clear_dropped();
   if (frame_.has_depth()) {
     if (frame_.contact().touching()) depth_.emplace(frame_.depth());
-    const recon::Surface surface = cli::surface_of(frame_.surface());
-    if (surface != clouds_.surface()) {
-      clouds_ = CloudMaker(surface);
-      release();
-    }
+    heed_sensor();
   }
   const bool gone = frame_.has_contact() && !frame_.contact().touching();
   if (!pose || gone) release();
   if (pose && depth_) follow(*depth_, frame_.depth().uncertainty_um());
   frame_.clear_depth();
+}
+
+void FrameMaker::heed_sensor() {
+  const recon::Surface surface = cli::surface_of(frame_.surface());
+  if (surface != clouds_.surface()) {
+    clouds_ = CloudMaker(surface);
+    release();
+  }
+  const auto calibration =
+      frame_.has_calibration() ? std::optional(frame_.calibration()) : std::nullopt;
+  if (std::exchange(calibration_, calibration) != calibration) release();
 }
 
 void FrameMaker::release() {

@@ -27,6 +27,8 @@ class FrameMaker {
   /// Begins another frame; with `pose` the object's motion is followed. Throws
   /// client::ProtocolError for a damaged map.
   void begin(v1::Frame frame, bool pose);
+  /// What touches from now on is another contact.
+  void release();
   /// The frame as `kind`; the same buffer when asked again. Null when it would exceed the wire's
   /// cap.
   [[nodiscard]] std::shared_ptr<const net::EncodedFrame> make(const net::FrameKind& kind);
@@ -36,10 +38,12 @@ class FrameMaker {
  private:
   void add_cloud(DepthPart& depth, const net::FrameKind& kind, v1::PointCloud& out);
   void follow(DepthPart& depth, double uncertainty_um);
-  void release();
+  /// Lets go of what was measured by another calibration or on another surface.
+  void heed_sensor();
 
   v1::Frame frame_;  ///< Without what is made here, and without the depth map.
   std::optional<DepthPart> depth_;
+  std::optional<std::uint64_t> calibration_;  ///< Of the depth before.
   CloudMaker clouds_;
   PointCloud cloud_;
   PointCloud contact_;  ///< Its own: what is as it was in cloud_ is not made again.

@@ -54,6 +54,7 @@ void Server::on_frame() {
   ++frames_;
   skipped_ += taken->missed;
   const std::int64_t timestamp_ns = taken->frame.monotonic_ns();
+  if (taken->parted) maker_.release();
   try {
     maker_.begin(std::move(taken->frame), pose_wanted_);
   } catch (const client::ProtocolError& e) {

@@ -27,9 +27,9 @@ void Upstream::want(const v1::Subscribe& subscription) {
   subscribe();
 }
 
-std::optional<Upstream::Taken> Upstream::take() {
+std::optional<NewestFrame::Taken> Upstream::take() {
   const std::lock_guard lock(mutex_);
-  return std::exchange(newest_, std::nullopt);
+  return newest_.take();
 }
 
 std::string Upstream::serial() const {
@@ -41,6 +41,7 @@ void Upstream::on_up(const v1::HelloReply& daemon, bool same_machine) {
   {
     const std::lock_guard lock(mutex_);
     serial_ = daemon.serial();
+    newest_.part();
     // Raw values cost least where they need not travel.
     compressed_ = !same_machine && client::lists_feature(daemon, "predict_zstd");
     subscribe();
@@ -69,8 +70,7 @@ void Upstream::on_message(const std::string& bytes) {
   if (!message.has_frame()) return;
   {
     const std::lock_guard lock(mutex_);
-    const std::uint64_t missed = newest_ ? newest_->missed + 1 : 0;
-    newest_ = Taken{std::move(*message.mutable_frame()), missed};
+    newest_.put(std::move(*message.mutable_frame()));
   }
   handlers_.frame();
 }

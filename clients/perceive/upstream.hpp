@@ -7,6 +7,7 @@
 #include <string>
 
 #include "clients/common/link.hpp"
+#include "clients/perceive/newest_frame.hpp"
 
 namespace dtact::perceive {
 
@@ -26,12 +27,8 @@ class Upstream {
   /// What to subscribe to from now on.
   void want(const v1::Subscribe& subscription);
 
-  struct Taken {
-    v1::Frame frame;
-    std::uint64_t missed = 0;  ///< That came after the one before and were replaced.
-  };
   /// The newest frame that was not taken yet.
-  [[nodiscard]] std::optional<Taken> take();
+  [[nodiscard]] std::optional<NewestFrame::Taken> take();
   [[nodiscard]] std::string serial() const;
 
  private:
@@ -44,7 +41,7 @@ class Upstream {
   mutable std::mutex mutex_;  ///< Of all that follows but the link.
   v1::Subscribe wanted_;
   bool compressed_ = false;  ///< Depth, since it travels.
-  std::optional<Taken> newest_;
+  NewestFrame newest_;
   std::string serial_;
   cli::Link link_;  ///< Last: its thread uses the others.
 };

@@ -96,6 +96,24 @@ TEST(FrameMakerOfAnObject, SearchesFindsAndFollowsInEachContact) {
   }
 }
 
+// Another calibration may lay the same pixels elsewhere, and a daemon that was away says nothing of
+// what happened meanwhile.
+TEST(FrameMaker, AnotherCalibrationAndAReleaseBeginAnotherContact) {
+  FrameMaker maker;
+  const Frame seen(bumps(), {}, 5);
+  const auto tracking = [&](std::uint64_t sequence, std::uint64_t calibration) {
+    v1::Frame frame = sent(seen, sequence);
+    frame.set_calibration(calibration);
+    return pose_of(maker, std::move(frame)).tracking();
+  };
+  EXPECT_EQ(tracking(1, 0), ObjectPose::STARTED);
+  EXPECT_EQ(tracking(2, 0), ObjectPose::TRACKED);
+  EXPECT_EQ(tracking(3, 7), ObjectPose::STARTED);
+  EXPECT_EQ(tracking(4, 7), ObjectPose::TRACKED);
+  maker.release();
+  EXPECT_EQ(tracking(5, 7), ObjectPose::STARTED);
+}
+
 TEST(FrameMakerOfAnObject, WhatIsAnotherObjectIsNeverPlaced) {
   FrameMaker maker(model_of(bumps()));
   const Frame ball({{{{0, 0, 3.0}, 4.0}}}, {}, 5);

@@ -1,0 +1,60 @@
+// What is known of frames that nobody took.
+#include "clients/perceive/newest_frame.hpp"
+
+#include <gtest/gtest.h>
+
+namespace dtact::perceive {
+namespace {
+
+v1::Frame frame_of(std::uint64_t sequence, bool touching) {
+  v1::Frame frame;
+  frame.set_sequence(sequence);
+  frame.mutable_contact()->set_touching(touching);
+  return frame;
+}
+
+TEST(NewestFrame, IsTakenOnceAndCountsWhatItReplaced) {
+  NewestFrame newest;
+  EXPECT_FALSE(newest.take().has_value());
+  for (const std::uint64_t sequence : {1U, 2U, 3U}) newest.put(frame_of(sequence, true));
+  const auto taken = newest.take();
+  ASSERT_TRUE(taken.has_value());
+  EXPECT_EQ(taken->frame.sequence(), 3U);
+  EXPECT_EQ(taken->missed, 2U);
+  EXPECT_FALSE(taken->parted) << "it was touched throughout";
+  EXPECT_FALSE(newest.take().has_value());
+}
+
+TEST(NewestFrame, AReleaseThatWasReplacedIsTold) {
+  NewestFrame newest;
+  newest.put(frame_of(1, true));
+  (void)newest.take();
+  newest.put(frame_of(2, false));
+  newest.put(frame_of(3, true));
+  newest.put(frame_of(4, true));
+  EXPECT_TRUE(newest.take()->parted);
+  newest.put(frame_of(5, true));
+  EXPECT_FALSE(newest.take()->parted) << "once";
+}
+
+// In a daemon's other life the same sequence may be another frame.
+TEST(NewestFrame, OfAnotherConnectionItIsAnotherContact) {
+  NewestFrame newest;
+  newest.put(frame_of(1, true));
+  newest.part();
+  EXPECT_FALSE(newest.take().has_value());
+  newest.put(frame_of(1, true));
+  newest.put(frame_of(2, true));
+  EXPECT_TRUE(newest.take()->parted);
+}
+
+// A frame that says nothing of contact, as while the light settles, is no release.
+TEST(NewestFrame, WhatWasNotMeasuredIsNoRelease) {
+  NewestFrame newest;
+  newest.put({});
+  newest.put(frame_of(2, true));
+  EXPECT_FALSE(newest.take()->parted);
+}
+
+}  // namespace
+}  // namespace dtact::perceive
