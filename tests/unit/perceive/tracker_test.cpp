@@ -118,7 +118,7 @@ TEST(Tracker, FollowsThroughChangesOfResolution) {
   Tracker tracker;
   for (unsigned i = 0; i <= 40; ++i) {
     const Motion truth = moved({0.05 * i, 0, 0}, Vector3d::UnitZ(), 0.3 * i);
-    const Frame fine(bumps(), truth, 5, i);
+    const Frame fine({{{{-0.5, -0.4, 1.8}, 2}, {{0.5, 0.3, 2.3}, 2.5}}}, truth, 5, i);
     const int times = std::array{1, 4, 2}.at(i / 5 % 3);
     const CoarseFrame coarse(fine, times);
     const auto& pose = tracker.follow(times == 1 ? fine.view() : coarse.view(), 100 + i);
