@@ -1,8 +1,6 @@
 #include "clients/perceive/pose/object_tracker.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -35,42 +33,6 @@ constexpr double kUpright = 0.1;
 /// What a good alignment has at least, beside kGoodRms.
 constexpr double kOverlap = 0.5;
 constexpr double kArea = 0.1;  // of the contact
-
-/// What a twist's rotation is about, and what makes a length of it.
-struct Frame {
-  Vector3d centre;
-  double arm = 0;
-};
-
-/// The same motion as a twist of another frame.
-Twist seen_from(const Twist& twist, const Frame& from, const Frame& to) {
-  const Vector3d turn = twist.head<3>() / from.arm;
-  Twist seen;
-  seen << to.arm * turn, twist.tail<3>() + turn.cross(to.centre - from.centre);
-  return seen;
-}
-
-/// What both have in common: the principal angles between the two. `a` is orthonormal.
-std::vector<Twist> in_both(const std::vector<Twist>& a, const std::vector<Twist>& b) {
-  if (a.empty() || b.empty()) return {};
-  const auto columns = [](const std::vector<Twist>& twists) {
-    Eigen::MatrixXd matrix(6, twists.size());
-    for (std::size_t i = 0; i < twists.size(); ++i) {
-      matrix.col(static_cast<Eigen::Index>(i)) = twists[i];
-    }
-    return matrix;
-  };
-  const Eigen::MatrixXd all = columns(a);
-  const Eigen::MatrixXd base = Eigen::HouseholderQR<Eigen::MatrixXd>(columns(b)).householderQ() *
-                               Eigen::MatrixXd::Identity(6, static_cast<Eigen::Index>(b.size()));
-  const Eigen::JacobiSVD<Eigen::MatrixXd> angles(all.transpose() * base, Eigen::ComputeThinU);
-  constexpr double kCommon = 0.9;
-  std::vector<Twist> common;
-  for (Eigen::Index k = 0; k < angles.singularValues().size(); ++k) {
-    if (angles.singularValues()[k] > kCommon) common.emplace_back(all * angles.matrixU().col(k));
-  }
-  return common;
-}
 
 /// The surfels that touch where `place` puts the object, those that lie around the view.
 std::vector<Surfel> touching(const ObjectModel& object, const ContactView& view,
@@ -123,44 +85,6 @@ std::optional<Alignment> ObjectTracker::align_object(const ContactView& view,
   if (found.overlap < kOverlap || found.rms > kGoodRms) return std::nullopt;
   if (!is_near(start, found.motion, found.centre)) return std::nullopt;
   return found;
-}
-
-std::vector<Twist> ObjectTracker::unknown(const Alignment& alignment, const Placement& placement) {
-  const Motion& pose = alignment.motion;
-  const Frame here{alignment.centre, alignment.arm};
-  const Frame then{pose * placement.centre, placement.arm};
-  std::vector<Twist> hidden;
-  for (const Twist& one : placement.hidden) {
-    Twist turned;
-    turned << pose.rotation * one.head<3>(), pose.rotation * one.tail<3>();
-    hidden.push_back(seen_from(turned, then, here));
-  }
-  return in_both(alignment.unobservable, hidden);
-}
-
-bool ObjectTracker::forget(const Alignment& alignment, const Alignment& contact,
-                           Placement& placement) {
-  const Frame here{alignment.centre, alignment.arm};
-  std::vector<Twist> of_contact;
-  of_contact.reserve(contact.unobservable.size());
-  for (const Twist& one : contact.unobservable) {
-    of_contact.push_back(seen_from(one, {contact.centre, contact.arm}, here));
-  }
-  const Motion& pose = alignment.motion;
-  const Frame then{pose * placement.centre, placement.arm};
-  bool more = false;
-  for (const Twist& one : in_both(alignment.unobservable, of_contact)) {
-    const Twist there = seen_from(one, here, then);
-    Twist back;
-    back << pose.rotation.transpose() * there.head<3>(),
-        pose.rotation.transpose() * there.tail<3>();
-    for (const Twist& known : placement.hidden) back -= known * known.dot(back);
-    constexpr double kAnother = 0.3;
-    if (back.norm() < kAnother * there.norm()) continue;
-    placement.hidden.push_back(back.normalized());
-    more = true;
-  }
-  return more;
 }
 
 void ObjectTracker::in_vain() {
@@ -239,6 +163,7 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
         pose_.state = State::tracked;
       }
       placement_ = found;
+      hidden_ = {found->hidden, found->centre, found->arm};
       forgot_ = strayed_ = false;
       pause_ = kPause;
       next_pause_ = 0;
@@ -253,8 +178,11 @@ const Tracker::Pose& ObjectTracker::follow(const ContactView& view, std::uint64_
   if (aligned && placement_) {
     place_ = aligned->motion;
     pose_.alignment = *std::move(aligned);
-    forgot_ |= forget(pose_.alignment, contact_.pose().alignment, *placement_);
-    pose_.alignment.unobservable = unknown(pose_.alignment, *placement_);
+    // What neither this frame's alignment with the object nor the contact's motion shows.
+    Alignment& shown = pose_.alignment;
+    const auto of_contact = seen_from(contact_.unseen(), contact_.pose().alignment, shown);
+    forgot_ |= hidden_.add(in_both(shown.unobservable, of_contact), shown);
+    shown.unobservable = in_both(shown.unobservable, hidden_.seen_at(shown));
     pose_.alternatives = placement_->alternatives;
   } else {
     if (placement_ && !was_lost) pause_ = 0;

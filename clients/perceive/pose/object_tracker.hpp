@@ -6,6 +6,7 @@
 #include <optional>
 #include <stop_token>
 
+#include "clients/perceive/pose/hidden.hpp"
 #include "clients/perceive/pose/object_model.hpp"
 #include "clients/perceive/pose/placement_search.hpp"
 #include "clients/perceive/pose/tracker.hpp"
@@ -62,19 +63,14 @@ class ObjectTracker {
   /// Aligned with the object from `start` on; nothing where that does not explain the frame.
   [[nodiscard]] std::optional<Alignment> align_object(const ContactView& view,
                                                       const Motion& start) const;
-  /// What neither the touched shape nor, since the search, anything else has shown; as twists of
-  /// `alignment`.
-  [[nodiscard]] static std::vector<Twist> unknown(const Alignment& alignment,
-                                                  const Placement& placement);
-  /// Adds to what the placement hides what neither this frame's alignment with the object nor the
-  /// contact's motion shows. True where that is more than before.
-  static bool forget(const Alignment& alignment, const Alignment& contact, Placement& placement);
 
   std::shared_ptr<const ObjectModel> object_;
   Tracker contact_;
   std::optional<SearchUnderWay> search_;
   std::optional<Placement> placement_;  ///< Its centre and hidden twists in the object's frame.
-  Motion place_;                        ///< Where the object is, as far as its contact tells.
+  /// What neither the touched shape nor, since the search, anything else has shown.
+  Hidden hidden_;
+  Motion place_;  ///< Where the object is, as far as its contact tells.
   double searched_area_ = 0;
   int pause_ = 0;       ///< Frames until the next search may begin.
   int next_pause_ = 0;  ///< After one in vain; 0: the shortest.

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace dtact::perceive {
 namespace {
@@ -42,6 +43,7 @@ void Tracker::release() {
 Tracker::Keyframe Tracker::keyframe_of(const ContactView& view) const {
   Keyframe key;
   key.motion = pose_.alignment.motion;
+  if (!keyframes_.empty()) key.hidden = keyframes_[current_].hidden;
   key.area = view.area();
   key.centre = view.centre();
   key.surfels = view.choose(kSurfels);
@@ -54,17 +56,28 @@ Tracker::Keyframe Tracker::keyframe_of(const ContactView& view) const {
 }
 
 void Tracker::add_keyframe(const ContactView& view) {
+  Keyframe key = keyframe_of(view);
+  key.hidden.add(pose_.alignment.unobservable, pose_.alignment);
   if (keyframes_.size() == kMostKeyframes) {
     // The one of the object's furthest part; the first stays, which has no error.
     const Eigen::Vector3d here = pose_.alignment.motion.inverse() * view.centre();
-    const auto distance = [&here](const Keyframe& key) {
-      return (key.motion.inverse() * key.centre - here).norm();
+    const auto distance = [&here](const Keyframe& one) {
+      return (one.motion.inverse() * one.centre - here).norm();
     };
     keyframes_.erase(
         std::ranges::max_element(keyframes_.begin() + 1, keyframes_.end(), {}, distance));
   }
-  keyframes_.push_back(keyframe_of(view));
+  keyframes_.push_back(std::move(key));
   current_ = keyframes_.size() - 1;
+}
+
+void Tracker::tell_hidden() {
+  Alignment& shown = pose_.alignment;
+  unseen_ = shown.unobservable;
+  Hidden all;
+  all.add(unseen_, shown);
+  all.add(keyframes_[current_].hidden.seen_at(shown), shown);
+  shown.unobservable = all.seen_at(shown);
 }
 
 std::size_t Tracker::oldest_shared(const ContactView& view, const Motion& from) const {
@@ -133,10 +146,14 @@ const Tracker::Pose& Tracker::follow(const ContactView& view, std::uint64_t sequ
     // With itself: which directions it shows.
     pose_ = {State::started, sequence, align(keyframes_[0].surfels, view, {})};
     pose_.alignment.motion = {};
+    tell_hidden();
     return pose_;
   }
   if (pose_.state == State::lost) {
-    if (view.area() >= kLeastArea && recover(view)) pose_.state = State::recovered;
+    if (view.area() >= kLeastArea && recover(view)) {
+      pose_.state = State::recovered;
+      tell_hidden();
+    }
     return pose_;
   }
   const Motion before = pose_.alignment.motion;
@@ -150,11 +167,12 @@ const Tracker::Pose& Tracker::follow(const ContactView& view, std::uint64_t sequ
   pose_.alignment = found;
   if (view.area() >= kGrown * keyframes_[current_].area) {
     // In its place: the tip of what was just touched lies on all that is touched later, and turns
-    // on it as it likes.
+    // on it as it likes. A contact that is pressed in is not taken to slide meanwhile.
     keyframes_[current_] = keyframe_of(view);
   } else if (found.overlap < kSharedOverlap) {
     add_keyframe(view);
   }
+  tell_hidden();
   return pose_;
 }
 

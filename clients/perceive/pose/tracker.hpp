@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "clients/perceive/pose/alignment.hpp"
+#include "clients/perceive/pose/hidden.hpp"
 
 namespace dtact::perceive {
 
@@ -42,12 +43,17 @@ class Tracker {
   const Pose& follow(const ContactView& view, std::uint64_t sequence);
   /// Nothing touches any more: what comes is another contact.
   void release();
+  /// `unobservable` of its alignment has what was not seen on the way as well.
   [[nodiscard]] const Pose& pose() const noexcept { return pose_; }
+  /// What the last frame alone does not show of the motion since its keyframe; as twists of
+  /// pose().alignment.
+  [[nodiscard]] const std::vector<Twist>& unseen() const noexcept { return unseen_; }
 
  private:
   struct Keyframe {
     std::vector<Surfel> surfels;  ///< As they lay in the first frame.
     Motion motion;
+    Hidden hidden;                                     ///< Along which `motion` is not known.
     double area = 0;                                   ///< Of the contact then, square metres.
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Of the contact then, surface frame.
   };
@@ -55,6 +61,8 @@ class Tracker {
   /// What is seen now, laid back by the present motion.
   [[nodiscard]] Keyframe keyframe_of(const ContactView& view) const;
   void add_keyframe(const ContactView& view);
+  /// What its keyframe does not know of its own motion is not known of this frame's either.
+  void tell_hidden();
   /// The oldest keyframe of which most is in view, since errors have added up least until then;
   /// where there is none, the one of which most is.
   [[nodiscard]] std::size_t oldest_shared(const ContactView& view, const Motion& from) const;
@@ -65,6 +73,7 @@ class Tracker {
   std::size_t current_ = 0;
   int attempt_ = 0;
   Pose pose_;
+  std::vector<Twist> unseen_;
 };
 
 }  // namespace dtact::perceive

@@ -141,6 +141,26 @@ TEST(Tracker, FollowsASmallTipAtAQuarterOfTheResolution) {
   }
 }
 
+// A plate over all of the map, of which no edge is seen, is pushed to the right until its left edge
+// is in view: how far it went before is not known however well the edge is followed later.
+TEST(Tracker, WhatWasNotSeenOnTheWayStaysTold) {
+  Tracker tracker;
+  for (unsigned i = 0; i <= 60; ++i) {
+    const double edge_mm = -5.5 + 0.1 * i;
+    const Frame frame(
+        [&](const SurfacePoint& at) {
+          const double beside = edge_mm - 1e3 * at.point[0];
+          return 0.4 * (beside > 0 ? std::exp(-beside / 0.15) : 1);
+        },
+        2, i);
+    const auto& pose = tracker.follow(frame.view(), 100 + i);
+    ASSERT_EQ(pose.state, i == 0 ? State::started : State::tracked) << i;
+    double along_x = 0;
+    for (const Twist& one : pose.alignment.unobservable) along_x += one[3] * one[3];
+    EXPECT_GT(along_x, 0.8) << i;
+  }
+}
+
 // In the first frames the contact is half a millimetre wide and the noise an eighth of its depth.
 // The seeds are those of 200 whose ball turned by more than half a degree where a direction was
 // taken for seen too easily, and one more.
