@@ -87,7 +87,7 @@ ChosenPressGain press_gain_of(const SettledPress& press) {
 /// Chooses the press's own gain and, where it may, the model's; `settled` becomes the press under
 /// it.
 PressChoices choose(const BallPress& press, recon::Model& model, SettledPress& settled) {
-  PressChoices chosen{press_gain_of(settled), {}};
+  PressChoices chosen{press_gain_of(settled), {}, {}};
   const recon::SpatialGain& given = press.gain;
   if (!press.may_share_light || given.shape != recon::GainShape::none ||
       !given.polynomial.empty()) {
@@ -95,8 +95,19 @@ PressChoices choose(const BallPress& press, recon::Model& model, SettledPress& s
   }
   recon::Model shared = model;
   shared.gain.shape = recon::GainShape::uniform;
-  SettledPress under =
-      settle(shared, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
+  SettledPress under;
+  try {
+    under = settle(shared, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
+  } catch (const std::runtime_error& e) {
+    chosen.share_refused = e.what();
+    return chosen;
+  }
+  if (!same_place(settled.contact, under.contact, press.mm_per_px)) {
+    chosen.share_refused =
+        fmt::format("the most of its light is lost at column {:.0f}, row {:.0f} of the depth map",
+                    under.contact.col, under.contact.row);
+    return chosen;
+  }
   const ChosenPressGain gain = press_gain_of(under);
   chosen.light = {false, lean_of(settled), lean_of(under)};
   if (!(chosen.light->plain_per_mm > kLeans &&
@@ -196,7 +207,17 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
   return press;
 }
 
+bool same_place(const Contact& a, const Contact& b, double mm_per_px) noexcept {
+  return std::hypot(a.col - b.col, a.row - b.row) * mm_per_px < 0.5 * a.radius_mm;
+}
+
 std::string PressChoices::describe() const {
+  if (!share_refused.empty()) {
+    return fmt::format(
+        "light: as it is, since as a share of the light the press is not found ({}); where a part "
+        "of the map is dark, --crop leaves it out\n{}",
+        share_refused, press_gain.describe());
+  }
   if (!light) return press_gain.describe();
   return fmt::format(
       "light: the press leans by {:.1f} % a mm, by {:.1f} with darkening as a share of the light: "

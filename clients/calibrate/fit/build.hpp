@@ -27,6 +27,10 @@ struct SettledPress {
                                   std::span<const std::uint16_t> reference_q8,
                                   std::span<const image::Grey8> frames, double ball_radius_mm);
 
+/// Whether two contacts in one map are the same one: their centres less than half of the first's
+/// radius apart. Under another gain something dark may darken by more than the ball.
+[[nodiscard]] bool same_place(const Contact& a, const Contact& b, double mm_per_px) noexcept;
+
 /// The depth map's place in the frame.
 struct Crop {
   int col = 0;
@@ -62,7 +66,9 @@ struct PressChoices {
     double plain_per_mm = 0;
     double shared_per_mm = 0;
   };
-  std::optional<Light> light;  ///< None: not asked.
+  std::optional<Light> light;  ///< None: not asked, or not to be told.
+  /// Why the press, which is seen as it is, cannot be read as a share of the light; empty: it can.
+  std::string share_refused;
 
   /// In a sentence or two.
   [[nodiscard]] std::string describe() const;
@@ -100,7 +106,8 @@ inline constexpr double kSmoothingMm = 0.1;
 /// The share of the light is taken where the press leans by more than 0.4 % a millimetre, half of
 /// that at most under the share, and sectors that are left out lose nothing by it. A light that
 /// falls to one side and a layer that is thicker there look alike in one press, but the light shows
-/// in the reference, too, and is right far from the press as well.
+/// in the reference, too, and is right far from the press as well. A press that is lost under the
+/// share, to a dark part of the map whose few grey levels are a great share, is read as it is.
 ///
 /// Throws std::runtime_error saying what is wrong with the images and what to do,
 /// std::invalid_argument when sizes or numbers cannot be.

@@ -113,7 +113,7 @@ Contact find_contact(const DifferenceMap& map, double ball_radius_mm) {
     }
   }
   if (!(peak >= kLeastPeak)) {
-    throw std::runtime_error(fmt::format(
+    throw NoContact(fmt::format(
         "no contact found: nowhere is the frame darker than the reference by {} grey levels (the "
         "most is {:.1f}); press deeper, and check that reference and frame are not exchanged",
         kLeastPeak, peak));

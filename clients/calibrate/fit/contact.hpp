@@ -1,5 +1,6 @@
 #pragma once
 
+#include <stdexcept>
 #include <vector>
 
 #include "clients/calibrate/fit/difference.hpp"
@@ -38,11 +39,17 @@ inline constexpr double kFarField = 2.25;
 [[nodiscard]] RadialProfile radial_profile(const DifferenceMap& map, const Contact& contact,
                                            double reach_mm);
 
+/// Nothing is dark enough to be a contact.
+class NoContact : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// Finds a ball's contact. The centre is the centroid of the darkening over the connected patch
 /// darker than 0.3 of the peak, weighted with the darkening; the radius is where the mean darkening
 /// about it falls to 3 grey levels, at most 0.85 of the ball's radius (further out the sphere is so
-/// steep that a pixel spans 0.1 mm of depth). Throws std::runtime_error saying what to do when
-/// nothing touches (less than 8 grey levels), or the contact leaves the map.
+/// steep that a pixel spans 0.1 mm of depth). Throws saying what to do: NoContact when nothing
+/// touches (less than 8 grey levels), std::runtime_error when the contact leaves the map.
 [[nodiscard]] Contact find_contact(const DifferenceMap& map, double ball_radius_mm);
 
 /// How much darker the untouched surroundings became between reference and frame, grey levels: the

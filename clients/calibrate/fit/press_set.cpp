@@ -50,6 +50,28 @@ std::vector<SettledPress> settle_all(const recon::Model& model, BallPresses& set
   return presses;
 }
 
+/// A press that is not too faint as a share of the light and yet lost or found elsewhere: its name
+/// and why; empty: none. What is dark has grey levels that are a great share of its light.
+std::string lost_to_the_share(const recon::Model& uniform, const BallPresses& set,
+                              const std::vector<SettledPress>& seen) {
+  for (std::size_t p = 0; p < seen.size(); ++p) {
+    const BallPresses::Press& press = set.presses[p];
+    try {
+      const Contact lit =
+          settle(uniform, set.reference_q8.pixels, press.frames, set.ball_radius_mm).contact;
+      if (same_place(seen[p].contact, lit, set.mm_per_px)) continue;
+      return fmt::format(
+          "{}: the most of its light is lost at column {:.0f}, row {:.0f} of the depth map",
+          press.name, lit.col, lit.row);
+    } catch (const NoContact&) {
+      continue;
+    } catch (const std::runtime_error& e) {
+      return fmt::format("{}: {}", press.name, e.what());
+    }
+  }
+  return {};
+}
+
 /// One gain, and how the presses meet each other under it.
 struct Trial {
   const std::vector<SettledPress>* presses = nullptr;
@@ -243,16 +265,24 @@ Calibration build(const BallPresses& presses, PressReport* report) {
   uniform.gain.shape = recon::GainShape::uniform;
 
   PressReport found;
-  // With one gain a faint press may be seen and with the other not: both get what both see.
-  (void)settle_all(plain, set, found.left_out);
-  const std::vector<SettledPress> lit = settle_all(uniform, set, found.left_out);
-  const std::vector<SettledPress> seen = settle_all(plain, set, found.left_out);
+  std::vector<SettledPress> seen = settle_all(plain, set, found.left_out);
+  std::vector<SettledPress> lit;
+  if (const std::string lost = lost_to_the_share(uniform, set, seen); !lost.empty()) {
+    found.note = fmt::format(
+        "light: as it is, since as a share of the light a press is not found ({}); where a part of "
+        "the map is dark, --crop leaves it out",
+        lost);
+  } else {
+    // With one gain a faint press may be seen and with the other not: both get what both see.
+    lit = settle_all(uniform, set, found.left_out);
+    seen = settle_all(plain, set, found.left_out);
+  }
   std::vector<Trial> trials;
   for (const int terms : {0, 2, 5}) {
     // As many presses as the gain has factors say nothing of how it predicts another.
     if (terms > 0 && static_cast<int>(seen.size()) < terms + 3) break;
     trials.push_back(try_gain(seen, set, recon::GainShape::none, terms));
-    trials.push_back(try_gain(lit, set, recon::GainShape::uniform, terms));
+    if (!lit.empty()) trials.push_back(try_gain(lit, set, recon::GainShape::uniform, terms));
   }
   std::erase_if(trials, [](const Trial& trial) { return !reaches_corners(trial); });
   for (const Trial& trial : trials) found.gains.push_back({.name = name_of(trial)});

@@ -31,7 +31,9 @@ struct PressReport {
   };
   std::vector<Depth> presses;         ///< Those that were used.
   std::vector<std::string> left_out;  ///< The others: name and reason.
-  std::string note;  ///< What the list of one press chose (PressChoices); else empty.
+  /// What the list of one press chose (PressChoices), or why several did not try the share of the
+  /// light; else empty.
+  std::string note;
   /// A gain that was tried: how far each press is from the known sphere under the list of all
   /// others (meet()), the mean over the presses.
   struct Gain {
@@ -49,7 +51,8 @@ struct PressReport {
 /// How darkening differs from place to place is told by the gain, as simple as the presses allow:
 /// none, a share of the light at its place, either with a plane, either with a quadratic. Each is
 /// judged by how well it predicts presses that list and gain were made without (leave_each_out());
-/// taken is the simplest within one standard error of the best.
+/// taken is the simplest within one standard error of the best. The share is not tried where it
+/// finds a press elsewhere than it is.
 ///
 /// What the list says of its own uncertainty is that error of the chosen one, how much the list
 /// moves with the presses that make it, 5 % of the depth for objects of another shape, and what the

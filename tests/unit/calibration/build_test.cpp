@@ -145,6 +145,22 @@ TEST(Build, ALightThatFallsToOneSideIsSeenInOnePress) {
   EXPECT_THAT(choices.describe(), HasSubstr("as a share of the light: as it is"));
 }
 
+// In the corner what is taken for a contact leaves the map; beside the ball it does not.
+TEST(Build, ADarkPartOfTheMapDoesNotCostThePress) {
+  for (const int from : {0, 20}) {
+    BallPress press = press_of(Ball{});
+    press.may_share_light = true;
+    tilt(press.reference_q8, press.frames[0]);
+    darken(press.reference_q8, press.frames[0], from, from, 24);
+    PressChoices choices;
+    const Calibration made = build(press, &choices);
+    EXPECT_EQ(made.model->gain.shape, recon::GainShape::none) << from;
+    EXPECT_THAT(choices.describe(), HasSubstr("--crop leaves it out")) << from;
+    EXPECT_NEAR(read_ball(made, press.reference_q8.pixels, press.frames, 4).contact.col, 120.25, 1)
+        << from;
+  }
+}
+
 TEST(Build, ThePublishedMethodHasNoHalves) {
   BallPress press = press_of(Ball{});
   press.method = recon::Method::published;

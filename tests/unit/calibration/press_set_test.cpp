@@ -282,6 +282,19 @@ TEST(BuildFromPresses, APressThatOneGainCannotSeeIsLeftOut) {
   EXPECT_NEAR(report.presses[1].depth_mm, 0.7, 0.03);
 }
 
+TEST(BuildFromPresses, ADarkPartOfTheMapCostsNoPress) {
+  BallPresses set = set_of({Ball{.depth_mm = 0.5}, Ball{.depth_mm = 0.75},
+                            Ball{.col = 130, .row = 125, .depth_mm = 1.0}, Ball{.depth_mm = 1.5}});
+  for (auto& press : set.presses) darken(set.reference_q8, press.frames[0], 0, 0, 24);
+  PressReport report;
+  const Calibration made = build(set, &report);
+  EXPECT_THAT(report.left_out, testing::IsEmpty());
+  ASSERT_EQ(report.presses.size(), 4U);
+  EXPECT_NEAR(report.presses[2].depth_mm, 1.0, 0.015);
+  EXPECT_EQ(made.model->gain.shape, recon::GainShape::none);
+  EXPECT_THAT(report.note, AllOf(HasSubstr("press 1: the contact"), HasSubstr("--crop")));
+}
+
 // Presses that differ by a tenth either way make a list that is sure to a tenth over the root of
 // their number.
 TEST(BuildFromPresses, StatesHowFarThePressesThatMadeTheListDiffer) {

@@ -113,7 +113,7 @@ Calibration chained_at(const FittedCalibration& fitted, const BallPresses& set,
   });
   Calibration made = build(at_depths, &report);
   report.left_out.insert(report.left_out.begin(), fitted.left_out.begin(), fitted.left_out.end());
-  report.note = "list: what the presses show, at the depths of a layer" + left_by(fitted);
+  add_line(report.note, "list: what the presses show, at the depths of a layer" + left_by(fitted));
   made.layer = fitted.calibration.layer;
   return made;
 }

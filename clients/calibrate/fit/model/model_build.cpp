@@ -79,6 +79,17 @@ Seen look(const recon::Model& model, const BallPresses& set) {
   return seen;
 }
 
+/// A press is found at two places: something dark is taken for the ball.
+bool disagree(const Seen& seen, const Seen& shares, double mm_per_px) {
+  for (std::size_t i = 0; i < seen.names.size(); ++i) {
+    const auto same = std::ranges::find(shares.names, seen.names[i]);
+    if (same == shares.names.end()) continue;
+    const auto at = static_cast<std::size_t>(same - shares.names.begin());
+    if (!same_place(seen.presses[i].contact, shares.presses[at].contact, mm_per_px)) return true;
+  }
+  return false;
+}
+
 void refuse(const FittedCalibration& made) {
   const double residual = made.fit.residual * made.light_levels;
   if (residual > kMostResidual) {
@@ -151,6 +162,7 @@ FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& 
     uniform.gain.shape = recon::GainShape::uniform;
     Seen shares = look(uniform, set);
     if (shares.presses.size() >= seen.presses.size() && !shares.presses.empty() &&
+        !disagree(seen, shares, set.mm_per_px) &&
         (seen.presses.empty() || lopsided(seen.presses) > kRounder * lopsided(shares.presses))) {
       model->gain = uniform.gain;
       seen = std::move(shares);
