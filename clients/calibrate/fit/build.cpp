@@ -87,7 +87,7 @@ ChosenPressGain press_gain_of(const SettledPress& press) {
 /// Chooses the press's own gain and, where it may, the model's; `settled` becomes the press under
 /// it.
 PressChoices choose(const BallPress& press, recon::Model& model, SettledPress& settled) {
-  PressChoices chosen{press_gain_of(settled), {}, {}};
+  PressChoices chosen{press_gain_of(settled), {}, {}, press.depth_mm};
   const recon::SpatialGain& given = press.gain;
   if (!press.may_share_light || given.shape != recon::GainShape::none ||
       !given.polynomial.empty()) {
@@ -212,18 +212,22 @@ bool same_place(const Contact& a, const Contact& b, double mm_per_px) noexcept {
 }
 
 std::string PressChoices::describe() const {
+  std::string text;
   if (!share_refused.empty()) {
-    return fmt::format(
+    text = fmt::format(
         "light: as it is, since as a share of the light the press is not found ({}); where a part "
-        "of the map is dark, --crop leaves it out\n{}",
-        share_refused, press_gain.describe());
+        "of the map is dark, --crop leaves it out\n",
+        share_refused);
+  } else if (light) {
+    text = fmt::format(
+        "light: the press leans by {:.1f} % a mm, by {:.1f} with darkening as a share of the "
+        "light: {}\n",
+        100 * light->plain_per_mm, 100 * light->shared_per_mm,
+        light->shared ? "the share is used" : "as it is");
   }
-  if (!light) return press_gain.describe();
-  return fmt::format(
-      "light: the press leans by {:.1f} % a mm, by {:.1f} with darkening as a share of the light: "
-      "{}\n{}",
-      100 * light->plain_per_mm, 100 * light->shared_per_mm,
-      light->shared ? "the share is used" : "as it is", press_gain.describe());
+  text += press_gain.describe();
+  if (depth_mm) text += fmt::format("\nlist: at the measured depth of {:g} mm", *depth_mm);
+  return text;
 }
 
 Calibration build(const BallPress& press, PressChoices* choices) {
@@ -245,12 +249,13 @@ Calibration build(const BallPress& press, PressChoices* choices) {
   if (press.method == recon::Method::list) {
     const PressChoices chosen = choose(press, *model, settled);
     const LevelledPress level = levelled(settled.map, settled.contact, chosen.press_gain.gain);
-    model->list = fit_list(level.map, level.contact);
+    model->list = fit_list(level.map, level.contact, {}, press.depth_mm);
     if (choices != nullptr) *choices = chosen;
+    model->uncertainty = uncertainty_by_zero(model->list, std::span(&settled, 1), press.depth_mm);
   } else {
     model->list = fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
+    model->uncertainty = uncertainty_by_zero(model->list, std::span(&settled, 1));
   }
-  model->uncertainty = uncertainty_by_zero(model->list, std::span(&settled, 1));
   calibration.model = std::move(model);
   return calibration;
 }

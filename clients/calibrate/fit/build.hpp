@@ -54,6 +54,8 @@ struct BallPress {
   recon::Method method = recon::Method::list;
   /// Where `gain` says nothing, the press may: whether darkening is a share of the light.
   bool may_share_light = false;
+  /// Of the ball's lowest point, where it was measured. The published method has no use for it.
+  std::optional<double> depth_mm = {};
 };
 
 /// What one press chose, and why.
@@ -69,6 +71,7 @@ struct PressChoices {
   std::optional<Light> light;  ///< None: not asked, or not to be told.
   /// Why the press, which is seen as it is, cannot be read as a share of the light; empty: it can.
   std::string share_refused;
+  std::optional<double> depth_mm;  ///< BallPress::depth_mm.
 
   /// In a sentence or two.
   [[nodiscard]] std::string describe() const;
@@ -101,7 +104,8 @@ inline constexpr double kSmoothingMm = 0.1;
 
 /// Builds a calibration from images alone, with what it is worth (uncertainty_by_zero()). `origin`
 /// is left for the caller to fill. The list is fitted to the press without its own gain
-/// (choose_press_gain()); `choices` says what was chosen.
+/// (choose_press_gain()), and put to zero by its measured depth where there is one; `choices` says
+/// what was chosen.
 ///
 /// The share of the light is taken where the press leans by more than 0.4 % a millimetre, half of
 /// that at most under the share, and sectors that are left out lose nothing by it. A light that

@@ -103,12 +103,14 @@ SagLine fit_sag_line(const DifferenceMap& map, const Contact& contact, const Pix
   return fit_line(sag_by_level(map, contact, use, kSureOfContact * contact.radius_mm, 1));
 }
 
-recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
-                          const PixelFilter& use) {
+recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact, const PixelFilter& use,
+                          std::optional<double> depth_mm) {
   const double sure_mm = kSureOfContact * contact.radius_mm;
   const SagLine line = fit_sag_line(map, contact, use);
   std::vector<Knot> knots = sag_by_level(map, contact, use, contact.radius_mm, kBinsPerLevel);
-  for (Knot& knot : knots) knot.depth_mm = line.depth_mm - knot.depth_mm;
+  for (Knot& knot : knots) {
+    knot.depth_mm = depth_mm.value_or(line.depth_mm) - knot.depth_mm;
+  }
   make_monotone(knots);
 
   const RadialProfile profile = radial_profile(map, contact, kFarField * contact.ball_radius_mm);

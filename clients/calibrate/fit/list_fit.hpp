@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 
 #include "clients/calibrate/fit/contact.hpp"
 #include "daemon/recon/list.hpp"
@@ -42,8 +43,11 @@ struct SagLine {
 ///    part's edge down to zero the fit hands over to the straight line to the origin.
 /// 4. make_list() adds what lies beyond and the bulge, along the line of 1.
 ///
+/// `depth_mm`: of the ball's lowest point, where it was measured; then it is g.
+///
 /// Throws std::runtime_error when the image doesn't darken from the contact's edge to its centre.
 [[nodiscard]] recon::DepthList fit_list(const DifferenceMap& map, const Contact& contact,
-                                        const PixelFilter& use = {});
+                                        const PixelFilter& use = {},
+                                        std::optional<double> depth_mm = {});
 
 }  // namespace dtact::calibration

@@ -36,7 +36,8 @@ double ring_doubt_mm(const SettledPress& press, double slope) {
 }
 
 std::vector<recon::Model::Uncertainty> uncertainty_by_zero(const recon::DepthList& list,
-                                                           std::span<const SettledPress> presses) {
+                                                           std::span<const SettledPress> presses,
+                                                           std::optional<double> depth_mm) {
   struct Bin {
     double depth = 0;
     double error = 0;
@@ -47,7 +48,9 @@ std::vector<recon::Model::Uncertainty> uncertainty_by_zero(const recon::DepthLis
   for (const SettledPress& press : presses) {
     const std::optional<SagLine> line = line_of(press);
     if (!line) continue;
-    const double zero = std::hypot(kZeroLevels * line->slope, ring_doubt_mm(press, line->slope));
+    const double ring_mm = depth_mm ? 0 : ring_doubt_mm(press, line->slope);
+    const double zero = std::hypot(kZeroLevels * line->slope, ring_mm);
+    const double deepest_mm = depth_mm.value_or(line->depth_mm);
     const double ball = press.contact.ball_radius_mm;
     for (int y = 0; y < press.map.height; ++y) {
       for (int x = 0; x < press.map.width; ++x) {
@@ -58,7 +61,7 @@ std::vector<recon::Model::Uncertainty> uncertainty_by_zero(const recon::DepthLis
         const auto at = static_cast<std::size_t>(std::max(0.0, read) / kDepthBinMm);
         if (at >= bins.size()) bins.resize(at + 1);
         bins[at].depth += read;
-        bins[at].error += std::abs(read - (line->depth_mm - sag_mm(ball, r)));
+        bins[at].error += std::abs(read - (deepest_mm - sag_mm(ball, r)));
         bins[at].zero += zero;
         bins[at].pixels += 1;
       }
@@ -67,9 +70,9 @@ std::vector<recon::Model::Uncertainty> uncertainty_by_zero(const recon::DepthLis
   std::vector<recon::Model::Uncertainty> rows;
   for (const Bin& bin : bins) {
     if (bin.pixels == 0) continue;
-    const double depth_mm = std::max(0.0, bin.depth / bin.pixels);
+    const double read_mm = std::max(0.0, bin.depth / bin.pixels);
     const double error_mm = std::hypot(bin.error, bin.zero) / bin.pixels;
-    rows.push_back({std::round(1000 * depth_mm) / 1000, std::round(10000 * error_mm) / 10});
+    rows.push_back({std::round(1000 * read_mm) / 1000, std::round(10000 * error_mm) / 10});
   }
   return rows;
 }

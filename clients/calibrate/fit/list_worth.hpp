@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -25,9 +26,13 @@ inline constexpr double kDepthBinMm = 0.2;
 ///   shallow by -0.16 to 0.57 of the ring's level, half of them by 0.08 to 0.28; with 0.15 the mean
 ///   of true over stated is 1.01. On 27 presses of nine other sensors it is 0.71.
 ///
+/// `depth_mm`: of the lowest point of the one press, where it was measured. Then the sphere is
+/// where that puts it, and what the zero is uncertain by is the grey level alone.
+///
 /// Rows of kDepthBinMm. Empty when no press says anything.
 [[nodiscard]] std::vector<recon::Model::Uncertainty> uncertainty_by_zero(
-    const recon::DepthList& list, std::span<const SettledPress> presses);
+    const recon::DepthList& list, std::span<const SettledPress> presses,
+    std::optional<double> depth_mm = {});
 
 /// The ring's part of the second alone, millimetres: what its scattered light may make of the
 /// press's zero on a list of so many millimetres a grey level.

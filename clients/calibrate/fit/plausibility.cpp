@@ -39,8 +39,9 @@ std::vector<std::string> doubts_about(const Evaluation& press) {
     doubts.push_back(fmt::format(
         "list and sphere disagree by {:.2f} mm where healthy presses do by less than {}: check the "
         "scale (--mm-per-px, --lens), the ball's radius (--radius-mm), the place of the map "
-        "(--centre, --crop), that the light did not change since the reference, and that the press "
-        "is no deeper than half of the ball's radius",
+        "(--centre, --crop), the press's depth where one was measured, that the light did not "
+        "change since the reference, and that the press is no deeper than half of the ball's "
+        "radius",
         press.offset_mm, kMostOffsetMm));
   }
   if (press.mae_mm > std::max(kLeastShapeMm, kMostShape * sphere_mm)) {

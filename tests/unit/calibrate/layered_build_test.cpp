@@ -39,6 +39,23 @@ BallPresses press_in_fallen_light(const ImaginedView& view, double levels_per_mm
   return set;
 }
 
+/// What a calibration reads of the press's middle, the mean over a quarter of a millimetre.
+double deepest_mm(const Calibration& made, const BallPresses& set) {
+  const ImaginedView view;
+  const std::vector<float> um =
+      mean_depth_um(*made.model, set.reference_q8.pixels, set.presses[0].frames);
+  double sum = 0;
+  int count = 0;
+  for (int y = 0; y < view.height; ++y) {
+    for (int x = 0; x < view.width; ++x) {
+      if (std::hypot(x - view.col, y - view.row) > 4) continue;
+      sum += um[static_cast<std::size_t>(y * view.width + x)];
+      ++count;
+    }
+  }
+  return 0.001 * sum / count;
+}
+
 // One frame's rounding is more than noise for the fit, so this is no layer that explains all.
 TEST(LayeredBuild, TiesTheListToALayerThatIsTheSameInAllParts) {
   const BallPresses set = press_of({});
@@ -62,12 +79,18 @@ TEST(LayeredBuild, BelievesNoDepthThatChangesWithThePartLookedAt) {
 
 TEST(LayeredBuild, MeasuredDepthsNeedNoLayer) {
   BallPresses set = press_of({});
-  set.presses[0].depth_mm = ImaginedView{}.contact().depth_mm;
+  const double depth_mm = ImaginedView{}.contact().depth_mm;
+  set.presses[0].depth_mm = depth_mm;
   PressReport report;
   const Calibration made = build_layered(set, {}, report);
   PressReport ignored;
   EXPECT_EQ(made.model->list.um, build_alone(set, {}, ignored).model->list.um);
   EXPECT_FALSE(made.layer);
+  EXPECT_THAT(report.note, HasSubstr("list: at the measured depth of"));
+  EXPECT_NEAR(deepest_mm(made, set), depth_mm, 0.01);
+  // A gauge that reads 0.05 mm more moves the list by as much.
+  set.presses[0].depth_mm = depth_mm + 0.05;
+  EXPECT_NEAR(deepest_mm(build_layered(set, {}, ignored), set), depth_mm + 0.05, 0.01);
 }
 
 }  // namespace

@@ -69,6 +69,16 @@ TEST(FitList, PartOfThePixelsWillDo) {
   EXPECT_NEAR(um_at(list, 30), 1000, 8);
 }
 
+// The darkening's straight line ends at 1.5 mm; a gauge read 1.6.
+TEST(FitList, AMeasuredDepthSaysWhereZeroIs) {
+  const DifferenceMap map = Ball{}.map();
+  const recon::DepthList list = fit_list(map, find_contact(map, 4), {}, 1.6);
+  EXPECT_EQ(um_at(list, 0), 0);
+  for (const double level : {20.0, 30.0, 44.0}) {
+    EXPECT_NEAR(um_at(list, level), 100 + level / 30 * 1000, 8) << level;
+  }
+}
+
 TEST(FitList, SaysWhenTheImageIsNoBall) {
   DifferenceMap map = Ball{}.map();
   for (float& level : map.levels) level = level > 3 ? 20.0F : 0.0F;

@@ -51,6 +51,16 @@ TEST(UncertaintyByZero, CountsHowFarTheListIsFromTheSphere) {
   }
 }
 
+// The sphere is where the gauge has it, and the ring has no part in that.
+TEST(UncertaintyByZero, OfAMeasuredDepthIsAGreyLevel) {
+  const std::vector<SettledPress> presses{settled(Ball{.depth_mm = 1.2})};
+  for (const auto& row : uncertainty_by_zero(line(), presses, 1.2)) {
+    EXPECT_NEAR(row.error_um, 33.3, 2) << row.depth_mm;
+  }
+  // The root of 33.3^2 + 100^2.
+  EXPECT_NEAR(uncertainty_by_zero(line(), presses, 1.3)[3].error_um, 105.4, 2);
+}
+
 TEST(UncertaintyByZero, SaysNothingWithoutAPress) {
   EXPECT_TRUE(uncertainty_by_zero(line(), {}).empty());
 }

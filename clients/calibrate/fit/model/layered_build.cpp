@@ -29,7 +29,8 @@ BallPress only_press(const BallPresses& set, const recon::SpatialGain& gain) {
           .crop = set.crop,
           .gain = gain,
           // A lens file says what its pins ask for.
-          .may_share_light = !set.lens};
+          .may_share_light = !set.lens,
+          .depth_mm = set.presses.front().depth_mm};
 }
 
 /// A press as a calibration sees it, without the gain that is the press's own.

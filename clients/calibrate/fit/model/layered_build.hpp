@@ -5,8 +5,9 @@
 
 namespace dtact::calibration {
 
-/// The calibration of one press or several from the known sphere alone: build(). `gain`, a lens
-/// file's, counts for one press; several tell their own. Throws as build().
+/// The calibration of one press or several from the known sphere alone, at their measured depths
+/// where there are any: build(). `gain`, a lens file's, counts for one press; several tell their
+/// own. Throws as build().
 [[nodiscard]] Calibration build_alone(const BallPresses& set, const recon::SpatialGain& gain,
                                       PressReport& report);
 
