@@ -22,7 +22,8 @@ struct ForceModel {
   double per_mm3 = 0;
   double per_mm2 = 0;
   double per_mm5 = 0;
-  double threshold_mm = 0;  ///< V and A are those of what is pressed deeper than this.
+  double threshold_mm = 0;  ///< V and A are those of what is pressed deeper than this, …
+  int sharpen_steps = 0;    ///< … in a map of levels sharpened by so many steps.
   double error_n = 0;       ///< Mean absolute error of readings that were left out of the fit.
   /// How fast the error grows away from the readings: with x = (V, A, V A) it is error_n ·
   /// √(1 + xᵀ S x). The upper triangle of S, row by row.

@@ -15,6 +15,7 @@
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
 #include "daemon/calibration/calibration.hpp"
+#include "daemon/recon/scattering.hpp"
 
 namespace dtact::force {
 namespace {
@@ -27,6 +28,7 @@ struct Options {
   std::vector<std::string> pairs;
   std::string csv;
   double threshold_mm = 0.1;
+  int sharpen_steps = 0;
   bool grams = false;
   std::string output;
 };
@@ -45,7 +47,7 @@ std::vector<Pair> measured(const Options& options, const calibration::Calibratio
       throw std::runtime_error("--reference has not the size of the calibration's frame");
     }
   }
-  const ContactReader reader(calibration, reference, options.threshold_mm);
+  const ContactReader reader(calibration, reference, options.threshold_mm, options.sharpen_steps);
   std::vector<Pair> pairs;
   for (const Reading& reading : readings) {
     pairs.push_back(reader.measure(reading.frames));
@@ -89,7 +91,7 @@ void report(const Fit& fit, const std::vector<Pair>& pairs, const std::string& o
 void run(const Options& options, cli::Context& context) {
   calibration::Calibration calibration = calibration::load(options.calibration);
   const std::vector<Pair> pairs = measured(options, calibration);
-  const Fit fit = fit_force(pairs, options.threshold_mm);
+  const Fit fit = fit_force(pairs, options.threshold_mm, options.sharpen_steps);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   model->force = fit.model;
   calibration.model = std::move(model);
@@ -133,6 +135,14 @@ void add_force(CLI::App& app, cli::Context& context) {
                    "configuration")
       ->capture_default_str()
       ->check(CLI::Range(0.01, 2.0));
+  force
+      ->add_option("--sharpen", options->sharpen_steps,
+                   "Steps of sharpening of the maps that the force is for, 0 to 2: "
+                   "reconstruction.sharpen of the daemon's configuration; maps of other steps get "
+                   "no force")
+      ->capture_default_str()
+      ->type_name("STEPS")
+      ->check(CLI::Range(0, recon::kMostSharpeningSteps));
   force
       ->add_option("-o,--output", options->output,
                    "Calibration folder to write; left out: the same one")

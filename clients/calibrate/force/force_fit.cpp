@@ -94,7 +94,7 @@ void check(const std::vector<Pair>& pairs) {
 
 }  // namespace
 
-Fit fit_force(const std::vector<Pair>& pairs, double threshold_mm) {
+Fit fit_force(const std::vector<Pair>& pairs, double threshold_mm, int sharpen_steps) {
   check(pairs);
   const auto n = static_cast<double>(pairs.size());
   cv::Vec3d squares;
@@ -143,6 +143,7 @@ Fit fit_force(const std::vector<Pair>& pairs, double threshold_mm) {
     best = std::move(fit);
   }
   best.model.threshold_mm = threshold_mm;
+  best.model.sharpen_steps = sharpen_steps;
   best.model.pairs = static_cast<int>(pairs.size());
   const auto [least, most] = std::ranges::minmax(pairs, {}, &Pair::newtons);
   best.model.from_n = least.newtons;

@@ -26,11 +26,13 @@ struct Fit {
 
 /// Ridge regression of the reading on V, A and V A without a constant, each scaled to a root mean
 /// square of 1. Of weights 1e-8 … 1 the one whose mean absolute leave-one-out error is smallest.
-/// `threshold_mm`: of volume and area. Throws std::invalid_argument with a sentence that says what
-/// to do when there are fewer than kLeastPairs, one has no contact or no positive reading, the
-/// readings do not grow with the volume (Spearman's rank correlation below 0.8), or their ratio is
-/// none that silicones have: 0.02 … 5 N per mm³ as the layers of the public study (0.07 … 0.3)
-/// with room on both sides; readings in grams are 102 times as large, in kilograms as small.
-[[nodiscard]] Fit fit_force(const std::vector<Pair>& pairs, double threshold_mm);
+/// `threshold_mm`, `sharpen_steps`: of volume and area. Throws std::invalid_argument with a
+/// sentence that says what to do when there are fewer than kLeastPairs, one has no contact or no
+/// positive reading, the readings do not grow with the volume (Spearman's rank correlation below
+/// 0.8), or their ratio is none that silicones have: 0.02 … 5 N per mm³ as the layers of the public
+/// study (0.07 … 0.3) with room on both sides; readings in grams are 102 times as large, in
+/// kilograms as small.
+[[nodiscard]] Fit fit_force(const std::vector<Pair>& pairs, double threshold_mm,
+                            int sharpen_steps = 0);
 
 }  // namespace dtact::force

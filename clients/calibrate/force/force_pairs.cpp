@@ -14,8 +14,10 @@
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/recording/channels.hpp"
 #include "clients/recording/read_recording.hpp"
+#include "daemon/recon/decimate.hpp"
 #include "daemon/recon/kernels.hpp"
 #include "daemon/recon/reconstructor.hpp"
+#include "daemon/recon/scattering.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::force {
@@ -38,12 +40,21 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(from, text.find_last_not_of(" \t\r") - from + 1);
 }
 
+bool same_sharpening(const recon::Model& a, const recon::Model& b) {
+  return a.scattering == b.scattering &&
+         std::ranges::equal(a.sharpened, b.sharpened, [](const auto& one, const auto& other) {
+           return one.steps == other.steps && one.list.first_q6 == other.list.first_q6 &&
+                  one.list.um == other.list.um;
+         });
+}
+
 // Depth by both calibrations is the same; what either says of force does not matter.
 bool same_depth(const recon::Model& a, const recon::Model& b) {
   return a.method == b.method && a.mm_per_px == b.mm_per_px && a.smoothing_px == b.smoothing_px &&
          a.list.first_q6 == b.list.first_q6 && a.list.um == b.list.um &&
          a.rectify.width == b.rectify.width && a.rectify.height == b.rectify.height &&
-         a.reference_q8 == b.reference_q8 && a.gain.polynomial == b.gain.polynomial;
+         a.reference_q8 == b.reference_q8 && a.gain.polynomial == b.gain.polynomial &&
+         same_sharpening(a, b);
 }
 
 void require_same_calibration(const mcap::Reader& file, const std::string& path,
@@ -109,8 +120,23 @@ std::vector<Reading> read_readings(const fs::path& csv) {
 }
 
 ContactReader::ContactReader(const calibration::Calibration& calibration,
-                             std::span<const std::uint16_t> reference_q8, double threshold_mm)
-    : calibration_(calibration), reference_q8_(reference_q8), threshold_mm_(threshold_mm) {}
+                             std::span<const std::uint16_t> reference_q8, double threshold_mm,
+                             int sharpen_steps)
+    : calibration_(calibration),
+      model_(calibration.model),
+      reference_q8_(reference_q8),
+      threshold_mm_(threshold_mm),
+      sharpen_steps_(sharpen_steps) {
+  if (sharpen_steps == 0) return;
+  const std::vector<int> all = recon::sharpening_steps(*model_);
+  if (std::ranges::find(all, sharpen_steps) == all.end()) {
+    throw std::runtime_error(
+        fmt::format("--sharpen {}: the calibration has no list for levels sharpened so often: "
+                    "calibrate with --method model, or leave --sharpen out",
+                    sharpen_steps));
+  }
+  model_ = std::make_shared<const recon::Model>(recon::decimate(*model_, recon::kSharpenedAt));
+}
 
 Pair ContactReader::measure(const std::string& frames) const {
   const auto found = frames.rfind(kRecording);
@@ -139,8 +165,9 @@ Pair ContactReader::measure(const std::string& frames) const {
 }
 
 Pair ContactReader::measure(std::span<const image::Grey8> frames, const std::string& name) const {
-  const recon::Model& model = *calibration_.model;
-  recon::Reconstructor reconstructor(calibration_.model);
+  const recon::Model& model = *model_;
+  const int decimation = model.rectify.decimation;
+  recon::Reconstructor reconstructor(model_, sharpen_steps_);
   reconstructor.set_reference(reference_q8_);
   recon::SumRules rules;
   rules.made_um = rules.lost_um = static_cast<std::int16_t>(std::lround(threshold_mm_ * 1000));
@@ -155,7 +182,9 @@ Pair ContactReader::measure(std::span<const image::Grey8> frames, const std::str
     }
     std::ranges::copy(frame.pixels, padded.begin());
     reconstructor.run(padded.data(), frame.width, depth);
-    if (reconstructor.beyond_pixels() > kBeyondPixels) fail_beyond(name);
+    if (reconstructor.beyond_pixels() * decimation * decimation > kBeyondPixels) {
+      fail_beyond(name);
+    }
     for (int y = 0; y < model.rectify.height; ++y) {
       recon::kernels::sum_row(depth.data() + std::ptrdiff_t{y} * model.rectify.width, y, 0,
                               model.rectify.width, sums);
@@ -177,6 +206,14 @@ Pair ContactReader::measure_recording(const std::string& path, std::uint64_t fir
   takers.frame = [&](const v1::Frame& frame, std::uint64_t) {
     if (const std::uint64_t index = at++; index < first) return true;
     if (!frame.contact().touching()) return at < end;
+    const auto steps = static_cast<int>(frame.depth().sharpen_steps());
+    if (frame.has_depth() && steps != sharpen_steps_) {
+      throw std::runtime_error(fmt::format(
+          "{}:{}: its depth was made with {} steps of sharpening, not {}: set the daemon's "
+          "reconstruction.sharpen to \"off\", \"1\" or \"2\" as it will measure, record again, "
+          "and give --sharpen as many",
+          path, at - 1, steps, sharpen_steps_));
+    }
     if (std::ranges::find(frame.health(), v1::HEALTH_BEYOND_CALIBRATION) != frame.health().end()) {
       fail_beyond(fmt::format("{}:{}", path, at - 1));
     }

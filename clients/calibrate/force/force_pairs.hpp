@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -29,13 +30,17 @@ struct Reading {
 /// The contacts of frames as the daemon sums them up, averaged over each reading's frames.
 class ContactReader {
  public:
-  /// Pictures are measured against `reference_q8`, the untouched image in their light.
+  /// Pictures are measured against `reference_q8`, the untouched image in their light, in maps
+  /// sharpened by `sharpen_steps`, 0 to 2. Throws std::runtime_error when the calibration has no
+  /// list for so many.
   ContactReader(const calibration::Calibration& calibration,
-                std::span<const std::uint16_t> reference_q8, double threshold_mm);
+                std::span<const std::uint16_t> reference_q8, double threshold_mm,
+                int sharpen_steps = 0);
 
   /// Volume and area; the reading itself is left to the caller. A recording's are those that the
   /// daemon measured. Throws std::runtime_error when the frames cannot be read, are of another size
-  /// or, recorded, of another calibration, or reach deeper than the calibration covers.
+  /// or, recorded, of another calibration or sharpened by other steps, or reach deeper than the
+  /// calibration covers.
   [[nodiscard]] Pair measure(const std::string& frames) const;
   /// The same of pictures at hand.
   [[nodiscard]] Pair measure(std::span<const image::Grey8> frames, const std::string& name) const;
@@ -45,8 +50,10 @@ class ContactReader {
                                        std::uint64_t end) const;
 
   const calibration::Calibration& calibration_;
+  std::shared_ptr<const recon::Model> model_;  ///< As coarse as its levels are sharpened at.
   std::span<const std::uint16_t> reference_q8_;
   double threshold_mm_;
+  int sharpen_steps_;
 };
 
 }  // namespace dtact::force

@@ -66,7 +66,7 @@ void DepthRemaker::remake(const hal::LumaView& luma, v1::Frame& frame) {
   resolution.reconstructor.run_active(luma.data, luma.stride, resolution.tiles, depth_um_, drawn_,
                                       nullptr, &sums);
   summary_ = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
-  contact_.weigh(model.force, summary_);
+  contact_.weigh(model.force, resolution.steps(), summary_);
 
   v1::DepthMap map;
   map.set_encoding(v1::DEPTH_PREDICT_ZSTD);

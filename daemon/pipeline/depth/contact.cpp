@@ -45,9 +45,12 @@ ContactSummary ContactDetector::inspect(const recon::DepthSums& sums, int width,
   return summary;
 }
 
-void ContactDetector::weigh(const std::optional<recon::ForceModel>& model,
+void ContactDetector::weigh(const std::optional<recon::ForceModel>& model, int sharpen_steps,
                             ContactSummary& summary) const noexcept {
-  if (!model || micrometres(model->threshold_mm) != micrometres(rules_.made_mm)) return;
+  if (!model || model->sharpen_steps != sharpen_steps ||
+      micrometres(model->threshold_mm) != micrometres(rules_.made_mm)) {
+    return;
+  }
   summary.force = summary.touching ? recon::force_of(*model, summary.volume_mm3, summary.area_mm2)
                                    : recon::force_of(*model, 0, 0);
 }

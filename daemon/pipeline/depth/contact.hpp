@@ -25,8 +25,10 @@ class ContactDetector {
   [[nodiscard]] ContactSummary inspect(const recon::DepthSums& sums, int width, int height,
                                        double mm_per_px) noexcept;
 
-  /// Gives `summary` its force, where a calibration tells one for this very threshold.
-  void weigh(const std::optional<recon::ForceModel>& model, ContactSummary& summary) const noexcept;
+  /// Gives `summary`, of a map sharpened by `sharpen_steps`, its force, where a calibration tells
+  /// one for this very threshold and so many steps: sharpening alone changes volume and area.
+  void weigh(const std::optional<recon::ForceModel>& model, int sharpen_steps,
+             ContactSummary& summary) const noexcept;
 
   [[nodiscard]] bool touching() const noexcept { return touching_; }
 

@@ -71,7 +71,7 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   out.contact_um = rules.made_um;
   out.contact_absence = ContactAbsence::none;
   out.contact = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
-  contact_.weigh(model.force, out.contact);
+  contact_.weigh(model.force, out.sharpen_steps, out.contact);
   beyond_ = reconstructor.beyond_pixels() * out.made_decimation * out.made_decimation >
             config_.beyond_pixels;
   judge(untouched.trust(), bend_um(sums, model.mm_per_px), out);

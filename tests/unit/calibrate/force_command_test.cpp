@@ -117,10 +117,40 @@ TEST_F(Force, IsFittedInPlaceFromGrams) {
   EXPECT_TRUE(calibration::load(at("cal")).model->force);
 }
 
+/// With a list for sharpened levels that says the same as the plain one, and covers more.
+calibration::Calibration sharpenable(calibration::Calibration made) {
+  auto model = std::make_shared<recon::Model>(*made.model);
+  model->scattering = recon::Scattering{.narrow_mm = 0.3, .wide_mm = 1.5, .narrow_weight = 0.7};
+  model->sharpened = {{.steps = 1, .list = model->list, .uncertainty = {}}};
+  recon::DepthList& list = model->sharpened.front().list;
+  list.covered_to_q6 = list.first_q6 + static_cast<int>(list.um.size()) - 1;
+  made.model = std::move(model);
+  return made;
+}
+
+// Sharpening undoes blur that the drawn ball has not: beside its bright ring, which begins a
+// millimetre beyond the contact, the untouched surface darkens.
+TEST_F(Force, IsOfMapsSharpenedAsItIsAskedFor) {
+  const calibration::Calibration cal = sharpenable(calibration::load(at("cal")));
+  calibration::save(cal, at("cal"));
+  const std::string csv = readings();
+  const Pair plain = ContactReader(cal, cal.model->reference_q8, 0.1).measure(at("press10.png"));
+  const Pair sharp = ContactReader(cal, cal.model->reference_q8, 0.1, 1).measure(at("press10.png"));
+  EXPECT_GT(std::abs(sharp.volume_mm3 - plain.volume_mm3), 0.02 * plain.volume_mm3);
+  EXPECT_GT(sharp.area_mm2, 1.2 * plain.area_mm2);
+  ASSERT_EQ(run({"force", "--calibration", at("cal"), "--pairs", csv, "--sharpen", "1"}), 0)
+      << said_;
+  EXPECT_EQ(calibration::load(at("cal")).model->force->sharpen_steps, 1);
+  EXPECT_EQ(run({"force", "--calibration", at("cal"), "--pairs", csv, "--sharpen", "2"}), 1);
+  EXPECT_THAT(said_, HasSubstr("--sharpen 2: the calibration has no list"));
+}
+
 class ForceOfARecording : public Force {
  protected:
-  /// 16 frames; in those from 4 on something presses (frame − 3) mm³.
-  [[nodiscard]] std::string recording(const std::string& calibration_folder) const {
+  /// 16 frames, their maps sharpened by so many steps; in those from 4 on something presses (frame
+  /// − 3) mm³.
+  [[nodiscard]] std::string recording(const std::string& calibration_folder,
+                                      std::uint32_t sharpen_steps = 0) const {
     mcap::FileSink sink(at("press.mcap"), true);
     recording::RecordingWriter writer(sink, {.program = "test"});
     for (std::uint64_t i = 0; i < 16; ++i) {
@@ -128,6 +158,14 @@ class ForceOfARecording : public Force {
       frame.set_sequence(i);
       frame.set_monotonic_ns(static_cast<std::int64_t>(i + 1) * 16'666'667);
       frame.set_wall_ns(frame.monotonic_ns());
+      v1::DepthMap& map = *frame.mutable_depth();
+      map.set_encoding(v1::DEPTH_INT16);
+      map.set_width(1);
+      map.set_height(1);
+      map.set_mm_per_px(0.05);
+      map.set_um_per_unit(1);
+      map.set_data(std::string(2, '\0'));
+      map.set_sharpen_steps(sharpen_steps);
       v1::Contact& contact = *frame.mutable_contact();
       if (i >= 4) {
         contact.set_touching(true);
@@ -158,6 +196,19 @@ TEST_F(ForceOfARecording, TakesWhatTheDaemonMeasured) {
                   AllOf(HasSubstr("press.mcap:15"), HasSubstr("deeper than"))));
   EXPECT_THAT([&] { (void)reader.measure(file + ":x"); },
               ThrowsMessage<std::runtime_error>(HasSubstr("press.mcap:120:180")));
+}
+
+TEST_F(ForceOfARecording, RefusesThatOfMapsSharpenedOtherwise) {
+  calibration::save(sharpenable(calibration::load(at("cal"))), at("cal"));
+  const calibration::Calibration cal = calibration::load(at("cal"));
+  const std::string file = recording("cal", 1);
+  const ContactReader plain(cal, cal.model->reference_q8, 0.1);
+  EXPECT_THAT(
+      [&] { (void)plain.measure(file + ":10"); },
+      ThrowsMessage<std::runtime_error>(AllOf(
+          HasSubstr("press.mcap:10: its depth was made with 1 steps"), HasSubstr("--sharpen"))));
+  EXPECT_EQ(ContactReader(cal, cal.model->reference_q8, 0.1, 1).measure(file + ":10").volume_mm3,
+            7);
 }
 
 TEST_F(ForceOfARecording, RefusesThatOfAnotherCalibration) {

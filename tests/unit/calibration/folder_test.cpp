@@ -61,6 +61,7 @@ TEST(CalibrationFolder, EverythingComesBack) {
   EXPECT_EQ(loaded.model->force->per_mm3, 0.125);
   EXPECT_EQ(loaded.model->force->per_mm2, -0.25);
   EXPECT_EQ(loaded.model->force->per_mm5, 0.002);
+  EXPECT_EQ(loaded.model->force->sharpen_steps, 2);
   EXPECT_EQ(loaded.model->force->threshold_mm, 0.1);
   EXPECT_EQ(loaded.model->force->error_n, 0.03);
   EXPECT_EQ(loaded.model->force->spread, (std::array<double, 6>{1, -2, 3, 4, -5, 6.5}));

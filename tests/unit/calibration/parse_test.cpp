@@ -274,7 +274,13 @@ TEST(ParseCalibration, ForceIsCheckedAndMayBeAbsent) {
   expect_refused(with("per_mm3 = 0.125", ""), "force.per_mm3", "missing");
   expect_refused(with("spread = [1, -2, 3, 4, -5, 6.5]", "spread = [1]"), "force.spread", "six");
   expect_refused(with("to_n = 2", "to_n = 0.05"), "force.to_n", "from 0.1");
+  expect_refused(with("sharpen_steps = 2", "sharpen_steps = 3"), "force.sharpen_steps", "0 to 2");
   const Files files = format(sample());
+  // Files that are older than the key were made of maps that are not sharpened.
+  const Calibration plain =
+      parse(with("sharpen_steps = 2  # of the maps of V and A\n", ""), files.reference_png, "old");
+  EXPECT_EQ(plain.model->force->sharpen_steps, 0);
+  EXPECT_THAT(format(plain).toml, testing::Not(HasSubstr("sharpen_steps")));
   std::string old = files.toml;
   const auto from = old.find("[force]");
   old.erase(from, old.find("[lens]") - from);
@@ -295,13 +301,14 @@ TEST(ParseCalibration, ScatteringIsChecked) {
 }
 
 TEST(ParseCalibration, SharpenedListsAreChecked) {
-  expect_refused(with("steps = 1", "steps = 0"), "sharpened[0].steps", "from 1 to 2");
-  expect_refused(with("steps = 2", "steps = 3"), "sharpened[1].steps", "from 1 to 2");
-  expect_refused(with("steps = 2", "steps = 1"), "sharpened[1].steps", "which has 1");
+  expect_refused(with("\nsteps = 1", "\nsteps = 0"), "sharpened[0].steps", "from 1 to 2");
+  expect_refused(with("\nsteps = 2", "\nsteps = 3"), "sharpened[1].steps", "from 1 to 2");
+  expect_refused(with("\nsteps = 2", "\nsteps = 1"), "sharpened[1].steps", "which has 1");
   expect_refused(with("-9, 0, 9", "-9, 0, -10"), "sharpened[0]", "entry 3");
   expect_refused(with("-8, -4, -1, 0,", "-8,"), "sharpened[1]", "list.covered_from_q6");
   expect_refused(with("  0.5,", "  0.5, 0.6,"), "sharpened[0].error_um", "one for each");
-  expect_refused(with("steps = 2", "steps = 2\nradius = 1"), "sharpened[1].radius", "unknown key");
+  expect_refused(with("\nsteps = 2", "\nsteps = 2\nradius = 1"), "sharpened[1].radius",
+                 "unknown key");
 }
 
 TEST(ParseCalibration, SharpenedListsNeedTheirScattering) {

@@ -43,6 +43,7 @@ inline Calibration sample() {
                                    .per_mm2 = -0.25,
                                    .per_mm5 = 0.002,
                                    .threshold_mm = 0.1,
+                                   .sharpen_steps = 2,
                                    .error_n = 0.03,
                                    .spread = {1, -2, 3, 4, -5, 6.5},
                                    .pairs = 12,

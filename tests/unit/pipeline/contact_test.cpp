@@ -129,22 +129,32 @@ TEST_F(ContactTest, TellsTheForceOfAContactByTheCalibration) {
                                 .to_n = 2};
   fill(600, 2);
   ContactSummary summary = summarise();
-  detector.weigh(model, summary);  // not yet a contact
+  detector.weigh(model, 0, summary);  // not yet a contact
   ASSERT_TRUE(summary.force);
   EXPECT_EQ(summary.force->newtons, 0);
   EXPECT_EQ(summary.force->uncertainty_n, 0.05);
   summary = summarise();
-  detector.weigh(model, summary);
+  detector.weigh(model, 0, summary);
   EXPECT_NEAR(summary.force->newtons, 1.1, 1e-12);
   EXPECT_NEAR(summary.force->uncertainty_n, 0.05 * std::sqrt(2), 1e-12);
 
   summary = summarise();
-  detector.weigh(std::nullopt, summary);
+  detector.weigh(std::nullopt, 0, summary);
   EXPECT_FALSE(summary.force);
   recon::ForceModel other = model;
   other.threshold_mm = 0.15;
-  detector.weigh(other, summary);
+  detector.weigh(other, 0, summary);
   EXPECT_FALSE(summary.force);
+
+  // A map sharpened by another number of steps has another volume and area of the same contact.
+  other = model;
+  other.sharpen_steps = 1;
+  detector.weigh(other, 0, summary);
+  EXPECT_FALSE(summary.force);
+  detector.weigh(model, 2, summary);
+  EXPECT_FALSE(summary.force);
+  detector.weigh(other, 1, summary);
+  EXPECT_TRUE(summary.force);
 }
 
 TEST_F(ContactTest, AsksForItsOwnThresholdsAndForNoBend) {
