@@ -131,15 +131,19 @@ void check(const BallPress& press) {
           frame.width, frame.height, press.reference_q8.width, press.reference_q8.height));
     }
   }
-  if (!(press.ball_radius_mm > 0.1 && press.ball_radius_mm < 100)) {
-    throw std::invalid_argument("the ball's radius must be 0.1 to 100 mm");
-  }
-  if (!(press.mm_per_px >= 0.001 && press.mm_per_px <= 1)) {
-    throw std::invalid_argument("the scale must be 0.001 to 1 mm a pixel");
-  }
+  check_sizes(press.ball_radius_mm, press.mm_per_px);
 }
 
 }  // namespace
+
+void check_sizes(double ball_radius_mm, double mm_per_px) {
+  if (!(ball_radius_mm > 0.1 && ball_radius_mm < 100)) {
+    throw std::invalid_argument("the ball's radius must be 0.1 to 100 mm");
+  }
+  if (!(mm_per_px >= 0.001 && mm_per_px <= 1)) {
+    throw std::invalid_argument("the scale must be 0.001 to 1 mm a pixel");
+  }
+}
 
 image::Grey8 rectified_reference(const recon::RectifyTable& table, const image::Grey16& q8) {
   return rectified(table, [&](std::size_t at) {

@@ -77,6 +77,10 @@ struct PressChoices {
   [[nodiscard]] std::string describe() const;
 };
 
+/// Throws std::invalid_argument, saying which and the range, unless the ball's radius is above 0.1
+/// and below 100 mm and the scale 0.001 to 1 mm a pixel.
+void check_sizes(double ball_radius_mm, double mm_per_px);
+
 /// A calibration without a list: frame, crop (none: all that the frame shows), scale, lens,
 /// smoothing, reference. Throws std::invalid_argument when the crop leaves the frame.
 [[nodiscard]] Calibration empty_calibration(const image::Grey16& reference_q8,

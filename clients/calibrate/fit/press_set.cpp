@@ -258,6 +258,7 @@ void refuse_gaps(const ChainFit& chain, const BallPresses& set,
 }  // namespace
 
 Calibration build(const BallPresses& presses, PressReport* report) {
+  check_sizes(presses.ball_radius_mm, presses.mm_per_px);
   BallPresses set = presses;
   Calibration calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
   const recon::Model plain = *calibration.model;

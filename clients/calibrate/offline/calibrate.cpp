@@ -123,7 +123,9 @@ void add_calibrate(CLI::App& app) {
                    "or a folder; repeat. FOLDER@MM where the depth was measured")
       ->type_name("FILE")
       ->take_all();
-  depth->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")->required();
+  depth->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")
+      ->check(CLI::Range(0.1, 100.0))
+      ->required();
   add_map_options(*depth, options->map);
   depth
       ->add_option(

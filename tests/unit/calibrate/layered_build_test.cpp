@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "tests/unit/calibrate/imagined_press.hpp"
 
@@ -91,6 +92,18 @@ TEST(LayeredBuild, MeasuredDepthsNeedNoLayer) {
   // A gauge that reads 0.05 mm more moves the list by as much.
   set.presses[0].depth_mm = depth_mm + 0.05;
   EXPECT_NEAR(deepest_mm(build_layered(set, {}, ignored), set), depth_mm + 0.05, 0.01);
+}
+
+TEST(LayeredBuild, RefusesSizesThatCannotBe) {
+  BallPresses set = press_of({});
+  PressReport report;
+  set.ball_radius_mm = -4;
+  EXPECT_THAT([&] { (void)build_layered(set, {}, report); },
+              testing::ThrowsMessage<std::invalid_argument>(HasSubstr("radius must be 0.1 to")));
+  set.ball_radius_mm = 4;
+  set.mm_per_px = 0;
+  EXPECT_THAT([&] { (void)build_layered(set, {}, report); },
+              testing::ThrowsMessage<std::invalid_argument>(HasSubstr("scale must be 0.001 to")));
 }
 
 }  // namespace

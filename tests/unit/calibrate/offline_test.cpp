@@ -226,6 +226,9 @@ TEST_F(Offline, NamesWhatIsWrong) {
   EXPECT_THAT([&] { run(other); },
               ThrowsMessage<std::runtime_error>(HasSubstr("calibration is for 260x240")));
   EXPECT_THROW(run(with(calibrate(), "--method", "magic")), CLI::ParseError);
+  std::vector<std::string> inside_out = calibrate();
+  *std::ranges::find(inside_out, "4.0") = "-4";
+  EXPECT_THAT([&] { run(inside_out); }, ThrowsMessage<CLI::ParseError>(HasSubstr("--radius-mm")));
 }
 
 TEST(DepthFile, NpyIsLittleEndianFloats) {

@@ -150,6 +150,7 @@ std::string FittedCalibration::describe_press() const {
 }
 
 FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& gain) {
+  check_sizes(set.ball_radius_mm, set.mm_per_px);
   FittedCalibration made;
   made.calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
   auto model = std::make_shared<recon::Model>(*made.calibration.model);
