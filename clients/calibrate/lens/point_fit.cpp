@@ -9,6 +9,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <stdexcept>
+#include <string>
 
 namespace dtact::ctl {
 namespace {
@@ -19,6 +20,12 @@ using recon::Point;
 constexpr LensModel kModels[] = {LensModel::affine,  LensModel::projective, LensModel::radial1,
                                  LensModel::radial2, LensModel::radial3,    LensModel::radial4};
 constexpr std::size_t kHomography = 8;
+
+/// The solver came to no parameters that could be used.
+class FitFailed : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 std::size_t radial_terms(LensModel model) {
   return static_cast<std::size_t>(std::max(0, static_cast<int>(model) - 1));
@@ -83,8 +90,8 @@ class MarkCost {
     const Lens lens = lens_of(p, units_);
     for (const Mark& mark : marks_) {
       const Point at = project(lens, mark.mm);
-      // Where the lens folds it shows no such mark: as wrong as the marks are wide, a step to
-      // refuse.
+      // Where the lens folds it shows no such mark: as wrong as the marks are wide, far more than
+      // any step gains elsewhere.
       const bool shown = std::isfinite(at.x) && std::isfinite(at.y);
       *errors++ = shown ? (at.x - mark.px.x) / units_.px_size : 1;
       *errors++ = shown ? (at.y - mark.px.y) / units_.px_size : 1;
@@ -128,7 +135,8 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
   return p;
 }
 
-/// Of the model's parameters, the first of `p`.
+/// Of the model's parameters, the first of `p`. Throws FitFailed where the solver does, so that a
+/// smaller model's parameters do not pass as this one's.
 void minimise(Parameters& p, const Units& u, std::span<const Mark> marks, LensModel model) {
   const int n = parameters(model);
   auto cost = std::make_unique<ceres::DynamicNumericDiffCostFunction<MarkCost, ceres::CENTRAL>>(
@@ -144,6 +152,10 @@ void minimise(Parameters& p, const Units& u, std::span<const Mark> marks, LensMo
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
+  if (!summary.IsSolutionUsable()) {
+    throw FitFailed("lens: no lens of " + std::to_string(n) +
+                    " parameters fits the points; look for points that were found wrong");
+  }
 }
 
 /// The best parameters for all marks, in `u`.
@@ -229,7 +241,13 @@ ChosenLens choose_lens(std::span<const Mark> marks) {
   for (const LensModel model : kModels) {
     // Twice as many coordinates as parameters at least, also with one mark left out.
     if (marks.size() < static_cast<std::size_t>(parameters(model)) + 1) break;
-    std::vector<Point> left_out = leave_one_out(marks, model);
+    std::vector<Point> left_out;
+    try {
+      left_out = leave_one_out(marks, model);
+    } catch (const FitFailed&) {
+      if (best.left_out.empty()) throw;
+      break;  // the larger ones start where this one ends
+    }
     const double error = rms(left_out);
     best.left_out_rms_of_each.push_back(error);
     std::vector<double> squares;

@@ -26,7 +26,7 @@ enum class LensModel {
 
 /// The lens that minimises the squared distances in pixels (by Ceres, from the best affine map
 /// through the smaller models). Throws std::runtime_error when there are fewer marks than
-/// parameters or they lie on a line.
+/// parameters, they lie on a line, or the solver fails.
 [[nodiscard]] recon::Lens fit_lens(std::span<const Mark> marks, LensModel model);
 
 /// Distances in millimetres on the surface from where each mark should lie to where the lens puts
@@ -50,7 +50,7 @@ struct ChosenLens {
 };
 
 /// The smallest model that no larger one beats: a larger one must lower the mean squared
-/// left-out residual clearly.
+/// left-out residual clearly. One that the solver fails on ends the search.
 [[nodiscard]] ChosenLens choose_lens(std::span<const Mark> marks);
 
 /// Whether the mean of `squares` lies below that of `others`, of the same samples, by more than

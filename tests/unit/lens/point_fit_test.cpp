@@ -117,6 +117,22 @@ TEST(PointFit, ADifferenceWithinItsScatterIsNotClear) {
   EXPECT_FALSE(clearly_lower(higher, some));
 }
 
+// The board's corners are at 0.39 of the distance; a lens of k1 = -2 folds at 0.41.
+TEST(PointFit, FindsALensThatFoldsJustBeyondTheMarks) {
+  BoardCamera camera;
+  camera.k1 = -2;
+  EXPECT_LT(worst_on_board_px(fit_lens(marks_of(camera, 0), LensModel::radial1), camera), 0.01);
+  EXPECT_EQ(choose_lens(marks_of(camera, 0.2)).model, LensModel::radial1);
+}
+
+TEST(PointFit, RefusesWhatTheSolverCannotFit) {
+  std::vector<Mark> marks = marks_of(tilted_barrel(), 0);
+  marks.front().px.x = NAN;
+  for (const LensModel model : {LensModel::projective, LensModel::radial1}) {
+    EXPECT_THROW((void)fit_lens(marks, model), std::runtime_error);
+  }
+}
+
 TEST(PointFit, RefusesTooFewMarks) {
   const std::vector<Mark> marks(5);
   EXPECT_THROW((void)fit_lens(marks, LensModel::affine), std::runtime_error);
