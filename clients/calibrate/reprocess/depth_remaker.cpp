@@ -8,9 +8,6 @@
 namespace dtact::reprocess {
 namespace {
 
-/// All resolutions: the recorded map says which.
-constexpr pipeline::ReconstructionRules kEveryResolution{.decimation = 0};
-
 void set(v1::Frame& frame, v1::Health condition, bool on) {
   auto& health = *frame.mutable_health();
   health.erase(std::remove(health.begin(), health.end(), condition), health.end());
@@ -26,72 +23,102 @@ bool has(const v1::Frame& frame, v1::Health condition) {
 DepthRemaker::DepthRemaker(std::shared_ptr<const calibration::Calibration> calibration)
     : calibration_(std::move(calibration)),
       image_(calibration_),
-      maps_(calibration_->model, image_.cells.lattice(), kEveryResolution),
+      steps_(recon::sharpening_steps(*calibration_->model)),
       follower_(pipeline::DriftRules{}),
       contact_(pipeline::ContactRules{}) {}
 
 void DepthRemaker::set_reference(std::span<const std::uint16_t> reference_q8, double light) {
   light_ = light;
+  reference_q8_.assign(reference_q8.begin(), reference_q8.end());
   image_.cells.set_reference(reference_q8);
   follower_.restart(calibration_->model->method == recon::Method::list);
-  maps_.set_reference(reference_q8);
-  if (light == 1) return;
-  image_.cells.set_light(light);
-  maps_.set_light(light);
+  for (auto& [way, maps] : maps_) maps.set_reference(reference_q8);
+  light_now_ = 1;
+  if (light != 1) set_light(light);
+}
+
+void DepthRemaker::set_light(double factor) {
+  light_now_ = factor;
+  image_.cells.set_light(factor);
+  for (auto& [way, maps] : maps_) maps.set_light(factor);
 }
 
 void DepthRemaker::follow_light(const pipeline::LightSeen& light, std::int64_t timestamp_ns) {
-  const auto factor = follower_.look(light, timestamp_ns);
-  if (!factor) return;
-  image_.cells.set_light(light_ * *factor);
-  maps_.set_light(light_ * *factor);
+  if (const auto factor = follower_.look(light, timestamp_ns)) set_light(light_ * *factor);
+}
+
+pipeline::Resolutions& DepthRemaker::maps_for(const Way& way) {
+  if (const auto found = maps_.find(way); found != maps_.end()) return found->second;
+  pipeline::Resolutions maps(calibration_->model, image_.cells.lattice(),
+                             {.decimation = way.decimation, .sharpen = way.steps});
+  if (!reference_q8_.empty()) maps.set_reference(reference_q8_);
+  if (light_now_ != 1) maps.set_light(light_now_);
+  return maps_.emplace(way, std::move(maps)).first->second;
 }
 
 void DepthRemaker::remake(const hal::LumaView& luma, v1::Frame& frame) {
   const auto seen = image_.cells.look(luma);
   if (!has(frame, v1::HEALTH_REFERENCE_RESTORED)) follow_light(seen.light, frame.monotonic_ns());
 
-  const int decimation =
-      frame.has_depth() ? std::max(1, static_cast<int>(frame.depth().decimation())) : 1;
-  if (const auto rung = maps_.find(decimation, 0)) maps_.use(*rung);
-  pipeline::Resolution& resolution = maps_.in_use();
+  Way way;
+  if (frame.has_depth()) {
+    const auto decimation = static_cast<int>(frame.depth().decimation());
+    way = {decimation == 2 || decimation == 4 ? decimation : 1,
+           static_cast<int>(frame.depth().sharpen_steps())};
+  }
+  if (way.steps != 0 && std::ranges::find(steps_, way.steps) == steps_.end()) {
+    way.steps = 0;
+    ++left_plain_;
+  }
+  pipeline::Resolutions& maps = maps_for(way);
+  pipeline::Resolution& resolution = maps.in_use();
   const recon::Model& model = resolution.reconstructor.model();
-  depth_um_.resize(model.rectify.entries.size());
-  if (std::exchange(drawn_decimation_, decimation) != decimation) drawn_.rest = 0;
+  const pipeline::MapShape shape = maps.shape();
+  depth_um_.resize(static_cast<std::size_t>(shape.width) * static_cast<std::size_t>(shape.height));
+  if (std::exchange(drawn_way_, way) != way || resolution.coarse) drawn_.rest = 0;
   resolution.readers.mark(image_.cells.active(), resolution.tiles);
   recon::SumRules rules = contact_.sum_rules();
   rules.bend_reach = pipeline::bend_reach(model.mm_per_px);
   rules.bend_from_um = rules.made_um;
   recon::DepthSums sums(rules);
-  resolution.reconstructor.run_active(luma.data, luma.stride, resolution.tiles, depth_um_, drawn_,
-                                      nullptr, &sums);
+  resolution.reconstructor.run_active(
+      luma.data, luma.stride, resolution.tiles,
+      resolution.coarse ? std::span(resolution.coarse->depth_um) : std::span(depth_um_),
+      resolution.coarse ? resolution.coarse->drawn : drawn_, nullptr, &sums);
+  if (resolution.coarse) {
+    resolution.coarse->upsampler.run(resolution.coarse->depth_um, depth_um_);
+  }
   summary_ = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
-  contact_.weigh(model.force, resolution.steps(), summary_);
+  contact_.weigh(model.force, way.steps, summary_);
 
   v1::DepthMap map;
   map.set_encoding(v1::DEPTH_PREDICT_ZSTD);
-  map.set_width(static_cast<std::uint32_t>(model.rectify.width));
-  map.set_height(static_cast<std::uint32_t>(model.rectify.height));
+  map.set_width(static_cast<std::uint32_t>(shape.width));
+  map.set_height(static_cast<std::uint32_t>(shape.height));
   map.set_full_width(map.width());
   map.set_full_height(map.height());
-  map.set_mm_per_px(model.mm_per_px);
+  map.set_mm_per_px(shape.mm_per_px);
   map.set_um_per_unit(1);
   map.set_untrusted_value(recon::kUntrusted);
-  map.set_decimation(static_cast<std::uint32_t>(decimation));
+  map.set_decimation(static_cast<std::uint32_t>(shape.decimation));
+  map.set_sharpen_steps(static_cast<std::uint32_t>(way.steps));
+  if (resolution.coarse) {
+    map.set_made_decimation(static_cast<std::uint32_t>(resolution.decimation()));
+  }
   encoder_.encode(depth_um_, map.width(), *map.mutable_data());
   *frame.mutable_depth() = std::move(map);
-  describe(sums,
-           resolution.reconstructor.beyond_pixels() * decimation * decimation >
-               pipeline::PipelineConfig{}.beyond_pixels,
-           frame);
+  describe(sums, maps, resolution, frame);
 }
 
-void DepthRemaker::describe(const recon::DepthSums& sums, bool beyond, v1::Frame& frame) const {
+void DepthRemaker::describe(const recon::DepthSums& sums, const pipeline::Resolutions& maps,
+                            const pipeline::Resolution& resolution, v1::Frame& frame) const {
   const pipeline::Trust trust{.light_left = follower_.left(), .light_unseen = follower_.unseen()};
+  const int made = resolution.decimation();
+  const int steps = resolution.steps();
+  const double bend_um = pipeline::bend_um(sums, resolution.reconstructor.model().mm_per_px);
   frame.mutable_depth()->set_uncertainty_um(
-      pipeline::uncertainty_at_um(maps_.contact_um(summary_.deepest_mm, 0, trust),
-                                  pipeline::bend_um(sums, frame.depth().mm_per_px()),
-                                  static_cast<int>(frame.depth().decimation())));
+      pipeline::uncertainty_at_um(maps.contact_um(summary_.deepest_mm, steps, trust),
+                                  pipeline::plain_bend_um(bend_um, steps), made, steps));
   auto& contact = *frame.mutable_contact();
   contact.set_touching(summary_.touching);
   contact.set_area_mm2(summary_.area_mm2);
@@ -111,7 +138,9 @@ void DepthRemaker::describe(const recon::DepthSums& sums, bool beyond, v1::Frame
   frame.clear_calibration();  // of the daemon's numbers it has none
   frame.clear_times();
   set(frame, v1::HEALTH_UNCALIBRATED, false);
-  set(frame, v1::HEALTH_BEYOND_CALIBRATION, beyond);
+  set(frame, v1::HEALTH_BEYOND_CALIBRATION,
+      resolution.reconstructor.beyond_pixels() * made * made >
+          pipeline::PipelineConfig{}.beyond_pixels);
 }
 
 }  // namespace dtact::reprocess

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <compare>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <span>
 #include <vector>
@@ -32,25 +34,44 @@ class DepthRemaker {
   void set_reference(std::span<const std::uint16_t> reference_q8, double light = 1);
 
   /// Replaces `frame`'s depth, contact and what follows from them. The map has the resolution that
-  /// the frame's own had; full resolution where it had none.
+  /// the frame's own had and is sharpened by as many steps; full resolution and none where it had
+  /// no map, and no steps where the calibration has no list for so many.
   void remake(const hal::LumaView& luma, v1::Frame& frame);
+
+  /// Frames so far whose own map was sharpened by steps that the calibration has no list for.
+  [[nodiscard]] std::uint64_t left_plain() const noexcept { return left_plain_; }
 
   [[nodiscard]] bool touching() const noexcept { return contact_.touching(); }
 
  private:
+  /// Of a map: 1/decimation of the calibration's resolution, sharpened by so many steps.
+  struct Way {
+    int decimation = 1;
+    int steps = 0;
+    auto operator<=>(const Way&) const = default;
+  };
+
   void follow_light(const pipeline::LightSeen& light, std::int64_t timestamp_ns);
-  void describe(const recon::DepthSums& sums, bool beyond, v1::Frame& frame) const;
+  void set_light(double factor);
+  /// What makes such maps, for the reference and the light of now.
+  [[nodiscard]] pipeline::Resolutions& maps_for(const Way& way);
+  void describe(const recon::DepthSums& sums, const pipeline::Resolutions& maps,
+                const pipeline::Resolution& resolution, v1::Frame& frame) const;
 
   std::shared_ptr<const calibration::Calibration> calibration_;
   pipeline::CalibratedImage image_;
-  pipeline::Resolutions maps_;
+  std::vector<int> steps_;  ///< That the calibration has lists for.
+  std::map<Way, pipeline::Resolutions> maps_;
+  std::vector<std::uint16_t> reference_q8_;
   pipeline::LightFollower follower_;
   pipeline::ContactDetector contact_;
   pipeline::ContactSummary summary_;
-  double light_ = 1;  // followed before the recording
+  double light_ = 1;      // followed before the recording
+  double light_now_ = 1;  // and since
   std::vector<std::int16_t> depth_um_;
   recon::DrawnTiles drawn_;
-  int drawn_decimation_ = 0;
+  Way drawn_way_;
+  std::uint64_t left_plain_ = 0;
   wire::PredictZstdEncoder encoder_;
 };
 

@@ -86,6 +86,9 @@ class Reprocessor {
     writer_.finish();
   }
 
+  /// DepthRemaker::left_plain().
+  [[nodiscard]] std::uint64_t left_plain() const noexcept { return remaker_.left_plain(); }
+
   [[nodiscard]] cli::RecordingReport report() const {
     cli::RecordingReport report;
     report.set_output(options_.output);
@@ -237,6 +240,12 @@ void run(const cli::Context& context, const Options& options) {
   }
   context.out << fmt::format("{}: {} frames, depth made anew in {}\n", report.output(),
                              report.frames(), report.maps());
+  if (reprocessor.left_plain() > 0) {
+    context.out << fmt::format(
+        "{} of these were sharpened when they were recorded and are plain now: {} has no list for "
+        "as many steps (dtact-calibrate depth --method model makes them)\n",
+        reprocessor.left_plain(), options.calibration);
+  }
   if (!report.damage().empty()) {
     context.out << fmt::format("the recording is not whole ({}): all before that is in it\n",
                                report.damage());
