@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
@@ -182,15 +183,36 @@ Calibration empty_calibration(const image::Grey16& reference_q8, const std::opti
   return calibration;
 }
 
+bool reaches_corners(const recon::SpatialGain& gain, double width_mm, double height_mm) noexcept {
+  return std::ranges::all_of(std::array{-0.5, 0.5}, [&](double right) {
+    return std::ranges::all_of(std::array{-0.5, 0.5}, [&](double down) {
+      const double factor = gain.polynomial_at(right * width_mm, down * height_mm);
+      return factor > 0.5 && factor < 2;
+    });
+  });
+}
+
 recon::SpatialGain gain_on_map(const recon::SpatialGain& gain, const Calibration& calibration) {
-  if (!calibration.lens) return gain;
   const recon::Model& model = *calibration.model;
   const recon::RectifyTable& map = model.rectify;
-  const recon::Point centre = surface_point(
-      *calibration.lens,
-      {calibration.crop_col, calibration.crop_row, map.width, map.height, model.mm_per_px},
-      0.5 * (map.width - 1), 0.5 * (map.height - 1));
-  return moved(gain, centre.x, centre.y);
+  recon::SpatialGain on_map = gain;
+  if (calibration.lens) {
+    const recon::Point centre = surface_point(
+        *calibration.lens,
+        {calibration.crop_col, calibration.crop_row, map.width, map.height, model.mm_per_px},
+        0.5 * (map.width - 1), 0.5 * (map.height - 1));
+    on_map = moved(gain, centre.x, centre.y);
+  }
+  if (!reaches_corners(on_map, map.width * model.mm_per_px, map.height * model.mm_per_px)) {
+    on_map.polynomial.clear();
+  }
+  return on_map;
+}
+
+std::string gain_left_out(const recon::SpatialGain& gain, const Calibration& calibration) {
+  if (gain.polynomial.empty() || !gain_on_map(gain, calibration).polynomial.empty()) return {};
+  return "gain: the lens file's is not used: extended to the corners of the map, where no pin was, "
+         "it would halve or double darkening; give the --crop that the board covered to use it";
 }
 
 SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> reference_q8,

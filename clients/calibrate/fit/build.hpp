@@ -87,11 +87,22 @@ void check_sizes(double ball_radius_mm, double mm_per_px);
                                             const std::optional<Crop>& crop, double mm_per_px,
                                             const std::optional<recon::Lens>& lens);
 
+/// Whether a gain, of places from the middle of a map of this size, stays between half and twice
+/// of its middle at the map's corners. It is fitted where presses or pins are and used everywhere:
+/// what halves or doubles at a corner was not seen but extended there.
+[[nodiscard]] bool reaches_corners(const recon::SpatialGain& gain, double width_mm,
+                                   double height_mm) noexcept;
+
 /// A lens file's gain, whose places are millimetres of the lens's surface, with places from the
 /// middle of the calibration's map, as recon::Model has it. Without a lens they are that already.
+/// Without its polynomial where that was extended too far (reaches_corners()).
 /// Throws std::invalid_argument when the gain is not above zero there.
 [[nodiscard]] recon::SpatialGain gain_on_map(const recon::SpatialGain& gain,
                                              const Calibration& calibration);
+
+/// A sentence on a polynomial that gain_on_map() leaves out; empty: it does not.
+[[nodiscard]] std::string gain_left_out(const recon::SpatialGain& gain,
+                                        const Calibration& calibration);
 
 /// The depth map's part of the reference, the nearest pixels, to whole grey levels.
 [[nodiscard]] image::Grey8 rectified_reference(const recon::RectifyTable& table,

@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -102,21 +101,6 @@ Trial try_gain(const std::vector<SettledPress>& presses, const BallPresses& set,
   trial.left_out = leave_each_out(trial.rings);
   for (const MetPress& met : trial.left_out.met) trial.errors_mm.push_back(met.mean_error_mm());
   return trial;
-}
-
-/// A gain is fitted where presses are and used everywhere: what halves or doubles at a corner of
-/// the map was not seen but extended there.
-bool reaches_corners(const Trial& trial) {
-  const DifferenceMap& map = trial.presses->front().map;
-  const recon::SpatialGain gain{.polynomial = trial.fit.gain};
-  const double x = 0.5 * map.width * map.mm_per_px;
-  const double y = 0.5 * map.height * map.mm_per_px;
-  return std::ranges::all_of(std::array{-1, 1}, [&](int right) {
-    return std::ranges::all_of(std::array{-1, 1}, [&](int down) {
-      const double factor = gain.polynomial_at(right * x, down * y);
-      return factor > 0.5 && factor < 2;
-    });
-  });
 }
 
 /// Mean of `value(press)` over the presses of which every trial says something, and its standard
@@ -285,7 +269,10 @@ Calibration build(const BallPresses& presses, PressReport* report) {
     trials.push_back(try_gain(seen, set, recon::GainShape::none, terms));
     if (!lit.empty()) trials.push_back(try_gain(lit, set, recon::GainShape::uniform, terms));
   }
-  std::erase_if(trials, [](const Trial& trial) { return !reaches_corners(trial); });
+  std::erase_if(trials, [&](const Trial& trial) {
+    return !reaches_corners({.polynomial = trial.fit.gain}, plain.rectify.width * set.mm_per_px,
+                            plain.rectify.height * set.mm_per_px);
+  });
   for (const Trial& trial : trials) found.gains.push_back({.name = name_of(trial)});
   const std::size_t choice = simplest(trials, found.gains);
   const Trial& chosen = trials[choice];

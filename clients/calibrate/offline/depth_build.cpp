@@ -148,6 +148,11 @@ calibration::Calibration build_list(const PressImages& images, ListMethod method
     found.presses = std::move(fitted.presses);
     made = std::move(fitted.calibration);
   }
+  // Several presses tell their own gain, but the layer is fitted under the lens file's.
+  if (method != ListMethod::alone || images.set.presses.size() == 1) {
+    const std::string left_out = calibration::gain_left_out(images.gain, made);
+    if (!left_out.empty()) found.note += (found.note.empty() ? "" : "\n") + left_out;
+  }
   made.origin = images.origin;
   made.origin.created = utc_now();
   if (report != nullptr) *report = std::move(found);

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <stdexcept>
+#include <utility>
 
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/plausibility.hpp"
@@ -111,6 +112,10 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
         e.ball->half_mae_mm.value_or(0), e.ball->half_worst_mm.value_or(0),
         e.ball->sector_mae_mm.value_or(0)));
     lines.push_back(e.ball->press_gain.describe());
+    if (std::string left_out = calibration::gain_left_out(e.gain.gain, *e.calibration);
+        !left_out.empty()) {
+      lines.push_back(std::move(left_out));
+    }
     for (const auto& doubts : {calibration::doubts_about(*e.ball),
                                calibration::doubts_about(e.calibration->model->list)}) {
       for (const std::string& doubt : doubts) {

@@ -43,7 +43,7 @@ double deepest_mm(const Calibration& calibration, const ImaginedView& view) {
 TEST(ModelBuild, AGainStaysAtItsPlaceOnTheSurface) {
   ImaginedView view;
   view.col = 130;
-  const recon::SpatialGain on_surface{.polynomial = {0, 0, 0.008, 0.002, 0.003}};
+  const recon::SpatialGain on_surface{.polynomial = {0, 0, 0.004, 0.001, 0.002}};
   // Of a lens whose board's middle the camera shows at column 250, row 180.
   const auto gain_at = [&](double x, double y) {
     return on_surface.polynomial_at((x - 250) * ImaginedView::kMmPerPx,

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <stdexcept>
+#include <utility>
 
 #include "clients/calibrate/fit/evaluate.hpp"
 #include "tests/unit/calibration/ball.hpp"
@@ -77,6 +78,18 @@ TEST(Build, AGainStaysAtItsPlaceOnTheSurface) {
   const auto gain = build(press).model->gain.polynomial;
   ASSERT_EQ(gain.size(), 2U);
   EXPECT_NEAR(gain[0], 0.1 / 0.95, 1e-3);
+}
+
+// The map's corner is 6.5 and 6 mm from its middle.
+TEST(Build, AGainIsNotExtendedToWhatHalvesOrDoublesAtACorner) {
+  for (const auto& [per_mm2, kept] :
+       {std::pair{-0.011, true}, {-0.012, false}, {0.023, true}, {0.024, false}}) {
+    BallPress press = press_of(Ball{});
+    press.gain.polynomial = {0, 0, per_mm2, 0, 0};
+    const Calibration made = build(press);
+    EXPECT_EQ(made.model->gain.polynomial.size(), kept ? 5U : 0U) << per_mm2;
+    EXPECT_EQ(gain_left_out(press.gain, made).empty(), kept) << per_mm2;
+  }
 }
 
 TEST(Build, AnotherPressIsReadToo) {
