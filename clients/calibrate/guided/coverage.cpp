@@ -47,8 +47,7 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty,
       coverage.doubts = calibration::doubts_about(*coverage.made, images.set);
       if (!coverage.doubts.empty() && !force) {
         coverage.made = nullptr;
-        coverage.missing =
-            fmt::format("{} (--force takes it as it is)", fmt::join(coverage.doubts, "; "));
+        coverage.missing = doubted(coverage.doubts);
       }
     } catch (const std::exception& e) {
       coverage.missing = e.what();
@@ -65,6 +64,10 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty,
     return false;
   });
   return coverage;
+}
+
+std::string doubted(const std::vector<std::string>& doubts) {
+  return fmt::format("{} (--force takes it as it is)", fmt::join(doubts, "; "));
 }
 
 double covered_mm(const calibration::Calibration& made) {

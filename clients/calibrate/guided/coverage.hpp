@@ -25,6 +25,9 @@ struct Coverage {
 [[nodiscard]] Coverage cover(const PressImages& images, const calibration::Calibration& empty,
                              bool force);
 
+/// Why a doubted list is not made: the doubts, and what takes it anyhow.
+[[nodiscard]] std::string doubted(const std::vector<std::string>& doubts);
+
 /// How deep the covered list reaches, millimetres.
 [[nodiscard]] double covered_mm(const calibration::Calibration& made);
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/guided/fitness.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -217,7 +218,7 @@ Prompt Session::press_prompt() const {
 void Session::press_steps() {
   for (;;) {
     const std::size_t taken = images_.set.presses.size();
-    if (coverage_.made && taken >= static_cast<std::size_t>(plan_.presses)) return;
+    if (taken >= static_cast<std::size_t>(plan_.presses) && make()) return;
     if (taken > 0) console_.say("");
     const std::string line = ask(press_prompt());
     try {
@@ -233,7 +234,7 @@ void Session::press_steps() {
         }
         console_.say("preview: " + folder_.at("preview.png"));
       } else if (line == "s") {
-        if (coverage_.made) return;
+        if (make()) return;
         console_.say("that is not yet enough: " + coverage_.missing);
       } else {
         console_.say("\"" + line + "\" means nothing here");
@@ -290,6 +291,7 @@ void Session::take_press(const std::string& name) {
 }
 
 void Session::judge() {
+  made_.reset();
   coverage_ = cover(images_, empty_, plan_.force);
   view_.set_presses(coverage_.presses, coverage_.made ? covered_mm(*coverage_.made) : 0);
   if (!coverage_.made) {
@@ -307,11 +309,36 @@ void Session::judge() {
                            covered_mm(*coverage_.made), fmt::join(depths, ", ")));
 }
 
-Outcome Session::finish() {
-  if (plan_.method != ListMethod::alone) {
-    coverage_.made = std::make_shared<const calibration::Calibration>(
-        build_list(images_, plan_.method, &coverage_.report));
+bool Session::make() {
+  if (made_) return *made_;
+  made_ = plan_.method == ListMethod::alone && coverage_.made != nullptr;
+  if (plan_.method == ListMethod::alone || images_.set.presses.size() < 2) return *made_;
+  // What the presses lack by themselves, as a lighter one that is too faint to be seen, a layer may
+  // make up for; and a list may be doubted only with the layer.
+  std::string missing;
+  try {
+    calibration::PressReport report;
+    auto list = std::make_shared<const calibration::Calibration>(
+        build_list(images_, plan_.method, &report));
+    const std::vector<std::string> doubts = calibration::doubts_about(*list, images_.set);
+    if (doubts.empty() || plan_.force) {
+      for (const std::string& doubt : doubts) {
+        if (std::ranges::count(coverage_.doubts, doubt) == 0) console_.say("doubtful: " + doubt);
+      }
+      coverage_.made = std::move(list);
+      coverage_.report = std::move(report);
+      return *(made_ = true);
+    }
+    missing = doubted(doubts);
+  } catch (const std::exception& e) {
+    missing = e.what();
   }
+  if (missing != coverage_.missing) console_.say("not yet a list: " + missing);
+  coverage_.missing = missing;
+  return false;
+}
+
+Outcome Session::finish() {
   calibration::save(*coverage_.made, folder_.path() / kCalibration);
   console_.say(report_text(coverage_.report) + list_text(*coverage_.made->model) + "saved in " +
                folder_.at(kCalibration));

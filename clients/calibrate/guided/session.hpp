@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "clients/calibrate/guided/capture.hpp"
@@ -63,6 +64,9 @@ class Session {
   [[nodiscard]] Prompt press_prompt() const;
   void take_press(const std::string& name);
   void judge();
+  /// Makes the calibration by the method that was asked for, once for the presses that there are;
+  /// whether there is one. If not, coverage_.missing says why.
+  [[nodiscard]] bool make();
   [[nodiscard]] Outcome finish();
   void upload();
 
@@ -79,6 +83,7 @@ class Session {
   CellMeans untouched_;
   CellMeans last_;  ///< The press taken last.
   Coverage coverage_;
+  std::optional<bool> made_;  ///< What make() came to.
 };
 
 }  // namespace dtact::ctl::guided

@@ -90,8 +90,9 @@ class FakeSensor : public Sensor {
     frame.set_monotonic_ns(static_cast<std::int64_t>(sequence_) * 16'666'667);
     *frame.mutable_health() = now.health();
     *frame.mutable_light() = now.light();
-    *frame.mutable_luma() = picture(scene, scene.depth_mm + in_scene_ * scene.step_mm,
-                                    static_cast<std::uint32_t>(sequence_));
+    const double depth_mm = scene.depth_mm + in_scene_ * scene.step_mm;
+    *frame.mutable_luma() =
+        paint ? paint(scene) : picture(scene, depth_mm, static_cast<std::uint32_t>(sequence_));
     ++in_scene_;
     return frame;
   }
@@ -105,6 +106,7 @@ class FakeSensor : public Sensor {
 
   v1::Status now;
   std::function<void(v1::Status&)> on_status;
+  std::function<v1::LumaMap(const Scene&)> paint;  ///< Instead of picture().
   std::optional<v1::UploadCalibration> uploaded;
   bool silent = false;
   int frames_until_gone = -1;  ///< Negative: never.

@@ -3,12 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <map>
 
 #include "clients/calibrate/guided/capture.hpp"
 #include "clients/calibrate/guided/session.hpp"
 #include "clients/calibrate/guided/work_folder.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/calibrate/guided_fakes.hpp"
+#include "tests/unit/calibrate/imagined_press.hpp"
 
 namespace dtact::ctl::guided {
 namespace {
@@ -231,6 +233,41 @@ TEST_F(GuidedSession, NamesThePressThatIsMissing) {
   EXPECT_THAT(console.said,
               AllOf(HasSubstr("that is not yet enough: no press shows indentations from 0.00 to"),
                     HasSubstr("Press 3 of 4: the one that is missing")));
+}
+
+/// A ball of 4 mm in a layer, at the scene's place, as deep as makes a contact of so many mm.
+v1::LumaMap layer_picture(const Scene& scene) {
+  static std::map<double, v1::LumaMap> painted;  // a picture takes a while
+  v1::LumaMap& map = painted[scene.depth_mm];
+  if (map.width() > 0) return map;
+  calibration::ImaginedView view;
+  view.width = test::kWidth;
+  view.height = test::kHeight;
+  view.col = scene.x_px;
+  view.row = scene.y_px;
+  view.contact_radius_mm = scene.depth_mm;
+  map.set_encoding(v1::LUMA_GREY8);
+  map.set_width(test::kWidth);
+  map.set_height(test::kHeight);
+  if (scene.depth_mm == 0) {
+    map.mutable_data()->assign(std::size_t{test::kWidth} * test::kHeight, static_cast<char>(160));
+  } else {
+    const image::Grey8 frame = view.frame();
+    map.mutable_data()->assign(frame.pixels.begin(), frame.pixels.end());
+  }
+  return map;
+}
+
+// Contacts of 2.8 and 2.5 mm are 1.1 and 0.9 mm deep: a chain of them cannot begin at zero.
+TEST_F(GuidedSession, EndsWhereTheLayerMakesUpForAPress) {
+  plan_.map.mm_per_px = calibration::ImaginedView::kMmPerPx;
+  plan_.presses = 6;
+  FakeSensor sensor(presses({{.depth_mm = 2.8}, {.depth_mm = 2.5, .x_px = 150, .y_px = 158}}));
+  sensor.paint = layer_picture;
+  FakeConsole console({"", "", "", "s", ""});
+  EXPECT_EQ(run(sensor, console), Outcome::uploaded) << console.said;
+  EXPECT_THAT(console.said, AllOf(HasSubstr("not yet a list: no press shows indentations from"),
+                                  HasSubstr("of a layer")));
 }
 
 TEST_F(GuidedSession, AReferenceUnderTouchIsTakenAgain) {
