@@ -57,7 +57,8 @@ std::string format(const LensFile& file) {
   for (const std::string& note : file.notes) t += fmt::format("# {}\n", note);
   t += fmt::format("version = {}\n\n[frame]\nwidth = {}\nheight = {}\n\n[lens]\n", kFormatVersion,
                    file.frame_width, file.frame_height);
-  return t + format_lens(file.lens) + "\n" + format_gain(file.gain);
+  t += format_lens(file.lens) + "\n";
+  return file.gain_told ? t + format_gain(file.gain) : t;
 }
 
 LensFile load_lens(const std::filesystem::path& path) {
@@ -71,7 +72,8 @@ LensFile load_lens(const std::filesystem::path& path) {
             calibration.model->rectify.frame_height,
             *calibration.lens,
             {},
-            {}};
+            {},
+            false};
   }
   const toml::table document = tomlfile::parse(base::read_file(path), path.string());
   tomlfile::KeyReader top(document, path.string());
@@ -83,7 +85,8 @@ LensFile load_lens(const std::filesystem::path& path) {
   frame.finish();
   const std::optional<recon::Lens> lens =
       read_lens(top.table("lens"), file.frame_width, file.frame_height);
-  if (top.has("gain")) file.gain = read_gain(top.table("gain"));
+  file.gain_told = top.has("gain");
+  if (file.gain_told) file.gain = read_gain(top.table("gain"));
   top.finish();
   if (!lens) top.fail("lens", "is empty; make a lens with dtactctl calibrate lens");
   file.lens = *lens;

@@ -21,6 +21,9 @@ struct BallPresses {
   double mm_per_px = 0;
   std::optional<Crop> crop;         ///< None: all that the frame shows.
   std::optional<recon::Lens> lens;  ///< None: the frame as it is.
+  /// The gain that goes with it is a board's answer: where it is none, darkening is no share of the
+  /// light either.
+  bool gain_told = false;
 };
 
 /// What build() found out on the way.

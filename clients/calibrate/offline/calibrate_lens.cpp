@@ -2,6 +2,7 @@
 #include <fmt/ranges.h>
 
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "clients/calibrate/fit/build.hpp"
@@ -43,8 +44,10 @@ std::pair<int, int> pair_of(const std::string& text, const char* option) {
 }
 
 void write(const LensOptions& options, const ImageSet& images, const ChosenLens& chosen,
-           const recon::SpatialGain& gain, const std::vector<std::string>& what) {
-  calibration::LensFile file{images.width(), images.height(), chosen.lens, gain, what};
+           const std::optional<recon::SpatialGain>& gain, const std::vector<std::string>& what) {
+  calibration::LensFile file{images.width(), images.height(),
+                             chosen.lens,    gain.value_or(recon::SpatialGain{}),
+                             what,           gain.has_value()};
   recon::check(file.lens, file.frame_width, file.frame_height);
   file.notes.push_back(
       fmt::format("RMS distance from the ideal places: {:.4f} mm, each left out of "
@@ -84,7 +87,7 @@ void run_chessboard(const LensOptions& options) {
   for (const auto& source : images.sources) names.push_back(source.name);
   const ChessboardLens made =
       calibrate_chessboards(grey_images(images), names, {cols, rows, options.square_mm});
-  write(options, images, made.lens, {},
+  write(options, images, made.lens, std::nullopt,
         {fmt::format("chessboard of {}x{} squares of {} mm, {} image(s)", cols, rows,
                      options.square_mm, images.images.size())});
 }

@@ -79,11 +79,15 @@ void add_map_options(CLI::App& command, MapOptions& options) {
 }
 
 MapChoice choose_map(const MapOptions& options, int frame_width, int frame_height) {
-  MapChoice map{{}, {}, options.mm_per_px, crop_of(options, frame_width, frame_height)};
+  MapChoice map{.lens = {},
+                .gain = {},
+                .mm_per_px = options.mm_per_px,
+                .crop = crop_of(options, frame_width, frame_height)};
   if (!options.lens.empty()) {
     const calibration::LensFile file = lens_for(options.lens, frame_width, frame_height);
     map.lens = file.lens;
     map.gain = file.gain;
+    map.gain_told = file.gain_told;
     if (map.mm_per_px == 0) map.mm_per_px = recon::central_mm_per_px(*map.lens);
   } else if (map.mm_per_px == 0) {
     throw std::runtime_error("--mm-per-px or --lens is required: one of them says the scale");
@@ -100,7 +104,8 @@ PressImages begin_presses(const std::vector<std::string>& reference, double ball
                              .ball_radius_mm = ball_radius_mm,
                              .mm_per_px = choice.mm_per_px,
                              .crop = choice.crop,
-                             .lens = choice.lens},
+                             .lens = choice.lens,
+                             .gain_told = choice.gain_told},
                      .gain = choice.gain,
                      .origin = recorded_origin(reference)};
   images.origin.sources = untouched.sources;

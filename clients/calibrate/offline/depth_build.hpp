@@ -26,6 +26,7 @@ void add_map_options(CLI::App& command, MapOptions& options);
 struct MapChoice {
   std::optional<recon::Lens> lens;
   recon::SpatialGain gain;  ///< Of the lens file: what its board's pins ask for.
+  bool gain_told = false;   ///< LensFile::gain_told.
   double mm_per_px = 0;
   std::optional<calibration::Crop> crop;
 };

@@ -138,6 +138,7 @@ Calibration by_layer(const FolderEvaluation& e) {
   presses.presses = {{"ball.png", e.ball_images.frames(), {}}};
   presses.ball_radius_mm = 4;
   presses.lens = e.pins->lens.lens;
+  presses.gain_told = true;
   presses.mm_per_px = recon::central_mm_per_px(e.pins->lens.lens);
   const calibration::FittedCalibration made = calibration::build_model(presses, e.gain.gain);
   const calibration::LayerModel& layer = made.fit.layer;

@@ -40,6 +40,16 @@ double deepest_mm(const Calibration& calibration, const ImaginedView& view) {
   return 0.001 * sum / count;
 }
 
+// Light that grows by 1.2 % a millimetre, of which darkening is a share.
+TEST(ModelBuild, ABoardThatAskedForNoGainIsBelieved) {
+  ImaginedView view;
+  view.light = [](int x, int) { return 160 * (1 + 0.012 * ImaginedView::kMmPerPx * (x - 200)); };
+  BallPresses set = presses_of(view);
+  EXPECT_EQ(build_model(set).calibration.model->gain.shape, recon::GainShape::uniform);
+  set.gain_told = true;
+  EXPECT_EQ(build_model(set).calibration.model->gain.shape, recon::GainShape::none);
+}
+
 TEST(ModelBuild, AGainStaysAtItsPlaceOnTheSurface) {
   ImaginedView view;
   view.col = 130;

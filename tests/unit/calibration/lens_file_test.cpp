@@ -53,6 +53,7 @@ TEST_F(LensFileTest, IsRead) {
   EXPECT_EQ(file.lens.radius_px, 250);
   EXPECT_EQ(file.lens.radial, (std::vector<double>{-0.1, 0.02}));
   EXPECT_EQ(file.gain.shape, recon::GainShape::none) << "files from before there were gains";
+  EXPECT_FALSE(file.gain_told);
 }
 
 TEST_F(LensFileTest, IsReadBackExactly) {
@@ -60,12 +61,23 @@ TEST_F(LensFileTest, IsReadBackExactly) {
   file.lens.homography[0] = 20.1;  // no binary fraction
   file.lens.radial = {1.0 / 3, -2.0 / 7};
   file.gain.polynomial = {0, 0, 0.001, -0.0002, 1.0 / 3000};
+  file.gain_told = true;
   file.notes = {"how it was measured"};
   base::write_file_atomically(path(), format(file));
   const LensFile again = load_lens(path());
   EXPECT_EQ(again.lens.homography, file.lens.homography);
   EXPECT_EQ(again.lens.radial, file.lens.radial);
   EXPECT_EQ(again.gain.polynomial, file.gain.polynomial);
+}
+
+// A board of pins that asks for no gain is an answer, a chessboard is none.
+TEST_F(LensFileTest, TellsNoGainFromNoAnswer) {
+  LensFile file = load();
+  for (const bool told : {false, true}) {
+    file.gain_told = told;
+    base::write_file_atomically(path(), format(file));
+    EXPECT_EQ(load_lens(path()).gain_told, told);
+  }
 }
 
 TEST_F(LensFileTest, ErrorsNameFileKeyAndRemedy) {

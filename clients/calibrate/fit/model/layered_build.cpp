@@ -28,8 +28,7 @@ BallPress only_press(const BallPresses& set, const recon::SpatialGain& gain) {
           .lens = set.lens,
           .crop = set.crop,
           .gain = gain,
-          // A lens file says what its pins ask for.
-          .may_share_light = !set.lens,
+          .may_share_light = !set.gain_told,
           .depth_mm = set.presses.front().depth_mm};
 }
 

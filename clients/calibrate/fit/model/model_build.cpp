@@ -156,7 +156,7 @@ FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& 
   auto model = std::make_shared<recon::Model>(*made.calibration.model);
   model->gain = gain_on_map(gain, made.calibration);
   Seen seen = look(*model, set);
-  if (gain.shape == recon::GainShape::none && gain.polynomial.empty()) {
+  if (!set.gain_told && gain.shape == recon::GainShape::none && gain.polynomial.empty()) {
     // The loss is a share of the light. Rings do not tell whether a sensor's picture is one, but
     // where it is not, a share of uneven light makes a round dent lopsided.
     recon::Model uniform = *model;

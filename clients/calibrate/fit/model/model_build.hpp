@@ -11,10 +11,10 @@ namespace dtact::calibration {
 
 /// A calibration by a layer that was fitted to presses of a ball (fit_model()), one or several, and
 /// the fit. Darkening is a share of the light at its place, unless the dents are much rounder in
-/// grey levels or `gain`, the lens file's, says another thing. A press is looked at about the
-/// ball's middle and without the press's own gain (choose_press_gain()), which is no part of the
-/// calibration: rings about the centroid of a lopsided dent mix places of different depths.
-/// Measured depths play no part. `origin` is left for the caller to fill.
+/// grey levels or `gain`, the lens file's, says another thing (BallPresses::gain_told). A press is
+/// looked at about the ball's middle and without the press's own gain (choose_press_gain()), which
+/// is no part of the calibration: rings about the centroid of a lopsided dent mix places of
+/// different depths. Measured depths play no part. `origin` is left for the caller to fill.
 struct FittedCalibration {
   Calibration calibration;
   ModelFit fit;
