@@ -128,6 +128,12 @@ void add_press(PressImages& images, const std::vector<std::string>& paths, const
 
 void add_press(PressImages& images, const std::string& press) {
   const auto [path, depth_mm] = split_press(press);
+  const fs::path folder = fs::weakly_canonical(path);
+  for (const calibration::BallPresses::Press& other : images.set.presses) {
+    if (fs::weakly_canonical(split_press(other.name).first) != folder) continue;
+    throw std::runtime_error("--press " + press + ": the images of " + other.name +
+                             " again; give each press once");
+  }
   add_press(images, {path}, "--press");
   images.set.presses.back().name = press;
   images.set.presses.back().depth_mm = depth_mm;

@@ -48,7 +48,7 @@ struct PressImages {
                                         double ball_radius_mm, const MapOptions& map);
 
 /// Adds the images of one press: a PNG file or a folder, FOLDER@MM where the depth was measured.
-/// Throws std::runtime_error naming --press.
+/// Throws std::runtime_error naming --press, also where the set has these images already.
 void add_press(PressImages& images, const std::string& press);
 
 /// What the darkening of a ball's presses is turned into a list by.

@@ -94,6 +94,17 @@ TEST(LayeredBuild, MeasuredDepthsNeedNoLayer) {
   EXPECT_NEAR(deepest_mm(build_layered(set, {}, ignored), set), depth_mm + 0.05, 0.01);
 }
 
+TEST(LayeredBuild, NamesThePressThatIsLeftOutOfTwo) {
+  BallPresses set = press_of({});
+  image::Grey8 untouched = set.presses[0].frames[0];
+  std::ranges::fill(untouched.pixels, std::uint8_t{160});
+  set.presses.push_back({.name = "nothing", .frames = {untouched}, .depth_mm = {}});
+  PressReport report;
+  EXPECT_THAT([&] { (void)build_layered(set, {}, report); },
+              testing::ThrowsMessage<std::runtime_error>(testing::AllOf(
+                  HasSubstr("at least two"), HasSubstr("left out: nothing: no contact"))));
+}
+
 TEST(LayeredBuild, RefusesSizesThatCannotBe) {
   BallPresses set = press_of({});
   PressReport report;

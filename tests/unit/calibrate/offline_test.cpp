@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "clients/calibrate/offline/colour_map.hpp"
+#include "clients/calibrate/offline/depth_build.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
@@ -229,6 +230,20 @@ TEST_F(Offline, NamesWhatIsWrong) {
   std::vector<std::string> inside_out = calibrate();
   *std::ranges::find(inside_out, "4.0") = "-4";
   EXPECT_THAT([&] { run(inside_out); }, ThrowsMessage<CLI::ParseError>(HasSubstr("--radius-mm")));
+}
+
+// Presses are told apart by their names, and one that counts twice chains with itself.
+TEST_F(Offline, RefusesAPressThatIsGivenTwice) {
+  MapOptions map;
+  map.mm_per_px = 0.05;
+  PressImages images = begin_presses({at("reference.png")}, 4, map);
+  add_press(images, at("ball.png") + "@1.5");
+  EXPECT_THAT([&] { add_press(images, at("") + "./ball.png"); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("--press"), HasSubstr("ball.png@1.5 again"))));
+  write("light.png", Ball{.depth_mm = 0.5}.frame());
+  add_press(images, at("light.png"));
+  EXPECT_EQ(images.set.presses.size(), 2U);
 }
 
 TEST(DepthFile, NpyIsLittleEndianFloats) {

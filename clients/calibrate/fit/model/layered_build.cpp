@@ -105,14 +105,12 @@ Calibration tied_to(const FittedCalibration& fitted, const BallPresses& set,
 Calibration chained_at(const FittedCalibration& fitted, const BallPresses& set,
                        PressReport& report) {
   BallPresses at_depths = set;
-  std::erase_if(at_depths.presses, [&](BallPresses::Press& press) {
-    const auto used = std::ranges::find(fitted.presses, press.name, &PressReport::Depth::name);
-    if (used == fitted.presses.end()) return true;
-    press.depth_mm = used->depth_mm;
-    return false;
-  });
+  for (const PressReport::Depth& used : fitted.presses) {
+    const auto press = std::ranges::find(at_depths.presses, used.name, &BallPresses::Press::name);
+    press->depth_mm = used.depth_mm;
+  }
+  // The presses that the layer was not fitted to are left out there, too, and named.
   Calibration made = build(at_depths, &report);
-  report.left_out.insert(report.left_out.begin(), fitted.left_out.begin(), fitted.left_out.end());
   add_line(report.note, "list: what the presses show, at the depths of a layer" + left_by(fitted));
   made.layer = fitted.calibration.layer;
   return made;
