@@ -62,7 +62,9 @@ TEST(LayeredBuild, TiesTheListToALayerThatIsTheSameInAllParts) {
   const BallPresses set = press_of({});
   PressReport report;
   const Calibration made = build_layered(set, {}, report);
-  EXPECT_THAT(report.note, HasSubstr("list: what the press shows, at the depth of a layer"));
+  EXPECT_THAT(report.note,
+              testing::AllOf(HasSubstr("list: what the press shows, at the depth of a layer"),
+                             HasSubstr("averages of 10 images and more")));
   EXPECT_TRUE(made.layer);
   PressReport ignored;
   EXPECT_NE(made.model->list.um, build_alone(set, {}, ignored).model->list.um);

@@ -72,10 +72,18 @@ void add_line(std::string& note, const std::string& line) {
   note += (note.empty() ? "" : "\n") + line;
 }
 
-/// "; the layer itself leaves 0.20 grey levels".
-std::string left_by(const FittedCalibration& fitted) {
-  return fmt::format("; the layer itself leaves {:.2f} grey levels",
-                     fitted.fit.residual * fitted.light_levels);
+/// "; the layer itself leaves 0.200 grey levels", and what that may be by noise alone: a single
+/// image's is more than explains() allows.
+std::string left_by(const FittedCalibration& fitted, const BallPresses& set) {
+  constexpr std::size_t kEnough = 10;  // images whose mean has too little noise to matter
+  const bool few = std::ranges::any_of(
+      set.presses, [](const BallPresses::Press& press) { return press.frames.size() < kEnough; });
+  return fmt::format(
+      "; the layer itself leaves {:.3f} grey levels{}", fitted.fit.residual * fitted.light_levels,
+      few ? fmt::format("; averages of {} images and more of the press, and of the untouched "
+                        "surface, show whether that is more than their noise",
+                        kEnough)
+          : "");
 }
 
 Calibration tied_to(const FittedCalibration& fitted, const BallPresses& set,
@@ -98,7 +106,7 @@ Calibration tied_to(const FittedCalibration& fitted, const BallPresses& set,
   add_line(report.note,
            fmt::format("list: what the press shows, at the depth of a layer, {:+.3f} mm "
                        "from where the darkening's straight line ends{}",
-                       tied.moved_mm, left_by(fitted)));
+                       tied.moved_mm, left_by(fitted, set)));
   return made;
 }
 
@@ -111,7 +119,8 @@ Calibration chained_at(const FittedCalibration& fitted, const BallPresses& set,
   }
   // The presses that the layer was not fitted to are left out there, too, and named.
   Calibration made = build(at_depths, &report);
-  add_line(report.note, "list: what the presses show, at the depths of a layer" + left_by(fitted));
+  add_line(report.note,
+           "list: what the presses show, at the depths of a layer" + left_by(fitted, set));
   made.layer = fitted.calibration.layer;
   return made;
 }
