@@ -103,7 +103,8 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
   }
   if (e.ball && e.calibration) {  // which made it
     lines.push_back(fmt::format(
-        "ball: contact at row {:.1f}, column {:.1f} of the rectified image, offset {:+.4f} mm "
+        "ball, by its known sphere alone (--method list): contact at row {:.1f}, column {:.1f} of "
+        "the rectified image, offset {:+.4f} mm "
         "taken "
         "off; mean absolute error {:.4f} mm in sample, {:.4f} mm half-disc (worst of eight "
         "{:.4f}), "
@@ -119,7 +120,7 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
     for (const auto& doubts : {calibration::doubts_about(*e.ball),
                                calibration::doubts_about(e.calibration->model->list)}) {
       for (const std::string& doubt : doubts) {
-        lines.push_back("ball: a calibration would be refused: " + doubt);
+        lines.push_back("ball: a calibration by --method list would be refused: " + doubt);
       }
     }
   } else {
