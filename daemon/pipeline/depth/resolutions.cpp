@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
 #include "daemon/pipeline/depth/uncertainty.hpp"
 #include "daemon/recon/decimate.hpp"
+#include "daemon/recon/kernels.hpp"
 #include "daemon/recon/scattering.hpp"
 
 namespace dtact::pipeline {
@@ -24,14 +24,30 @@ void require_sharpening(const recon::Model& model, int steps) {
       "model, or set reconstruction.sharpen to \"auto\" or \"off\"");
 }
 
+/// Of the reference over the map's pixels that are lit and to be trusted: housing that the frame
+/// shows beside the map, or a dark corner in it, has no depth that light could move.
+double mean_grey_of(const recon::Model& model) {
+  constexpr int kDarkest_q8 = 4 * recon::kernels::kDarkest_q6;
+  const recon::RectifyTable& map = model.rectify;
+  double sum = 0;
+  double count = 0;
+  for (std::size_t i = 0; i < map.entries.size(); ++i) {
+    const recon::RectifyTable::Entry& at = map.entries[i];
+    const std::uint16_t q8 = model.reference_q8[static_cast<std::size_t>(at.y) *
+                                                    static_cast<std::size_t>(map.frame_width) +
+                                                static_cast<std::size_t>(at.x)];
+    if (q8 < kDarkest_q8 || (!model.untrusted.empty() && model.untrusted[i] != 0)) continue;
+    sum += q8;
+    count += 1;
+  }
+  return count > 0 ? sum / 256 / count : 0;
+}
+
 }  // namespace
 
 Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
                          const recon::CellLattice& lattice, const ReconstructionRules& rules)
-    : model_(model),
-      max_error_um_(rules.max_error_um),
-      mean_grey_(std::accumulate(model->reference_q8.begin(), model->reference_q8.end(), 0.0) /
-                 256 / static_cast<double>(model->reference_q8.size())) {
+    : model_(model), max_error_um_(rules.max_error_um), mean_grey_(mean_grey_of(*model)) {
   // Where nothing else is asked for a sharpened map stays as coarse as it is made.
   const int map = rules.decimation == 0 ? recon::kSharpenedAt : rules.decimation;
   if (rules.sharpen > 0) {

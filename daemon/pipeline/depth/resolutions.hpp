@@ -86,7 +86,7 @@ class Resolutions {
 
   std::shared_ptr<const recon::Model> model_;
   double max_error_um_;
-  double mean_grey_;             // of the calibration's reference
+  double mean_grey_;             // of the calibration's reference where depth is made of it
   std::vector<Resolution> all_;  // the cheaper before the more accurate
   std::size_t in_use_ = 0;
 };

@@ -5,6 +5,7 @@
 
 #include <memory>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "daemon/pipeline/untouched/calibrated_image.hpp"
@@ -84,6 +85,28 @@ TEST(Resolutions, ThatChooseTheirStepsArePlainWhereThereAreNone) {
       EXPECT_EQ(rungs(toy, method, kAuto), rungs(toy, method, 0)) << method;
     }
   }
+}
+
+// The light is 100 in the map, a grey level of which is 32 um (the toy), and 2 around it.
+TEST(Resolutions, CountTheLightOfTheMapAlone) {
+  const auto toy = fakes::toy_calibration();
+  recon::Model model = *toy->model;
+  model.reference_q8.assign(model.reference_q8.size(), 2 * 256);
+  for (const recon::RectifyTable::Entry& at : model.rectify.entries) {
+    model.reference_q8[static_cast<std::size_t>(at.y) * fakes::kToyWidth +
+                       static_cast<std::size_t>(at.x)] = 100 * 256;
+  }
+  // A dark corner of the map is no part of it either.
+  for (std::size_t i = 0; i < 20; ++i) {
+    const recon::RectifyTable::Entry& at = model.rectify.entries[i];
+    model.reference_q8[static_cast<std::size_t>(at.y) * fakes::kToyWidth +
+                       static_cast<std::size_t>(at.x)] = 2 * 256;
+  }
+  model.uncertainty = {{.depth_mm = 0.5, .error_um = 0}};
+  const CalibratedImage image(fakes::toy_calibration());
+  const Resolutions maps(std::make_shared<const recon::Model>(std::move(model)),
+                         image.cells.lattice(), {.decimation = 1});
+  EXPECT_NEAR(maps.contact_um(1, 0, {.light_left = 0.01}), 0.01 * 100 * 32, 0.01);
 }
 
 TEST(Resolutions, RefuseStepsThatTheFilterCannotTake) {
