@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <stdexcept>
 
 namespace dtact::calibration {
@@ -17,7 +18,72 @@ double depth_um(const recon::DepthList& list, int q6) {
   return list.um[static_cast<std::size_t>(std::clamp(q6 - list.first_q6, 0, last))];
 }
 
+/// Where a press's contact is and the mean light there; nothing where there is none.
+struct LitContact {
+  Contact contact;
+  double light = 0;
+};
+std::vector<LitContact> lit_contacts(const recon::Model& model, const BallPresses& set,
+                                     const image::Grey8& light) {
+  std::vector<LitContact> found;
+  for (const BallPresses::Press& press : set.presses) {
+    try {
+      const SettledPress settled =
+          settle(model, set.reference_q8.pixels, press.frames, set.ball_radius_mm);
+      double sum = 0;
+      double pixels = 0;
+      for (int y = 0, i = 0; y < light.height; ++y) {
+        for (int x = 0; x < light.width; ++x, ++i) {
+          if (distance_mm(settled.map, settled.contact, x, y) >= settled.contact.radius_mm)
+            continue;
+          sum += light.pixels[static_cast<std::size_t>(i)];
+          pixels += 1;
+        }
+      }
+      if (pixels > 0) found.push_back({settled.contact, sum / pixels});
+    } catch (const std::runtime_error&) {
+      continue;  // it shows no contact, and build() has said why it was left out
+    }
+  }
+  return found;
+}
+
 }  // namespace
+
+std::string dim_part_of(const Calibration& made, const BallPresses& set) {
+  constexpr double kLeastPart = 0.005;  // of the map
+  const recon::Model& model = *made.model;
+  if (set.gain_told || model.gain.shape != recon::GainShape::none ||
+      !model.gain.polynomial.empty()) {
+    return {};
+  }
+  const image::Grey8 light = rectified_reference(model.rectify, set.reference_q8);
+  const std::vector<LitContact> contacts = lit_contacts(model, set, light);
+  if (contacts.empty()) return {};
+  const double half = 0.5 * std::ranges::min(contacts, {}, &LitContact::light).light;
+  double all = 0;
+  double dim = 0;
+  double nearest_mm = std::numeric_limits<double>::infinity();
+  for (int y = 0, i = 0; y < light.height; ++y) {
+    for (int x = 0; x < light.width; ++x, ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      if (!model.untrusted.empty() && model.untrusted[at] != 0) continue;
+      all += 1;
+      if (light.pixels[at] >= half) continue;
+      dim += 1;
+      for (const LitContact& press : contacts) {
+        nearest_mm = std::min(
+            nearest_mm, model.mm_per_px * std::hypot(x - press.contact.col, y - press.contact.row));
+      }
+    }
+  }
+  if (dim < kLeastPart * all) return {};
+  return fmt::format(
+      "light: {:.0f} % of the map, from {:.1f} mm beside the ball on, has less than half of the "
+      "light that the ball was pressed in; where darkening is a share of the light depth reads too "
+      "shallow there, unless a board of pins says the gain (dtact-calibrate lens)",
+      std::max(1.0, 100 * dim / all), nearest_mm);
+}
 
 std::vector<std::string> doubts_about(const recon::DepthList& list) {
   const int at_q6 =

@@ -46,6 +46,13 @@ namespace dtact::calibration {
 [[nodiscard]] std::vector<std::string> doubts_about(const Calibration& made,
                                                     const BallPresses& set);
 
+/// Not a doubt but to be known: a sentence where half a per cent of the map and more has less than
+/// half of the light that the presses' contacts have, and the calibration counts darkening the same
+/// at every place without a board's having said so; else empty. Where darkening is a share of the
+/// light, as it is in the simulator, depth reads too shallow there, and presses in the middle of an
+/// even light do not show it.
+[[nodiscard]] std::string dim_part_of(const Calibration& made, const BallPresses& set);
+
 inline constexpr double kMostOffsetMm = 0.22;
 inline constexpr double kMostShape = 0.09;     ///< Of the sphere's depth.
 inline constexpr double kLeastShapeMm = 0.05;  ///< What a light press may be off in any case.

@@ -9,6 +9,7 @@
 
 #include "clients/calibrate/fit/model/layered_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
+#include "clients/calibrate/fit/plausibility.hpp"
 #include "daemon/calibration/lens_file.hpp"
 #include "daemon/calibration/sensor_file.hpp"
 
@@ -159,11 +160,14 @@ calibration::Calibration build_list(const PressImages& images, ListMethod method
     found.presses = std::move(fitted.presses);
     made = std::move(fitted.calibration);
   }
+  const auto add_note = [&found](const std::string& line) {
+    if (!line.empty()) found.note += (found.note.empty() ? "" : "\n") + line;
+  };
   // Several presses tell their own gain, but the layer is fitted under the lens file's.
   if (method != ListMethod::alone || images.set.presses.size() == 1) {
-    const std::string left_out = calibration::gain_left_out(images.gain, made);
-    if (!left_out.empty()) found.note += (found.note.empty() ? "" : "\n") + left_out;
+    add_note(calibration::gain_left_out(images.gain, made));
   }
+  add_note(calibration::dim_part_of(made, images.set));
   made.origin = images.origin;
   made.origin.created = utc_now();
   if (report != nullptr) *report = std::move(found);

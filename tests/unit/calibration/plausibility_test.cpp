@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <memory>
+#include <utility>
+
 #include "tests/unit/calibration/ball.hpp"
 
 namespace dtact::calibration {
@@ -139,6 +142,38 @@ TEST(Doubts, OfAPressHalfInTheDark) {
     }
   }
   EXPECT_THAT(doubts_of(press), Contains(HasSubstr("too dark to be seen")));
+}
+
+// A corner at a quarter of the light: 625 of 62400 pixels, the nearest at (24, 24), the ball at
+// (120.25, 110.5).
+TEST(DimPart, IsToldWhereNobodySaidTheGain) {
+  BallPresses set;
+  set.reference_q8 = Ball{}.untouched_q8();
+  set.presses = {{"ball", {Ball{}.frame()}, {}}};
+  set.ball_radius_mm = 4;
+  set.mm_per_px = 0.05;
+  BallPress press = scaled_press_of(Ball{});
+  EXPECT_EQ(dim_part_of(build(press), set), "");
+  for (int y = 0; y < 25; ++y) {
+    for (int x = 0; x < 25; ++x) {
+      const auto at = static_cast<std::size_t>(y) * 260 + static_cast<std::size_t>(x);
+      set.reference_q8.pixels[at] = 50 * 256;
+      set.presses[0].frames[0].pixels[at] = 50;
+    }
+  }
+  press.reference_q8 = set.reference_q8;
+  press.frames = set.presses[0].frames;
+  Calibration made = build(press);
+  EXPECT_THAT(dim_part_of(made, set), AllOf(HasSubstr("1 % of the map"), HasSubstr("from 6.5 mm"),
+                                            HasSubstr("less than half of the light")));
+  EXPECT_THAT(doubts_about(made, set), IsEmpty()) << "it is to be known, not refused";
+  set.gain_told = true;
+  EXPECT_EQ(dim_part_of(made, set), "");
+  set.gain_told = false;
+  auto shared = std::make_shared<recon::Model>(*made.model);
+  shared->gain.shape = recon::GainShape::uniform;
+  made.model = std::move(shared);
+  EXPECT_EQ(dim_part_of(made, set), "");
 }
 
 TEST(Doubts, OfSeveralPressesNameThePress) {
