@@ -103,8 +103,7 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
   }
   if (e.ball && e.calibration) {  // which made it
     lines.push_back(fmt::format(
-        "ball, by its known sphere alone (--method list): contact at row {:.1f}, column {:.1f} of "
-        "the rectified image, offset {:+.4f} mm "
+        "ball: contact at row {:.1f}, column {:.1f} of the rectified image, offset {:+.4f} mm "
         "taken "
         "off; mean absolute error {:.4f} mm in sample, {:.4f} mm half-disc (worst of eight "
         "{:.4f}), "
@@ -112,6 +111,9 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
         e.ball->contact.row, e.ball->contact.col, e.ball->offset_mm, e.ball->mae_mm,
         e.ball->half_mae_mm.value_or(0), e.ball->half_worst_mm.value_or(0),
         e.ball->sector_mae_mm.value_or(0)));
+    lines.push_back(
+        "list: of the ball's known sphere alone (--method list), also where a calibration would be "
+        "refused");
     lines.push_back(e.ball->press_gain.describe());
     if (std::string left_out = calibration::gain_left_out(e.gain.gain, *e.calibration);
         !left_out.empty()) {
@@ -120,7 +122,7 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
     for (const auto& doubts : {calibration::doubts_about(*e.ball),
                                calibration::doubts_about(e.calibration->model->list)}) {
       for (const std::string& doubt : doubts) {
-        lines.push_back("ball: a calibration by --method list would be refused: " + doubt);
+        lines.push_back("ball: a calibration would be refused: " + doubt);
       }
     }
   } else {
