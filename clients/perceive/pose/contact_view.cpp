@@ -36,6 +36,7 @@ ContactView::ContactView(const DepthGrid& depth, const PointCloud& cloud, const 
   }
   const double threshold =
       std::max(kUncertainties * uncertainty_um / depth.um_per_unit, kTouchingPart * deepest);
+  deepest_ = 1e-6 * deepest * depth.um_per_unit;
   for (int row = 0; row < cloud.height; ++row) {
     for (int column = 0; column < cloud.width; ++column) {
       const std::size_t i = index(column, row);

@@ -49,6 +49,8 @@ class ContactView {
   [[nodiscard]] const Eigen::Vector3d& upright() const noexcept { return upright_; }
   /// Of all that touches, square metres; alike at each of the map's resolutions.
   [[nodiscard]] double area() const noexcept { return static_cast<double>(pixels_) * px_ * px_; }
+  /// Of all that touches, metres.
+  [[nodiscard]] double deepest() const noexcept { return deepest_; }
 
   /// The points that it is of; a pixel's index in them.
   [[nodiscard]] const PointCloud& cloud() const noexcept { return cloud_; }
@@ -90,6 +92,7 @@ class ContactView {
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d upright_ = Eigen::Vector3d::Zero();
   std::size_t pixels_ = 0;
+  double deepest_ = 0;
 };
 
 }  // namespace dtact::perceive

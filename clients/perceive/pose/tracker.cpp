@@ -45,6 +45,7 @@ Tracker::Keyframe Tracker::keyframe_of(const ContactView& view) const {
   key.motion = pose_.alignment.motion;
   if (!keyframes_.empty()) key.hidden = keyframes_[current_].hidden;
   key.area = view.area();
+  key.deepest = view.deepest();
   key.centre = view.centre();
   key.surfels = view.choose(kSurfels);
   const Eigen::Matrix3d back = key.motion.rotation.transpose();
@@ -165,9 +166,11 @@ const Tracker::Pose& Tracker::follow(const ContactView& view, std::uint64_t sequ
   }
   pose_.state = State::tracked;
   pose_.alignment = found;
-  if (view.area() >= kGrown * keyframes_[current_].area) {
+  if (view.area() >= kGrown * keyframes_[current_].area ||
+      view.deepest() >= kGrown * keyframes_[current_].deepest) {
     // In its place: the tip of what was just touched lies on all that is touched later, and turns
-    // on it as it likes. A contact that is pressed in is not taken to slide meanwhile.
+    // on it as it likes; and of a light touch more of the gel only follows, which lies on nothing
+    // later. A contact that is pressed in is not taken to slide meanwhile.
     keyframes_[current_] = keyframe_of(view);
   } else if (found.overlap < kSharedOverlap) {
     add_keyframe(view);

@@ -54,6 +54,7 @@ class Tracker {
     std::vector<Surfel> surfels;  ///< As they lay in the first frame.
     Motion motion;
     Hidden hidden;                                     ///< Along which `motion` is not known.
+    double deepest = 0;                                ///< Of the contact then, metres.
     double area = 0;                                   ///< Of the contact then, square metres.
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Of the contact then, surface frame.
   };
