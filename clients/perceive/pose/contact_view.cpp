@@ -14,8 +14,11 @@ namespace {
 /// What is shallower than this part of the deepest is taken for gel that follows the object without
 /// touching it.
 constexpr double kTouchingPart = 0.3;
-/// And so is what noise alone may press in.
+/// And so is what noise alone may press in: so many times the uncertainty, which is more of bias
+/// and blur than of noise, and at most three deviations of the most noise that an untouched map
+/// has.
 constexpr double kUncertainties = 3;
+constexpr double kMostNoiseUm = 30;
 /// The normals' change is taken over so far to each side, metres: 3 pixels of 0.0414 mm.
 constexpr double kBendReach = 1.3e-4;
 
@@ -34,8 +37,8 @@ ContactView::ContactView(const DepthGrid& depth, const PointCloud& cloud, const 
   for (const std::int16_t value : depth.values) {
     if (value != depth.untrusted) deepest = std::max(deepest, int{value});
   }
-  const double threshold =
-      std::max(kUncertainties * uncertainty_um / depth.um_per_unit, kTouchingPart * deepest);
+  const double noise_um = std::min(kUncertainties * uncertainty_um, kMostNoiseUm);
+  const double threshold = std::max(noise_um / depth.um_per_unit, kTouchingPart * deepest);
   deepest_ = 1e-6 * deepest * depth.um_per_unit;
   for (int row = 0; row < cloud.height; ++row) {
     for (int column = 0; column < cloud.width; ++column) {
