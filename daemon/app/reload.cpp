@@ -79,7 +79,7 @@ std::string what_waits(const Reload& reload) {
     waits = fmt::format("needs a restart: {}", fmt::join(reload.restart, ", "));
   }
   if (!reload.credentials.empty()) {
-    waits += fmt::format("{}credentials stay until a restart: {}", waits.empty() ? "" : "; ",
+    waits += fmt::format("{}new credentials need a restart: {}", waits.empty() ? "" : "; ",
                          fmt::join(reload.credentials, ", "));
   }
   return waits;

@@ -13,7 +13,7 @@ struct Reload {
   std::vector<std::string> changed;  ///< Keys that take their new value in it, …
   std::vector<std::string> restart;  ///< … and those that keep the old one until a restart.
   std::vector<std::string> files;    ///< Keys whose files are read again with the configuration, …
-  /// … and those whose files systemd hands in at a start alone.
+  /// … and those that systemd hands in, which it need not do anew before a restart.
   std::vector<std::string> credentials;
 };
 

@@ -135,11 +135,11 @@ TEST_F(Reload, NamesWhatNeedsARestart) {
   EXPECT_EQ(daemon_->stop(SIGTERM), 0);
 }
 
-TEST_F(Reload, SaysThatCredentialsStay) {
+TEST_F(Reload, SaysThatNewCredentialsNeedARestart) {
   std::string handed_in = configuration("old", "");
   handed_in.replace(handed_in.find("'tokens'"), 8, "'credential:tokens'");
   write("dtactd.toml", handed_in);
-  EXPECT_THAT(reload(), HasSubstr("; credentials stay until a restart: net.token_file; listening"));
+  EXPECT_THAT(reload(), HasSubstr("; new credentials need a restart: net.token_file; listening"));
   EXPECT_THAT(daemon_->log(), HasSubstr("configuration read again, and with it the files of "
                                         "net.tls_certificate, net.tls_key; changed: "
                                         "net.token_file"));

@@ -27,12 +27,12 @@ systemctl reload dtactd || fail "a reload with credentials is refused: $(journal
 within 60 journal_says 'changed: net.max_clients'
 is_still "$before"
 runuser -u dtactd -- test -r $store/dtactd.tokens && fail "the daemon's user reads the tokens on disk"
-# A token that is revoked there counts until a restart, and the reload says so.
+# A token that is revoked there may count until a restart (systemd 252 hands in new ones with a reload,
+# later ones do not), and the reload says so.
 dtactctl token --new view > /tmp/token-line
 install -m 600 /tmp/token-line $store/dtactd.tokens
 systemctl reload dtactd
-within 60 bash -c 'systemctl show -p StatusText dtactd | grep "credentials stay until a restart: .*net.token_file"'
-dtactctl "${tls[@]}" --token-file /tmp/token status > /dev/null || fail "the tokens of the start are gone"
+within 60 bash -c 'systemctl show -p StatusText dtactd | grep "new credentials need a restart: .*net.token_file"'
 systemctl restart dtactd
 dtactctl "${tls[@]}" --token-file /tmp/token status && fail "the revoked token is taken"
 cut -d ' ' -f 2 /tmp/token-line > /tmp/token
