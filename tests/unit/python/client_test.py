@@ -89,6 +89,20 @@ class Connecting(unittest.TestCase):
             dtact.connect(daemon.address, token="secret", insecure=True).close()
             self.assertEqual(daemon.requests[0].hello.token, "secret")
 
+    def test_token_that_systemd_hands_in(self):
+        with tempfile.TemporaryDirectory() as folder, FakeDaemon() as daemon:
+            file = pathlib.Path(folder, "token")
+            file.write_text("handed-in")
+            file.chmod(0o640)
+            if file.stat().st_gid != 0:
+                self.skipTest("only root has files of root's group")
+            with mock.patch.dict("os.environ", CREDENTIALS_DIRECTORY=folder):
+                dtact.connect(daemon.address, token_file=file).close()
+                self.assertEqual(daemon.requests[0].hello.token, "handed-in")
+                file.chmod(0o644)
+                with self.assertRaisesRegex(dtact.Error, "chmod 600"):
+                    dtact.connect(daemon.address, token_file=file)
+
     def test_token_files_that_will_not_do(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder, "token")

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import os
 import random
 import ssl
 import stat
@@ -251,14 +252,23 @@ def _plain(fingerprint: str) -> str:
     return plain
 
 
+def _others(file: Path, status: os.stat_result) -> int:
+    """The permissions that a token's file may not have. A credential (systemd.exec(5)) may be root's and
+    readable by an access control list, whose mask its mode shows as the rights of root's group."""
+    credentials = os.environ.get("CREDENTIALS_DIRECTORY")
+    if credentials and file.parent == Path(credentials) and status.st_gid == 0:
+        return stat.S_IRWXO
+    return stat.S_IRWXG | stat.S_IRWXO
+
+
 def read_token(file: Path) -> str:
     """The first line of a file. Error when it is no token or others may read it."""
     try:
-        mode = file.stat().st_mode
+        status = file.stat()
         lines = file.read_text().splitlines()
     except (OSError, UnicodeDecodeError) as e:
         raise Error(f"cannot read a token from {file}: {e}") from e
-    if mode & (stat.S_IRWXG | stat.S_IRWXO):
+    if status.st_mode & _others(file, status):
         raise Error(f"{file} can be read by others: chmod 600 {file}")
     token = lines[0].rstrip() if lines else ""
     if not 1 <= len(token.encode()) <= _MOST_TOKEN_BYTES:
