@@ -8,12 +8,16 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
+#include <string>
+#include <thread>
 
 #include "hal/base/atomic_file.hpp"
 
@@ -22,6 +26,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kController = "/sys/devices/platform/vhci_hcd.0";
+constexpr int kLongestRelease_ms = 10000;
 constexpr std::size_t kPayloadBytes = 16384;  // of a bulk transfer
 constexpr std::uint32_t kIsoPayloadBytes = 3072;
 constexpr std::size_t kMaxMessage = 1U << 17U;
@@ -74,6 +80,20 @@ bool write_all(int fd, const void* from, std::size_t n) {
   return true;
 }
 
+bool port_is_free(int port) {
+  std::ifstream status(fs::path(kController) / "status");
+  int number = 0;
+  int state = 0;
+  constexpr int kFree = 4;  // VDEV_ST_NULL, enum usbip_device_status
+  for (std::string line; std::getline(status, line);) {
+    // "hs  0000 004 …": hub, port, state
+    if (std::sscanf(line.c_str(), "%*s %d %d", &number, &state) == 2 && number == port) {
+      return state == kFree;
+    }
+  }
+  return true;
+}
+
 }  // namespace
 
 FakeCamera::FakeCamera(const Options& options)
@@ -109,15 +129,14 @@ void FakeCamera::plug_in() {
   }
   socket_.reset(ends[0]);
   const dtact::base::UniqueFd other(ends[1]);
-  constexpr const char* kAttach = "/sys/devices/platform/vhci_hcd.0/attach";
-  const dtact::base::UniqueFd attach(::open(kAttach, O_WRONLY | O_CLOEXEC));
+  const fs::path path = fs::path(kController) / "attach";
+  const dtact::base::UniqueFd attach(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
   constexpr int kHighSpeed = 3;  // enum usb_device_speed
   std::array<char, 64> line{};
   const int n = std::snprintf(line.data(), line.size(), "%d %d %d %d", options_.port, other.get(),
                               0x10001 + options_.port, kHighSpeed);
   if (!attach || ::write(attach.get(), line.data(), static_cast<std::size_t>(n)) != n) {
-    throw std::runtime_error(std::string("cannot attach: ") + kAttach + ": " +
-                             std::strerror(errno));
+    throw std::runtime_error("cannot attach: " + path.string() + ": " + std::strerror(errno));
   }
   std::fprintf(stderr, "uvcfake: plugged in\n");
 }
@@ -345,6 +364,22 @@ bool FakeCamera::handle_message() {
     pump(false);
   }
   return !broken_;
+}
+
+// By saying that nothing more comes, taking what the controller still sends, and waiting until its
+// port is free. Between the end of vhci-hcd's sending thread and the port's being free, a transfer
+// that waits for that thread is not given back when it is cancelled, so that VIDIOC_STREAMOFF hangs
+// (Linux 6.1, vhci_urb_dequeue and vhci_device_unlink_cleanup).
+void FakeCamera::unplug() {
+  ::shutdown(socket_.get(), SHUT_WR);
+  ssize_t n = 0;
+  do {
+    n = ::read(socket_.get(), scratch_.data(), scratch_.size());
+  } while (n > 0 || (n < 0 && errno == EINTR));
+  for (int waited_ms = 0; !port_is_free(options_.port); ++waited_ms) {
+    if (waited_ms == kLongestRelease_ms) throw std::runtime_error("the controller keeps the port");
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
 }
 
 }  // namespace uvcfake

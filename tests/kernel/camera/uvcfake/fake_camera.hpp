@@ -39,6 +39,8 @@ class FakeCamera {
   /// One frame time has passed.
   void handle_timer();
   void toggle_freeze();
+  /// Goes, and comes back once the controller has let go. Nothing may follow.
+  void unplug();
   void drift() { controls_.drift(); }
   [[nodiscard]] unsigned sent() const { return sent_; }
   /// Frame times at which the host had not yet taken the frame before.

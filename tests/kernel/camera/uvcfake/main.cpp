@@ -112,6 +112,7 @@ int main(int argc, char** argv) try {
     if (fds[0].revents != 0 && !camera.handle_message()) break;
     if (fds[1].revents != 0) camera.handle_timer();
   }
+  camera.unplug();
   std::fprintf(stderr, "uvcfake: unplugged, %u frames sent, %u dropped\n", camera.sent(),
                camera.dropped());
   return 0;
