@@ -81,7 +81,8 @@ bool write_all(int fd, const void* from, std::size_t n) {
 }
 
 bool port_is_free(int port) {
-  std::ifstream status(fs::path(kController) / "status");
+  const fs::path path = fs::path(kController) / "status";
+  std::ifstream status(path);
   int number = 0;
   int state = 0;
   constexpr int kFree = 4;  // VDEV_ST_NULL, enum usbip_device_status
@@ -91,7 +92,7 @@ bool port_is_free(int port) {
       return state == kFree;
     }
   }
-  return true;
+  throw std::runtime_error("no port " + std::to_string(port) + " in " + path.string());
 }
 
 }  // namespace
