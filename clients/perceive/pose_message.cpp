@@ -38,15 +38,16 @@ void fill(const Tracker::Pose& pose, v1::ObjectPose& out) {
   constexpr double kMillimetres = 1e3;
   const Alignment& found = pose.alignment;
   out.set_tracking(to_wire(pose.state));
+  out.set_valid(pose.valid());
   if (pose.state == Tracker::State::searching) return;
   out.set_since_sequence(pose.since);
-  fill(kMillimetres * found.motion.translation, *out.mutable_translation_mm());
-  const Eigen::AngleAxisd turn(found.motion.rotation);
+  fill(kMillimetres * found.motion.translation(), *out.mutable_translation_mm());
+  const Eigen::AngleAxisd turn(found.motion.linear());
   fill(turn.angle() * 180 / std::numbers::pi * turn.axis(), *out.mutable_rotation_deg());
-  for (const Twist& hidden : found.unobservable) {
+  for (const Twist& direction : pose.unobservable) {
     auto& twist = *out.add_unobservable();
-    fill(Eigen::Vector3d(hidden.head<3>()), *twist.mutable_rotation());
-    fill(Eigen::Vector3d(hidden.tail<3>()), *twist.mutable_translation());
+    fill(Eigen::Vector3d(direction.head<3>()), *twist.mutable_rotation());
+    fill(Eigen::Vector3d(direction.tail<3>()), *twist.mutable_translation());
   }
   fill(kMillimetres * found.centre, *out.mutable_centre_mm());
   out.set_arm_mm(kMillimetres * found.arm);

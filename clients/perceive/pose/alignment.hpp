@@ -5,53 +5,44 @@
 #include <vector>
 
 #include "clients/perceive/pose/contact_view.hpp"
+#include "clients/perceive/pose/motion.hpp"
 
 namespace dtact::perceive {
 
-/// A rigid motion: p lies at rotation · p + translation after it. Metres.
-struct Motion {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
-
-  [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& p) const {
-    return rotation * p + translation;
-  }
-  /// `first`, and then this one.
-  [[nodiscard]] Motion operator*(const Motion& first) const {
-    return {rotation * first.rotation, *this * first.translation};
-  }
-  [[nodiscard]] Motion inverse() const {
-    return {rotation.transpose(), -(rotation.transpose() * translation)};
-  }
-};
-
-/// A small motion about Alignment::centre: rotation (radians times Alignment::arm, metres), then
-/// translation (metres).
-using Twist = Eigen::Matrix<double, 6, 1>;
-
-/// The one twist about `centre`, its rotation times `arm`, that going along for a while is
-/// `motion`: a screw.
-[[nodiscard]] Twist screw_of(const Motion& motion, const Eigen::Vector3d& centre, double arm);
-
-/// How surfels were brought onto a view.
+/// How surfels lie on the gel of a view.
 struct Alignment {
-  Motion motion;
-  double rms = 0;          ///< Of the distances along the normals of those that count, metres.
-  double overlap = 0;      ///< Part of the surfels that count.
-  std::size_t points = 0;  ///< That count.
-  /// Unit twists that the shape does not show.
-  std::vector<Twist> unobservable;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  double arm = 0;
+  Motion motion = Motion::Identity();
+  double rms = 0;      ///< Of the distances along the normals, of the points that count, metres.
+  double overlap = 0;  ///< Share of the surfels that count.
+  double fit = 0;      ///< Share of the surfels compared that count: the others lie elsewhere.
+  std::size_t points = 0;  ///< Number of those.
+  /// Covariance of the error of `motion`, as a motion after it about the origin: rotation
+  /// (radians), then translation (metres). Huge along directions that the shape does not determine.
+  Matrix6 covariance = Matrix6::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Mean of the moved surfels, metres.
+  double arm = 0;                                    ///< Their root mean square distance from it.
 };
 
-/// Brings `surfels` onto what `view` shows, beginning at `start`: each is compared with the place
-/// of the view that it lies above or below (projective association along the untouched surface's
-/// normal), by the distance along the view's normal and by the normals themselves; Gauss–Newton on
-/// both with Tukey's weights. The spectrum of the normal equations says which directions are not
-/// seen: nothing is moved along them but what makes the rotation least, so that a sliding ball
-/// slides and does not roll.
+/// Point-to-plane ICP with projective association: brings `surfels` onto the gel that `view` shows,
+/// starting at `start`. Each surfel is compared with the gel above or below it along the undeformed
+/// surface's normal; Gauss-Newton with Tukey's weights. Where neither the gel nor the surfel is
+/// pressed, nothing is compared. Directions that the shape does not determine (a ball's rotations,
+/// a plate's sliding) are not moved along, except for what makes the rotation least, so that a
+/// sliding ball slides and does not roll.
 [[nodiscard]] Alignment align(std::span<const Surfel> surfels, const ContactView& view,
                               const Motion& start);
+
+/// The covariance, as Alignment has it, of an error that is unknown along unit twists about
+/// `centre`, their rotation times `arm`, and 0 along all others.
+[[nodiscard]] Matrix6 unknown_along(std::span<const Twist> twists, const Eigen::Vector3d& centre,
+                                    double arm);
+
+/// Directions in which the standard deviation of `covariance` (as Alignment has it) exceeds 0.3 mm:
+/// unit twists about `centre`, their rotation times `arm`.
+[[nodiscard]] std::vector<Twist> unobservable_of(const Matrix6& covariance,
+                                                 const Eigen::Vector3d& centre, double arm);
+
+/// The covariance of the error of `after` · M, where M has `covariance` and `after` is exact.
+[[nodiscard]] Matrix6 carried(const Matrix6& covariance, const Motion& after);
 
 }  // namespace dtact::perceive

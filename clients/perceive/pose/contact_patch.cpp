@@ -12,53 +12,8 @@ using Eigen::Vector3d;
 
 /// Samples of the core.
 constexpr std::size_t kCore = 1500;
-/// The gel's bend is taken over so far to both sides, metres.
-constexpr double kReach = 3.5e-4;
-/// A sum of both second derivatives below this is a shoulder: what noise of 3 µm does not reach,
-/// and a finger of 12 mm of radius does not have by itself. 1/metre.
-constexpr double kShoulder = -250;
-
-class Grid {
- public:
-  explicit Grid(const ContactView& view, const Motion& frame)
-      : view_(view), width_(view.cloud().width), height_(view.cloud().height) {
-    const std::size_t size = view.cloud().size();
-    heights_.assign(size, NAN);
-    for (std::size_t i = 0; i < size; ++i) {
-      if (!view.cloud().has(i)) continue;
-      heights_[i] = frame.rotation.col(2).dot(view.point(i) - frame.translation);
-    }
-  }
-
-  /// The mean of nine around; NaN beside the map.
-  [[nodiscard]] double height(int column, int row) const {
-    if (column < 1 || row < 1 || column + 1 >= width_ || row + 1 >= height_) return NAN;
-    double sum = 0;
-    for (int r = row - 1; r <= row + 1; ++r) {
-      for (int c = column - 1; c <= column + 1; ++c) sum += heights_[index(c, r)];
-    }
-    return sum / 9;
-  }
-  [[nodiscard]] bool is_core(int column, int row, int reach, double px) const {
-    if (!view_.touches(index(column, row))) return false;
-    const double bend =
-        (height(column - reach, row) + height(column + reach, row) + height(column, row - reach) +
-         height(column, row + reach) - 4 * height(column, row)) /
-        (reach * px * reach * px);
-    return bend > kShoulder;
-  }
-  [[nodiscard]] std::size_t index(int column, int row) const noexcept {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) +
-           static_cast<std::size_t>(column);
-  }
-
- private:
-  const ContactView& view_;
-  int width_;
-  int height_;
-  std::vector<double> heights_;
-};
-
+/// What is shallower than this part of the deepest is no core.
+constexpr double kCorePart = 0.3;
 void measure(ContactPatch& patch) {
   std::vector<double> heights;
   for (const auto& sample : patch.core) {
@@ -79,33 +34,32 @@ ContactPatch make_patch(const ContactView& view) {
   ContactPatch patch;
   const Vector3d& up = view.upright();
   const Vector3d side = (Vector3d::UnitX() - up.x() * up).normalized();
-  patch.frame.rotation << side, up.cross(side), up;
-  patch.frame.translation = view.centre();
-  const Grid grid(view, patch.frame);
-  const int reach = std::max(1, static_cast<int>(std::lround(kReach / view.px())));
-  std::vector<std::pair<int, int>> core;
+  patch.frame.linear() << side, up.cross(side), up;
+  patch.frame.translation() = view.centre();
   const int width = view.cloud().width;
   const int height = view.cloud().height;
+  std::vector<std::uint8_t> is_core(view.cloud().size());
+  std::size_t core = 0;
   for (int row = 0; row < height; ++row) {
     for (int column = 0; column < width; ++column) {
-      if (grid.is_core(column, row, reach, view.px())) core.emplace_back(column, row);
+      const std::size_t i = view.index(column, row);
+      if (!(view.depth(i) > kCorePart * view.deepest()) || !view.is_core(column, row)) continue;
+      is_core[i] = 1;
+      ++core;
     }
   }
-  if (core.empty()) return patch;
-  patch.area = static_cast<double>(core.size()) * view.px() * view.px();
+  if (core == 0) return patch;
+  patch.area = static_cast<double>(core) * view.px() * view.px();
   // Every so many-th pixel of both sides, and so of the places beside.
-  const int stride = std::max(
-      1, static_cast<int>(
-             std::ceil(std::sqrt(static_cast<double>(core.size()) / static_cast<double>(kCore)))));
-  const Eigen::Matrix3d back = patch.frame.rotation.transpose();
-  std::vector<std::uint8_t> is_core(view.cloud().size());
-  for (const auto& [column, row] : core) is_core[grid.index(column, row)] = 1;
+  const int stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(
+                                     static_cast<double>(core) / static_cast<double>(kCore)))));
+  const Motion back = patch.frame.inverse();
   for (int row = stride / 2; row < height; row += stride) {
     for (int column = stride / 2; column < width; column += stride) {
-      const std::size_t i = grid.index(column, row);
+      const std::size_t i = view.index(column, row);
       if (!view.cloud().has(i)) continue;
       (is_core[i] != 0 ? patch.core : patch.beside)
-          .push_back({back * (view.point(i) - patch.frame.translation), back * view.normal(i)});
+          .push_back({back * view.point(i), back.linear() * view.normal(i)});
     }
   }
   if (patch.core.empty()) return patch;

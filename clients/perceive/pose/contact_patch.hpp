@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "clients/perceive/pose/alignment.hpp"
 #include "clients/perceive/pose/contact_view.hpp"
+#include "clients/perceive/pose/motion.hpp"
 
 namespace dtact::perceive {
 
@@ -26,7 +26,7 @@ struct ContactPatch {
   /// How many places of the core one of them stands for.
   double beside_weight = 1;
   /// The contact's frame to the surface frame.
-  Motion frame;
+  Motion frame = Motion::Identity();
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Of the core.
   double lowest = 0;   ///< z of the core, but for its lowest twentieth.
   double highest = 0;  ///< And but for its highest.

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -9,52 +8,63 @@
 
 namespace dtact::perceive {
 
-/// A point of the touched object: where it touches, the gel's surface is its own. Metres, surface
-/// frame; the normal is the gel's, into the object.
+/// A point of the gel's surface. Metres, surface frame; the normal has length 1 and points away
+/// from the camera, into the object.
 struct Surfel {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  /// The gel's shoulder beside the object: where the object's edge is pressed deeper, the shoulder
+  /// is so by `share` of it, since the gel is elastic. Elsewhere the point itself and 1.
+  Eigen::Vector3d edge = Eigen::Vector3d::Zero();
+  double share = 1;
 };
 
-/// What one frame shows of the object: its shape where it touches, and nothing elsewhere.
+/// The gel's surface in one frame, round a contact: the object's own shape where it touches, and
+/// beside it the gel's shoulders, which move with the object.
 class ContactView {
  public:
+  /// Depth at which a pixel counts as pressed, metres: three standard deviations of the noise of an
+  /// untouched map.
+  static constexpr double kPressed = 3e-5;
+
   /// `cloud` is what a CloudMaker makes of `depth` at stride 1, `table` its table (null: a plane);
-  /// all must outlive the view.
+  /// both must outlive the view. `uncertainty_um`: of the depth, as the frame states it.
   ContactView(const DepthGrid& depth, const PointCloud& cloud, const SurfaceTable* table,
               double uncertainty_um);
 
-  /// How the normal changes with the place, along two axes of the untouched surface (of a plane x
-  /// and y).
-  struct Bend {
-    Eigen::Matrix<double, 3, 2> axes;
-    /// Of the normal's part along each axis, for each metre of a shift.
-    Eigen::Matrix<double, 2, 3> change;
-  };
   struct Sample {
-    Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< Metres.
-    Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-    /// Nothing where the pixels that it is taken between do not touch.
-    std::optional<Bend> bend;
+    Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< Of the gel, metres.
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();    ///< Of the gel there, of length 1.
+    Eigen::Vector3d upright = Eigen::Vector3d::UnitZ();  ///< The undeformed surface's normal.
+    double depth = 0;  ///< Of the gel there, metres, positive = pressed.
+    double below = 0;  ///< How deep the point asked for lies below the undeformed surface, metres.
   };
-  /// The gel's surface where the untouched surface's normal through `point` (metres) crosses it,
-  /// between the pixels around; nothing where one of them does not touch.
+  /// The gel where the undeformed surface's normal through `point` (metres) crosses it,
+  /// interpolated between four pixels; nothing beside the map and where a pixel is untrusted.
   [[nodiscard]] std::optional<Sample> at(const Eigen::Vector3d& point) const;
 
-  /// At most `most` points, alike many of each direction that the surface looks in: spread().
-  [[nodiscard]] std::vector<Surfel> choose(std::size_t most) const;
-  /// The mean of all that touches.
+  /// The object lies on the gel here: no shoulder, where the depth falls off hollowly.
+  [[nodiscard]] bool is_core(int column, int row) const;
+  [[nodiscard]] std::size_t index(int column, int row) const noexcept {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(cloud_.width) +
+           static_cast<std::size_t>(column);
+  }
+  /// At most about `count` of the pressed pixels, on a square grid.
+  [[nodiscard]] std::vector<Surfel> surfels(std::size_t count) const;
+  /// Mean of the pressed points, metres.
   [[nodiscard]] const Eigen::Vector3d& centre() const noexcept { return centre_; }
-  /// The mean of the untouched surface's normals there, of length 1.
+  /// Mean of the undeformed surface's normals there, of length 1.
   [[nodiscard]] const Eigen::Vector3d& upright() const noexcept { return upright_; }
-  /// Of all that touches, square metres; alike at each of the map's resolutions.
+  /// Of the pressed pixels, square metres.
   [[nodiscard]] double area() const noexcept { return static_cast<double>(pixels_) * px_ * px_; }
-  /// Of all that touches, metres.
+  /// Metres.
   [[nodiscard]] double deepest() const noexcept { return deepest_; }
+  /// As the frame states it, metres.
+  [[nodiscard]] double uncertainty() const noexcept { return uncertainty_; }
+  /// Of the depth at a pixel, metres; NaN where it is untrusted.
+  [[nodiscard]] double depth(std::size_t i) const noexcept;
 
-  /// The points that it is of; a pixel's index in them.
   [[nodiscard]] const PointCloud& cloud() const noexcept { return cloud_; }
-  [[nodiscard]] bool touches(std::size_t i) const noexcept { return touching_[i] != 0; }
   /// From one pixel to the next, metres.
   [[nodiscard]] double px() const noexcept { return px_; }
   [[nodiscard]] Eigen::Vector3d point(std::size_t i) const {
@@ -67,28 +77,17 @@ class ContactView {
   }
 
  private:
-  /// Between the pixels of the cloud.
-  struct Place {
-    double column = 0;
-    double row = 0;
-    Eigen::Vector3d upright = Eigen::Vector3d::UnitZ();
-  };
-  [[nodiscard]] std::optional<Place> place_of(const Eigen::Vector3d& point) const;
-  /// Of a curved surface.
+  [[nodiscard]] double mean_depth(int column, int row) const;
+  [[nodiscard]] bool is_pressed(std::size_t i) const noexcept { return depth(i) > kPressed; }
+  /// The undeformed surface's normal at a pixel of the cloud.
   [[nodiscard]] Eigen::Vector3d upright_at(int column, int row) const;
-  [[nodiscard]] std::optional<Bend> bend_at(int column, int row,
-                                            const Eigen::Vector3d& upright) const;
-  [[nodiscard]] std::size_t index(int column, int row) const noexcept {
-    return static_cast<std::size_t>(row) * static_cast<std::size_t>(cloud_.width) +
-           static_cast<std::size_t>(column);
-  }
+  DepthGrid depth_;
   const PointCloud& cloud_;
   const SurfaceTable* table_;
-  std::vector<std::uint8_t> touching_;
   double px_;  ///< Metres.
-  int reach_;  ///< Pixels to each side that the normals' change is taken over.
-  double x0_;  ///< Of the first column of a plane.
+  double x0_;  ///< x of the first column, of a plane.
   double y0_;
+  double uncertainty_;
   Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d upright_ = Eigen::Vector3d::Zero();
   std::size_t pixels_ = 0;

@@ -31,7 +31,8 @@ Underside::Underside(const ObjectModel& object, const Eigen::Matrix3d& turn, dou
   const Vector3d up = turn.row(2);
   double lowest = INFINITY;
   for (const Surfel& surfel : object.surfels) lowest = std::min(lowest, up.dot(surfel.point));
-  from_object_ = {turn, Vector3d(0, 0, -lowest)};
+  from_object_.linear() = turn;
+  from_object_.translation() = Vector3d(0, 0, -lowest);
   Eigen::AlignedBox2d box;
   for (const Surfel& surfel : object.surfels) {
     if (up.dot(surfel.point) > lowest + highest || up.dot(surfel.normal) < kLeastUpright) continue;
@@ -109,7 +110,7 @@ double score_of(const Underside& underside, const ContactPatch& patch, const Mot
     if (surfel == nullptr) continue;
     const double gap = surfel->normal.dot(surfel->point - point);
     const double part = gap / limit;
-    if (std::abs(part) < 1 && surfel->normal.dot(move.rotation * sample.normal) > kSameWay) {
+    if (std::abs(part) < 1 && surfel->normal.dot(move.linear() * sample.normal) > kSameWay) {
       explained += 1 - part * part;
     }
     wrong += inside(gap, limit);
@@ -124,15 +125,11 @@ double score_of(const Underside& underside, const ContactPatch& patch, const Mot
 }
 
 Motion twisted(const Motion& move, const ContactPatch& patch, const Twist& twist) {
-  const Vector3d turn = twist.head<3>() / patch.arm;
-  const double angle = turn.norm();
-  const Eigen::Matrix3d rotation = angle > 0
-                                       ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix()
-                                       : Eigen::Matrix3d::Identity();
-  // The contact turns the other way about in the object's frame: the twist is the object's.
-  const Eigen::Matrix3d back = rotation.transpose();
-  const Vector3d shift = patch.middle - back * (patch.middle + twist.tail<3>());
-  return {move.rotation * back, move.rotation * shift + move.translation};
+  // The twist is the object's: in the object's frame the contact moves the other way.
+  Motion back = Motion::Identity();
+  back.linear() = rotation_by(-twist.head<3>() / patch.arm);
+  back.translation() = patch.middle - back.linear() * (patch.middle + twist.tail<3>());
+  return move * back;
 }
 
 Climbed climb(const Underside& underside, const ContactPatch& patch, const Motion& move,
@@ -167,13 +164,12 @@ std::vector<Twist> hidden_of(const Underside& underside, const ContactPatch& pat
   constexpr double kLimit = 1e-4;
   constexpr double kChange = 0.03;
   // What the touched shape does not show, by the distances along the normals alone.
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
   Matrix6 shape = Matrix6::Zero();
   double count = 0;
   for (const auto& sample : patch.core) {
     const Surfel* surfel = underside.at(move * sample.point);
     if (surfel == nullptr) continue;
-    const Vector3d normal = move.rotation.transpose() * surfel->normal;
+    const Vector3d normal = move.linear().transpose() * surfel->normal;
     Twist row;
     row << (sample.point - patch.middle).cross(normal) / patch.arm, normal;
     shape += row * row.transpose();

@@ -40,7 +40,7 @@ class Underside {
  private:
   void fill_holes();
 
-  Motion from_object_;
+  Motion from_object_ = Motion::Identity();
   std::vector<Surfel> surfels_;
   std::vector<std::int32_t> cells_;  ///< Of surfels_; −1: none.
   double x0_ = 0;
@@ -62,7 +62,7 @@ class Underside {
 /// Climbs to a better score: each of the six directions in turn, with steps that are halved from
 /// `step` on as long as they are longer than `last`, metres.
 struct Climbed {
-  Motion move;
+  Motion move = Motion::Identity();
   double score = 0;
 };
 [[nodiscard]] Climbed climb(const Underside& underside, const ContactPatch& patch,

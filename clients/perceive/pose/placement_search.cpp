@@ -46,12 +46,31 @@ constexpr double kExplained = 0.5;
 constexpr double kAsWell = 0.06;
 
 struct Candidate {
-  Matrix3d turn;  ///< Of the object's frame to the underside's.
-  Motion move;    ///< The contact's frame to the underside's.
-  Motion place;   ///< The object's frame to the contact's.
+  Matrix3d turn;                      ///< Of the object's frame to the underside's.
+  Motion move = Motion::Identity();   ///< The contact's frame to the underside's.
+  Motion place = Motion::Identity();  ///< The object's frame to the contact's.
   double score = 0;
   bool present = false;
 };
+
+/// The twist about `centre`, its rotation times `arm`, that is `motion` after unit time: a screw.
+Twist screw_of(const Motion& motion, const Vector3d& centre, double arm) {
+  const Eigen::AngleAxisd turn(motion.linear());
+  const double angle = turn.angle();
+  const Vector3d& axis = turn.axis();
+  const Vector3d shift = motion * centre - centre;
+  Vector3d along = shift;
+  // The inverse of the left Jacobian of SO(3): Barfoot, State Estimation for Robotics, 7.1.3.
+  constexpr double kMinAngle = 1e-6;
+  if (angle > kMinAngle) {
+    const double half = angle / 2;
+    const double cotangent = half / std::tan(half);
+    along = cotangent * shift + (1 - cotangent) * axis * axis.dot(shift) - half * axis.cross(shift);
+  }
+  Twist twist;
+  twist << arm * angle * axis, along;
+  return twist;
+}
 
 /// Its last row is `up`.
 Matrix3d turn_to(const Vector3d& up) {
@@ -95,11 +114,11 @@ class Search {
   /// The contact turned by `angle`, its core's middle on `low`'s.
   [[nodiscard]] Motion laid(const Underside& underside, const Eigen::Vector2d& low,
                             double angle) const {
-    Motion move;
-    move.rotation = Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
-    move.translation = -(move.rotation * patch_.middle);
-    move.translation.head<2>() += low;
-    move.translation.z() = -patch_.lowest;
+    Motion move = Motion::Identity();
+    move.linear() = Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
+    move.translation() = -(move.linear() * patch_.middle);
+    move.translation().head<2>() += low;
+    move.translation().z() = -patch_.lowest;
     // Where the lowest of it does not touch, it is not as deep.
     std::array<double, kFirstSamples> gaps{};
     std::size_t count = 0;
@@ -114,7 +133,7 @@ class Search {
     const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(count / 2);
     std::nth_element(gaps.begin(), middle, gaps.begin() + static_cast<std::ptrdiff_t>(count));
     constexpr double kMostGap = 3e-4;
-    move.translation.z() += std::clamp(*middle, -kMostGap, kMostGap);
+    move.translation().z() += std::clamp(*middle, -kMostGap, kMostGap);
     return move;
   }
 
@@ -154,7 +173,7 @@ class Search {
   void add_present(const Motion& pose) {
     Candidate& one = candidates_.emplace_back();
     one.place = patch_.frame.inverse() * pose;
-    one.turn = one.place.rotation;
+    one.turn = one.place.linear();
     one.move = underside_of(one.turn).from_object() * one.place.inverse();
     one.present = true;
   }
@@ -204,12 +223,7 @@ class Search {
     Placement found;
     found.pose = patch_.frame * place_of(underside, climbed.move);
     found.score = climbed.score;
-    found.centre = patch_.frame * patch_.middle;
-    found.arm = patch_.arm;
-    for (const Twist& one : hidden) {
-      Twist& turned = found.hidden.emplace_back();
-      turned << patch_.frame.rotation * one.head<3>(), patch_.frame.rotation * one.tail<3>();
-    }
+    found.covariance = carried(unknown_along(hidden, patch_.middle, patch_.arm), patch_.frame);
     found.alternatives = static_cast<std::uint32_t>(families.size() - 1);
     return found;
   }

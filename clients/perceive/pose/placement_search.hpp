@@ -5,6 +5,7 @@
 #include <stop_token>
 #include <vector>
 
+#include "clients/perceive/pose/alignment.hpp"
 #include "clients/perceive/pose/contact_patch.hpp"
 #include "clients/perceive/pose/object_model.hpp"
 
@@ -12,14 +13,13 @@ namespace dtact::perceive {
 
 /// Where a known object is.
 struct Placement {
-  Motion pose;       ///< The object's frame to the surface frame.
-  double score = 0;  ///< score_of(), at most 1.
-  /// Unit twists about `centre`, their rotation times `arm`, that neither the shape nor its outline
-  /// shows. All in the surface frame.
-  std::vector<Twist> hidden;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  double arm = 0;
-  /// Other placements that explain the contact as well and that no motion along `hidden` leads to.
+  Motion pose = Motion::Identity();  ///< The object's frame to the surface frame.
+  double score = 0;                  ///< score_of(), at most 1.
+  /// Of the error of `pose`, as Alignment has it: huge along the directions that neither the shape
+  /// nor its outline determines, 0 along the others.
+  Matrix6 covariance = Matrix6::Zero();
+  /// Other placements that explain the contact as well and that no motion along those directions
+  /// leads to.
   std::uint32_t alternatives = 0;
 };
 

@@ -3,37 +3,45 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <numbers>
 #include <utility>
 
 namespace dtact::perceive {
 namespace {
 
-/// Surfels of a keyframe.
-constexpr std::size_t kSurfels = 600;
-/// A contact that has grown so many times shows what its keyframe lacks.
-constexpr double kGrown = 2;
-/// What a good alignment has at least, beside kGoodRms.
-constexpr double kGoodOverlap = 0.4;
-/// Sharing less with every keyframe, a frame becomes one.
-constexpr double kSharedOverlap = 0.7;
-constexpr std::size_t kMostKeyframes = 16;
-/// More than this in one frame is not followed but searched for: metres, radians.
-constexpr double kMostSlide = 1e-3;
-constexpr double kMostTurn = 0.25;
+using Eigen::Vector3d;
 
-bool is_good(const Alignment& alignment) {
-  return alignment.overlap >= kGoodOverlap && alignment.rms <= kGoodRms;
+constexpr std::size_t kSurfels = 1500;
+/// A contact that has grown so many times shows what its keyframe lacks.
+constexpr double kGrown = 1.5;
+/// What a good alignment has at least; through the daemon those of fifteen objects that turn, slide
+/// and roll have a fit above 0.95. A frame becomes a keyframe where it shares less than kShared
+/// with every other one, or where less than kWellExplained of what it shares fits.
+constexpr double kMinOverlap = 0.4;
+constexpr double kMinFit = 0.6;
+constexpr double kShared = 0.7;
+constexpr double kWellExplained = 0.8;
+constexpr std::size_t kMaxKeyframes = 16;
+/// A larger motion in one frame is not tracked but searched for: metres, radians.
+constexpr double kMaxSlide = 1e-3;
+constexpr double kMaxTurn = 0.25;
+
+/// Root mean square distance that a good alignment has at most, metres: what the stated uncertainty
+/// allows.
+double max_rms(const ContactView& view) { return std::max(6e-5, 1.5 * view.uncertainty()); }
+
+bool is_good(const Alignment& alignment, const ContactView& view) {
+  return alignment.overlap >= kMinOverlap && alignment.fit >= kMinFit &&
+         alignment.rms <= max_rms(view);
+}
+
+/// What is moved from `a` to `b` moves by little about `at`, where the contact is after `b`.
+bool is_near(const Motion& a, const Motion& b, const Vector3d& at) {
+  const Motion back = a * b.inverse();
+  return (back * at - at).norm() <= kMaxSlide &&
+         Eigen::AngleAxisd(back.linear()).angle() <= kMaxTurn;
 }
 
 }  // namespace
-
-bool is_near(const Motion& a, const Motion& b, const Eigen::Vector3d& at) {
-  const Motion back = a * b.inverse();
-  return (back * at - at).norm() <= kMostSlide &&
-         Eigen::AngleAxisd(back.rotation).angle() <= kMostTurn;
-}
 
 void Tracker::release() {
   keyframes_.clear();
@@ -43,25 +51,25 @@ void Tracker::release() {
 Tracker::Keyframe Tracker::keyframe_of(const ContactView& view) const {
   Keyframe key;
   key.motion = pose_.alignment.motion;
-  if (!keyframes_.empty()) key.hidden = keyframes_[current_].hidden;
+  key.covariance = pose_.alignment.covariance;
   key.area = view.area();
   key.deepest = view.deepest();
   key.centre = view.centre();
-  key.surfels = view.choose(kSurfels);
-  const Eigen::Matrix3d back = key.motion.rotation.transpose();
+  key.surfels = view.surfels(kSurfels);
+  const Motion back = key.motion.inverse();
   for (Surfel& surfel : key.surfels) {
-    surfel.point = back * (surfel.point - key.motion.translation);
-    surfel.normal = back * surfel.normal;
+    surfel.point = back * surfel.point;
+    surfel.edge = back * surfel.edge;
+    surfel.normal = back.linear() * surfel.normal;
   }
   return key;
 }
 
 void Tracker::add_keyframe(const ContactView& view) {
   Keyframe key = keyframe_of(view);
-  key.hidden.add(pose_.alignment.unobservable, pose_.alignment);
-  if (keyframes_.size() == kMostKeyframes) {
-    // The one of the object's furthest part; the first stays, which has no error.
-    const Eigen::Vector3d here = pose_.alignment.motion.inverse() * view.centre();
+  if (keyframes_.size() == kMaxKeyframes) {
+    // The one of the object's furthest part goes; the first stays, which has no error.
+    const Vector3d here = key.motion.inverse() * key.centre;
     const auto distance = [&here](const Keyframe& one) {
       return (one.motion.inverse() * one.centre - here).norm();
     };
@@ -72,13 +80,23 @@ void Tracker::add_keyframe(const ContactView& view) {
   current_ = keyframes_.size() - 1;
 }
 
-void Tracker::tell_hidden() {
-  Alignment& shown = pose_.alignment;
-  unseen_ = shown.unobservable;
-  Hidden all;
-  all.add(unseen_, shown);
-  all.add(keyframes_[current_].hidden.seen_at(shown), shown);
-  shown.unobservable = all.seen_at(shown);
+void Tracker::start(const ContactView& view, std::uint64_t sequence) {
+  release();
+  if (view.area() < kMinArea) return;
+  add_keyframe(view);
+  // Aligned with itself: which directions the shape determines.
+  const Alignment own = align(keyframes_.front().surfels, view, Motion::Identity());
+  pose_ = {State::started, sequence, own, unobservable_of(own.covariance, own.centre, own.arm), 0};
+  pose_.alignment.motion = Motion::Identity();
+}
+
+void Tracker::take(Alignment alignment, State state) {
+  const Keyframe& key = keyframes_[current_];
+  alignment.covariance += carried(key.covariance, alignment.motion * key.motion.inverse());
+  pose_.unobservable = unobservable_of(alignment.covariance, alignment.centre, alignment.arm);
+  pose_.alignment = std::move(alignment);
+  pose_.state = state;
+  lost_ = 0;
 }
 
 std::size_t Tracker::oldest_shared(const ContactView& view, const Motion& from) const {
@@ -91,10 +109,11 @@ std::size_t Tracker::oldest_shared(const ContactView& view, const Motion& from) 
     std::size_t probes = 0;
     std::size_t met = 0;
     for (std::size_t k = 0; k < surfels.size(); k += every, ++probes) {
-      if (view.at(from * surfels[k].point)) ++met;
+      const auto sample = view.at(from * surfels[k].point);
+      if (sample && sample->depth > ContactView::kPressed) ++met;
     }
     const double part = static_cast<double>(met) / static_cast<double>(probes);
-    if (part >= kSharedOverlap) return i;
+    if (part >= kShared) return i;
     if (part > most) {
       most = part;
       chosen = i;
@@ -103,79 +122,73 @@ std::size_t Tracker::oldest_shared(const ContactView& view, const Motion& from) 
   return chosen;
 }
 
-Alignment Tracker::best(const ContactView& view, const Motion& from) {
-  const std::size_t chosen = oldest_shared(view, from);
-  Alignment found = align(keyframes_[chosen].surfels, view, from);
-  if (chosen == current_) return found;
-  if (!is_good(found) || found.overlap < kSharedOverlap) {
-    const Alignment other = align(keyframes_[current_].surfels, view, from);
-    if (is_good(other) && (!is_good(found) || other.overlap > found.overlap)) return other;
-  }
-  current_ = chosen;
-  return found;
-}
-
-bool Tracker::recover(const ContactView& view) {
-  // A keyframe's pose moved to where the contact is now, turned about the normal; another attempt
-  // with every frame.
-  constexpr std::array kTurns{0.0, 0.2, -0.2, 0.4, -0.4, 0.7, -0.7};
-  const auto attempt = static_cast<std::size_t>(attempt_++);
-  const std::size_t key = attempt % keyframes_.size();
-  const double turn = kTurns[attempt / keyframes_.size() % kTurns.size()];
-  const Keyframe& keyframe = keyframes_[key];
-  const Eigen::Matrix3d rotation = Eigen::AngleAxisd(turn, view.upright()).toRotationMatrix();
-  Motion start;
-  start.rotation = rotation * keyframe.motion.rotation;
-  start.translation = rotation * (keyframe.motion.translation - keyframe.centre) + view.centre();
-  for (const Motion& from : {pose_.alignment.motion, start}) {
-    const Alignment found = align(keyframe.surfels, view, from);
-    // Stricter than while it is followed: nothing says that it is near.
-    if (found.overlap < 0.6 || found.rms > kGoodRms / 2) continue;
-    pose_.alignment = found;
-    current_ = key;
-    attempt_ = 0;
-    return true;
+bool Tracker::relocalise(const ContactView& view) {
+  // From where it was, and from a keyframe that is moved to where the contact is now and turned
+  // about the normal; another turn with every frame.
+  constexpr std::array kTurns{0.0, 0.25, -0.25, 0.5, -0.5, 0.9, -0.9, 1.4, -1.4, 2.1, -2.1, 3.1};
+  const auto attempt = static_cast<std::size_t>(lost_ - 1);
+  for (const std::size_t key : {current_, (current_ + attempt) % keyframes_.size()}) {
+    const Keyframe& keyframe = keyframes_[key];
+    Motion placed = Motion::Identity();
+    placed.linear() =
+        Eigen::AngleAxisd(kTurns.at(attempt % kTurns.size()), view.upright()).toRotationMatrix();
+    placed.translation() = view.centre() - placed.linear() * keyframe.centre;
+    for (const Motion& from : {pose_.alignment.motion, placed * keyframe.motion}) {
+      Alignment found = align(keyframe.surfels, view, from);
+      // Stricter than while it is tracked: nothing says that it is near.
+      constexpr double kMinRelocalised = 0.6;
+      if (found.overlap < kMinRelocalised || found.rms > max_rms(view) / 2) continue;
+      current_ = key;
+      take(std::move(found), State::recovered);
+      return true;
+    }
   }
   return false;
 }
 
 const Tracker::Pose& Tracker::follow(const ContactView& view, std::uint64_t sequence) {
   if (keyframes_.empty()) {
-    pose_ = {};
-    if (view.area() < kLeastArea) return pose_;
-    add_keyframe(view);
-    // With itself: which directions it shows.
-    pose_ = {State::started, sequence, align(keyframes_[0].surfels, view, {})};
-    pose_.alignment.motion = {};
-    tell_hidden();
+    start(view, sequence);
     return pose_;
   }
   if (pose_.state == State::lost) {
-    if (view.area() >= kLeastArea && recover(view)) {
-      pose_.state = State::recovered;
-      tell_hidden();
-    }
+    ++lost_;
+    if (view.area() >= kMinArea && !relocalise(view) && lost_ >= kMaxLost) start(view, sequence);
     return pose_;
   }
   const Motion before = pose_.alignment.motion;
-  const Alignment found = view.area() < kLeastArea ? Alignment{} : best(view, before);
-  if (!is_good(found) || !is_near(before, found.motion, found.centre)) {
+  Alignment found;
+  if (view.area() >= kMinArea) {
+    const std::size_t oldest = oldest_shared(view, before);
+    found = align(keyframes_[oldest].surfels, view, before);
+    if (oldest != current_ && (!is_good(found, view) || found.overlap < kShared)) {
+      const Alignment other = align(keyframes_[current_].surfels, view, before);
+      if (is_good(found, view) && found.overlap >= other.overlap) {
+        current_ = oldest;
+      } else {
+        found = other;
+      }
+    } else {
+      current_ = oldest;
+    }
+  }
+  if (!is_good(found, view) || !is_near(before, found.motion, found.centre)) {
     pose_.state = State::lost;
-    attempt_ = 0;
+    lost_ = 0;
     return pose_;
   }
-  pose_.state = State::tracked;
-  pose_.alignment = found;
+  take(std::move(found), State::tracked);
   if (view.area() >= kGrown * keyframes_[current_].area ||
       view.deepest() >= kGrown * keyframes_[current_].deepest) {
-    // In its place: the tip of what was just touched lies on all that is touched later, and turns
-    // on it as it likes; and of a light touch more of the gel only follows, which lies on nothing
-    // later. A contact that is pressed in is not taken to slide meanwhile.
+    // In its place: the tip that is touched first lies on all that is touched later, and turns on
+    // it as it likes. A contact that is being pressed in is not taken to slide meanwhile, so what
+    // its tip does not show adds no uncertainty.
+    const Matrix6 covariance = keyframes_[current_].covariance;
     keyframes_[current_] = keyframe_of(view);
-  } else if (found.overlap < kSharedOverlap) {
+    keyframes_[current_].covariance = covariance;
+  } else if (pose_.alignment.overlap < kShared || pose_.alignment.fit < kWellExplained) {
     add_keyframe(view);
   }
-  tell_hidden();
   return pose_;
 }
 

@@ -100,7 +100,7 @@ TEST(FrameMakerOfAnObject, SearchesFindsAndFollowsInEachContact) {
 // what happened meanwhile.
 TEST(FrameMaker, AnotherCalibrationAndAReleaseBeginAnotherContact) {
   FrameMaker maker;
-  const Frame seen(bumps(), {}, 5);
+  const Frame seen(bumps(), Motion::Identity(), 5);
   const auto tracking = [&](std::uint64_t sequence, std::uint64_t calibration) {
     v1::Frame frame = sent(seen, sequence);
     frame.set_calibration(calibration);
@@ -116,7 +116,7 @@ TEST(FrameMaker, AnotherCalibrationAndAReleaseBeginAnotherContact) {
 
 TEST(FrameMakerOfAnObject, WhatIsAnotherObjectIsNeverPlaced) {
   FrameMaker maker(model_of(bumps()));
-  const Frame ball({{{{0, 0, 3.0}, 4.0}}}, {}, 5);
+  const Frame ball({{{{0, 0, 3.0}, 4.0}}}, Motion::Identity(), 5);
   for (std::uint64_t sequence = 1; sequence < 40; ++sequence) {
     EXPECT_EQ(pose_of(maker, sent(ball, sequence)).tracking(), ObjectPose::SEARCHING);
   }

@@ -120,13 +120,13 @@ TEST(PoseMessage, MillimetresAndDegrees) {
   Tracker::Pose pose;
   pose.state = Tracker::State::tracked;
   pose.since = 7;
-  pose.alignment.motion.translation = {0.001, 0, -0.0005};
-  pose.alignment.motion.rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  pose.alignment.motion.translation() = Eigen::Vector3d(0.001, 0, -0.0005);
+  pose.alignment.motion.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
   pose.alignment.rms = 4e-6;
   pose.alignment.arm = 2e-3;
   Twist hidden = Twist::Zero();
   hidden[4] = 1;
-  pose.alignment.unobservable.push_back(hidden);
+  pose.unobservable.push_back(hidden);
   v1::ObjectPose message;
   fill(pose, message);
   EXPECT_EQ(message.tracking(), v1::ObjectPose::TRACKED);
