@@ -27,6 +27,10 @@ std::string name_of(v1::Health condition) {
   return plain(v1::Health_Name(condition), "HEALTH_", condition);
 }
 
+std::string name_of(v1::ForceAbsence absence) {
+  return plain(v1::ForceAbsence_Name(absence), "FORCE_ABSENCE_", absence);
+}
+
 std::vector<std::string> names_of(const google::protobuf::RepeatedField<int>& health) {
   std::vector<std::string> names;
   for (const int value : health) names.push_back(name_of(static_cast<v1::Health>(value)));

@@ -14,6 +14,8 @@ DTACT_EXPORT [[nodiscard]] std::string name_of(v1::State state);
 DTACT_EXPORT [[nodiscard]] std::string name_of(v1::TimestampMeaning meaning);
 /// HEALTH_LIGHT_UNSETTLED → "light_unsettled".
 DTACT_EXPORT [[nodiscard]] std::string name_of(v1::Health condition);
+/// FORCE_ABSENCE_CUT_OFF → "cut_off".
+DTACT_EXPORT [[nodiscard]] std::string name_of(v1::ForceAbsence absence);
 /// The `health` of a frame, an event or the status.
 DTACT_EXPORT [[nodiscard]] std::vector<std::string> names_of(
     const google::protobuf::RepeatedField<int>& health);

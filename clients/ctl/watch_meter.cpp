@@ -37,11 +37,13 @@ std::string watch_line(const WatchMeter& meter, const v1::Frame& last) {
   if (last.depth().sharpen_steps() > 0) {
     worth += fmt::format(" sharpened {}x", last.depth().sharpen_steps());
   }
-  const std::string force =
-      last.contact().has_force_n()
-          ? fmt::format("  force {:.2f} N +- {:.2f}", last.contact().force_n(),
-                        last.contact().force_uncertainty_n())
-          : "";
+  std::string force;
+  if (last.contact().has_force_n()) {
+    force = fmt::format("  force {:.2f} N +- {:.2f}", last.contact().force_n(),
+                        last.contact().force_uncertainty_n());
+  } else if (last.contact().force_absence() > v1::FORCE_ABSENCE_UNCALIBRATED) {
+    force = fmt::format("  force {}", client::name_of(last.contact().force_absence()));
+  }
   return fmt::format(
       "{:5.1f} fps  contact {:6.1f} mm2  deepest {:6.3f} mm{}{}  latency {}  drops {}  {}",
       meter.fps(), last.contact().area_mm2(), last.contact().deepest_mm(), worth, force, delay,

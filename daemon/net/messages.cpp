@@ -198,6 +198,7 @@ void fill(const pipeline::ContactSummary& contact, v1::Contact& out) {
     out.set_force_n(contact.force->newtons);
     out.set_force_uncertainty_n(contact.force->uncertainty_n);
   }
+  out.set_force_absence(static_cast<v1::ForceAbsence>(contact.force_absence));
 }
 
 void fill(const pipeline::DepthFrame& frame, v1::Frame& out) {

@@ -33,10 +33,9 @@ struct ContactSummary {
   double deepest_mm = 0;  ///< Greatest indentation.
   double deepest_x_mm = 0;
   double deepest_y_mm = 0;
-  double volume_mm3 = 0;  ///< Indentation summed over the contact area.
-  /// Along the surface's normal; 0 N when nothing touches. None: not calibrated, or for another
-  /// contact threshold.
-  std::optional<recon::Force> force;
+  double volume_mm3 = 0;              ///< Indentation summed over the contact area.
+  std::optional<recon::Force> force;  ///< Along the surface's normal; 0 N when nothing touches.
+  recon::ForceAbsence force_absence = recon::ForceAbsence::none;  ///< Why there is none.
 };
 
 /// Why a frame says nothing of contact: what is not measured may touch all the same.

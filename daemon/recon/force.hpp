@@ -1,6 +1,11 @@
 #pragma once
 
-#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "daemon/recon/layer_response.hpp"
+#include "daemon/recon/tiles.hpp"
 
 namespace dtact::recon {
 
@@ -10,29 +15,56 @@ struct Force {
   double uncertainty_n = 0;
 };
 
-/// The force along the surface's normal that a contact's volume V (mm³) and area A (mm²) stand for,
-/// as a user's scale calibrated it:
+/// Why a contact comes without a force, in the numbers of dtact.v1.ForceAbsence.
+enum class ForceAbsence : std::uint8_t {
+  none = 0,                ///< It has one.
+  uncalibrated = 1,        ///< The calibration has no force.
+  beyond_calibration = 2,  ///< Part of the contact is deeper than the calibration covers.
+  cut_off = 3              ///< The contact reaches the map's edge or pixels that are not trusted.
+};
+
+/// The force of an incompressible gel bonded to a stiff block (LayerResponse), as readings of a
+/// scale calibrated it: with the indentation u + zero_mm and Young's modulus,
 ///
-///     F = per_mm3 V + per_mm2 A + per_mm5 V A
-///
-/// A bonded incompressible layer resists mostly in proportion to V; it is the stiffer the wider the
-/// contact is for its thickness, which is the last term; and the second makes up for what lies
-/// below the threshold. Without a contact there is no force.
+///     F = modulus_mpa ∫ q (u + zero_mm) dA.
 struct ForceModel {
-  double per_mm3 = 0;
-  double per_mm2 = 0;
-  double per_mm5 = 0;
-  double threshold_mm = 0;  ///< V and A are those of what is pressed deeper than this, …
-  int sharpen_steps = 0;    ///< … in a map of levels sharpened by so many steps.
-  double error_n = 0;       ///< Mean absolute error of readings that were left out of the fit.
-  /// How fast the error grows away from the readings: with x = (V, A, V A) it is error_n ·
-  /// √(1 + xᵀ S x). The upper triangle of S, row by row.
-  std::array<double, 6> spread{};
-  int pairs = 0;      ///< Readings that made it, …
-  double from_n = 0;  ///< … the smallest and the greatest of them.
+  double modulus_mpa = 0;
+  double thickness_mm = 0;  ///< Of the gel.
+  double zero_mm = 0;       ///< What depth maps lack where something presses.
+  double error_share = 0;   ///< Error of readings left out of the fit over the force.
+  int pairs = 0;            ///< Readings that made it, …
+  double from_n = 0;        ///< … the smallest and the greatest of them.
   double to_n = 0;
 };
 
-[[nodiscard]] Force force_of(const ForceModel& model, double volume_mm3, double area_mm2) noexcept;
+/// The force of a contact in a map that is uncertain by `uncertainty_mm`.
+///
+/// The uncertainty adds in squares a share of what the depth's is worth by the contact's stiffness,
+/// a share of the force for the law itself and what a contact too light to be seen presses with. It
+/// grows beyond the greatest reading.
+[[nodiscard]] Force force_of(const ForceModel& model, const LayerResponse::Answer& answer,
+                             double uncertainty_mm) noexcept;
+
+/// Measures the force in depth maps of one shape. One thread at a time; does not allocate after
+/// construction.
+class ForceMeter {
+ public:
+  ForceMeter(const ForceModel& model, int width, int height, double mm_per_px);
+
+  struct Reading {
+    std::optional<Force> force;
+    ForceAbsence absence = ForceAbsence::none;
+  };
+  /// Of a contact. `tiles`: where the map is not 0.
+  [[nodiscard]] Reading read(std::span<const std::int16_t> depth_um, const TileRows& tiles,
+                             double uncertainty_mm) noexcept;
+  /// Where nothing touches.
+  [[nodiscard]] Force none() const noexcept { return force_of(model_, {}, 0); }
+
+ private:
+  ForceModel model_;
+  CellMap cells_;
+  LayerResponse response_;
+};
 
 }  // namespace dtact::recon

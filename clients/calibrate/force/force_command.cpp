@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <stdexcept>
 #include <string>
@@ -15,7 +16,6 @@
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
 #include "daemon/calibration/calibration.hpp"
-#include "daemon/recon/scattering.hpp"
 
 namespace dtact::force {
 namespace {
@@ -27,8 +27,7 @@ struct Options {
   std::vector<std::string> reference;
   std::vector<std::string> pairs;
   std::string csv;
-  double threshold_mm = 0.1;
-  int sharpen_steps = 0;
+  std::optional<double> thickness_mm;
   bool grams = false;
   std::string output;
 };
@@ -47,7 +46,7 @@ std::vector<Pair> measured(const Options& options, const calibration::Calibratio
       throw std::runtime_error("--reference has not the size of the calibration's frame");
     }
   }
-  const ContactReader reader(calibration, reference, options.threshold_mm, options.sharpen_steps);
+  const ContactReader reader(calibration, reference);
   std::vector<Pair> pairs;
   for (const Reading& reading : readings) {
     pairs.push_back(reader.measure(reading.frames));
@@ -62,15 +61,15 @@ void report(const Fit& fit, const std::vector<Pair>& pairs, const std::string& o
   if (context.json) {
     cli::ForceReport report;
     report.set_output(output);
-    report.set_error_n(model.error_n);
+    report.set_modulus_mpa(model.modulus_mpa);
+    report.set_thickness_mm(model.thickness_mm);
+    report.set_zero_mm(model.zero_mm);
+    report.set_error_share(model.error_share);
     report.set_from_n(model.from_n);
     report.set_to_n(model.to_n);
-    report.set_ridge(fit.ridge);
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       cli::ForcePair& pair = *report.add_pairs();
       pair.set_name(pairs[i].name);
-      pair.set_volume_mm3(pairs[i].volume_mm3);
-      pair.set_area_mm2(pairs[i].area_mm2);
       pair.set_newtons(pairs[i].newtons);
       pair.set_left_out_error_n(fit.left_out[i]);
     }
@@ -78,20 +77,22 @@ void report(const Fit& fit, const std::vector<Pair>& pairs, const std::string& o
     return;
   }
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    context.out << fmt::format(
-        "{}: {:.2f} mm3, {:.2f} mm2, {:.3f} N; left out, missed by {:+.3f} N\n", pairs[i].name,
-        pairs[i].volume_mm3, pairs[i].area_mm2, pairs[i].newtons, fit.left_out[i]);
+    context.out << fmt::format("{}: {:.3f} N; left out, missed by {:+.3f} N\n", pairs[i].name,
+                               pairs[i].newtons, fit.left_out[i]);
   }
   context.out << fmt::format(
-      "force: mean absolute error {:.3f} N of pairs left out, {} pairs of {:.2f} to {:.2f} N; in "
-      "{}\n",
-      model.error_n, model.pairs, model.from_n, model.to_n, output);
+      "force: Young's modulus {:.3f} MPa of a gel {:.2f} mm thick; pairs left out are missed by "
+      "{:.1f} %, {} pairs of {:.2f} to {:.2f} N; in {}\n",
+      model.modulus_mpa, model.thickness_mm, 100 * model.error_share, model.pairs, model.from_n,
+      model.to_n, output);
 }
 
 void run(const Options& options, cli::Context& context) {
   calibration::Calibration calibration = calibration::load(options.calibration);
   const std::vector<Pair> pairs = measured(options, calibration);
-  const Fit fit = fit_force(pairs, options.threshold_mm, options.sharpen_steps);
+  std::optional<double> thickness_mm = options.thickness_mm;
+  if (!thickness_mm && calibration.layer) thickness_mm = calibration.layer->thickness_mm.value;
+  const Fit fit = fit_force(pairs, thickness_mm);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   model->force = fit.model;
   calibration.model = std::move(model);
@@ -105,8 +106,7 @@ void run(const Options& options, cli::Context& context) {
 void add_force(CLI::App& app, cli::Context& context) {
   CLI::App* force = app.add_subcommand(
       "force",
-      "Calibrate the normal force: newtons from the pressed volume and area, fitted to readings of "
-      "a scale");
+      "Calibrate the normal force: the gel's Young's modulus, fitted to readings of a scale");
   const auto options = std::make_shared<Options>();
   force->add_option("--calibration", options->calibration, "Calibration folder")
       ->type_name("FOLDER")
@@ -130,19 +130,11 @@ void add_force(CLI::App& app, cli::Context& context) {
                    "of them (averaged); left out: the calibration's")
       ->type_name("FILE");
   force
-      ->add_option("--threshold-mm", options->threshold_mm,
-                   "What is deeper counts as pressed, mm: contact.made_mm of the daemon's "
-                   "configuration")
-      ->capture_default_str()
-      ->check(CLI::Range(0.01, 2.0));
-  force
-      ->add_option("--sharpen", options->sharpen_steps,
-                   "Steps of sharpening of the maps that the force is for, 0 to 2: "
-                   "reconstruction.sharpen of the daemon's configuration; maps of other steps get "
-                   "no force")
-      ->capture_default_str()
-      ->type_name("STEPS")
-      ->check(CLI::Range(0, recon::kMostSharpeningSteps));
+      ->add_option(
+          "--thickness-mm", options->thickness_mm,
+          "Thickness of the gel, mm; left out: as the depth calibration found it, or fitted to "
+          "the readings")
+      ->check(CLI::Range(0.5, 5.0));
   force
       ->add_option("-o,--output", options->output,
                    "Calibration folder to write; left out: the same one")

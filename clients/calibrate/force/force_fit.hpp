@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,29 +11,28 @@ namespace dtact::force {
 /// A contact and what a scale said of it.
 struct Pair {
   std::string name;  ///< For messages: where it is from.
-  double volume_mm3 = 0;
-  double area_mm2 = 0;
+  recon::CellMap contact;
   double newtons = 0;
 };
 
-/// Fewer pairs determine three numbers, and how heavily to distrust them, too badly.
-inline constexpr int kLeastPairs = 8;
+/// Fewer pairs determine three numbers and their error too badly.
+inline constexpr int kMinPairs = 6;
 
 struct Fit {
   recon::ForceModel model;
-  double ridge = 0;              ///< The weight that was chosen.
   std::vector<double> left_out;  ///< Of each pair: what the others say of it minus the reading, N.
 };
 
-/// Ridge regression of the reading on V, A and V A without a constant, each scaled to a root mean
-/// square of 1. Of weights 1e-8 … 1 the one whose mean absolute leave-one-out error is smallest.
-/// `threshold_mm`, `sharpen_steps`: of volume and area. Throws std::invalid_argument with a
-/// sentence that says what to do when there are fewer than kLeastPairs, one has no contact or no
-/// positive reading, the readings do not grow with the volume (Spearman's rank correlation below
-/// 0.8), or their ratio is none that silicones have: 0.02 … 5 N per mm³ as the layers of the public
-/// study (0.07 … 0.3) with room on both sides; readings in grams are 102 times as large, in
-/// kilograms as small.
-[[nodiscard]] Fit fit_force(const std::vector<Pair>& pairs, double threshold_mm,
-                            int sharpen_steps = 0);
+/// Fits Young's modulus, the depth's zero and, unless it is known, the gel's thickness to the
+/// readings by least squares. An error of 2 % of the reading counts as much as one of 5 mN; zeros
+/// around 0 ± 0.03 mm and thicknesses around 2 mm ± 35 % are preferred.
+///
+/// Throws std::invalid_argument with the fix when there are fewer than kMinPairs, contacts are of
+/// different map sizes, one is missing or cut off or has no positive reading, pairs that are left
+/// out are missed by more than a quarter, or the modulus is none that silicones have: 0.02 … 2 MPa
+/// (the public study's gels: 0.04 … 0.27). Readings in grams give 102 times as much, in kilograms a
+/// tenth.
+[[nodiscard]] Fit fit_force(const std::vector<Pair>& pairs,
+                            std::optional<double> thickness_mm = std::nullopt);
 
 }  // namespace dtact::force

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <cstddef>
 #include <sstream>
 #include <stdexcept>
@@ -12,12 +11,10 @@
 #include <utility>
 
 #include "clients/calibrate/offline/images.hpp"
+#include "clients/cpp/maps.hpp"
 #include "clients/recording/channels.hpp"
 #include "clients/recording/read_recording.hpp"
-#include "daemon/recon/decimate.hpp"
-#include "daemon/recon/kernels.hpp"
 #include "daemon/recon/reconstructor.hpp"
-#include "daemon/recon/scattering.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::force {
@@ -79,6 +76,35 @@ void require_same_calibration(const mcap::Reader& file, const std::string& path,
       name));
 }
 
+/// The mean of depth maps of one size, micrometres; untrusted where one of them is.
+class MeanMap {
+ public:
+  void add(const std::vector<std::int16_t>& depth_um) {
+    sums_.resize(std::max(sums_.size(), depth_um.size()));
+    trusted_.resize(sums_.size());
+    for (std::size_t i = 0; i < depth_um.size(); ++i) {
+      sums_[i] += depth_um[i];
+      trusted_[i] += depth_um[i] == recon::kUntrusted ? 0 : 1;
+    }
+    ++count_;
+  }
+  [[nodiscard]] recon::CellMap cells(int width, int height, double mm_per_px) const {
+    std::vector<std::int16_t> mean(sums_.size());
+    for (std::size_t i = 0; i < mean.size(); ++i) {
+      mean[i] =
+          trusted_[i] == count_ ? static_cast<std::int16_t>(sums_[i] / count_) : recon::kUntrusted;
+    }
+    recon::CellMap cells(width, height, mm_per_px);
+    cells.read(mean);
+    return cells;
+  }
+
+ private:
+  std::vector<int> sums_;
+  std::vector<int> trusted_;
+  int count_ = 0;
+};
+
 }  // namespace
 
 Reading parse_reading(const std::string& text) {
@@ -119,25 +145,6 @@ std::vector<Reading> read_readings(const fs::path& csv) {
   return readings;
 }
 
-ContactReader::ContactReader(const calibration::Calibration& calibration,
-                             std::span<const std::uint16_t> reference_q8, double threshold_mm,
-                             int sharpen_steps)
-    : calibration_(calibration),
-      model_(calibration.model),
-      reference_q8_(reference_q8),
-      threshold_mm_(threshold_mm),
-      sharpen_steps_(sharpen_steps) {
-  if (sharpen_steps == 0) return;
-  const std::vector<int> all = recon::sharpening_steps(*model_);
-  if (std::ranges::find(all, sharpen_steps) == all.end()) {
-    throw std::runtime_error(
-        fmt::format("--sharpen {}: the calibration has no list for levels sharpened so often: "
-                    "calibrate with --method model, or leave --sharpen out",
-                    sharpen_steps));
-  }
-  model_ = std::make_shared<const recon::Model>(recon::decimate(*model_, recon::kSharpenedAt));
-}
-
 Pair ContactReader::measure(const std::string& frames) const {
   const auto found = frames.rfind(kRecording);
   if (found == std::string::npos) {
@@ -165,13 +172,10 @@ Pair ContactReader::measure(const std::string& frames) const {
 }
 
 Pair ContactReader::measure(std::span<const image::Grey8> frames, const std::string& name) const {
-  const recon::Model& model = *model_;
-  const int decimation = model.rectify.decimation;
-  recon::Reconstructor reconstructor(model_, sharpen_steps_);
+  const recon::Model& model = *calibration_.model;
+  recon::Reconstructor reconstructor(calibration_.model);
   reconstructor.set_reference(reference_q8_);
-  recon::SumRules rules;
-  rules.made_um = rules.lost_um = static_cast<std::int16_t>(std::lround(threshold_mm_ * 1000));
-  recon::DepthSums sums(rules);
+  MeanMap mean;
   std::vector<std::int16_t> depth(model.rectify.entries.size());
   std::vector<std::uint8_t> padded(model.reference_q8.size() + recon::kLumaPadding);
   for (const image::Grey8& frame : frames) {
@@ -182,50 +186,41 @@ Pair ContactReader::measure(std::span<const image::Grey8> frames, const std::str
     }
     std::ranges::copy(frame.pixels, padded.begin());
     reconstructor.run(padded.data(), frame.width, depth);
-    if (reconstructor.beyond_pixels() * decimation * decimation > kBeyondPixels) {
-      fail_beyond(name);
-    }
-    for (int y = 0; y < model.rectify.height; ++y) {
-      recon::kernels::sum_row(depth.data() + std::ptrdiff_t{y} * model.rectify.width, y, 0,
-                              model.rectify.width, sums);
-    }
+    if (reconstructor.beyond_pixels() > kBeyondPixels) fail_beyond(name);
+    mean.add(depth);
   }
-  const double px_mm2 = model.mm_per_px * model.mm_per_px / static_cast<double>(frames.size());
-  return {name, static_cast<double>(sums.um) / 1000 * px_mm2,
-          static_cast<double>(sums.made) * px_mm2, 0};
+  return {name, mean.cells(model.rectify.width, model.rectify.height, model.mm_per_px), 0};
 }
 
 Pair ContactReader::measure_recording(const std::string& path, std::uint64_t first,
                                       std::uint64_t end) const {
   const mcap::Reader file(path);
   require_same_calibration(file, path, calibration_);
-  Pair pair;
+  MeanMap mean;
+  v1::DepthMap map;
   std::uint64_t at = 0;
-  int touching = 0;
   recording::Takers takers;
   takers.frame = [&](const v1::Frame& frame, std::uint64_t) {
     if (const std::uint64_t index = at++; index < first) return true;
-    if (!frame.contact().touching()) return at < end;
-    const auto steps = static_cast<int>(frame.depth().sharpen_steps());
-    if (frame.has_depth() && steps != sharpen_steps_) {
-      throw std::runtime_error(fmt::format(
-          "{}:{}: its depth was made with {} steps of sharpening, not {}: set the daemon's "
-          "reconstruction.sharpen to \"off\", \"1\" or \"2\" as it will measure, record again, "
-          "and give --sharpen as many",
-          path, at - 1, steps, sharpen_steps_));
-    }
+    if (!frame.contact().touching() || !frame.has_depth()) return at < end;
     if (std::ranges::find(frame.health(), v1::HEALTH_BEYOND_CALIBRATION) != frame.health().end()) {
       fail_beyond(fmt::format("{}:{}", path, at - 1));
     }
-    ++touching;
-    pair.volume_mm3 += frame.contact().volume_mm3();
-    pair.area_mm2 += frame.contact().area_mm2();
+    map = frame.depth();
+    mean.add(client::values_of(map));
     return at < end;
   };
   recording::read_recording(file, takers);
-  pair.volume_mm3 /= std::max(touching, 1);
-  pair.area_mm2 /= std::max(touching, 1);
-  return pair;
+  if (map.data().empty()) {
+    throw std::runtime_error(fmt::format(
+        "{}: nothing touches in its frames, or they have no depth: take the pair out, or "
+        "record while the scale shows the load",
+        path));
+  }
+  return {
+      path,
+      mean.cells(static_cast<int>(map.width()), static_cast<int>(map.height()), map.mm_per_px()),
+      0};
 }
 
 }  // namespace dtact::force

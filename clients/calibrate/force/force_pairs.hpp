@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,20 +26,17 @@ struct Reading {
 /// line.
 [[nodiscard]] std::vector<Reading> read_readings(const std::filesystem::path& csv);
 
-/// The contacts of frames as the daemon sums them up, averaged over each reading's frames.
+/// The contacts of frames, averaged over each reading's frames.
 class ContactReader {
  public:
-  /// Pictures are measured against `reference_q8`, the untouched image in their light, in maps
-  /// sharpened by `sharpen_steps`, 0 to 2. Throws std::runtime_error when the calibration has no
-  /// list for so many.
+  /// Pictures are measured against `reference_q8`, the untouched image in their light.
   ContactReader(const calibration::Calibration& calibration,
-                std::span<const std::uint16_t> reference_q8, double threshold_mm,
-                int sharpen_steps = 0);
+                std::span<const std::uint16_t> reference_q8)
+      : calibration_(calibration), reference_q8_(reference_q8) {}
 
-  /// Volume and area; the reading itself is left to the caller. A recording's are those that the
-  /// daemon measured. Throws std::runtime_error when the frames cannot be read, are of another size
-  /// or, recorded, of another calibration or sharpened by other steps, or reach deeper than the
-  /// calibration covers.
+  /// The reading itself is left to the caller. A recording's maps are those that the daemon
+  /// measured. Throws std::runtime_error when the frames cannot be read, are of another size or,
+  /// recorded, of another calibration, or reach deeper than the calibration covers.
   [[nodiscard]] Pair measure(const std::string& frames) const;
   /// The same of pictures at hand.
   [[nodiscard]] Pair measure(std::span<const image::Grey8> frames, const std::string& name) const;
@@ -50,10 +46,7 @@ class ContactReader {
                                        std::uint64_t end) const;
 
   const calibration::Calibration& calibration_;
-  std::shared_ptr<const recon::Model> model_;  ///< As coarse as its levels are sharpened at.
   std::span<const std::uint16_t> reference_q8_;
-  double threshold_mm_;
-  int sharpen_steps_;
 };
 
 }  // namespace dtact::force

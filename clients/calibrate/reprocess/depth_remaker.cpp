@@ -89,7 +89,6 @@ void DepthRemaker::remake(const hal::LumaView& luma, v1::Frame& frame) {
     resolution.coarse->upsampler.run(resolution.coarse->depth_um, depth_um_);
   }
   summary_ = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
-  contact_.weigh(model.force, way.steps, summary_);
 
   v1::DepthMap map;
   map.set_encoding(v1::DEPTH_PREDICT_ZSTD);
@@ -111,14 +110,20 @@ void DepthRemaker::remake(const hal::LumaView& luma, v1::Frame& frame) {
 }
 
 void DepthRemaker::describe(const recon::DepthSums& sums, const pipeline::Resolutions& maps,
-                            const pipeline::Resolution& resolution, v1::Frame& frame) const {
+                            pipeline::Resolution& resolution, v1::Frame& frame) {
   const pipeline::Trust trust{.light_left = follower_.left(), .light_unseen = follower_.unseen()};
   const int made = resolution.decimation();
   const int steps = resolution.steps();
   const double bend_um = pipeline::bend_um(sums, resolution.reconstructor.model().mm_per_px);
-  frame.mutable_depth()->set_uncertainty_um(
+  const double uncertainty_um =
       pipeline::uncertainty_at_um(maps.contact_um(summary_.deepest_mm, steps, trust),
-                                  pipeline::plain_bend_um(bend_um, steps), made, steps));
+                                  pipeline::plain_bend_um(bend_um, steps), made, steps);
+  const bool beyond = resolution.reconstructor.beyond_pixels() * made * made >
+                      pipeline::PipelineConfig{}.beyond_pixels;
+  pipeline::add_force(
+      resolution, resolution.coarse ? std::span(resolution.coarse->depth_um) : std::span(depth_um_),
+      beyond, uncertainty_um, summary_);
+  frame.mutable_depth()->set_uncertainty_um(uncertainty_um);
   auto& contact = *frame.mutable_contact();
   contact.set_touching(summary_.touching);
   contact.set_area_mm2(summary_.area_mm2);
@@ -130,6 +135,7 @@ void DepthRemaker::describe(const recon::DepthSums& sums, const pipeline::Resolu
   contact.set_volume_mm3(summary_.volume_mm3);
   contact.clear_force_n();
   contact.clear_force_uncertainty_n();
+  contact.set_force_absence(static_cast<v1::ForceAbsence>(summary_.force_absence));
   if (summary_.force) {
     contact.set_force_n(summary_.force->newtons);
     contact.set_force_uncertainty_n(summary_.force->uncertainty_n);
@@ -138,9 +144,7 @@ void DepthRemaker::describe(const recon::DepthSums& sums, const pipeline::Resolu
   frame.clear_calibration();  // of the daemon's numbers it has none
   frame.clear_times();
   set(frame, v1::HEALTH_UNCALIBRATED, false);
-  set(frame, v1::HEALTH_BEYOND_CALIBRATION,
-      resolution.reconstructor.beyond_pixels() * made * made >
-          pipeline::PipelineConfig{}.beyond_pixels);
+  set(frame, v1::HEALTH_BEYOND_CALIBRATION, beyond);
 }
 
 }  // namespace dtact::reprocess

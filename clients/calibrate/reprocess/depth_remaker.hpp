@@ -56,7 +56,7 @@ class DepthRemaker {
   /// What makes such maps, for the reference and the light of now.
   [[nodiscard]] pipeline::Resolutions& maps_for(const Way& way);
   void describe(const recon::DepthSums& sums, const pipeline::Resolutions& maps,
-                const pipeline::Resolution& resolution, v1::Frame& frame) const;
+                pipeline::Resolution& resolution, v1::Frame& frame);
 
   std::shared_ptr<const calibration::Calibration> calibration_;
   pipeline::CalibratedImage image_;

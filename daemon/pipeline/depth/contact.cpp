@@ -45,16 +45,6 @@ ContactSummary ContactDetector::inspect(const recon::DepthSums& sums, int width,
   return summary;
 }
 
-void ContactDetector::weigh(const std::optional<recon::ForceModel>& model, int sharpen_steps,
-                            ContactSummary& summary) const noexcept {
-  if (!model || model->sharpen_steps != sharpen_steps ||
-      micrometres(model->threshold_mm) != micrometres(rules_.made_mm)) {
-    return;
-  }
-  summary.force = summary.touching ? recon::force_of(*model, summary.volume_mm3, summary.area_mm2)
-                                   : recon::force_of(*model, 0, 0);
-}
-
 void ContactDetector::decide(double made_mm2, double lost_mm2) noexcept {
   const bool other = touching_ ? lost_mm2 < rules_.area_mm2 : made_mm2 >= rules_.area_mm2;
   agreeing_ = other ? agreeing_ + 1 : 0;

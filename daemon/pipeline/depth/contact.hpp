@@ -1,11 +1,8 @@
 #pragma once
 
-#include <optional>
-
 #include "daemon/pipeline/depth_frame.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/recon/depth_sums.hpp"
-#include "daemon/recon/force.hpp"
 
 namespace dtact::pipeline {
 
@@ -24,11 +21,6 @@ class ContactDetector {
   /// right, y down. Area, centroid and volume are those of the pixels deeper than `made_mm`.
   [[nodiscard]] ContactSummary inspect(const recon::DepthSums& sums, int width, int height,
                                        double mm_per_px) noexcept;
-
-  /// Gives `summary`, of a map sharpened by `sharpen_steps`, its force, where a calibration tells
-  /// one for this very threshold and so many steps: sharpening alone changes volume and area.
-  void weigh(const std::optional<recon::ForceModel>& model, int sharpen_steps,
-             ContactSummary& summary) const noexcept;
 
   [[nodiscard]] bool touching() const noexcept { return touching_; }
 

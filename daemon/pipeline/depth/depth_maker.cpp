@@ -50,7 +50,7 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   out.drawn_rung = maps_->rung();
   resolution.readers.mark(untouched.active(), resolution.tiles);
   recon::SumRules rules = contact_.sum_rules();
-  if (judged || chooses()) {
+  if (judged || chooses() || resolution.force) {
     rules.bend_reach = bend_reach(model.mm_per_px);
     rules.bend_from_um = rules.made_um;
   }
@@ -71,10 +71,11 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   out.contact_um = rules.made_um;
   out.contact_absence = ContactAbsence::none;
   out.contact = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
-  contact_.weigh(model.force, out.sharpen_steps, out.contact);
   beyond_ = reconstructor.beyond_pixels() * out.made_decimation * out.made_decimation >
             config_.beyond_pixels;
   judge(untouched.trust(), bend_um(sums, model.mm_per_px), out);
+  add_force(resolution, resolution.coarse ? resolution.coarse->depth_um : out.depth_um, beyond_,
+            out.uncertainty_um, out.contact);
   out.times.inspect_ns = steps.sums_ns + clock_.monotonic_ns() - began_ns;
 }
 

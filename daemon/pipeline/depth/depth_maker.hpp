@@ -30,7 +30,8 @@ class DepthMaker {
 
   /// Depth, contact and uncertainty of a frame that `untouched` has just looked at, into buffers
   /// that hold a map of this calibration. `judged`: somebody asks what the map is worth; else its
-  /// bend is left out of the uncertainty, unless the resolution is chosen by it.
+  /// bend is left out of the uncertainty, unless the resolution is chosen by it or there is a
+  /// force.
   void make(const hal::LumaView& luma, const UntouchedImage& untouched, bool judged,
             DepthFrame& out) noexcept;
   /// No depth is made of this frame: what was known of contact stands, and `out` says nothing.

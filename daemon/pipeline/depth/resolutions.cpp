@@ -45,6 +45,23 @@ double mean_grey_of(const recon::Model& model) {
 
 }  // namespace
 
+void add_force(Resolution& resolution, std::span<const std::int16_t> depth_um, bool beyond,
+               double uncertainty_um, ContactSummary& contact) noexcept {
+  contact.force.reset();
+  contact.force_absence = recon::ForceAbsence::none;
+  if (!resolution.force) {
+    contact.force_absence = recon::ForceAbsence::uncalibrated;
+  } else if (beyond) {
+    contact.force_absence = recon::ForceAbsence::beyond_calibration;
+  } else if (!contact.touching) {
+    contact.force = resolution.force->none();
+  } else {
+    const auto read = resolution.force->read(depth_um, resolution.tiles, uncertainty_um / 1000);
+    contact.force = read.force;
+    contact.force_absence = read.absence;
+  }
+}
+
 Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
                          const recon::CellLattice& lattice, const ReconstructionRules& rules)
     : model_(model), max_error_um_(rules.max_error_um), mean_grey_(mean_grey_of(*model)) {
@@ -76,7 +93,10 @@ void Resolutions::add(const recon::CellLattice& lattice, int decimation, int ste
   recon::Reconstructor reconstructor(of, steps);
   recon::TileReaders readers(lattice, of->rectify, reconstructor.radius());
   recon::TileRows tiles(static_cast<std::size_t>(readers.grid().rows()));
-  all_.push_back({std::move(reconstructor), std::move(readers), std::move(tiles), {}});
+  std::optional<recon::ForceMeter> force;
+  if (of->force) force.emplace(*of->force, of->rectify.width, of->rectify.height, of->mm_per_px);
+  all_.push_back(
+      {std::move(reconstructor), std::move(readers), std::move(tiles), {}, std::move(force)});
   if (map_decimation == decimation) return;
   all_.back().coarse = {
       .upsampler = recon::Upsampler(model_->rectify.width, model_->rectify.height, decimation,

@@ -7,8 +7,10 @@
 #include <span>
 #include <vector>
 
+#include "daemon/pipeline/depth_frame.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/pipeline/untouched/untouched_image.hpp"
+#include "daemon/recon/force.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
 #include "daemon/recon/upsampler.hpp"
@@ -29,11 +31,17 @@ struct Resolution {
     recon::DrawnTiles drawn;
   };
   std::optional<Coarse> coarse;
+  std::optional<recon::ForceMeter> force;  ///< Where the calibration has a force.
 
   /// The reconstruction's; the map's may be finer.
   [[nodiscard]] int decimation() const noexcept { return reconstructor.model().rectify.decimation; }
   [[nodiscard]] int steps() const noexcept { return reconstructor.sharpen_steps(); }
 };
+
+/// Gives a contact its force. `depth_um`: what `resolution` made; `beyond`: of it part is deeper
+/// than the calibration covers.
+void add_force(Resolution& resolution, std::span<const std::int16_t> depth_um, bool beyond,
+               double uncertainty_um, ContactSummary& contact) noexcept;
 
 /// What a map is and where it goes.
 struct MapShape {

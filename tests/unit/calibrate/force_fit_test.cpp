@@ -3,10 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <opencv2/core.hpp>
+#include <cstdint>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace dtact::force {
@@ -16,101 +18,99 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::ThrowsMessage;
 
-double law(double v, double a) { return 0.12 * v + 0.005 * a + 0.002 * v * a; }
+constexpr int kWidth = 500;
+constexpr int kHeight = 400;
+constexpr double kMmPerPx = 0.0417;
+constexpr double kModulus = 0.13;
+constexpr double kZero = 0.02;
 
-// Balls and plates: volume over area differs.
-std::vector<Pair> pairs() {
+/// What a ball of 4 mm off the centre presses `depth_mm` deep, as a cap.
+recon::CellMap cap(double depth_mm) {
+  std::vector<std::int16_t> um;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double r = kMmPerPx * std::hypot(x - 270, y - 180);
+      const double mm = depth_mm - (4 - std::sqrt(std::max(0.0, 16 - r * r)));
+      um.push_back(static_cast<std::int16_t>(std::lround(1000 * std::max(0.0, mm))));
+    }
+  }
+  recon::CellMap cells(kWidth, kHeight, kMmPerPx);
+  cells.read(um);
+  return cells;
+}
+
+std::vector<Pair> pairs(double thickness_mm = 2.3) {
   std::vector<Pair> pairs;
-  for (const auto& [v, a] : {std::pair{0.3, 2.0},
-                             {0.9, 3.5},
-                             {1.7, 5.3},
-                             {2.7, 6.9},
-                             {3.9, 8.1},
-                             {1.9, 13.0},
-                             {3.3, 14.1},
-                             {5.5, 15.3},
-                             {7.6, 16.0},
-                             {9.7, 16.6}}) {
-    pairs.push_back({"load", v, a, law(v, a)});
+  for (const double depth : {0.25, 0.4, 0.55, 0.7, 0.9, 1.1, 1.3, 1.5}) {
+    Pair pair{"load", cap(depth), 0};
+    const auto answer = recon::LayerResponse(thickness_mm, pair.contact).answer(pair.contact);
+    pair.newtons = kModulus * (answer.mm2 + kZero * answer.mm);
+    pairs.push_back(std::move(pair));
   }
   return pairs;
 }
 
 TEST(FitForce, FindsTheLawBehindExactReadings) {
-  const Fit fit = fit_force(pairs(), 0.1);
-  EXPECT_NEAR(fit.model.per_mm3, 0.12, 1e-4);
-  EXPECT_NEAR(fit.model.per_mm2, 0.005, 1e-4);
-  EXPECT_NEAR(fit.model.per_mm5, 0.002, 1e-5);
-  EXPECT_LT(fit.model.error_n, 1e-4);
-  EXPECT_EQ(fit.model.threshold_mm, 0.1);
-  EXPECT_EQ(fit.model.pairs, 10);
-  EXPECT_NEAR(fit.model.from_n, law(0.3, 2.0), 1e-12);
-  EXPECT_NEAR(fit.model.to_n, law(9.7, 16.6), 1e-12);
-  EXPECT_NEAR(recon::force_of(fit.model, 5, 10).newtons, law(5, 10), 1e-3);
+  const Fit fit = fit_force(pairs(), 2.3);
+  EXPECT_NEAR(fit.model.modulus_mpa, kModulus, 0.001);
+  EXPECT_NEAR(fit.model.zero_mm, kZero, 0.002);
+  EXPECT_EQ(fit.model.thickness_mm, 2.3);
+  EXPECT_LT(fit.model.error_share, 0.005);
+  EXPECT_EQ(fit.model.pairs, 8);
+  EXPECT_EQ(fit.model.from_n, pairs().front().newtons);
+  EXPECT_EQ(fit.model.to_n, pairs().back().newtons);
 }
 
-// What the short cut by leverage says is what a fit without the pair says.
+TEST(FitForce, FindsTheThickness) {
+  EXPECT_NEAR(fit_force(pairs(1.6)).model.thickness_mm, 1.6, 0.25);
+  const Fit thick = fit_force(pairs(2.8));
+  EXPECT_NEAR(thick.model.thickness_mm, 2.8, 0.4);
+  EXPECT_LT(thick.model.error_share, 0.02);
+}
+
 TEST(FitForce, LeavesOutByRefitting) {
   std::vector<Pair> noisy = pairs();
-  for (std::size_t i = 0; i < noisy.size(); ++i) noisy[i].newtons += i % 2 == 0 ? 0.03 : -0.02;
-  const Fit fit = fit_force(noisy, 0.1);
-  const auto x_of = [](const Pair& p) {
-    return cv::Vec3d(p.volume_mm3, p.area_mm2, p.volume_mm3 * p.area_mm2);
-  };
-  cv::Vec3d squares;
-  for (const Pair& pair : noisy) squares += x_of(pair).mul(x_of(pair));
-  double sum = 0;
-  for (std::size_t out = 0; out < noisy.size(); ++out) {
-    cv::Matx33d normal = fit.ridge * cv::Matx33d::diag({squares[0], squares[1], squares[2]});
-    cv::Vec3d right;
-    for (std::size_t i = 0; i < noisy.size(); ++i) {
-      if (i == out) continue;
-      normal += x_of(noisy[i]) * x_of(noisy[i]).t();
-      right += x_of(noisy[i]) * noisy[i].newtons;
-    }
-    const double error = x_of(noisy[out]).dot(normal.inv() * right) - noisy[out].newtons;
-    EXPECT_NEAR(fit.left_out[out], error, 1e-6) << out;
-    sum += std::abs(error);
-  }
-  EXPECT_NEAR(fit.model.error_n, sum / 10, 1e-6);
-}
-
-TEST(FitForce, IsLessSureBeyondItsReadings) {
-  std::vector<Pair> noisy = pairs();
-  noisy[3].newtons += 0.1;
-  const recon::ForceModel model = fit_force(noisy, 0.1).model;
-  const double near = recon::force_of(model, 3, 9).uncertainty_n;
-  EXPECT_GT(near, model.error_n);
-  EXPECT_LT(near, 1.5 * model.error_n);
-  EXPECT_GT(recon::force_of(model, 40, 50).uncertainty_n, 3 * model.error_n);
-}
-
-TEST(FitForce, TellsNoPull) {
-  const recon::ForceModel model{.per_mm3 = 1, .per_mm2 = -1};
-  EXPECT_EQ(recon::force_of(model, 1, 2).newtons, 0);
+  for (std::size_t i = 0; i < noisy.size(); ++i) noisy[i].newtons *= i % 2 == 0 ? 1.06 : 0.97;
+  const Fit fit = fit_force(noisy, 2.3);
+  std::vector<Pair> others = noisy;
+  others.erase(others.begin() + 5);
+  const recon::ForceModel model = fit_force(others, 2.3).model;
+  const auto answer = recon::LayerResponse(2.3, noisy[5].contact).answer(noisy[5].contact);
+  EXPECT_NEAR(fit.left_out[5], recon::force_of(model, answer, 0).newtons - noisy[5].newtons, 1e-6);
+  EXPECT_GT(fit.model.error_share, 0.02);
+  EXPECT_LT(fit.model.error_share, 0.1);
 }
 
 void expect_refused(const std::vector<Pair>& pairs, const char* a, const char* b) {
-  EXPECT_THAT([&] { (void)fit_force(pairs, 0.1); },
+  EXPECT_THAT([&] { (void)fit_force(pairs, 2.3); },
               ThrowsMessage<std::invalid_argument>(AllOf(HasSubstr(a), HasSubstr(b))));
 }
 
 TEST(FitForce, RefusesWhatCannotBeRight) {
   std::vector<Pair> few = pairs();
-  few.resize(7);
-  expect_refused(few, "7 pairs", "at least 8");
+  few.erase(few.begin() + 5, few.end());
+  expect_refused(few, "5 pairs", "at least 6");
 
   std::vector<Pair> air = pairs();
-  air[4] = {"press/4.png", 0, 0, 0.5};
+  air[4] = {"press/4.png", cap(0), 0.5};
   expect_refused(air, "press/4.png", "nothing touches");
+
+  std::vector<Pair> other = pairs();
+  other[4] = {"quarter.mcap", recon::CellMap(kWidth / 4, kHeight / 4, 4.1 * kMmPerPx), 0.5};
+  expect_refused(other, "quarter.mcap", "one resolution");
+
+  std::vector<Pair> edge = pairs();
+  std::vector<std::int16_t> all(std::size_t{kWidth} * kHeight, 500);
+  edge[4].contact.read(all);
+  expect_refused(edge, "edge", "nearer to the middle");
 
   std::vector<Pair> zero = pairs();
   zero[2].newtons = 0;
   expect_refused(zero, "load", "not above 0");
 
   std::vector<Pair> swapped = pairs();
-  for (std::size_t i = 0; i < 5; ++i) std::swap(swapped[i].newtons, swapped[9 - i].newtons);
-  expect_refused(swapped, "do not grow with the pressed volume", "same order");
+  for (std::size_t i = 0; i < 4; ++i) std::swap(swapped[i].newtons, swapped[7 - i].newtons);
+  expect_refused(swapped, "missed by", "same order");
 
   std::vector<Pair> grams = pairs();
   for (Pair& pair : grams) pair.newtons *= 102;

@@ -58,13 +58,10 @@ TEST(CalibrationFolder, EverythingComesBack) {
   EXPECT_EQ(loaded.model->reference_q8, saved.model->reference_q8);
   EXPECT_EQ(loaded.model->untrusted, saved.model->untrusted);
   ASSERT_TRUE(loaded.model->force);
-  EXPECT_EQ(loaded.model->force->per_mm3, 0.125);
-  EXPECT_EQ(loaded.model->force->per_mm2, -0.25);
-  EXPECT_EQ(loaded.model->force->per_mm5, 0.002);
-  EXPECT_EQ(loaded.model->force->sharpen_steps, 2);
-  EXPECT_EQ(loaded.model->force->threshold_mm, 0.1);
-  EXPECT_EQ(loaded.model->force->error_n, 0.03);
-  EXPECT_EQ(loaded.model->force->spread, (std::array<double, 6>{1, -2, 3, 4, -5, 6.5}));
+  EXPECT_EQ(loaded.model->force->modulus_mpa, 0.125);
+  EXPECT_EQ(loaded.model->force->thickness_mm, 2.25);
+  EXPECT_EQ(loaded.model->force->zero_mm, -0.0625);
+  EXPECT_EQ(loaded.model->force->error_share, 0.03);
   EXPECT_EQ(loaded.model->force->pairs, 12);
   EXPECT_EQ(loaded.model->force->from_n, 0.1);
   EXPECT_EQ(loaded.model->force->to_n, 2);

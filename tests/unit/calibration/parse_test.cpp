@@ -271,16 +271,10 @@ TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {
 }
 
 TEST(ParseCalibration, ForceIsCheckedAndMayBeAbsent) {
-  expect_refused(with("per_mm3 = 0.125", ""), "force.per_mm3", "missing");
-  expect_refused(with("spread = [1, -2, 3, 4, -5, 6.5]", "spread = [1]"), "force.spread", "six");
+  expect_refused(with("modulus_mpa = 0.125", ""), "force.modulus_mpa", "missing");
+  expect_refused(with("thickness_mm = 2.25", "thickness_mm = 0.2"), "force.thickness_mm", "0.5 to");
   expect_refused(with("to_n = 2", "to_n = 0.05"), "force.to_n", "from 0.1");
-  expect_refused(with("sharpen_steps = 2", "sharpen_steps = 3"), "force.sharpen_steps", "0 to 2");
   const Files files = format(sample());
-  // Files that are older than the key were made of maps that are not sharpened.
-  const Calibration plain =
-      parse(with("sharpen_steps = 2  # of the maps of V and A\n", ""), files.reference_png, "old");
-  EXPECT_EQ(plain.model->force->sharpen_steps, 0);
-  EXPECT_THAT(format(plain).toml, testing::Not(HasSubstr("sharpen_steps")));
   std::string old = files.toml;
   const auto from = old.find("[force]");
   old.erase(from, old.find("[lens]") - from);

@@ -39,13 +39,10 @@ inline Calibration sample() {
                  .centre_y_mm = -2,
                  .per_mm = -0.0125,
                  .polynomial = {0.015625, -0.5}};
-  model->force = recon::ForceModel{.per_mm3 = 0.125,
-                                   .per_mm2 = -0.25,
-                                   .per_mm5 = 0.002,
-                                   .threshold_mm = 0.1,
-                                   .sharpen_steps = 2,
-                                   .error_n = 0.03,
-                                   .spread = {1, -2, 3, 4, -5, 6.5},
+  model->force = recon::ForceModel{.modulus_mpa = 0.125,
+                                   .thickness_mm = 2.25,
+                                   .zero_mm = -0.0625,
+                                   .error_share = 0.03,
                                    .pairs = 12,
                                    .from_n = 0.1,
                                    .to_n = 2};

@@ -93,6 +93,10 @@ TEST(WatchMeter, PrintsTheForceWhereItIsCalibrated) {
   f.mutable_contact()->set_force_uncertainty_n(0.0312);
   EXPECT_NE(watch_line(meter, f).find("deepest  0.513 mm  force 0.52 N +- 0.03  latency"),
             std::string::npos);
+  f.mutable_contact()->clear_force_n();
+  f.mutable_contact()->set_force_absence(v1::FORCE_ABSENCE_CUT_OFF);
+  EXPECT_NE(watch_line(meter, f).find("deepest  0.513 mm  force cut_off  latency"),
+            std::string::npos);
 }
 
 TEST(WatchMeter, PrintsNoLatencyBetweenMachines) {

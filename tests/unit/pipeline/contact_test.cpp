@@ -116,47 +116,6 @@ TEST_F(ContactTest, AMapOfWhichNothingWasComputedIsNoContact) {
   EXPECT_EQ(summary.deepest_x_mm, 0);
 }
 
-// F = 2 V + 1 A of 0.3 mm³ and 0.5 mm²; the error grows by √(1 + 4 · 0.5²) of the area alone.
-TEST_F(ContactTest, TellsTheForceOfAContactByTheCalibration) {
-  const recon::ForceModel model{.per_mm3 = 2,
-                                .per_mm2 = 1,
-                                .per_mm5 = 0,
-                                .threshold_mm = 0.10,
-                                .error_n = 0.05,
-                                .spread = {0, 0, 0, 4, 0, 0},
-                                .pairs = 8,
-                                .from_n = 0,
-                                .to_n = 2};
-  fill(600, 2);
-  ContactSummary summary = summarise();
-  detector.weigh(model, 0, summary);  // not yet a contact
-  ASSERT_TRUE(summary.force);
-  EXPECT_EQ(summary.force->newtons, 0);
-  EXPECT_EQ(summary.force->uncertainty_n, 0.05);
-  summary = summarise();
-  detector.weigh(model, 0, summary);
-  EXPECT_NEAR(summary.force->newtons, 1.1, 1e-12);
-  EXPECT_NEAR(summary.force->uncertainty_n, 0.05 * std::sqrt(2), 1e-12);
-
-  summary = summarise();
-  detector.weigh(std::nullopt, 0, summary);
-  EXPECT_FALSE(summary.force);
-  recon::ForceModel other = model;
-  other.threshold_mm = 0.15;
-  detector.weigh(other, 0, summary);
-  EXPECT_FALSE(summary.force);
-
-  // A map sharpened by another number of steps has another volume and area of the same contact.
-  other = model;
-  other.sharpen_steps = 1;
-  detector.weigh(other, 0, summary);
-  EXPECT_FALSE(summary.force);
-  detector.weigh(model, 2, summary);
-  EXPECT_FALSE(summary.force);
-  detector.weigh(other, 1, summary);
-  EXPECT_TRUE(summary.force);
-}
-
 TEST_F(ContactTest, AsksForItsOwnThresholdsAndForNoBend) {
   const recon::SumRules rules = detector.sum_rules();
   EXPECT_EQ(rules.made_um, 100);

@@ -76,15 +76,19 @@ class Else(unittest.TestCase):
         self.assertTrue(contact.touching)
         self.assertEqual((contact.area_mm2, contact.deepest_mm, contact.x_mm), (2.5, 0.75, 0.0))
 
-    def test_force_is_none_where_it_is_not_calibrated(self):
+    def test_force_is_none_where_there_is_none(self):
         message = frame(1).frame
         message.contact.touching = True
         contact = dtact.Frame(message).contact
         self.assertEqual((contact.force_n, contact.force_uncertainty_n), (None, None))
+        self.assertFalse(contact.force_valid)
+        message.contact.force_absence = 3
+        self.assertEqual(dtact.Frame(message).contact.force_absence, "cut_off")
         message.contact.force_n = 0
         message.contact.force_uncertainty_n = 0.03
         contact = dtact.Frame(message).contact
         self.assertEqual((contact.force_n, contact.force_uncertainty_n), (0.0, 0.03))
+        self.assertTrue(contact.force_valid)
 
     def test_health_light_calibration_and_pictures(self):
         message = frame(1).frame

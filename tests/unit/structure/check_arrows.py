@@ -55,7 +55,7 @@ ROOMS = {
     # Depth of a recording, made by what makes it in the daemon.
     "clients/calibrate/reprocess": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mjpeg", "proto", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/recording"],
     # Contacts of pictures and of recordings.
-    "clients/calibrate/force": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/offline", "clients/recording"],
+    "clients/calibrate/force": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/offline", "clients/recording"],
     "clients/calibrate": ["clients/common", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
     # A client and a server: what serves the wire is the daemon's own.
     "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/perceive/geometry", "clients/perceive/pose"],

@@ -137,6 +137,11 @@ TEST(Golden11, ContactWithForce) {
                                "12 14 4a 12 49 00 00 00 00 00 00 f8 3f 51 00 00 00 00 00 00 d0 3f");
 }
 
+TEST(Golden11, ContactWithoutForce) {
+  expect_golden<ServerMessage>(R"(frame { contact { force_absence: FORCE_ABSENCE_CUT_OFF } })",
+                               "12 04 4a 02 58 03");
+}
+
 TEST(Golden11, SetReconstruction) {
   expect_golden<ClientMessage>(
       R"(id: 4 set_reconstruction { method: "m" sharpen: "s" max_error_um: 30 })",

@@ -34,15 +34,22 @@ class Contact:
     deepest_x_mm: float
     deepest_y_mm: float
     volume_mm3: float
-    #: Newtons along the surface's normal, 0 when nothing touches; None: not calibrated.
+    #: Newtons along the surface's normal, 0 when nothing touches; None: `force_absence` says why.
     force_n: float | None = None
     force_uncertainty_n: float | None = None  #: mean absolute error to expect of it
+    force_absence: str = "none"  #: "none", "uncalibrated", "beyond_calibration", "cut_off"
+
+    @property
+    def force_valid(self) -> bool:
+        """Whether there is a force."""
+        return self.force_n is not None
 
     @classmethod
     def of(cls, m: Message) -> Contact:
         force = (m.force_n, m.force_uncertainty_n) if m.HasField("force_n") else (None, None)
         return cls(m.touching, m.area_mm2, m.x_mm, m.y_mm, m.deepest_mm, m.deepest_x_mm,
-                   m.deepest_y_mm, m.volume_mm3, *force)
+                   m.deepest_y_mm, m.volume_mm3, *force,
+                   name_of("ForceAbsence", m.force_absence, "FORCE_ABSENCE_"))
 
 
 @dataclass(frozen=True)

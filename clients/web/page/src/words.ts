@@ -1,5 +1,5 @@
 // Numbers and the wire's enums, in words.
-import { ContactAbsence, Health, State } from "../gen/dtact_pb";
+import { ContactAbsence, ForceAbsence, Health, State } from "../gen/dtact_pb";
 
 const MINUS = "−";
 
@@ -44,5 +44,16 @@ export function absence(why: ContactAbsence): string {
       return "not measured yet";
     default:
       return "not measured";
+  }
+}
+
+export function forceAbsence(why: ForceAbsence): string {
+  switch (why) {
+    case ForceAbsence.BEYOND_CALIBRATION:
+      return "not known: pressed deeper than calibrated";
+    case ForceAbsence.CUT_OFF:
+      return "not known: the contact reaches the map's edge or untrusted pixels";
+    default:
+      return "not calibrated";
   }
 }

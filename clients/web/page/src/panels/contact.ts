@@ -3,7 +3,7 @@ import { ObjectPose_Tracking } from "../../gen/dtact_pb";
 import type { ObjectPose, Vector3 } from "../../gen/dtact_pb";
 import { Facts, panel } from "../dom";
 import type { Frame } from "../session/messages";
-import { absence, fixed, mm } from "../words";
+import { absence, fixed, forceAbsence, mm } from "../words";
 
 const TRACKING: Record<number, string> = {
   [ObjectPose_Tracking.STARTED]: "from here",
@@ -82,7 +82,7 @@ export class ContactPanel {
   private force(frame: Frame): string {
     const contact = frame.contact;
     if (!contact) return "–";
-    if (contact.forceN === undefined) return "not calibrated";
+    if (contact.forceN === undefined) return forceAbsence(contact.forceAbsence);
     const worth = contact.forceUncertaintyN;
     return `${fixed(contact.forceN, 3)} N${worth === undefined ? "" : ` ± ${fixed(worth, 3)}`}`;
   }

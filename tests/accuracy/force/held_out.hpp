@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "proto/dtact.pb.h"
+
+namespace dtact::force {
+
+/// What calibrates the force, each pressed with loads from light to heavy near the middle.
+enum class Calibrating : std::uint8_t {
+  ball,              ///< A ball of 4 mm radius, 11 loads.
+  ball_and_flat_end  ///< And a disc of 2 mm radius, 5 loads.
+};
+
+/// One press of an object that had no part in the calibration, and the force that a client got.
+struct HeldOut {
+  std::string object;
+  double thickness_mm = 0;  ///< Of the gel.
+  double depth_mm = 0;
+  double true_n = 0;
+  bool valid = false;
+  double force_n = 0;
+  double uncertainty_n = 0;
+  v1::ForceAbsence absence = v1::FORCE_ABSENCE_NONE;
+  bool touching = false;
+};
+
+struct Trial {
+  std::string calibration;  ///< What dtact-calibrate force printed last.
+  std::vector<HeldOut> presses;
+};
+
+/// Calibrates depth and force of the simulated sensor, whose gel has this thickness, by
+/// dtact-calibrate with PNG files of its camera in `folder`, then presses `count` objects of kinds,
+/// sizes, places, rotations, tilts and depths drawn by `seed`, through camera, capture loop and
+/// frame encoder.
+[[nodiscard]] Trial try_held_out(double thickness_mm, Calibrating calibrating, std::uint64_t seed,
+                                 int count, const std::filesystem::path& folder,
+                                 int sharpen_steps = 0);
+
+/// The error over the stated one.
+[[nodiscard]] double ratio(const HeldOut& press);
+
+/// The value below which `share` of them lie.
+[[nodiscard]] double quantile(std::vector<double> values, double share);
+
+}  // namespace dtact::force

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "daemon/pipeline/depth_frame.hpp"
+#include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/serve/frame_kind.hpp"
+#include "hal/sim/truth.hpp"
+
+namespace dtact::whole {
+
+/// What dtact-perceive asks of the daemon for a client that wants points of the contact and pose:
+/// depth at full resolution, cut to the contact and a margin. Nothing of it while nothing touches.
+[[nodiscard]] net::FrameKind perceive_kind();
+
+/// The whole map in every frame, as a client gets it that subscribes to depth alone.
+[[nodiscard]] net::FrameKind whole_map_kind();
+
+/// Solves the contacts of a scene's text (the keys of config/scenes/default.toml), about 50 ms a
+/// map. Throws std::runtime_error naming the key that is wrong.
+[[nodiscard]] std::shared_ptr<const hal::sim::Truth> solve(std::string_view scene);
+
+/// What the program runs with. As it stands: a daemon without a configuration.
+struct Settings {
+  pipeline::PipelineConfig daemon;
+  net::FrameKind kind = perceive_kind();
+  std::uint64_t seed = 1;        ///< Of the camera's noise.
+  std::string output = "mjpeg";  ///< What the camera delivers: "luma", "yuyv" or "mjpeg".
+};
+
+/// The simulated camera, the daemon's capture loop and its frame encoder in one thread and in the
+/// camera's own time: the same truth and settings give the same depth. The ring shows what it shows
+/// at start. The reference is taken in the first 45 frames, which must be untouched.
+class Program {
+ public:
+  /// Throws std::runtime_error when `calibration`, a folder, cannot be read, and
+  /// std::invalid_argument when it is for another camera mode.
+  Program(std::shared_ptr<const hal::sim::Truth> truth, const std::filesystem::path& calibration,
+          const Settings& settings = {});
+  ~Program();
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  /// The next camera frame, whose sequence is the scene's (0, 1, …), as the serialised v1::Frame of
+  /// Settings::kind.
+  [[nodiscard]] std::string next();
+  /// The same frame as a client of another kind gets it.
+  [[nodiscard]] std::string as(const net::FrameKind& kind);
+  /// The same frame as the capture loop publishes it: depth in micrometres, contact, health.
+  [[nodiscard]] const pipeline::DepthFrame& frame() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace dtact::whole
