@@ -53,7 +53,9 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::image_repeated,
      "The camera repeats all or part of a picture: depth is old there; look at the USB cable, hub "
      "and processor load."},
-    {Health::image_dark, "The picture is too dark to measure in: raise the light or the exposure."},
+    {Health::image_dark,
+     "The picture is too dark to measure in: check the ring's power and wiring, its brightness "
+     "(dtactctl led --brightness 255), the camera's exposure and that nothing covers the lens."},
     {Health::image_saturated,
      "Much of the picture is white: lower the light or the exposure and run dtactctl rezero."},
     {Health::light_drifted,
@@ -99,6 +101,12 @@ std::string detail(const pipeline::Status& status, Health health) {
   return {};
 }
 
+/// Start-up and a light change cannot end in a dark picture: waiting is no fix then.
+bool waits_for_light(const pipeline::HealthSet& health, Health flag) {
+  return health.has(Health::image_dark) &&
+         (flag == Health::starting || flag == Health::light_unsettled);
+}
+
 /// "HEALTH_CAMERA_TROUBLE" without the enum's name, in small letters.
 std::string short_name(std::string name) {
   name.erase(0, name.find('_') + 1);
@@ -126,6 +134,7 @@ std::string advice(const pipeline::Status& status) {
   }
   for (const auto& remedy : kRemedies) {
     if (!status.health.has(remedy.health)) continue;
+    if (waits_for_light(status.health, remedy.health)) continue;
     add(text, remedy.sentence);
     add(text, detail(status, remedy.health));
   }

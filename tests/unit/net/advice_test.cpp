@@ -9,6 +9,7 @@ namespace {
 using pipeline::Health;
 using testing::EndsWith;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 TEST(Advice, IsEmptyWhenAllIsWell) {
@@ -65,6 +66,19 @@ TEST(Advice, NamesBothRatesOfASlowCamera) {
   status.health.set(Health::camera_slow);
   EXPECT_THAT(advice(status), StartsWith("The camera takes fewer frames than its mode promises"));
   EXPECT_THAT(advice(status), EndsWith("30.0 come in a second instead of 60."));
+}
+
+// Waiting does not help in the dark.
+TEST(Advice, SaysWhatToCheckInADarkPictureInsteadOfStartingUp) {
+  for (const Health waits : {Health::starting, Health::light_unsettled}) {
+    pipeline::Status status;
+    status.health.set(waits);
+    status.health.set(Health::image_dark);
+    EXPECT_THAT(advice(status),
+                StartsWith("The picture is too dark to measure in: check the ring's "
+                           "power and wiring"));
+    EXPECT_THAT(advice(status), Not(HasSubstr("keep the surface untouched")));
+  }
 }
 
 TEST(Advice, EndsWithWhatCouldNotBeKept) {
