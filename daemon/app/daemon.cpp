@@ -186,6 +186,9 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   pipeline::PipelineConfig settings = config.pipeline;
   settings.state_folder = state;
   if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;
+  if (config.hal.ring.backend.starts_with("ws2812")) {
+    settings.light.gamma = config.hal.ring.ws2812.gamma;
+  }
   pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), calibration,
                               settings);
   calibration.reset();  // its megabytes go when another one comes into use

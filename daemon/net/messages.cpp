@@ -177,6 +177,7 @@ void fill(const recon::Surface& surface, v1::Surface& out) {
 void fill(const hal::Light& light, std::optional<std::int64_t> since_ns, v1::LightState& out) {
   out.set_brightness(light.brightness);
   if (since_ns) out.set_since_ns(*since_ns);
+  out.set_gamma(light.gamma);
   for (const auto& led : light.leds) {
     auto& to = *out.add_leds();
     to.set_r(led.r);

@@ -123,7 +123,7 @@ TEST(Led, ShowsAndChanges) {
             "brightness 255, LEDs ffffff ffffff ffffff ffffff ffffff ffffff ffffff ffffff\n");
   EXPECT_THAT(ctl(rig, {"led", "--brightness", "128", "--json"}).out,
               AllOf(StartsWith(R"({"brightness":128,"leds":[{"r":255,"g":255,"b":255},)"),
-                    EndsWith("]}\n")));
+                    EndsWith("],\"gamma\":1}\n")));
   EXPECT_EQ(ctl(rig, {"led", "--scheme", "scheme1"}).out,
             "brightness 128, LEDs ffffff ffffff 000000 000000 ffffff ffffff 000000 000000\n");
 }

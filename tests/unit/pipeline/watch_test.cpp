@@ -232,6 +232,19 @@ TEST(LightDiffers, ComparesAfterBrightness) {
   EXPECT_FALSE(light_differs(*calibration, light));
 }
 
+// White at brightness 128 emits 56 of 255 along a gamma of 2.2, and 128 along none.
+TEST(LightDiffers, ComparesAlongTheRingsGamma) {
+  const auto calibration = fakes::toy_calibration();
+  const hal::Light dimmed{.brightness = 128, .gamma = 2.2};
+  calibration->origin.leds.assign(std::size_t{3} * hal::kLedCount, 56);
+  EXPECT_FALSE(light_differs(*calibration, dimmed));
+  EXPECT_TRUE(light_differs(*calibration, {.brightness = 128}));
+  calibration->origin.leds.assign(std::size_t{3} * hal::kLedCount, 128);
+  EXPECT_TRUE(light_differs(*calibration, dimmed));
+  EXPECT_FALSE(light_differs(
+      *calibration, {.leds = hal::Light::all({128, 128, 128}), .brightness = 255, .gamma = 2.2}));
+}
+
 TEST(Activate, NamesTheListThatSharpeningNeeds) {
   hal::CameraInfo camera;
   camera.width = fakes::kToyWidth;
