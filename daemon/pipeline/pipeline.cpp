@@ -271,6 +271,11 @@ Status Pipeline::status() const {
   status.skipped = exchange_.slot.replaced();
   status.fps = exchange_.statistics.fps(clock_.monotonic_ns());
   status.camera_fps = exchange_.camera_fps.load(std::memory_order_relaxed);
+  // The picture may settle for patience_frames and be averaged for as long again; without frames
+  // the re-zero is refused after a second.
+  const double fps =
+      status.camera_fps > 0 ? std::min(status.camera_fps, status.camera.fps) : status.camera.fps;
+  status.rezero_within_s = 1 + 2 * config_.reference.patience_frames / fps;
   status.realtime = realtime_;
   status.stages = exchange_.statistics.stages();
   status.capture_thread = exchange_.statistics.usage();

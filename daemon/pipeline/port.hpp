@@ -145,6 +145,7 @@ struct Status {
   ThreadUsage capture_thread;  ///< Renewed once a second.
   /// How far the layer's marks lay from where they belong; meant while Health::camera_moved is set.
   std::string place_message;
+  double rezero_within_s = 0;  ///< The longest time that a re-zero takes, seconds.
   /// Why the calibration or the last good reference could not be used or kept, and what to do;
   /// empty when all is well.
   std::string storage_message;

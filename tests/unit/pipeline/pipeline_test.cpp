@@ -37,6 +37,14 @@ TEST_F(PipelineTest, ServesDepthAfterItsSequence) {
   EXPECT_TRUE(states.front().health.has(Health::starting));
 }
 
+// A picture that never holds still is refused after patience_frames in each of two phases.
+TEST_F(PipelineTest, SaysHowLongARezeroMayTake) {
+  config.reference.patience_frames = 90;
+  build(fakes::toy_calibration());
+  const Status status = pipeline->status();
+  EXPECT_DOUBLE_EQ(status.rezero_within_s, 1 + 2 * 90 / status.camera.fps);
+}
+
 TEST_F(PipelineTest, MeasuresAPressAndTellsContact) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());

@@ -268,6 +268,20 @@ class Requests(unittest.TestCase):
             self.assertRaises(dtact.TimeoutError, s.rezero)
             self.assertEqual(s.status().state, "serving")
 
+    def test_a_rezero_may_take_as_long_as_the_daemon_says(self):
+        def hello(request, reply):
+            reply.hello.major, reply.hello.rezero_within_s = 1, 60
+
+        def late(request, reply):
+            time.sleep(0.5)
+            refuse(5, "the picture is not still")(request, reply)
+
+        with FakeDaemon() as daemon:
+            daemon.answers |= {"hello": hello, "rezero": late}
+            with dtact.connect(daemon.address, timeout=0.2) as s:
+                with self.assertRaisesRegex(dtact.Refused, "not still"):
+                    s.rezero()
+
 
 class Spaces(unittest.TestCase):
     def test_box(self):

@@ -193,6 +193,8 @@ class Session:
         self._lost_at = None
 
     def _patience(self, request: Request[T]) -> float:
+        if request.averages and self._server is not None:
+            return self._timeout + self._server.rezero_within_s
         return max(self._timeout, _SLOW_S) if request.slow else self._timeout
 
     def _subscribe_request(self, subscription: Subscription | None) -> Request[None]:
