@@ -22,7 +22,7 @@ struct Remedy {
 
 // In the order in which one should act: without a camera or a ring nothing else can be mended.
 constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
-    {Health::camera_trouble, "The camera gives no frames."},
+    {Health::camera_trouble, "The camera gives no usable frames."},
     {Health::ring_trouble, "The LED ring cannot be written to."},
     {Health::uncalibrated,
      "No calibration: dtactctl calibrate --radius-mm MM --mm-per-px S guides through one with a "
@@ -93,6 +93,10 @@ std::string detail(const pipeline::Status& status, Health health) {
   if (health == Health::camera_slow) {
     return fmt::format("By their timestamps {:.1f} come in a second instead of {:g}.",
                        status.camera_fps, status.camera.fps);
+  }
+  if (health == Health::camera_trouble && status.camera_damaged) {
+    return "All that come are damaged: check its USB cable, hub and port, or set another "
+           "pixel_format or a lower camera.fps.";
   }
   if (health == Health::camera_trouble) return status.camera_report.remedy;
   if (health == Health::camera_mismatch) return status.camera_report.moved;

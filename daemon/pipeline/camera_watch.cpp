@@ -16,10 +16,12 @@ bool CameraWatch::arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexc
   have_sequence_ = true;
   last_ns_ = now_ns;
   stalled_ = false;
+  damaged_ = false;
   return returned;
 }
 
 void CameraWatch::missed(hal::GrabStatus status, std::int64_t now_ns) noexcept {
+  damaged_ = status == hal::GrabStatus::damaged;
   switch (status) {
     case hal::GrabStatus::unplugged:
     case hal::GrabStatus::ended:

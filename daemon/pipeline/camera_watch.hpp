@@ -22,8 +22,10 @@ class CameraWatch {
 
   /// Unplugged or ended: no frame comes unless the device returns.
   [[nodiscard]] bool away() const noexcept { return away_; }
-  /// Away, or silent for more than three frame periods.
+  /// Away, or without a usable frame for more than three frame periods.
   [[nodiscard]] bool trouble() const noexcept { return away_ || stalled_; }
+  /// What came last was a damaged frame.
+  [[nodiscard]] bool damaged() const noexcept { return damaged_; }
   [[nodiscard]] std::int64_t silent_ns(std::int64_t now_ns) const noexcept {
     return now_ns - last_ns_;
   }
@@ -45,6 +47,7 @@ class CameraWatch {
   bool lost_ = false;
   bool away_ = false;
   bool stalled_ = false;
+  bool damaged_ = false;
 };
 
 }  // namespace dtact::pipeline

@@ -258,6 +258,7 @@ Status Pipeline::status() const {
   status.health = health_of(exchange_.health.load(std::memory_order_relaxed));
   status.camera = camera_->info();
   status.camera_report = camera_->report();
+  status.camera_damaged = exchange_.camera_damaged.load(std::memory_order_relaxed);
   status.ring = light_.info();
   status.ring_message = light_.message();
   status.light = light_.light();

@@ -128,6 +128,7 @@ struct Status {
   HealthSet health = {};
   hal::CameraInfo camera;
   hal::CameraReport camera_report;
+  bool camera_damaged = false;  ///< What the camera sent last was damaged.
   hal::RingInfo ring;
   std::string ring_message;  ///< The ring's last error, or what to know; empty when well.
   hal::Light light = {};

@@ -40,12 +40,22 @@ TEST(Advice, AddsTheDevicesOwnSentenceAndPutsItFirst) {
   EXPECT_EQ(advice(status), "The camera is away. /dev/video0 is gone: plug it in.");
   status.health.set(Health::camera_trouble);
   status.health.set(Health::not_realtime);
-  EXPECT_THAT(advice(status),
-              StartsWith("The camera gives no frames. /dev/video0 is gone: plug it in. The capture "
-                         "thread"));
+  EXPECT_THAT(
+      advice(status),
+      StartsWith("The camera gives no usable frames. /dev/video0 is gone: plug it in. The capture "
+                 "thread"));
   status.health.set(Health::ring_trouble);
   status.ring_message = "the ring is gone.";
   EXPECT_THAT(advice(status), HasSubstr("LED ring cannot be written to. the ring is gone."));
+}
+
+TEST(Advice, SaysWhatToDoAboutDamagedFramesOnly) {
+  pipeline::Status status;
+  status.health.set(Health::camera_trouble);
+  status.camera_damaged = true;
+  EXPECT_EQ(advice(status),
+            "The camera gives no usable frames. All that come are damaged: check its USB cable, "
+            "hub and port, or set another pixel_format or a lower camera.fps.");
 }
 
 TEST(Advice, SaysHowFarTheCameraHasMovedOnlyWhileItHas) {
