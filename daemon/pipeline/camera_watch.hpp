@@ -29,7 +29,8 @@ class CameraWatch {
   [[nodiscard]] std::int64_t silent_ns(std::int64_t now_ns) const noexcept {
     return now_ns - last_ns_;
   }
-  /// A frame was lost or damaged within the last second.
+  /// The camera lost a frame within the last second, or sent a damaged one. Frames that were
+  /// skipped for a newer one are not lost.
   [[nodiscard]] bool lost_lately(std::int64_t now_ns) const noexcept {
     return lost_ && now_ns - lost_ns_ < 1'000'000'000;
   }
@@ -42,8 +43,6 @@ class CameraWatch {
   RateWatch rate_;
   std::int64_t last_ns_ = 0;
   std::int64_t lost_ns_ = 0;
-  std::uint64_t sequence_ = 0;
-  bool have_sequence_ = false;
   bool lost_ = false;
   bool away_ = false;
   bool stalled_ = false;

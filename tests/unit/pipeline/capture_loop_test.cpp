@@ -57,6 +57,16 @@ TEST(CaptureLoop, ACameraThatHalvesItsRateIsNamedWithoutLosses) {
   ASSERT_TRUE(loop.until([&] { return loop.health().empty(); }, 120));
 }
 
+// A daemon that cannot keep up skips frames: no cable is to blame.
+TEST(CaptureLoop, FramesThatWereSkippedAreNotLost) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.sequence += 2;
+  loop.step(2);
+  EXPECT_FALSE(loop.health().has(Health::frames_lost));
+}
+
 TEST(CaptureLoop, AStreamOfDamagedFramesIsToldFromSilence) {
   SteppedLoop loop;
   loop.begin(toy_calibration());

@@ -28,20 +28,40 @@ hal::FrameInfo numbered(std::uint64_t sequence, std::uint32_t flags = hal::kFram
 TEST(CameraWatch, AGapIsRememberedForASecond) {
   CameraWatch watch(kPeriod);
   EXPECT_FALSE(watch.arrived(numbered(5), 0));
-  EXPECT_FALSE(watch.lost_lately(0));  // the first number means nothing
+  EXPECT_FALSE(watch.lost_lately(0));
   (void)watch.arrived(numbered(6), kPeriod);
   EXPECT_FALSE(watch.lost_lately(kPeriod));
-  (void)watch.arrived(numbered(8), 100 * kMs);
+  (void)watch.arrived(numbered(8, hal::kFrameAfterGap), 100 * kMs);
   EXPECT_TRUE(watch.lost_lately(100 * kMs));
   EXPECT_TRUE(watch.lost_lately(1099 * kMs));
   EXPECT_FALSE(watch.lost_lately(1100 * kMs));
 }
 
-TEST(CameraWatch, FlagsAndDamageCountAsLossToo) {
+// The camera says what it lost; a frame that was passed over for a newer one is another thing.
+TEST(CameraWatch, ASkippedFrameIsNoLoss) {
+  CameraWatch watch(kPeriod);
+  (void)watch.arrived(numbered(5), 0);
+  (void)watch.arrived(numbered(8), 3 * kPeriod);
+  EXPECT_FALSE(watch.lost_lately(3 * kPeriod));
+}
+
+TEST(CameraWatch, KnowsAStreamOfDamagedFramesFromSilence) {
   CameraWatch watch(kPeriod);
   (void)watch.arrived(numbered(0), 0);
-  (void)watch.arrived(numbered(1, hal::kFrameAfterGap), kPeriod);
-  EXPECT_TRUE(watch.lost_lately(kPeriod));
+  watch.missed(hal::GrabStatus::damaged, 4 * kPeriod);
+  EXPECT_TRUE(watch.trouble());
+  EXPECT_TRUE(watch.damaged());
+  watch.missed(hal::GrabStatus::timeout, 8 * kPeriod);
+  EXPECT_TRUE(watch.trouble());
+  EXPECT_FALSE(watch.damaged());
+  watch.missed(hal::GrabStatus::damaged, 9 * kPeriod);
+  (void)watch.arrived(numbered(1), 10 * kPeriod);
+  EXPECT_FALSE(watch.damaged());
+}
+
+TEST(CameraWatch, DamageCountsAsLossToo) {
+  CameraWatch watch(kPeriod);
+  (void)watch.arrived(numbered(0), 0);
   watch.missed(hal::GrabStatus::damaged, 2000 * kMs);
   EXPECT_TRUE(watch.lost_lately(2000 * kMs));
 }
