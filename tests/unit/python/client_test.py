@@ -81,6 +81,13 @@ class Connecting(unittest.TestCase):
             self.assertEqual(daemon.requests[0].hello.token, "of-the-file")
             self.assertRaises(ValueError, dtact.connect, token="a", token_file="b")
 
+    def test_a_line_of_the_daemons_list_is_no_token(self):
+        with tempfile.NamedTemporaryFile("w") as file:
+            file.write("control " + 64 * "a" + " gripper\n")
+            file.flush()
+            with self.assertRaisesRegex(dtact.Error, "it is the second word"):
+                dtact.connect(token_file=file.name)
+
     def test_no_token_to_strangers(self):
         with FakeDaemon() as daemon, mock.patch("dtact.transport.is_local", return_value=False):
             with self.assertRaisesRegex(dtact.IdentityError, "fingerprint"):
