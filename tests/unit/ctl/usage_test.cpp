@@ -56,6 +56,13 @@ TEST(CommandLine, HoldsEveryOptionThatWasGiven) {
                 " guided --folder 'it'\\''s a press' --crop 500,400 --force");
 }
 
+TEST(Usage, NamesEveryMeaningOfExitCodeFour) {
+  for (const char* meaning :
+       {"watch --min-fps", "bench: no frame", "find: no daemon", "guided: ended without a"}) {
+    EXPECT_THAT(cli::kExitCodesHelp, HasSubstr(meaning));
+  }
+}
+
 TEST(Usage, SaysWhenTheOutputCouldNotBeWritten) {
   std::ofstream full("/dev/full");
   std::ostringstream error;
