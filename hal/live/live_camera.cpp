@@ -148,8 +148,7 @@ void LiveCamera::disconnect(CameraState state, const std::string& remedy) {
 void LiveCamera::lose(const char* what) noexcept {
   try {
     disconnect(CameraState::unplugged,
-               fmt::format("{} {}: plug it in again; it is looked for ten times a second",
-                           info_.identity, what));
+               fmt::format("{} {}: plug it in again: it is found by itself", info_.identity, what));
   } catch (const std::exception&) {
     state_.store(CameraState::unplugged);
   }
