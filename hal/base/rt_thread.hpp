@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sched.h>
+
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -39,6 +41,14 @@ class RtThread {
   bool joinable_ = false;
   std::vector<std::string> refused_;
 };
+
+/// Runs `body` on a thread with normal scheduling that may use all of `cpus`, and waits for its
+/// end. Threads that a library starts within inherit neither the caller's priority nor the CPU that
+/// it is pinned to. Throws what `body` throws, or std::system_error when no thread can be made.
+void run_unpinned(const cpu_set_t& cpus, const std::function<void()>& body);
+
+/// The CPUs that the calling thread may use.
+[[nodiscard]] cpu_set_t allowed_cpus() noexcept;
 
 /// Gives the calling thread SCHED_FIFO `priority`, 1 … 99; threads it starts from then on begin
 /// with normal scheduling. Returns the sentence that says why it was refused and what to do, or

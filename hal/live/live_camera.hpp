@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sched.h>
+
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
@@ -69,6 +71,7 @@ class LiveCamera : public Camera {
 
   const Opener open_;
   const std::int64_t period_ns_;
+  const cpu_set_t cpus_;  // that the thread which made this may use
 
   // The capture thread's own.
   FrameLender lender_;
