@@ -170,6 +170,8 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
   }
   net::check_security(loaded.config.net);
   loaded.origins = std::move(assembly).origins();
+  loaded.config.cpu_is_default =
+      std::ranges::find(loaded.origins, "capture.cpu", &KeyOrigin::key)->origin == "default";
   return loaded;
 }
 

@@ -36,6 +36,7 @@
 #include "daemon/pipeline/pipeline.hpp"
 #include "daemon/serve/security.hpp"
 #include "hal/base/clock.hpp"
+#include "hal/base/cpu_claim.hpp"
 #include "hal/base/rt_thread.hpp"
 #include "hal/registry.hpp"
 #include "version.hpp"
@@ -184,6 +185,10 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   if (ring.away) spdlog::warn("no LED ring yet, it is looked for: {}", ring.message);
   if (!ring.note.empty()) spdlog::warn("ring: {}", ring.note);
   pipeline::PipelineConfig settings = config.pipeline;
+  std::optional<base::CpuClaim> cpu;
+  if (config.cpu_is_default && settings.cpu) {
+    settings.cpu = cpu.emplace(base::allowed_cpus()).cpu();
+  }
   settings.state_folder = state;
   if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;
   if (config.hal.ring.backend.starts_with("ws2812")) {

@@ -249,6 +249,7 @@ void fill(const pipeline::Status& status, v1::Status& out) {
   for (const auto& refused : status.realtime) out.add_realtime_refused(refused);
   for (const auto& stage : status.stages) fill(stage, *out.add_stages());
   out.set_light_followed(status.light_followed);
+  if (status.cpu) out.set_capture_cpu(static_cast<std::uint32_t>(*status.cpu));
   auto& usage = *out.mutable_capture_thread();
   usage.set_minor_faults(status.capture_thread.minor_faults);
   usage.set_major_faults(status.capture_thread.major_faults);

@@ -104,6 +104,7 @@ void Pipeline::start() {
   capture_ = base::RtThread(
       {.name = "dtact-capture", .cpu = config_.cpu, .fifo_priority = config_.fifo_priority},
       [this] { loop_->run(); });
+  cpu_ = capture_.cpu();
   for (const std::string& refused : capture_.refused()) {
     realtime_.push_back(refused);
     if (refused.find("SCHED_FIFO") != std::string::npos) exchange_.not_realtime = true;
@@ -278,6 +279,7 @@ Status Pipeline::status() const {
       status.camera_fps > 0 ? std::min(status.camera_fps, status.camera.fps) : status.camera.fps;
   status.rezero_within_s = 1 + 2 * config_.reference.patience_frames / fps;
   status.realtime = realtime_;
+  status.cpu = cpu_;
   status.stages = exchange_.statistics.stages();
   status.capture_thread = exchange_.statistics.usage();
   status.light_followed = exchange_.light_followed.load(std::memory_order_relaxed);

@@ -139,6 +139,7 @@ struct Status {
   std::uint64_t skipped = 0;          ///< Published but replaced before the network fetched them.
   double fps = 0;                     ///< Over the last second.
   double camera_fps = 0;              ///< Of the camera, by its timestamps; 0 = not known yet.
+  std::optional<int> cpu;             ///< The capture thread is pinned to this CPU.
   std::vector<std::string> realtime;  ///< One sentence for each real-time setting refused.
   std::vector<StageStatistics> stages;
   /// How far the reference follows the light since it was taken: a share, negative = dimmer.

@@ -54,6 +54,8 @@ RtThread::RtThread(const RtSettings& settings, std::function<void()> body) {
           "thread {} is not pinned to CPU {} ({}): choose a CPU this machine and the unit's "
           "AllowedCPUs= have",
           settings.name, *settings.cpu, std::strerror(e)));
+    } else {
+      cpu_ = settings.cpu;
     }
   }
   if (settings.fifo_priority > 0) {
@@ -67,6 +69,7 @@ RtThread::RtThread(const RtSettings& settings, std::function<void()> body) {
 RtThread::RtThread(RtThread&& other) noexcept
     : thread_(other.thread_),
       joinable_(std::exchange(other.joinable_, false)),
+      cpu_(other.cpu_),
       refused_(std::move(other.refused_)) {}
 
 RtThread& RtThread::operator=(RtThread&& other) noexcept {
@@ -74,6 +77,7 @@ RtThread& RtThread::operator=(RtThread&& other) noexcept {
     join();
     thread_ = other.thread_;
     joinable_ = std::exchange(other.joinable_, false);
+    cpu_ = other.cpu_;
     refused_ = std::move(other.refused_);
   }
   return *this;

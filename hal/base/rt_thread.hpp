@@ -33,12 +33,15 @@ class RtThread {
   ~RtThread() { join(); }
 
   void join() noexcept;
+  /// The CPU that the thread is pinned to.
+  [[nodiscard]] std::optional<int> cpu() const noexcept { return cpu_; }
   /// One sentence for each setting the system refused, with the remedy.
   [[nodiscard]] const std::vector<std::string>& refused() const noexcept { return refused_; }
 
  private:
   pthread_t thread_{};
   bool joinable_ = false;
+  std::optional<int> cpu_;
   std::vector<std::string> refused_;
 };
 

@@ -148,6 +148,13 @@ TEST_F(ConfigFile, SettingsThatExcludeEachOtherAreBothNamed) {
               AllOf(HasSubstr("contact.lost_mm = 0.05"), HasSubstr("contact.made_mm = 0.04")));
 }
 
+// Several daemons spread over the CPUs unless one is configured.
+TEST_F(ConfigFile, SaysWhetherTheCpuWasChosen) {
+  EXPECT_TRUE(load("").cpu_is_default);
+  EXPECT_FALSE(load("[capture]\ncpu = 0\n").cpu_is_default);
+  EXPECT_FALSE(load("", {"capture.cpu=false"}).cpu_is_default);
+}
+
 // An empty area would be in contact for ever.
 TEST_F(ConfigFile, ContactNeedsAnArea) {
   EXPECT_THAT(error("[contact]\narea_mm2 = 0.0\n"),
