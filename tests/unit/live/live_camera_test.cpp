@@ -333,6 +333,21 @@ TEST(LiveCamera, TheFirstFrameAfterARestartSaysSo) {
   EXPECT_EQ(frame.info().flags, kFrameNormal);
 }
 
+// The silence of the camera before does not count for the one that was opened anew.
+TEST(LiveCamera, AReopenedCamerasFirstFrameIsWaitedFor) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  rig.source->broken = true;
+  const std::shared_ptr<LendingSource> lost = std::exchange(rig.source, nullptr);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(150)), GrabStatus::unplugged);
+  rig.source = std::make_shared<LendingSource>();
+  EXPECT_EQ(rig.camera.grab(frame, milliseconds(300)), GrabStatus::timeout);
+  EXPECT_NE(rig.camera.report().state, CameraState::stalled);
+}
+
 TEST(LiveCamera, RefusesImpossibleRates) {
   CameraConfig c = small();
   c.fps = 0;
