@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
@@ -17,12 +19,26 @@ struct Rgb {
 };
 
 /// What the ring is told to show: LED 0 is at the image's right (3 o'clock), the others follow
-/// clockwise as the camera sees them. Each LED shows its colour scaled by brightness / 255, or,
-/// where a ring dims along a gamma, by (brightness / 255)^gamma.
+/// clockwise as the camera sees them. Each LED emits its colour scaled by
+/// (brightness / 255)^gamma.
 struct Light {
   std::array<Rgb, kLedCount> leds = all({255, 255, 255});
   std::uint8_t brightness = 255;
+  double gamma = 1;  ///< The ring's, from its configuration; no command changes it.
   bool operator==(const Light&) const = default;
+
+  /// What each LED emits, in steps of a channel at full brightness.
+  [[nodiscard]] std::array<Rgb, kLedCount> emitted() const noexcept {
+    const double factor = std::pow(brightness / 255.0, gamma);
+    const auto shade = [&](std::uint8_t channel) {
+      return static_cast<std::uint8_t>(std::lround(channel * factor));
+    };
+    std::array<Rgb, kLedCount> out{};
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      out[i] = {shade(leds[i].r), shade(leds[i].g), shade(leds[i].b)};
+    }
+    return out;
+  }
 
   static constexpr std::array<Rgb, kLedCount> all(Rgb colour) {
     std::array<Rgb, kLedCount> leds{};

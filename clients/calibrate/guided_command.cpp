@@ -1,7 +1,6 @@
 #include "clients/calibrate/guided_command.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <unistd.h>
 
 #include <iostream>
@@ -15,24 +14,7 @@
 namespace dtact::ctl {
 namespace {
 
-/// The command that goes on with the work folder, for a shell.
-std::string command_of(const cli::Context& context, const guided::Plan& plan) {
-  const client::Options usual;
-  std::string text = "dtact-calibrate";
-  if (context.target.host != usual.host) text += " --host " + context.target.host;
-  if (context.target.port != usual.port) text += fmt::format(" --port {}", context.target.port);
-  text += fmt::format(" guided --radius-mm {}", plan.ball_radius_mm);
-  if (!plan.map.lens.empty()) text += fmt::format(" --lens '{}'", plan.map.lens);
-  if (plan.map.mm_per_px != 0) text += fmt::format(" --mm-per-px {}", plan.map.mm_per_px);
-  if (!plan.map.centre.empty())
-    text += fmt::format(" --centre {}", fmt::join(plan.map.centre, ","));
-  if (!plan.map.crop.empty()) text += fmt::format(" --crop {}", fmt::join(plan.map.crop, ","));
-  if (plan.force) text += " --force";
-  return text + fmt::format(" --folder '{}'", plan.folder.string());
-}
-
 void run_guided(const cli::Context& context, guided::Plan plan) {
-  plan.again = command_of(context, plan);
   const bool terminal =
       &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1 && ::isatty(STDIN_FILENO) == 1;
   const cli::Interruptible while_guiding;
@@ -89,8 +71,9 @@ void add_guided(CLI::App& app, cli::Context& context) {
   guided->add_flag("--force", plan->force,
                    "Make the calibration although list and ball disagree: a wrong scale or radius, "
                    "another light, a contact that is cut off");
-  guided->callback([&context, plan, method] {
+  guided->callback([&context, guided, plan, method] {
     plan->method = list_method(*method);
+    plan->again = cli::command_line(*guided);
     run_guided(context, *plan);
   });
 }

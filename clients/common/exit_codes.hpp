@@ -11,14 +11,14 @@ enum ExitCode : int {
   kFailed = 1,        ///< The command failed or the daemon refused it.
   kUsage = 2,         ///< The command line makes no sense.
   kNoConnection = 3,  ///< No daemon, or the connection broke.
-  kNotMet = 4         ///< What was asked for did not come about (watch --min-fps; a guided
-                      ///< calibration that ended before there was one).
+  kNotMet = 4         ///< What was asked for did not come about; kExitCodesHelp lists the cases.
 };
 
 inline constexpr const char* kExitCodesHelp =
     "Exit codes: 0 done; 1 failed, or refused by the daemon; 2 wrong usage; 3 no connection to\n"
-    "the daemon; 4 what was asked for did not come about (dtactctl watch --min-fps;\n"
-    "dtact-calibrate guided that ended early).";
+    "the daemon; 4 what was asked for did not come about (dtactctl watch --min-fps: too few\n"
+    "frames; bench: no frame; find: no daemon; dtact-calibrate guided: ended without a\n"
+    "calibration).";
 
 /// A failure with an exit code of its own. Any other exception ends the program with kFailed.
 class Failure : public std::runtime_error {

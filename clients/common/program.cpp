@@ -1,7 +1,9 @@
 #include "clients/common/program.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <ostream>
+#include <string_view>
 #include <utility>
 
 #include "clients/common/exit_codes.hpp"
@@ -39,7 +41,40 @@ int parse(CLI::App& app, std::vector<std::string> arguments, std::ostream& out,
   }
 }
 
+/// A word as a shell takes it.
+std::string shell_word(const std::string& word) {
+  constexpr std::string_view kPlain = "-_./:,@%+=";
+  const bool plain = !word.empty() && std::ranges::all_of(word, [&](unsigned char c) {
+    return std::isalnum(c) != 0 || kPlain.find(static_cast<char>(c)) != std::string_view::npos;
+  });
+  if (plain) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+std::string options_of(const CLI::App& app) {
+  std::string text;
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->count() == 0) continue;
+    text += " " + option->get_name();
+    if (option->get_items_expected_max() == 0) continue;
+    std::string value;
+    for (const std::string& part : option->results()) value += (value.empty() ? "" : ",") + part;
+    text += " " + shell_word(value);
+  }
+  return text;
+}
+
 }  // namespace
+
+std::string command_line(const CLI::App& command) {
+  std::string text = " " + command.get_name() + options_of(command);
+  for (const CLI::App* app = command.get_parent(); app != nullptr; app = app->get_parent()) {
+    text = " " + app->get_name() + options_of(*app) + text;
+  }
+  return text.substr(1);
+}
 
 void add_global_options(CLI::App& app, Context& context) {
   const std::string name = app.get_name() + " " DTACT_VERSION;

@@ -24,6 +24,10 @@ void add_global_options(CLI::App& app, Context& context);
 /// --json, of a program that prints what it was asked for.
 void add_json_option(CLI::App& app, Context& context);
 
+/// The command line that `command` was parsed from, for a shell: the program, its options, the
+/// command and its options, each with its value.
+[[nodiscard]] std::string command_line(const CLI::App& command);
+
 /// Parses `arguments` (without the program's own name), which runs the command. Help goes to `out`,
 /// what went wrong as a sentence to `error`. Returns an ExitCode.
 [[nodiscard]] int run(CLI::App& app, std::vector<std::string> arguments, std::ostream& out,

@@ -60,7 +60,10 @@ v1::LightState Client::set_light(const v1::SetLight& change) {
 void Client::rezero(bool force) {
   v1::ClientMessage message;
   message.mutable_rezero()->set_force(force);
-  (void)session_->request(message, session_->options().timeout);
+  // On top of the timeout: the daemon averages frames before it answers.
+  const auto within = std::chrono::duration_cast<std::chrono::milliseconds>(
+      std::chrono::duration<double>(server().rezero_within_s()));
+  (void)session_->request(message, session_->options().timeout + within);
 }
 
 v1::Reconstruction Client::set_reconstruction(const v1::SetReconstruction& change) {

@@ -76,7 +76,8 @@ class DTACT_EXPORT Client {
   void subscribe(const v1::Subscribe& subscription = depth_stream());
   /// Returns the light once the ring shows it.
   v1::LightState set_light(const v1::SetLight& change);
-  /// Takes the present image as untouched; `force`: although something touches.
+  /// Takes the present image as the reference; `force`: although something is in contact. Waits for
+  /// the frames that the daemon averages, on top of Options::timeout.
   void rezero(bool force = false);
   /// How depth is made from now on; returns it once frames are made so.
   v1::Reconstruction set_reconstruction(const v1::SetReconstruction& change);

@@ -9,7 +9,9 @@
 #include <memory>
 #include <optional>
 #include <ostream>
+#include <regex>
 #include <stdexcept>
+#include <vector>
 
 #include "clients/common/depth_file.hpp"
 #include "clients/common/depth_message.hpp"
@@ -245,12 +247,28 @@ class Exporter {
   std::uint64_t maps_ = 0;
 };
 
+bool is_exported(const std::string& name) {
+  static const std::regex kExported(
+      R"(frames\.csv|events\.csv|depth\.npy|depth-\d+\.(png|ply|pcd))");
+  return std::regex_match(name, kExported);
+}
+
+/// Removes what an earlier export left in the folder; other files stay.
+void remove_earlier(const fs::path& folder) {
+  std::vector<fs::path> earlier;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    if (is_exported(entry.path().filename().string())) earlier.push_back(entry.path());
+  }
+  for (const fs::path& file : earlier) fs::remove(file);
+}
+
 void run_export(const cli::Context& context, const ExportOptions& options) {
   const mcap::Reader file(options.recording);
   if (!options.force && fs::exists(options.output) && !fs::is_empty(options.output)) {
     throw std::runtime_error(options.output + " is not empty: name another folder, or add --force");
   }
   fs::create_directories(options.output);
+  remove_earlier(options.output);
   Exporter exporter(options);
   exporter.run(file);
   cli::RecordingReport report;
@@ -294,7 +312,9 @@ void add_export(CLI::App& app, cli::Context& context) {
       ->check([](const std::string& text) {
         return parse_range(text) ? "" : "\"" + text + "\" is not FIRST:END, as 0:100 is";
       });
-  command->add_flag("--force", options->force, "Also into a folder that is not empty");
+  command->add_flag(
+      "--force", options->force,
+      "Also into a folder that is not empty: replaces what an earlier export wrote there");
   command->callback([&context, options] { run_export(context, *options); });
 }
 

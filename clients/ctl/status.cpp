@@ -92,8 +92,9 @@ void print(const v1::Status& status, std::ostream& out) {
   }
   const auto& usage = status.capture_thread();
   fmt::print(out,
-             "capture      page faults {} minor, {} major; context switches {} waiting, {} "
+             "capture      {}page faults {} minor, {} major; context switches {} waiting, {} "
              "preempted\n",
+             status.has_capture_cpu() ? fmt::format("on CPU {}; ", status.capture_cpu()) : "",
              usage.minor_faults(), usage.major_faults(), usage.waits(), usage.preemptions());
   for (const auto& refused : status.realtime_refused())
     fmt::print(out, "realtime     {}\n", refused);

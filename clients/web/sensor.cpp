@@ -101,6 +101,7 @@ void Sensor::introduce(v1::HelloReply& reply) const {
   *reply.mutable_surface_frame() = daemon->surface_frame();
   reply.set_name(daemon->name());
   reply.set_serial(daemon->serial());
+  reply.set_rezero_within_s(daemon->rezero_within_s());
   if (daemon->rights() == v1::RIGHTS_VIEW) reply.set_rights(v1::RIGHTS_VIEW);
 }
 

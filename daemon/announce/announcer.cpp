@@ -78,22 +78,24 @@ struct Announcer::Impl : std::enable_shared_from_this<Impl> {
   template <void (Impl::*handler)(sd_bus_message*)>
   static int on(sd_bus_message* message, void* self, sd_bus_error*) {
     auto& impl = *static_cast<Impl*>(self);
-    // Of AddService, where another daemon of this machine has the name.
-    if (sd_bus_message_is_method_error(message, "org.freedesktop.Avahi.CollisionError") > 0) {
-      impl.on_state(kCollision, "");
-      return 0;
-    }
-    if (sd_bus_message_is_method_error(message, nullptr) > 0) {
-      impl.withdraw();
-      impl.tell("the service is not announced: " + text_of(sd_bus_message_get_error(message)));
-      return 0;
-    }
+    // Nothing may be thrown through sd-bus, nor out of io.run().
     try {
-      (impl.*handler)(message);
+      impl.answer(message, handler);
     } catch (const std::exception& e) {
       impl.tell(std::string("the service is not announced: ") + e.what());
     }
     return 0;
+  }
+  void answer(sd_bus_message* message, void (Impl::*handler)(sd_bus_message*)) {
+    // Of AddService, where another daemon of this machine has the name.
+    if (sd_bus_message_is_method_error(message, "org.freedesktop.Avahi.CollisionError") > 0) {
+      return on_state(kCollision, "");
+    }
+    if (sd_bus_message_is_method_error(message, nullptr) > 0) {
+      withdraw();
+      return tell("the service is not announced: " + text_of(sd_bus_message_get_error(message)));
+    }
+    (this->*handler)(message);
   }
   void on_owner_changed(sd_bus_message* message);
   void on_has_owner(sd_bus_message* message);
@@ -120,11 +122,15 @@ void Announcer::Impl::tell(const std::string& line) {
 }
 
 void Announcer::Impl::tick() {
-  if (bus == nullptr) {
-    connect();
-  } else if (!group.empty() && ask() != published) {
-    withdraw();
-    publish();
+  try {
+    if (bus == nullptr) {
+      connect();
+    } else if (!group.empty() && ask() != published) {
+      withdraw();
+      publish();
+    }
+  } catch (const std::exception& e) {
+    tell(std::string("the service is not announced: ") + e.what());
   }
   if (bus != nullptr) pump();
   timer.expires_after(kInterval);
@@ -209,9 +215,10 @@ void Announcer::Impl::on_owner_changed(sd_bus_message* message) {
 }
 
 void Announcer::Impl::publish() {
-  if (std::exchange(asking, true)) return;
+  if (asking) return;
   check(sd_bus_call_method_async(bus.get(), nullptr, kAvahi, "/", kServer, "EntryGroupNew",
                                  on<&Impl::on_group>, this, ""));
+  asking = true;
 }
 
 void Announcer::Impl::on_group(sd_bus_message* message) {

@@ -10,6 +10,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
 #include "daemon/app/config_keys.hpp"
 #include "daemon/serve/security.hpp"
@@ -110,6 +111,18 @@ toml::table parse_setting(const std::string& setting) {
   }
 }
 
+/// A wait that ends before its frames have come never ends in a reference.
+void check_reference(const pipeline::ReferenceRules& rules) {
+  for (const auto& [key, frames] :
+       {std::pair("frames", rules.frames), std::pair("settle_frames", rules.settle_frames)}) {
+    if (rules.patience_frames >= frames) continue;
+    throw std::runtime_error(fmt::format(
+        "reference.patience_frames = {} must be at least reference.{} = {}: no reference would "
+        "ever be taken",
+        rules.patience_frames, key, frames));
+  }
+}
+
 }  // namespace
 
 Config::Config() {
@@ -140,6 +153,7 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
     assembly.take(parse_setting(setting), "", fs::current_path(),
                   [&](unsigned) { return "--set"; });
   }
+  check_reference(loaded.config.pipeline.reference);
   const pipeline::ContactRules& contact = loaded.config.pipeline.contact;
   if (contact.lost_mm >= contact.made_mm) {
     throw std::runtime_error(
@@ -156,6 +170,8 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
   }
   net::check_security(loaded.config.net);
   loaded.origins = std::move(assembly).origins();
+  loaded.config.cpu_is_default =
+      std::ranges::find(loaded.origins, "capture.cpu", &KeyOrigin::key)->origin == "default";
   return loaded;
 }
 

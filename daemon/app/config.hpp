@@ -20,6 +20,7 @@ inline constexpr std::string_view kCredential = "credential:";
 /// Everything that can be configured. config/dtactd.toml documents every key.
 struct Config {
   Config();  ///< The defaults; the capture thread's CPU is the last one this process may use.
+  bool cpu_is_default = true;  ///< capture.cpu is not set: several daemons take different CPUs.
 
   hal::Config hal;
   std::string ring_scheme = "all";  ///< Which LEDs are lit at start (net/light_schemes.hpp).

@@ -134,7 +134,7 @@ std::vector<Key> bind_keys(Config& c) {
 
       real("contact.made_mm", p.contact.made_mm, 0.005, 5, "(millimetres)"),
       real("contact.lost_mm", p.contact.lost_mm, 0.001, 5, "(millimetres)"),
-      real("contact.area_mm2", p.contact.area_mm2, 0, 1000, "(square millimetres)"),
+      real("contact.area_mm2", p.contact.area_mm2, 0.001, 1000, "(square millimetres)"),
       integer("contact.debounce_frames", p.contact.debounce_frames, 1, 1000, "(frames)"),
       integer("contact.beyond_pixels", p.beyond_pixels, 0, 1 << 26, "(pixels)"),
 

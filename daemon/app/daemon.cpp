@@ -36,6 +36,7 @@
 #include "daemon/pipeline/pipeline.hpp"
 #include "daemon/serve/security.hpp"
 #include "hal/base/clock.hpp"
+#include "hal/base/cpu_claim.hpp"
 #include "hal/base/rt_thread.hpp"
 #include "hal/registry.hpp"
 #include "version.hpp"
@@ -184,8 +185,15 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   if (ring.away) spdlog::warn("no LED ring yet, it is looked for: {}", ring.message);
   if (!ring.note.empty()) spdlog::warn("ring: {}", ring.note);
   pipeline::PipelineConfig settings = config.pipeline;
+  std::optional<base::CpuClaim> cpu;
+  if (config.cpu_is_default && settings.cpu) {
+    settings.cpu = cpu.emplace(base::allowed_cpus()).cpu();
+  }
   settings.state_folder = state;
   if (const auto leds = net::scheme_leds(config.ring_scheme)) settings.light.leds = *leds;
+  if (config.hal.ring.backend.starts_with("ws2812")) {
+    settings.light.gamma = config.hal.ring.ws2812.gamma;
+  }
   pipeline::Pipeline pipeline(std::move(devices.camera), std::move(devices.ring), calibration,
                               settings);
   calibration.reset();  // its megabytes go when another one comes into use

@@ -25,7 +25,7 @@ struct Origin {
   std::string pixel_format;  ///< "MJPEG", ...; empty = not recorded.
   double fps = 0;            ///< 0 = not recorded.
   std::vector<Control> controls;
-  std::vector<std::uint8_t> leds;  ///< r, g, b of each LED after brightness; empty = not recorded.
+  std::vector<std::uint8_t> leds;  ///< r, g, b that each LED emits; empty = not recorded.
   std::string created;             ///< ISO 8601, UTC.
   struct Source {
     std::string name;    ///< File name, without folder.

@@ -26,8 +26,8 @@ struct AttachedCamera {
                                                          const AttachedCamera& now);
 
 /// One sentence for each LED (numbered from 0) that shows another colour than at calibration; empty
-/// when they agree or the calibration did not record the light. `leds`: r, g, b of each LED after
-/// brightness.
+/// when they agree or the calibration did not record the light. `leds`: r, g, b that each
+/// LED emits.
 [[nodiscard]] std::vector<std::string> light_mismatches(const Calibration& calibration,
                                                         std::span<const std::uint8_t> leds);
 

@@ -22,7 +22,7 @@ struct Remedy {
 
 // In the order in which one should act: without a camera or a ring nothing else can be mended.
 constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
-    {Health::camera_trouble, "The camera gives no frames."},
+    {Health::camera_trouble, "The camera gives no usable frames."},
     {Health::ring_trouble, "The LED ring cannot be written to."},
     {Health::uncalibrated,
      "No calibration: dtactctl calibrate --radius-mm MM --mm-per-px S guides through one with a "
@@ -53,7 +53,9 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::image_repeated,
      "The camera repeats all or part of a picture: depth is old there; look at the USB cable, hub "
      "and processor load."},
-    {Health::image_dark, "The picture is too dark to measure in: raise the light or the exposure."},
+    {Health::image_dark,
+     "The picture is too dark to measure in: check the ring's power and wiring, its brightness "
+     "(dtactctl led --brightness 255), the camera's exposure and that nothing covers the lens."},
     {Health::image_saturated,
      "Much of the picture is white: lower the light or the exposure and run dtactctl rezero."},
     {Health::light_drifted,
@@ -92,11 +94,21 @@ std::string detail(const pipeline::Status& status, Health health) {
     return fmt::format("By their timestamps {:.1f} come in a second instead of {:g}.",
                        status.camera_fps, status.camera.fps);
   }
+  if (health == Health::camera_trouble && status.camera_damaged) {
+    return "All that come are damaged: check its USB cable, hub and port, or set another "
+           "pixel_format or a lower camera.fps.";
+  }
   if (health == Health::camera_trouble) return status.camera_report.remedy;
   if (health == Health::camera_mismatch) return status.camera_report.moved;
   if (health == Health::camera_moved) return status.place_message;
   if (health == Health::ring_trouble) return status.ring_message;
   return {};
+}
+
+/// Start-up and a light change cannot end in a dark picture: waiting is no fix then.
+bool waits_for_light(const pipeline::HealthSet& health, Health flag) {
+  return health.has(Health::image_dark) &&
+         (flag == Health::starting || flag == Health::light_unsettled);
 }
 
 /// "HEALTH_CAMERA_TROUBLE" without the enum's name, in small letters.
@@ -126,6 +138,7 @@ std::string advice(const pipeline::Status& status) {
   }
   for (const auto& remedy : kRemedies) {
     if (!status.health.has(remedy.health)) continue;
+    if (waits_for_light(status.health, remedy.health)) continue;
     add(text, remedy.sentence);
     add(text, detail(status, remedy.health));
   }

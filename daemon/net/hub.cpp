@@ -163,7 +163,11 @@ std::vector<pipeline::StageStatistics> Hub::stages() const {
 // bus.
 std::string Hub::serial() const { return port_.status().camera.identity; }
 
-void Hub::introduce(v1::HelloReply& reply) const { reply.set_serial(serial()); }
+void Hub::introduce(v1::HelloReply& reply) const {
+  const pipeline::Status status = port_.status();
+  reply.set_serial(status.camera.identity);
+  reply.set_rezero_within_s(status.rezero_within_s);
+}
 
 void Hub::on_request(const std::shared_ptr<Session>& session, const v1::ClientMessage& message) {
   handlers_.request(session, message);

@@ -177,6 +177,7 @@ void fill(const recon::Surface& surface, v1::Surface& out) {
 void fill(const hal::Light& light, std::optional<std::int64_t> since_ns, v1::LightState& out) {
   out.set_brightness(light.brightness);
   if (since_ns) out.set_since_ns(*since_ns);
+  out.set_gamma(light.gamma);
   for (const auto& led : light.leds) {
     auto& to = *out.add_leds();
     to.set_r(led.r);
@@ -249,6 +250,7 @@ void fill(const pipeline::Status& status, v1::Status& out) {
   for (const auto& refused : status.realtime) out.add_realtime_refused(refused);
   for (const auto& stage : status.stages) fill(stage, *out.add_stages());
   out.set_light_followed(status.light_followed);
+  if (status.cpu) out.set_capture_cpu(static_cast<std::uint32_t>(*status.cpu));
   auto& usage = *out.mutable_capture_thread();
   usage.set_minor_faults(status.capture_thread.minor_faults);
   usage.set_major_faults(status.capture_thread.major_faults);

@@ -7,19 +7,18 @@ namespace dtact::pipeline {
 bool CameraWatch::arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexcept {
   const bool was_away = std::exchange(away_, false);
   const bool returned = was_away || (info.flags & hal::kFrameReopened) != 0;
-  // A camera that comes back may count from anywhere.
-  const bool gap = have_sequence_ && !returned && info.sequence > sequence_ + 1;
-  if (gap || (info.flags & hal::kFrameAfterGap) != 0) lose(now_ns);
+  // The sequence alone would count as lost what was passed over for a newer frame.
+  if ((info.flags & hal::kFrameAfterGap) != 0) lose(now_ns);
   if (returned) rate_.forget();
   rate_.add(info);
-  sequence_ = info.sequence;
-  have_sequence_ = true;
   last_ns_ = now_ns;
   stalled_ = false;
+  damaged_ = false;
   return returned;
 }
 
 void CameraWatch::missed(hal::GrabStatus status, std::int64_t now_ns) noexcept {
+  damaged_ = status == hal::GrabStatus::damaged;
   switch (status) {
     case hal::GrabStatus::unplugged:
     case hal::GrabStatus::ended:

@@ -22,12 +22,15 @@ class CameraWatch {
 
   /// Unplugged or ended: no frame comes unless the device returns.
   [[nodiscard]] bool away() const noexcept { return away_; }
-  /// Away, or silent for more than three frame periods.
+  /// Away, or without a usable frame for more than three frame periods.
   [[nodiscard]] bool trouble() const noexcept { return away_ || stalled_; }
+  /// What came last was a damaged frame.
+  [[nodiscard]] bool damaged() const noexcept { return damaged_; }
   [[nodiscard]] std::int64_t silent_ns(std::int64_t now_ns) const noexcept {
     return now_ns - last_ns_;
   }
-  /// A frame was lost or damaged within the last second.
+  /// The camera lost a frame within the last second, or sent a damaged one. Frames that were
+  /// skipped for a newer one are not lost.
   [[nodiscard]] bool lost_lately(std::int64_t now_ns) const noexcept {
     return lost_ && now_ns - lost_ns_ < 1'000'000'000;
   }
@@ -40,11 +43,10 @@ class CameraWatch {
   RateWatch rate_;
   std::int64_t last_ns_ = 0;
   std::int64_t lost_ns_ = 0;
-  std::uint64_t sequence_ = 0;
-  bool have_sequence_ = false;
   bool lost_ = false;
   bool away_ = false;
   bool stalled_ = false;
+  bool damaged_ = false;
 };
 
 }  // namespace dtact::pipeline

@@ -98,6 +98,7 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
     exchange_.camera_returned.store(true, std::memory_order_release);
     exchange_.wake.signal();
   }
+  exchange_.camera_damaged.store(false, std::memory_order_relaxed);
   exchange_.camera_fps.store(watch_.rate().fps(), std::memory_order_relaxed);
   exchange_.sequence.store(info.sequence, std::memory_order_relaxed);
   exchange_.light_lag_ns.store(timeline_.delay_ns() + stamp_lag_ns(info.meaning, period_ns_),
@@ -198,6 +199,7 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
 void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
                                 std::int64_t now_ns) noexcept {
   watch_.missed(status, now_ns);
+  exchange_.camera_damaged.store(watch_.damaged(), std::memory_order_relaxed);
   if (watch_.away() || watch_.silent_ns(now_ns) > kSecond) desk_.give_up_rezero();
   tell(health(now_ns), now_ns);
   teller_.flush();

@@ -63,6 +63,7 @@ struct Exchange {
   /// A camera that was away delivers again: the network thread compares it with the calibration.
   std::atomic<bool> camera_returned{false};
   std::atomic<bool> camera_mismatch{false};
+  std::atomic<bool> camera_damaged{false};  ///< What the camera sent last was damaged.
   std::atomic<State> state{State::settling};
   std::atomic<std::uint32_t> health{0};  ///< HealthSet::bits()
   std::atomic<std::uint64_t> frames{0};

@@ -104,6 +104,7 @@ void Pipeline::start() {
   capture_ = base::RtThread(
       {.name = "dtact-capture", .cpu = config_.cpu, .fifo_priority = config_.fifo_priority},
       [this] { loop_->run(); });
+  cpu_ = capture_.cpu();
   for (const std::string& refused : capture_.refused()) {
     realtime_.push_back(refused);
     if (refused.find("SCHED_FIFO") != std::string::npos) exchange_.not_realtime = true;
@@ -258,6 +259,7 @@ Status Pipeline::status() const {
   status.health = health_of(exchange_.health.load(std::memory_order_relaxed));
   status.camera = camera_->info();
   status.camera_report = camera_->report();
+  status.camera_damaged = exchange_.camera_damaged.load(std::memory_order_relaxed);
   status.ring = light_.info();
   status.ring_message = light_.message();
   status.light = light_.light();
@@ -271,7 +273,13 @@ Status Pipeline::status() const {
   status.skipped = exchange_.slot.replaced();
   status.fps = exchange_.statistics.fps(clock_.monotonic_ns());
   status.camera_fps = exchange_.camera_fps.load(std::memory_order_relaxed);
+  // The picture may settle for patience_frames and be averaged for as long again; without frames
+  // the re-zero is refused after a second.
+  const double fps =
+      status.camera_fps > 0 ? std::min(status.camera_fps, status.camera.fps) : status.camera.fps;
+  status.rezero_within_s = 1 + 2 * config_.reference.patience_frames / fps;
   status.realtime = realtime_;
+  status.cpu = cpu_;
   status.stages = exchange_.statistics.stages();
   status.capture_thread = exchange_.statistics.usage();
   status.light_followed = exchange_.light_followed.load(std::memory_order_relaxed);

@@ -76,6 +76,7 @@ class Pipeline final : public Port {
   std::size_t depth_capacity_;  // pixels that every frame of the pool has room for
   std::string restore_failure_;
   std::vector<std::string> realtime_;  // settings refused, one sentence each
+  std::optional<int> cpu_;             // that the capture thread is pinned to
   // Network thread only.
   ReconstructionRules rules_;  ///< As asked for last.
   std::deque<Event> own_events_;

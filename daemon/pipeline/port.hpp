@@ -128,6 +128,7 @@ struct Status {
   HealthSet health = {};
   hal::CameraInfo camera;
   hal::CameraReport camera_report;
+  bool camera_damaged = false;  ///< What the camera sent last was damaged.
   hal::RingInfo ring;
   std::string ring_message;  ///< The ring's last error, or what to know; empty when well.
   hal::Light light = {};
@@ -138,6 +139,7 @@ struct Status {
   std::uint64_t skipped = 0;          ///< Published but replaced before the network fetched them.
   double fps = 0;                     ///< Over the last second.
   double camera_fps = 0;              ///< Of the camera, by its timestamps; 0 = not known yet.
+  std::optional<int> cpu;             ///< The capture thread is pinned to this CPU.
   std::vector<std::string> realtime;  ///< One sentence for each real-time setting refused.
   std::vector<StageStatistics> stages;
   /// How far the reference follows the light since it was taken: a share, negative = dimmer.
@@ -145,6 +147,7 @@ struct Status {
   ThreadUsage capture_thread;  ///< Renewed once a second.
   /// How far the layer's marks lay from where they belong; meant while Health::camera_moved is set.
   std::string place_message;
+  double rezero_within_s = 0;  ///< The longest time that a re-zero takes, seconds.
   /// Why the calibration or the last good reference could not be used or kept, and what to do;
   /// empty when all is well.
   std::string storage_message;

@@ -44,7 +44,9 @@ void Entrance::reload(const NetConfig& fresh) {
   // From here on nothing fails.
   if (tls_ && new_tls) {
     *tls_ = std::move(*new_tls);  // where it is, since the listener knows its place
-    endpoints_.back().fingerprint = tls_->fingerprint;  // TCP is the last
+    for (EndpointInfo& endpoint : endpoints_) {
+      if (endpoint.tls) endpoint.fingerprint = tls_->fingerprint;
+    }
   }
   admission_.set_tokens(std::move(new_tokens));
   config_.max_clients = fresh.max_clients;

@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <exception>
 #include <memory>
 #include <system_error>
 #include <utility>
@@ -53,6 +54,8 @@ RtThread::RtThread(const RtSettings& settings, std::function<void()> body) {
           "thread {} is not pinned to CPU {} ({}): choose a CPU this machine and the unit's "
           "AllowedCPUs= have",
           settings.name, *settings.cpu, std::strerror(e)));
+    } else {
+      cpu_ = settings.cpu;
     }
   }
   if (settings.fifo_priority > 0) {
@@ -66,6 +69,7 @@ RtThread::RtThread(const RtSettings& settings, std::function<void()> body) {
 RtThread::RtThread(RtThread&& other) noexcept
     : thread_(other.thread_),
       joinable_(std::exchange(other.joinable_, false)),
+      cpu_(other.cpu_),
       refused_(std::move(other.refused_)) {}
 
 RtThread& RtThread::operator=(RtThread&& other) noexcept {
@@ -73,6 +77,7 @@ RtThread& RtThread::operator=(RtThread&& other) noexcept {
     join();
     thread_ = other.thread_;
     joinable_ = std::exchange(other.joinable_, false);
+    cpu_ = other.cpu_;
     refused_ = std::move(other.refused_);
   }
   return *this;
@@ -80,6 +85,43 @@ RtThread& RtThread::operator=(RtThread&& other) noexcept {
 
 void RtThread::join() noexcept {
   if (std::exchange(joinable_, false)) ::pthread_join(thread_, nullptr);
+}
+
+void run_unpinned(const cpu_set_t& cpus, const std::function<void()>& body) {
+  std::exception_ptr thrown;
+  std::function<void()> guarded = [&] {
+    try {
+      body();
+    } catch (...) {
+      thrown = std::current_exception();
+    }
+  };
+  pthread_attr_t attributes;
+  ::pthread_attr_init(&attributes);
+  ::pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+  ::pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
+  ::pthread_attr_setaffinity_np(&attributes, sizeof cpus, &cpus);
+  pthread_t thread{};
+  const int error = ::pthread_create(
+      &thread, &attributes,
+      [](void* argument) -> void* {
+        (*static_cast<std::function<void()>*>(argument))();
+        return nullptr;
+      },
+      &guarded);
+  ::pthread_attr_destroy(&attributes);
+  if (error != 0) {
+    throw std::system_error(error, std::generic_category(), "cannot start a thread");
+  }
+  ::pthread_join(thread, nullptr);
+  if (thrown) std::rethrow_exception(thrown);
+}
+
+cpu_set_t allowed_cpus() noexcept {
+  cpu_set_t cpus;
+  CPU_ZERO(&cpus);
+  (void)::sched_getaffinity(0, sizeof cpus, &cpus);
+  return cpus;
 }
 
 std::optional<std::string> make_fifo(const std::string& name, int priority) {

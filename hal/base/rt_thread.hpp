@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sched.h>
+
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -31,14 +33,25 @@ class RtThread {
   ~RtThread() { join(); }
 
   void join() noexcept;
+  /// The CPU that the thread is pinned to.
+  [[nodiscard]] std::optional<int> cpu() const noexcept { return cpu_; }
   /// One sentence for each setting the system refused, with the remedy.
   [[nodiscard]] const std::vector<std::string>& refused() const noexcept { return refused_; }
 
  private:
   pthread_t thread_{};
   bool joinable_ = false;
+  std::optional<int> cpu_;
   std::vector<std::string> refused_;
 };
+
+/// Runs `body` on a thread with normal scheduling that may use all of `cpus`, and waits for its
+/// end. Threads that a library starts within inherit neither the caller's priority nor the CPU that
+/// it is pinned to. Throws what `body` throws, or std::system_error when no thread can be made.
+void run_unpinned(const cpu_set_t& cpus, const std::function<void()>& body);
+
+/// The CPUs that the calling thread may use.
+[[nodiscard]] cpu_set_t allowed_cpus() noexcept;
 
 /// Gives the calling thread SCHED_FIFO `priority`, 1 … 99; threads it starts from then on begin
 /// with normal scheduling. Returns the sentence that says why it was refused and what to do, or

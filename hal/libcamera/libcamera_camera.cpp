@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <libcamera/camera_manager.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <memory>
 #include <string>
@@ -14,10 +13,10 @@
 #include "hal/libcamera/formats.hpp"
 #include "hal/libcamera/manager.hpp"
 #include "hal/libcamera/photometry.hpp"
-#include "hal/libcamera/search_pace.hpp"
 #include "hal/libcamera/session.hpp"
 #include "hal/live/device_error.hpp"
 #include "hal/live/live_camera.hpp"
+#include "hal/live/search_pace.hpp"
 
 namespace dtact::hal::libcamera_backend {
 namespace {
@@ -46,19 +45,10 @@ std::shared_ptr<lc::Camera> find(lc::CameraManager& manager, const std::string& 
 
 live::Opener opener(const CameraConfig& config) {
   check_pixel_format(config.libcamera.pixel_format);
-  return [config, lock = PhotometricLock(config.libcamera, config.fps), pace = SearchPace(),
-          heap = std::make_shared<DmaHeap>(), missing = std::string()]() mutable -> live::Opened {
-    if (!pace.due(std::chrono::steady_clock::now(), std::chrono::system_clock::now())) {
-      throw DeviceError(CameraState::unplugged, missing);
-    }
+  return [config, lock = PhotometricLock(config.libcamera, config.fps),
+          heap = std::make_shared<DmaHeap>()]() -> live::Opened {
     auto manager = std::make_unique<Manager>();
-    std::shared_ptr<lc::Camera> camera;
-    try {
-      camera = find(**manager, config.libcamera.device);
-    } catch (const DeviceError& e) {
-      missing = e.what();
-      throw;
-    }
+    std::shared_ptr<lc::Camera> camera = find(**manager, config.libcamera.device);
     const bool cached = driver_memory_is_cached(sensor_of(camera->properties()));
     const std::string id = camera->id();
     // Nothing of the camera stays here: the session gives it back before the manager ends.
@@ -75,7 +65,7 @@ std::unique_ptr<Camera> make_camera(const CameraConfig& config) {
   // it that works for all its parts.
   ::setenv("LIBCAMERA_LOG_LEVELS", "*:ERROR", /*overwrite=*/0);
   return std::make_unique<live::LiveCamera>(config, "libcamera", config.libcamera.device,
-                                            opener(config));
+                                            live::paced(opener(config)));
 }
 
 }  // namespace dtact::hal::libcamera_backend

@@ -265,12 +265,14 @@ void Session::wait(std::int64_t deadline_ns) noexcept {
 }
 
 live::DequeueStatus Session::dequeue(live::Filled& out) noexcept {
-  const std::lock_guard guard(mutex_);
-  if (gone_ || !acquired_) return live::DequeueStatus::failed;
-  if (completed_count_ == 0) return live::DequeueStatus::none;
-  out.index = completed_[0];
-  std::shift_left(completed_.begin(), completed_.begin() + completed_count_, 1);
-  --completed_count_;
+  {
+    const std::lock_guard guard(mutex_);
+    if (gone_ || !acquired_) return live::DequeueStatus::failed;
+    if (completed_count_ == 0) return live::DequeueStatus::none;
+    out.index = completed_[0];
+    std::shift_left(completed_.begin(), completed_.begin() + completed_count_, 1);
+    --completed_count_;
+  }
 
   const Slot& slot = slots_[static_cast<std::size_t>(out.index)];
   const bool readable = sync_for_reading(slot.fd, true);
@@ -297,6 +299,10 @@ live::DequeueStatus Session::dequeue(live::Filled& out) noexcept {
     out.timestamp_ns = stamp;
     out.meaning = TimestampMeaning::end_of_frame;
   }
+  // The watching thread allocates while it holds these: not waited for, the next frame has them
+  // too.
+  const std::unique_lock guard(readings_mutex_, std::try_to_lock);
+  if (!guard) return live::DequeueStatus::filled;
   try {
     PhotometricLock::read(slot.request->metadata(), readings_);
   } catch (const std::exception&) {
@@ -316,7 +322,7 @@ bool Session::enqueue(int index) noexcept {
 std::string Session::check_controls(std::vector<CameraControl>& controls) {
   Readings readings;
   {
-    const std::lock_guard guard(mutex_);
+    const std::lock_guard guard(readings_mutex_);
     readings = readings_;
   }
   return PhotometricLock::compare(readings, controls);

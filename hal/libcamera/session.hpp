@@ -75,12 +75,15 @@ class Session final : public live::Source {
   std::vector<Slot> slots_;
   bool acquired_ = false;
 
-  // Shared with libcamera's thread and the watching thread; held for copies only.
+  // Shared with libcamera's thread; held for copies that do not allocate.
   std::mutex mutex_;
   std::condition_variable changed_;
   std::array<int, 16> completed_{};  // slot indices, oldest first; never more than there are slots
   std::size_t completed_count_ = 0;
   bool gone_ = false;
+
+  // Shared with the watching thread.
+  std::mutex readings_mutex_;
   Readings readings_;
 };
 

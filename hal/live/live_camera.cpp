@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hal/base/clock.hpp"
+#include "hal/base/rt_thread.hpp"
 #include "hal/live/device_error.hpp"
 
 namespace dtact::hal::live {
@@ -41,6 +42,7 @@ LiveCamera::LiveCamera(const CameraConfig& config, const std::string& backend,
                        const std::string& identity, Opener opener)
     : open_(std::move(opener)),
       period_ns_(std::llround(1e9 / config.fps)),
+      cpus_(base::allowed_cpus()),
       lender_(config.width, config.height) {
   if (!(config.fps > 0)) throw std::runtime_error("camera.fps must be positive");
   info_.backend = backend;
@@ -95,7 +97,10 @@ void LiveCamera::start() {
 }
 
 void LiveCamera::connect() {
-  Opened opened = open_();
+  // The capture thread is real-time and pinned; threads that the driver's library starts must not
+  // be.
+  Opened opened;
+  base::run_unpinned(cpus_, [&] { opened = open_(); });
   auto fresh = std::make_shared<Connection>(opened.source);
   if (area_) fresh->decoder.will_read(*area_);
   opened_ns_ = now_ns();
@@ -148,8 +153,7 @@ void LiveCamera::disconnect(CameraState state, const std::string& remedy) {
 void LiveCamera::lose(const char* what) noexcept {
   try {
     disconnect(CameraState::unplugged,
-               fmt::format("{} {}: plug it in again; it is looked for ten times a second",
-                           info_.identity, what));
+               fmt::format("{} {}: plug it in again: it is found by itself", info_.identity, what));
   } catch (const std::exception&) {
     state_.store(CameraState::unplugged);
   }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <sched.h>
+
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
@@ -19,7 +21,7 @@ namespace dtact::hal::live {
 
 /// What is the same for every real camera, whatever library it is reached by. It may be absent,
 /// busy or forbidden, at the start and later: then grab() returns `unplugged`, the report says why,
-/// and the camera is looked for ten times a second until it streams again, with its controls
+/// and the opener is called ten times a second until the camera streams again, with its controls
 /// locked.
 ///
 /// A second thread reads the locked controls once a second (a USB transfer each, too slow for the
@@ -69,6 +71,7 @@ class LiveCamera : public Camera {
 
   const Opener open_;
   const std::int64_t period_ns_;
+  const cpu_set_t cpus_;  // that the thread which made this may use
 
   // The capture thread's own.
   FrameLender lender_;

@@ -94,7 +94,8 @@ GrabStatus SimCamera::Impl::grab(Frame& out, std::int64_t timeout_ns) noexcept {
   const std::int64_t latest = clock.monotonic_ns() + timeout_ns;
   for (;;) {
     // Told once as soon as it happens; later calls wait for the device to come back.
-    if (std::exchange(disconnects_seen, device.disconnects()) != disconnects_seen) {
+    const std::uint64_t disconnects = device.disconnects();
+    if (std::exchange(disconnects_seen, disconnects) != disconnects) {
       (void)device.take();  // what was on the cable went with it
       return GrabStatus::unplugged;
     }

@@ -49,6 +49,7 @@ class DeviceName {
     std::string identity;  ///< As configured, or the stable name of the only camera.
   };
   [[nodiscard]] Opened open(int width = 0, int height = 0) const;
+  [[nodiscard]] bool is_path() const noexcept { return kind_ == Kind::path; }
   [[nodiscard]] const std::string& text() const noexcept { return text_; }
 
  private:

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "hal/live/search_pace.hpp"
 #include "hal/v4l2/finder.hpp"
 #include "hal/v4l2/modes.hpp"
 #include "hal/v4l2/photometry.hpp"
@@ -31,9 +32,12 @@ live::Opener opener(const CameraConfig& config) {
     throw std::runtime_error(
         fmt::format("camera.v4l2.range = \"{}\": allowed are auto, full, limited", range));
   }
-  return [config, name = DeviceName(config.v4l2.device), lock = PhotometricLock(config.v4l2)] {
+  const DeviceName name(config.v4l2.device);
+  live::Opener open_named = [config, name, lock = PhotometricLock(config.v4l2)] {
     return open(config, name, lock);
   };
+  // A path is tried without a look at other nodes.
+  return name.is_path() ? open_named : live::paced(std::move(open_named));
 }
 
 }  // namespace

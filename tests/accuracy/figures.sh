@@ -40,7 +40,7 @@ scene=config/scenes/calibrate_ball.toml
 "$bin/dtact-sim-render" --scene "$scene" --frames 0:32 -o "$out/reference"
 "$bin/dtact-sim-render" --scene "$scene" --frames 300:332 -o "$out/ball"
 "$bin/dtact-calibrate" depth --reference "$out/reference" --ball "$out/ball" --radius-mm 4.0 \
-  --mm-per-px 0.0413793 --centre 300,400 --crop 580,580 -o "$out/simulated"
+  --mm-per-px 0.0413793 --centre 400,300 --crop 580,580 -o "$out/simulated"
 # Frame 540 of the built-in scene: an M4 nut pressed 0.9 mm deep.
 "$bin/dtact-sim-render" --frames 540 -o "$out/nut.png"
 "$bin/dtact-calibrate" reconstruct --calibration "$out/simulated" --reference "$out/reference" \

@@ -45,7 +45,7 @@ int guide(const Sensor& sensor, const std::string& typed, std::string* output,
                                         "--mm-per-px",
                                         "0.0413793",
                                         "--centre",
-                                        "300,400",
+                                        "400,300",
                                         "--crop",
                                         "580,580",
                                         "--folder",
@@ -148,7 +148,7 @@ TEST(Guided, QuitRetakeAndGoOn) {
   EXPECT_EQ(guide(sensor, "\n\n\nr\nq\n", &output), kNotMet) << output;
   EXPECT_THAT(output, AllOf(HasSubstr("[r] retake press-02"),
                             HasSubstr("To go on: dtact-calibrate --port "),
-                            HasSubstr(" guided --radius-mm 4 ")));
+                            HasSubstr(" guided --radius-mm 4.0 ")));
   EXPECT_TRUE(there(sensor, "reference/sensor.toml"));
   EXPECT_TRUE(there(sensor, "press-02/15.png"));
   EXPECT_FALSE(there(sensor, "press-03"));

@@ -40,7 +40,7 @@ def calibrate(folder):
                        check=True)
     subprocess.run([os.environ["CALIBRATE"], "depth", "--reference", folder / "reference", "--ball",
                     folder / "ball", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre",
-                    "300,400", "--crop", "582,570", "-o", folder / "calibration"], check=True,
+                    "400,300", "--crop", "570,582", "-o", folder / "calibration"], check=True,
                    stdout=subprocess.DEVNULL)
     return folder / "calibration"
 

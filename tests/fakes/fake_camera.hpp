@@ -99,8 +99,10 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
       ++sequence_;
       return hal::GrabStatus::damaged;
     }
-    sequence_ += static_cast<std::uint64_t>(handle_.lose.exchange(0));
+    const int lost = handle_.lose.exchange(0);
+    sequence_ += static_cast<std::uint64_t>(lost);
     hal::FrameInfo frame;
+    if (lost > 0) frame.flags = hal::kFrameAfterGap;
     frame.sequence = sequence_++;
     frame.timestamp_ns = base::system_clock().monotonic_ns();
     frame.ready_ns = frame.timestamp_ns;

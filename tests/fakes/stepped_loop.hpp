@@ -104,7 +104,7 @@ class SteppedLoop {
       grabbed.sequence = sequence++;
       grabbed.timestamp_ns = owner.clock.now - delay_ns;
       grabbed.ready_ns = owner.clock.now;
-      grabbed.meaning = hal::TimestampMeaning::start_of_exposure;
+      grabbed.meaning = meaning;
       grabbed.flags = std::exchange(flags, hal::kFrameNormal);
       toy_paint(scene, grabbed.sequence, pixels.data());
       out = hal::Frame(*this, 0, {pixels.data(), kToyWidth, kToyHeight, kToyWidth}, grabbed, jpeg);
@@ -117,8 +117,9 @@ class SteppedLoop {
     hal::GrabStatus status = hal::GrabStatus::ok;
     ToyScene scene;
     std::uint32_t flags = hal::kFrameNormal;  ///< Of the next frame.
-    double slower = 1;                        ///< Times the period that its mode promises.
-    std::int64_t delay_ns = 0;                ///< From a frame's timestamp to its arrival.
+    hal::TimestampMeaning meaning = hal::TimestampMeaning::start_of_exposure;
+    double slower = 1;          ///< Times the period that its mode promises.
+    std::int64_t delay_ns = 0;  ///< From a frame's timestamp to its arrival.
     std::uint64_t sequence = 0;
     std::vector<std::uint8_t> jpeg;  ///< Lent with every frame, whatever it shows.
     std::vector<std::uint8_t> pixels =

@@ -14,7 +14,7 @@ mkdir -p "$out/frames"
 "$build/hal/sim/dtact-sim-render" --scene "$scene" --frames 216:232 -o "$out/frames/new"
 for name in old new; do
   "$calibrate" depth --reference "$out/frames/$name-reference" --ball "$out/frames/$name" --radius-mm 4.0 \
-    --mm-per-px 0.0413793 --centre 300,400 --crop 580,580 -o "$out/$name" > /dev/null
+    --mm-per-px 0.0413793 --centre 400,300 --crop 580,580 -o "$out/$name" > /dev/null
 done
 rm -r "$out/frames"
 cmp -s "$out/old/calibration.toml" "$out/new/calibration.toml" && echo "$0: two times the same" && exit 1

@@ -41,7 +41,7 @@ def calibrate(programs: Programs, folder: pathlib.Path, name: str, seed: int) ->
     run(programs.render, *scene, "--frames", "0:32", "-o", pictures / "reference")
     run(programs.render, *scene, "--frames", "200:232", "-o", pictures / "ball")
     run(programs.calibrate, "depth", "--reference", pictures / "reference", "--ball",
-        pictures / "ball", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400",
+        pictures / "ball", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "400,300",
         "--crop", "580,580", "-o", folder / name)
     shutil.rmtree(pictures)
     return folder / name

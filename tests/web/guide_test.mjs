@@ -10,7 +10,7 @@ import { startDaemon, startGateway, status, stopAll, tokenFile, work } from "./p
 
 const scenes = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../../config/scenes");
 const folder = path.join(work, "sessions");
-const START = { radius_mm: 4, mm_per_px: 0.0413793, crop: [580, 580] };
+const START = { radius_mm: 4, mm_per_px: 0.0413793, crop: [560, 520] };
 
 let left;
 let view;
@@ -51,6 +51,9 @@ test("presses become a calibration that the daemon uses", async () => {
   // As the calibration in use has them.
   assert.equal(await guide.getByLabel("Millimetres a pixel").inputValue(), "0.0413793");
   assert.equal(await guide.getByLabel("Map's width, pixels").inputValue(), "580");
+  // Wider than high, so that an order which is confused shows.
+  await guide.getByLabel("Map's width, pixels").fill("560");
+  await guide.getByLabel("Map's height, pixels").fill("520");
   await guide.getByRole("button", { name: "Begin" }).click();
   const said = guide.getByLabel("Said", { exact: true });
   const done = /the daemon uses calibration left-\d{8}-\d{6} from now on/;
@@ -75,7 +78,7 @@ test("presses become a calibration that the daemon uses", async () => {
   assert.match(await guide.locator(".depths").textContent(), /the list reaches [\d.]+ mm/);
   // As large as the map, with the presses' circles on it.
   const canvas = guide.locator("canvas");
-  assert.equal(await canvas.evaluate(({ width, height }) => `${width} ${height}`), "580 580");
+  assert.equal(await canvas.evaluate(({ width, height }) => `${width} ${height}`), "560 520");
   await guide.screenshot({ path: path.join(work, "guide-done.png") });
   await until(
     () => guide.getByRole("button", { name: "Close" }).isVisible(),

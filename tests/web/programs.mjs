@@ -34,7 +34,7 @@ export function calibration(method = "auto") {
   ]) {
     execFileSync(SIM_RENDER, ["--scene", ball, "--frames", frames, "-o", path.join(folder, name)]);
   }
-  const depth = ["depth", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400"];
+  const depth = ["depth", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "400,300"];
   const from = ["--reference", path.join(folder, "reference"), "--ball", path.join(folder, "ball")];
   const how = ["--crop", "580,580", "--method", method];
   execFileSync(CALIBRATE, [...depth, ...from, ...how, "-o", made]);

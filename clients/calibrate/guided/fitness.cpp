@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <numeric>
 
@@ -86,9 +87,11 @@ calibration::Origin origin_of(const v1::Status& status) {
 
 std::vector<std::uint8_t> leds_of(const v1::LightState& light) {
   std::vector<std::uint8_t> leds;
+  const double factor =
+      std::pow(light.brightness() / 255.0, light.gamma() > 0 ? light.gamma() : 1.0);
   for (const v1::Rgb& led : light.leds()) {
     for (const std::uint32_t channel : {led.r(), led.g(), led.b()}) {
-      leds.push_back(static_cast<std::uint8_t>((channel * light.brightness() + 127) / 255));
+      leds.push_back(static_cast<std::uint8_t>(std::lround(channel * factor)));
     }
   }
   return leds;

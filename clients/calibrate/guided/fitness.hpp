@@ -21,7 +21,7 @@ namespace dtact::ctl::guided {
 
 /// Camera and light as the daemon tells them, in the calibration's terms.
 [[nodiscard]] calibration::Origin origin_of(const v1::Status& status);
-/// r, g, b of each LED after brightness.
+/// r, g, b that each LED emits: its colour after brightness and the ring's gamma.
 [[nodiscard]] std::vector<std::uint8_t> leds_of(const v1::LightState& light);
 
 /// One sentence for each difference between the sensor now and `then`, a frame of this size; empty

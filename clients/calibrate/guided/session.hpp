@@ -24,7 +24,7 @@ struct Plan {
   double patience_s = 60;  ///< For each take.
   bool force = false;      ///< A doubtful list is taken, too.
   ListMethod method = ListMethod::automatic;
-  std::string again;  ///< The command that goes on with the work folder.
+  std::string again;  ///< The command line that goes on with the work folder, for a shell.
 };
 
 enum class Outcome {

@@ -20,13 +20,13 @@ namespace fs = std::filesystem;
 
 std::optional<calibration::Crop> crop_of(const MapOptions& options, int width, int height) {
   if (options.crop.empty()) {
-    if (!options.centre.empty()) throw std::runtime_error("--centre needs --crop HEIGHT,WIDTH");
+    if (!options.centre.empty()) throw std::runtime_error("--centre needs --crop WIDTH,HEIGHT");
     return std::nullopt;
   }
   const std::vector<int> centre =
-      options.centre.empty() ? std::vector<int>{height / 2, width / 2} : options.centre;
-  return calibration::Crop{centre[1] - options.crop[1] / 2, centre[0] - options.crop[0] / 2,
-                           options.crop[1], options.crop[0]};
+      options.centre.empty() ? std::vector<int>{width / 2, height / 2} : options.centre;
+  return calibration::Crop{centre[0] - options.crop[0] / 2, centre[1] - options.crop[1] / 2,
+                           options.crop[0], options.crop[1]};
 }
 
 calibration::LensFile lens_for(const std::string& path, int width, int height) {
@@ -72,11 +72,11 @@ void add_map_options(CLI::App& command, MapOptions& options) {
                   "Middle of the crop in the frame (default: the frame's)")
       ->delimiter(',')
       ->expected(2)
-      ->type_name("ROW,COL");
+      ->type_name("X,Y");
   command.add_option("--crop", options.crop, "Size of the depth map (default: the whole frame)")
       ->delimiter(',')
       ->expected(2)
-      ->type_name("H,W");
+      ->type_name("W,H");
 }
 
 MapChoice choose_map(const MapOptions& options, int frame_width, int frame_height) {

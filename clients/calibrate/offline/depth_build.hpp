@@ -15,8 +15,8 @@ namespace dtact::ctl {
 struct MapOptions {
   double mm_per_px = 0;     ///< 0: the lens's in the middle.
   std::string lens;         ///< A lens file or a calibration folder; empty: the frame as it is.
-  std::vector<int> centre;  ///< Row, column; empty: the frame's.
-  std::vector<int> crop;    ///< Height, width; empty: all that the frame shows.
+  std::vector<int> centre;  ///< x, y in pixels; empty: the frame's.
+  std::vector<int> crop;    ///< Width, height in pixels; empty: all that the frame shows.
 };
 
 /// Adds --mm-per-px, --lens, --centre and --crop.

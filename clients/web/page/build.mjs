@@ -118,6 +118,7 @@ if (values.node) {
   await esbuild.build({
     ...common,
     entryPoints: {
+      axes: "src/surface/axes.ts",
       colour_map: "src/view/colour_map.ts",
       decoders: "src/wire/depth.ts",
       framing: "src/wire/framing.ts",

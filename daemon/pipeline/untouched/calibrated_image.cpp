@@ -51,12 +51,12 @@ bool light_differs(const calibration::Calibration& calibration, const hal::Light
   const auto& then = calibration.origin.leds;
   if (then.empty()) return false;
   if (then.size() != light.leds.size() * 3) return true;
-  const auto differs = [&](std::uint8_t channel, std::uint8_t recorded) {
-    const int shown = (channel * light.brightness + 127) / 255;
-    return std::abs(shown - int{recorded}) > 1;
+  const auto differs = [](std::uint8_t emitted, std::uint8_t recorded) {
+    return std::abs(int{emitted} - int{recorded}) > 1;
   };
-  for (std::size_t i = 0; i < light.leds.size(); ++i) {
-    const hal::Rgb& led = light.leds[i];
+  const auto now = light.emitted();
+  for (std::size_t i = 0; i < now.size(); ++i) {
+    const hal::Rgb& led = now[i];
     if (differs(led.r, then[3 * i]) || differs(led.g, then[3 * i + 1]) ||
         differs(led.b, then[3 * i + 2])) {
       return true;

@@ -24,8 +24,8 @@ struct CalibratedImage {
   std::shared_ptr<const LayerMarks> marks;  ///< Of the layer, within the region.
 };
 
-/// The ring shows another light than at calibration: any channel, after brightness, off by more
-/// than one step. False when the calibration did not record its light. Does not allocate.
+/// The ring emits another light than at calibration: any channel, after brightness and gamma, off
+/// by more than one step. False when the calibration did not record its light. Does not allocate.
 [[nodiscard]] bool light_differs(const calibration::Calibration& calibration,
                                  const hal::Light& light) noexcept;
 

@@ -76,6 +76,7 @@ void ReferenceKeeper::begin() noexcept {
   averaging_ = false;
   untouched_before_ = false;
   waited_ = 0;
+  dark_frames_ = 0;
   settle_.reset();
 }
 
@@ -90,6 +91,7 @@ void ReferenceKeeper::light_changed(bool touching, bool same_shape) noexcept {
   other_light_ = true;
   averaging_ = false;
   waited_ = 0;
+  dark_frames_ = 0;
   settle_.reset();
 }
 
@@ -142,9 +144,11 @@ KeeperStep ReferenceKeeper::settle(const hal::LumaView& luma) noexcept {
   if (now_.mean < kUnlitGrey) {
     settle_.reset();
     waited_ = 0;
+    dark_frames_ = std::min(dark_frames_ + 1, rules_.settle_frames);
     if (!std::exchange(request_, std::nullopt)) return {};
     return {.reference_changed = false, .answer = RezeroResult::dark};
   }
+  dark_frames_ = 0;
   if (settle_.add(now_.mean) || ++waited_ > rules_.patience_frames) {
     start_average();
     phase_ = Phase::averaging;

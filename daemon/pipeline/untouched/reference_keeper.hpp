@@ -71,6 +71,8 @@ class ReferenceKeeper {
   [[nodiscard]] bool ready() const noexcept { return phase_ == Phase::holding; }
   /// The sequence runs because the camera (re)started, not because of the light.
   [[nodiscard]] bool starting() const noexcept { return !ready() && starting_; }
+  /// No reference can be taken: the picture has been too dark for settle_frames frames.
+  [[nodiscard]] bool dark() const noexcept { return dark_frames_ >= rules_.settle_frames; }
   /// Q8 luma, frame sized. Only when ready().
   [[nodiscard]] std::span<const std::uint16_t> reference() const noexcept;
   /// The reference in use is worth keeping for the next start: taken with nothing touching.
@@ -117,9 +119,10 @@ class ReferenceKeeper {
   bool same_shape_ = true;         // the light differs from it by a factor only
   bool forced_ = false;
   std::optional<Request> request_;
-  int waited_ = 0;   // frames since the sequence or the average began
-  int watched_ = 0;  // frames since the last look
-  int clear_ = 0;    // looks in a row that saw nothing touch
+  int waited_ = 0;       // frames since the sequence or the average began
+  int dark_frames_ = 0;  // in a row, while no reference is in use
+  int watched_ = 0;      // frames since the last look
+  int clear_ = 0;        // looks in a row that saw nothing touch
 
   std::vector<std::uint16_t> good_;  // the last good reference
   LumaGrid good_grid_;

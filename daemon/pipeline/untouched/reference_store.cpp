@@ -39,6 +39,7 @@ hal::Light light_of(const toml::table& table, const std::filesystem::path& file)
     refuse(file, "\"brightness\" must be 0 to 255 and \"leds\" 24 numbers");
   }
   light.brightness = static_cast<std::uint8_t>(*brightness);
+  light.gamma = table["gamma"].value_or(light.gamma);
   const auto channel = [&](std::size_t i) {
     const std::int64_t value = leds->get(i)->value<std::int64_t>().value_or(-1);
     if (value < 0 || value > 255) refuse(file, "\"leds\" must be numbers from 0 to 255");
@@ -65,6 +66,7 @@ void save_reference(const StoredReference& reference, const calibration::Calibra
                           {"calibration", calibration.name},
                           {"created", calibration.origin.created},
                           {"brightness", std::int64_t{reference.light.brightness}},
+                          {"gamma", reference.light.gamma},
                           {"leds", std::move(leds)},
                           {"image_checksum", checksum(png)}};
   std::ostringstream text;

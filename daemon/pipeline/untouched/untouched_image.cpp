@@ -143,6 +143,7 @@ HealthSet UntouchedImage::conditions() const noexcept {
   set.set(Health::camera_moved, place_.moved());
   set.set(Health::exposure_follows, exposure_.follows());
   set.add(watch_.conditions());
+  if (settled_ && keeper_.dark()) set.set(Health::image_dark);
   if (follower_.drifted()) set.set(Health::light_drifted);
   return set;
 }

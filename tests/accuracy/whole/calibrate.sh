@@ -15,7 +15,7 @@ case $kind in
     "$render" --scene "$scene" --frames 0:32 -o "$work/reference"
     "$render" --scene "$scene" --frames 300:332 -o "$work/ball"
     "$calibrate" depth --reference "$work/reference" --ball "$work/ball" --radius-mm 4.0 \
-      --mm-per-px 0.0413793 --centre 300,400 --crop 580,580 -o "$folder"
+      --mm-per-px 0.0413793 --centre 400,300 --crop 580,580 -o "$folder"
     ;;
   *)
     echo "calibrate.sh: '$kind' is none of one_press" >&2

@@ -38,7 +38,7 @@ def prepare(programs, folder):
     run(programs.render, "--scene", scene, "--frames", "0:32", "-o", at["reference"])
     run(programs.render, "--scene", scene, "--frames", "300:316", "-o", at["press"])
     run(programs.calibrate, "depth", "--reference", at["reference"], "--ball",
-        at["press"], "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "300,400",
+        at["press"], "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "400,300",
         "--crop", "580,580", "-o", at["calibration"])
     ball = os.path.join(HERE, "ball.toml")
     # Four seconds, a quarter of them untouched.

@@ -43,7 +43,7 @@ class Conditions : public testing::Test {
 TEST_F(Conditions, BeginAndEndAreALineEach) {
   const auto lines = log_.step(with({Health::camera_trouble}), now_);
   ASSERT_EQ(lines.size(), 1U);
-  EXPECT_EQ(lines[0].text, "camera_trouble: The camera gives no frames.");
+  EXPECT_EQ(lines[0].text, "camera_trouble: The camera gives no usable frames.");
   EXPECT_EQ(lines[0].condition, "camera_trouble");
   EXPECT_TRUE(lines[0].warning);
   EXPECT_THAT(after(1s, with({Health::camera_trouble})), IsEmpty());

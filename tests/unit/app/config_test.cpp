@@ -133,6 +133,34 @@ TEST_F(ConfigFile, WrongTypeOrValueNamesWhatIsAllowed) {
   EXPECT_THAT(error("[contact]\nmade_mm = 0.05\nlost_mm = 0.05\n"), HasSubstr("contact.lost_mm"));
 }
 
+TEST_F(ConfigFile, SettingsThatExcludeEachOtherAreBothNamed) {
+  EXPECT_THAT(error("[reference]\nframes = 100\npatience_frames = 99\n"),
+              AllOf(HasSubstr("reference.patience_frames = 99"),
+                    HasSubstr("at least reference.frames = 100")));
+  EXPECT_THAT(
+      error("[reference]\nframes = 8\nsettle_frames = 12\n", {"reference.patience_frames=11"}),
+      AllOf(HasSubstr("reference.patience_frames = 11"),
+            HasSubstr("at least reference.settle_frames = 12")));
+  EXPECT_EQ(
+      load("[reference]\nframes = 100\npatience_frames = 100\n").pipeline.reference.patience_frames,
+      100);
+  EXPECT_THAT(error("[contact]\nmade_mm = 0.04\nlost_mm = 0.05\n"),
+              AllOf(HasSubstr("contact.lost_mm = 0.05"), HasSubstr("contact.made_mm = 0.04")));
+}
+
+// Several daemons spread over the CPUs unless one is configured.
+TEST_F(ConfigFile, SaysWhetherTheCpuWasChosen) {
+  EXPECT_TRUE(load("").cpu_is_default);
+  EXPECT_FALSE(load("[capture]\ncpu = 0\n").cpu_is_default);
+  EXPECT_FALSE(load("", {"capture.cpu=false"}).cpu_is_default);
+}
+
+// An empty area would be in contact for ever.
+TEST_F(ConfigFile, ContactNeedsAnArea) {
+  EXPECT_THAT(error("[contact]\narea_mm2 = 0.0\n"),
+              AllOf(HasSubstr("c.toml:2: contact.area_mm2"), HasSubstr("0.001 … 1000")));
+}
+
 TEST_F(ConfigFile, ReadsTheRingsPowerLine) {
   const hal::GpioLineConfig power =
       load("[ring.ws2812.power]\nname = 'GPIO17'\nbias = 'pull-down'\n").hal.ring.ws2812.power;

@@ -126,6 +126,17 @@ TEST(Covered, IsTheDepthWhereTheListsCoverageEnds) {
   EXPECT_DOUBLE_EQ(covered_mm(made), 1.25);
 }
 
+// As the daemon compares them.
+TEST(Fitness, RecordsWhatTheLedsEmit) {
+  v1::LightState light;
+  light.set_brightness(128);
+  light.add_leds()->set_r(255);
+  light.mutable_leds(0)->set_g(100);
+  EXPECT_EQ(leds_of(light), (std::vector<std::uint8_t>{128, 50, 0}));
+  light.set_gamma(2.2);
+  EXPECT_EQ(leds_of(light), (std::vector<std::uint8_t>{56, 22, 0}));
+}
+
 TEST(Fitness, NamesWhatKeepsFromCalibrating) {
   v1::Status status;
   status.set_state(v1::STATE_UNCALIBRATED);

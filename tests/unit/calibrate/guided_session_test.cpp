@@ -72,7 +72,9 @@ TEST_F(GuidedSession, GoesFromNothingToAnUpload) {
   EXPECT_EQ(sensor.uploaded.value_or(v1::UploadCalibration{}).name(), "ball");
   EXPECT_THAT(console.said,
               AllOf(HasSubstr("fake 1.0: camera fake:1, 320x300 mjpeg at 60 fps"),
-                    HasSubstr("reference taken: 8 frames"), HasSubstr("press-04 taken"),
+                    HasSubstr("reference taken: 8 frames"),
+                    HasSubstr("noise 1.1"),  // of the grain from -1 to 2: the root of 5/4
+                    HasSubstr("press-04 taken"),
                     HasSubstr("the daemon uses calibration ball from now on")));
   EXPECT_TRUE(has("preview.png"));
   // What the daemon compares itself with.

@@ -116,13 +116,13 @@ TEST_F(Offline, RefusesADoubtfulCalibrationUnlessForced) {
 }
 
 TEST_F(Offline, CropIsAboutTheCentre) {
-  run(with(calibrate(), "--centre", "115,125", "--crop", "200,180"));
+  run(with(calibrate(), "--centre", "125,115", "--crop", "180,200"));
   const calibration::Calibration made = calibration::load(at("cal"));
   EXPECT_EQ(made.crop_col, 35);
   EXPECT_EQ(made.crop_row, 15);
   EXPECT_EQ(made.model->rectify.width, 180);
   EXPECT_EQ(made.model->rectify.height, 200);
-  run(with(calibrate(), "--crop", "200,180"));
+  run(with(calibrate(), "--crop", "180,200"));
   EXPECT_EQ(calibration::load(at("cal")).crop_col, 40);
   EXPECT_THAT([&] { run(with(calibrate(), "--centre", "1,2")); },
               ThrowsMessage<std::runtime_error>(HasSubstr("--crop")));

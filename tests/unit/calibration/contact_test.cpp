@@ -56,6 +56,39 @@ TEST(FindContact, SaysWhenTheBallLeavesTheMap) {
               ThrowsMessage<std::runtime_error>(HasSubstr("leaves the map")));
 }
 
+// The contact has a radius of 61 pixels. On a map that is wider than high, or higher than wide,
+// each edge cuts by its own length.
+TEST(FindContact, EachEdgeCutsTheContact) {
+  const auto cut = [](const Ball& ball) {
+    try {
+      (void)find_contact(ball.map(), 4);
+      return false;
+    } catch (const std::runtime_error&) {
+      return true;
+    }
+  };
+  const Ball wide{.col = 180, .row = 120, .width = 360, .height = 240};
+  const Ball high{.col = 120, .row = 180, .width = 240, .height = 360};
+  EXPECT_FALSE(cut(wide));
+  EXPECT_FALSE(cut(high));
+  for (const double inside : {70.0, 290.0}) {
+    Ball ball = wide;
+    ball.col = inside;
+    EXPECT_FALSE(cut(ball)) << inside;
+    ball = high;
+    ball.row = inside;
+    EXPECT_FALSE(cut(ball)) << inside;
+  }
+  for (const double outside : {50.0, 190.0}) {
+    Ball ball = wide;
+    ball.row = outside;
+    EXPECT_TRUE(cut(ball)) << outside;
+    ball = high;
+    ball.col = outside;
+    EXPECT_TRUE(cut(ball)) << outside;
+  }
+}
+
 TEST(RadialProfile, MeansOfRings) {
   const DifferenceMap map = Ball{}.map();
   const RadialProfile profile = radial_profile(map, find_contact(map, 4), 8);

@@ -75,6 +75,26 @@ TEST(Features, ADaemonThatListsThemIsAsked) {
   }
 }
 
+// The daemon's refusal comes after patience_frames, which may be longer than any other answer
+// takes.
+TEST(Rezero, WaitsAsLongAsTheDaemonSays) {
+  PlayedDaemon daemon({[](Peer& peer) {
+    v1::Reply hello;
+    hello.mutable_hello()->set_major(wire::kMajor);
+    hello.mutable_hello()->set_rezero_within_s(kLong.count());
+    (void)peer.answer(hello);
+    const v1::ClientMessage request = peer.request();
+    std::this_thread::sleep_for(std::chrono::milliseconds(400));
+    v1::ServerMessage refused;
+    refused.mutable_reply()->set_id(request.id());
+    refused.mutable_reply()->mutable_error()->set_message("the picture is not still");
+    peer.send(refused);
+  }});
+  daemon.options.timeout = std::chrono::milliseconds(200);
+  Client client(daemon.options);
+  EXPECT_THROW(client.rezero(), Refused);
+}
+
 TEST(Features, PingAndReference) {
   PlayedDaemon daemon({[](Peer& peer) {
     peer.greet({"ping", "reference"});

@@ -62,6 +62,39 @@ TEST(Reconnecting, TheSubscriptionSurvivesADaemonThatGoesAndComesBack) {
   EXPECT_TRUE(client.has_feature("ping"));
 }
 
+TEST(Reconnecting, EachLossTellsItsOwnReason) {
+  PlayedDaemon daemon({[](Peer& peer) {
+                         peer.greet();
+                         peer.done();
+                         peer.frame(41);
+                       },
+                       [](Peer& peer) {
+                         peer.greet();
+                         peer.done();
+                         peer.frame(57);
+                         v1::ServerMessage end;
+                         end.mutable_reply()->mutable_error()->set_code(v1::ERROR_FLOOD);
+                         end.mutable_reply()->mutable_error()->set_message("too many requests");
+                         peer.send(end);
+                       },
+                       [](Peer& peer) {
+                         peer.greet();
+                         peer.done();
+                         peer.frame(60);
+                       }});
+  Client client(patient(daemon.options));
+  client.subscribe();
+  EXPECT_EQ(next<v1::Frame>(client).sequence(), 41U);
+  const auto first = next<Reconnected>(client);
+  EXPECT_THAT(first.reason, HasSubstr("ended the connection"));
+  EXPECT_EQ(first.last_sequence, 41U);
+  EXPECT_EQ(next<v1::Frame>(client).sequence(), 57U);
+  const auto second = next<Reconnected>(client);
+  EXPECT_THAT(second.reason, HasSubstr("too many requests"));
+  EXPECT_EQ(second.last_sequence, 57U);
+  EXPECT_EQ(next<v1::Frame>(client).sequence(), 60U);
+}
+
 TEST(Reconnecting, ARequestInFlightFailsAndIsNotSentAgain) {
   PlayedDaemon daemon({[](Peer& peer) {
                          peer.greet();

@@ -79,12 +79,14 @@ TEST(Status, IsPrinted) {
   status.stages = {{"activity", 3, 9, 20}};
   status.light_followed = -0.0042;
   status.capture_thread = {5, 6, 7, 8};
+  status.cpu = 3;
   rig.port.set_status(status);
   const auto result = ctl(rig, {"status"});
   EXPECT_EQ(result.code, 0) << result.error;
   EXPECT_THAT(result.out,
               AllOf(HasSubstr("activity   p50 3 us, p99 9 us, max 20 us"), HasSubstr("0 encoded"),
-                    HasSubstr("page faults 5 minor, 6 major; context switches 7 waiting, 8 pre")));
+                    HasSubstr("capture      on CPU 3; page faults 5 minor, 6 major; context "
+                              "switches 7 waiting, 8 pre")));
   EXPECT_THAT(result.out, AllOf(StartsWith("state        serving\nhealth       not_realtime\n"),
                                 HasSubstr("LimitRTPRIO"), HasSubstr("camera       sim"),
                                 HasSubstr("calibration  none"), HasSubstr("brightness 255"),
@@ -123,7 +125,7 @@ TEST(Led, ShowsAndChanges) {
             "brightness 255, LEDs ffffff ffffff ffffff ffffff ffffff ffffff ffffff ffffff\n");
   EXPECT_THAT(ctl(rig, {"led", "--brightness", "128", "--json"}).out,
               AllOf(StartsWith(R"({"brightness":128,"leds":[{"r":255,"g":255,"b":255},)"),
-                    EndsWith("]}\n")));
+                    EndsWith("],\"gamma\":1}\n")));
   EXPECT_EQ(ctl(rig, {"led", "--scheme", "scheme1"}).out,
             "brightness 128, LEDs ffffff ffffff 000000 000000 ffffff ffffff 000000 000000\n");
 }

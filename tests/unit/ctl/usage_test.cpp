@@ -5,6 +5,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "clients/common/exit_codes.hpp"
+#include "clients/common/program.hpp"
 #include "clients/ctl/ctl.hpp"
 
 namespace dtact::ctl {
@@ -28,6 +30,37 @@ TEST(Usage, NamesTheWordThatIsNoCommand) {
 
 TEST(Usage, AsksForACommandWhereThereIsNone) {
   EXPECT_THAT(told({"--port", "7400"}), HasSubstr("A subcommand is required"));
+}
+
+// What a program asks its user to run again.
+TEST(CommandLine, HoldsEveryOptionThatWasGiven) {
+  CLI::App app("test", "dtact-calibrate");
+  std::ostringstream out;
+  cli::Context context{{}, false, out};
+  cli::add_global_options(app, context);
+  CLI::App* guided = app.add_subcommand("guided");
+  std::string folder = "unchanged";
+  std::vector<int> crop;
+  bool force = false;
+  guided->add_option("-f,--folder", folder);
+  guided->add_option("--presses", folder);
+  guided->add_option("--crop", crop)->delimiter(',')->expected(2);
+  guided->add_flag("--force", force);
+  std::ostringstream error;
+  const std::vector<std::string> given = {
+      "--host", "gripper",      "guided",  "--crop",        "500,400",
+      "-f",     "it's a press", "--force", "--fingerprint", std::string(64, 'a')};
+  ASSERT_EQ(cli::run(app, given, out, error), 0) << error.str();
+  EXPECT_EQ(cli::command_line(*guided),
+            "dtact-calibrate --host gripper --fingerprint " + std::string(64, 'a') +
+                " guided --folder 'it'\\''s a press' --crop 500,400 --force");
+}
+
+TEST(Usage, NamesEveryMeaningOfExitCodeFour) {
+  for (const char* meaning :
+       {"watch --min-fps", "bench: no frame", "find: no daemon", "guided: ended without a"}) {
+    EXPECT_THAT(cli::kExitCodesHelp, HasSubstr(meaning));
+  }
 }
 
 TEST(Usage, SaysWhenTheOutputCouldNotBeWritten) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "hal/base/clock.hpp"
+#include "hal/base/rt_thread.hpp"
 #include "hal/live/device_error.hpp"
 #include "tests/fakes/jpeg_maker.hpp"
 
@@ -99,6 +100,37 @@ struct Rig {
                       return {source, "the one", "GREY", {}};
                     }};
 };
+
+// What libcamera starts within inherits priority and pinning from the thread that opens.
+TEST(LiveCamera, IsOpenedAnewOnAThreadThatIsNeitherPinnedNorRealTime) {
+  const cpu_set_t allowed = base::allowed_cpus();
+  cpu_set_t seen;
+  CPU_ZERO(&seen);
+  int policy = -1;
+  auto source = std::make_shared<LendingSource>();
+  LiveCamera camera(small(), "test", "nothing yet", [&]() -> Opened {
+    if (!source) throw DeviceError(CameraState::busy, "busy: wait");
+    seen = base::allowed_cpus();
+    policy = ::sched_getscheduler(0);
+    return {source, "the one", "GREY", {}};
+  });
+  source->broken = true;
+  camera.start();
+  int last = 0;
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+    if (CPU_ISSET(static_cast<std::size_t>(cpu), &allowed)) last = cpu;
+  }
+  // FIFO where it is allowed; the pinning always is.
+  base::RtThread capture({.name = "capture", .cpu = last, .fifo_priority = 1}, [&] {
+    Frame frame;
+    (void)camera.grab(frame, milliseconds(20));
+    source = std::make_shared<LendingSource>();
+    (void)camera.grab(frame, milliseconds(300));
+  });
+  capture.join();
+  EXPECT_TRUE(CPU_EQUAL(&seen, &allowed));
+  EXPECT_EQ(policy, SCHED_OTHER);
+}
 
 TEST(LiveCamera, LendsFullRangeLumaWithoutACopy) {
   Rig rig;
@@ -299,6 +331,21 @@ TEST(LiveCamera, TheFirstFrameAfterARestartSaysSo) {
   rig.source->fill(1, 60);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   EXPECT_EQ(frame.info().flags, kFrameNormal);
+}
+
+// The silence of the camera before does not count for the one that was opened anew.
+TEST(LiveCamera, AReopenedCamerasFirstFrameIsWaitedFor) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  rig.source->broken = true;
+  const std::shared_ptr<LendingSource> lost = std::exchange(rig.source, nullptr);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(150)), GrabStatus::unplugged);
+  rig.source = std::make_shared<LendingSource>();
+  EXPECT_EQ(rig.camera.grab(frame, milliseconds(300)), GrabStatus::timeout);
+  EXPECT_NE(rig.camera.report().state, CameraState::stalled);
 }
 
 TEST(LiveCamera, RefusesImpossibleRates) {

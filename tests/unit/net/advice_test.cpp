@@ -9,6 +9,7 @@ namespace {
 using pipeline::Health;
 using testing::EndsWith;
 using testing::HasSubstr;
+using testing::Not;
 using testing::StartsWith;
 
 TEST(Advice, IsEmptyWhenAllIsWell) {
@@ -39,12 +40,22 @@ TEST(Advice, AddsTheDevicesOwnSentenceAndPutsItFirst) {
   EXPECT_EQ(advice(status), "The camera is away. /dev/video0 is gone: plug it in.");
   status.health.set(Health::camera_trouble);
   status.health.set(Health::not_realtime);
-  EXPECT_THAT(advice(status),
-              StartsWith("The camera gives no frames. /dev/video0 is gone: plug it in. The capture "
-                         "thread"));
+  EXPECT_THAT(
+      advice(status),
+      StartsWith("The camera gives no usable frames. /dev/video0 is gone: plug it in. The capture "
+                 "thread"));
   status.health.set(Health::ring_trouble);
   status.ring_message = "the ring is gone.";
   EXPECT_THAT(advice(status), HasSubstr("LED ring cannot be written to. the ring is gone."));
+}
+
+TEST(Advice, SaysWhatToDoAboutDamagedFramesOnly) {
+  pipeline::Status status;
+  status.health.set(Health::camera_trouble);
+  status.camera_damaged = true;
+  EXPECT_EQ(advice(status),
+            "The camera gives no usable frames. All that come are damaged: check its USB cable, "
+            "hub and port, or set another pixel_format or a lower camera.fps.");
 }
 
 TEST(Advice, SaysHowFarTheCameraHasMovedOnlyWhileItHas) {
@@ -65,6 +76,19 @@ TEST(Advice, NamesBothRatesOfASlowCamera) {
   status.health.set(Health::camera_slow);
   EXPECT_THAT(advice(status), StartsWith("The camera takes fewer frames than its mode promises"));
   EXPECT_THAT(advice(status), EndsWith("30.0 come in a second instead of 60."));
+}
+
+// Waiting does not help in the dark.
+TEST(Advice, SaysWhatToCheckInADarkPictureInsteadOfStartingUp) {
+  for (const Health waits : {Health::starting, Health::light_unsettled}) {
+    pipeline::Status status;
+    status.health.set(waits);
+    status.health.set(Health::image_dark);
+    EXPECT_THAT(advice(status),
+                StartsWith("The picture is too dark to measure in: check the ring's "
+                           "power and wiring"));
+    EXPECT_THAT(advice(status), Not(HasSubstr("keep the surface untouched")));
+  }
 }
 
 TEST(Advice, EndsWithWhatCouldNotBeKept) {

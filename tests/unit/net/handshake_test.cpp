@@ -39,6 +39,15 @@ TEST(Handshake, TellsVersionProgramAndSurfaceFrame) {
   EXPECT_EQ(reply.hello().surface_frame().origin(), "centre");
 }
 
+TEST(Handshake, TellsHowLongARezeroMayTake) {
+  Rig rig;
+  pipeline::Status status;
+  status.rezero_within_s = 11.5;
+  rig.port.set_status(status);
+  RawClient client(rig.tcp_port());
+  EXPECT_EQ(client.request(hello(1)).hello().rezero_within_s(), 11.5);
+}
+
 TEST(Handshake, RefusesAnotherMajorVersionAndEnds) {
   const Rig rig;
   RawClient client(rig.tcp_port());

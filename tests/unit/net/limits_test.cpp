@@ -4,8 +4,10 @@
 #include <poll.h>
 
 #include <algorithm>
+#include <chrono>
 #include <memory>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "daemon/serve/admission.hpp"
@@ -240,6 +242,30 @@ TEST(Incoming, IsBoundedForAllClientsTogether) {
   next.hello();
   next.send_bytes(part);
   next.send_bytes("x");
+  EXPECT_EQ(next.reply().error().code(), v1::ERROR_TOO_LARGE);
+}
+
+// Two of them would be all the room there is.
+TEST(Incoming, ABrokenOffUploadGivesItsRoomBack) {
+  Rig rig;
+  const std::string part = "\1\0\0\0"s + std::string((16U << 20U) - 1, 'x');
+  for (int i = 0; i < 3; ++i) {
+    {
+      RawClient leaves(rig.tcp_port());
+      leaves.hello();
+      leaves.send_bytes(part);
+    }
+    const auto end = std::chrono::steady_clock::now() + kPatience;
+    while (rig.overview().status.clients_size() > 0) {
+      ASSERT_LT(std::chrono::steady_clock::now(), end);
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+  }
+  RawClient next(rig.tcp_port());
+  next.hello();
+  next.send_bytes(part);
+  next.send_bytes("x");
+  // Read to its end, and then found to be no upload.
   EXPECT_EQ(next.reply().error().code(), v1::ERROR_TOO_LARGE);
 }
 

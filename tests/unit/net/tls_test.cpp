@@ -285,6 +285,20 @@ TEST_F(TlsServer, SaysThatACertificateHasExpired) {
   EXPECT_THAT(refusal(), HasSubstr(config_.tls_certificate.string() + ": has expired"));
 }
 
+TEST_F(TlsServer, AReloadGivesASocketFileNoFingerprint) {
+  config_.address = "";
+  config_.unix_socket = folder_.path() / "dtactd.sock";
+  boost::asio::io_context io;
+  FakePort port;
+  FakeStore store;
+  Server server(io, config_, port, store);
+  server.reload(config_);
+  const v1::Status status = server.overview().status;
+  ASSERT_EQ(status.endpoints_size(), 1);
+  EXPECT_FALSE(status.endpoints(0).tls());
+  EXPECT_EQ(status.endpoints(0).fingerprint(), "");
+}
+
 TEST(Fingerprint, IsTheDigestOfTheCertificate) {
   const ctl::Pair pair = ctl::make_pair({"gripper"});
   EXPECT_THAT(ctl::fingerprint_of(pair.certificate), MatchesRegex("[0-9a-f]{64}"));

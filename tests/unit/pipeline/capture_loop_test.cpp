@@ -57,6 +57,30 @@ TEST(CaptureLoop, ACameraThatHalvesItsRateIsNamedWithoutLosses) {
   ASSERT_TRUE(loop.until([&] { return loop.health().empty(); }, 120));
 }
 
+// A daemon that cannot keep up skips frames: no cable is to blame.
+TEST(CaptureLoop, FramesThatWereSkippedAreNotLost) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.sequence += 2;
+  loop.step(2);
+  EXPECT_FALSE(loop.health().has(Health::frames_lost));
+}
+
+TEST(CaptureLoop, AStreamOfDamagedFramesIsToldFromSilence) {
+  SteppedLoop loop;
+  loop.begin(toy_calibration());
+  ASSERT_TRUE(loop.until_fresh());
+  loop.camera.status = hal::GrabStatus::damaged;
+  loop.step(5);
+  EXPECT_TRUE(loop.health().has(Health::camera_trouble));
+  EXPECT_TRUE(loop.exchange.camera_damaged);
+  loop.camera.status = hal::GrabStatus::ok;
+  loop.step(1);
+  EXPECT_FALSE(loop.health().has(Health::camera_trouble));
+  EXPECT_FALSE(loop.exchange.camera_damaged);
+}
+
 TEST(CaptureLoop, TheConfiguredDelayOfTheLightTakesThePlaceOfTheCameras) {
   SteppedLoop loop(100);
   loop.config.light_delay_frames = 5;  // the camera states two

@@ -126,6 +126,21 @@ TEST(CaptureLoop, AFrameKnowsSinceWhenItsLightShows) {
   EXPECT_EQ(loop.light->light_since_ns(), loop.frame->light_since_ns);
 }
 
+// A stamp at the frame's end lies a period after the exposure that shows the light.
+TEST(CaptureLoop, SinceWhenALightShowsIsInTheFramesOwnTimestamps) {
+  SteppedLoop loop;
+  loop.camera.meaning = hal::TimestampMeaning::end_of_frame;
+  loop.begin(toy_calibration());
+  const std::int64_t shown_ns = loop.clock.now;
+  loop.light->start();
+  loop.step(2);
+  const auto period_ns = static_cast<std::int64_t>(1e9 / 60);
+  ASSERT_TRUE(loop.frame->light_since_ns);
+  EXPECT_NEAR(static_cast<double>(*loop.frame->light_since_ns),
+              static_cast<double>(shown_ns + 3 * period_ns), 10);
+  EXPECT_EQ(loop.light->light_since_ns(), loop.frame->light_since_ns);
+}
+
 TEST(CaptureLoop, PublishesTheCamerasJpegWhenItIsWanted) {
   SteppedLoop loop;
   loop.exchange.want_contact = loop.exchange.want_depth = false;

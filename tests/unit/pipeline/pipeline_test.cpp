@@ -1,5 +1,6 @@
 // What the whole pipeline serves: depth, references, light and calibrations.
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include <algorithm>
 
@@ -35,6 +36,24 @@ TEST_F(PipelineTest, ServesDepthAfterItsSequence) {
   ASSERT_GE(states.size(), 3U);
   EXPECT_EQ(states.front().state, State::settling);
   EXPECT_TRUE(states.front().health.has(Health::starting));
+}
+
+TEST_F(PipelineTest, SaysWhichCpuTheCaptureThreadIsPinnedTo) {
+  config.cpu = ::sched_getcpu();
+  start(fakes::toy_calibration());
+  EXPECT_EQ(pipeline->status().cpu, config.cpu);
+  config.cpu = 1000;  // there is none
+  pipeline.reset();
+  start(fakes::toy_calibration());
+  EXPECT_EQ(pipeline->status().cpu, std::nullopt);
+}
+
+// A picture that never holds still is refused after patience_frames in each of two phases.
+TEST_F(PipelineTest, SaysHowLongARezeroMayTake) {
+  config.reference.patience_frames = 90;
+  build(fakes::toy_calibration());
+  const Status status = pipeline->status();
+  EXPECT_DOUBLE_EQ(status.rezero_within_s, 1 + 2 * 90 / status.camera.fps);
 }
 
 TEST_F(PipelineTest, MeasuresAPressAndTellsContact) {

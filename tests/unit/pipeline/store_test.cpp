@@ -31,6 +31,7 @@ class StoreTest : public ::testing::Test {
   StoredReference some() {
     StoredReference reference{fakes::kToyWidth, fakes::kToyHeight, fakes::toy_reference_q8(), {}};
     reference.light.brightness = 200;
+    reference.light.gamma = 2.2;
     reference.light.leds[3] = {1, 2, 3};
     return reference;
   }

@@ -159,6 +159,30 @@ TEST_F(UntouchedImageTest, NoDepthIsMeasuredBeforeTheLightHasSettled) {
   EXPECT_TRUE(look(next()).measurable);
 }
 
+// The ring has no power, say. A camera's first pictures may be dark.
+TEST_F(UntouchedImageTest, ReportsADarkPictureBeforeTheFirstReference) {
+  scene_.light = 0.04;  // 6 levels
+  show(config_.reference.settle_frames - 1);
+  EXPECT_FALSE(has(Health::image_dark));
+  show(1);
+  EXPECT_TRUE(has(Health::image_dark));
+  EXPECT_TRUE(has(Health::starting));
+  scene_.light = 1;
+  show(1);
+  EXPECT_FALSE(has(Health::image_dark));
+  EXPECT_TRUE(settles());
+}
+
+TEST_F(UntouchedImageTest, ReportsADarkPictureAfterTheLightIsSwitchedOff) {
+  ASSERT_TRUE(settles());
+  image_.light_changes({.brightness = 0});
+  scene_.light = 0.04;
+  show(config_.reference.settle_frames);
+  EXPECT_TRUE(has(Health::image_dark));
+  image_.light_changes(config_.light);
+  EXPECT_FALSE(has(Health::image_dark));
+}
+
 TEST_F(UntouchedImageTest, WhatWasWrongWithThePictureIsNotToldWhileTheLightChanges) {
   ASSERT_TRUE(settles());
   scene_.light = 0.12;  // 17 levels

@@ -28,20 +28,40 @@ hal::FrameInfo numbered(std::uint64_t sequence, std::uint32_t flags = hal::kFram
 TEST(CameraWatch, AGapIsRememberedForASecond) {
   CameraWatch watch(kPeriod);
   EXPECT_FALSE(watch.arrived(numbered(5), 0));
-  EXPECT_FALSE(watch.lost_lately(0));  // the first number means nothing
+  EXPECT_FALSE(watch.lost_lately(0));
   (void)watch.arrived(numbered(6), kPeriod);
   EXPECT_FALSE(watch.lost_lately(kPeriod));
-  (void)watch.arrived(numbered(8), 100 * kMs);
+  (void)watch.arrived(numbered(8, hal::kFrameAfterGap), 100 * kMs);
   EXPECT_TRUE(watch.lost_lately(100 * kMs));
   EXPECT_TRUE(watch.lost_lately(1099 * kMs));
   EXPECT_FALSE(watch.lost_lately(1100 * kMs));
 }
 
-TEST(CameraWatch, FlagsAndDamageCountAsLossToo) {
+// The camera says what it lost; a frame that was passed over for a newer one is another thing.
+TEST(CameraWatch, ASkippedFrameIsNoLoss) {
+  CameraWatch watch(kPeriod);
+  (void)watch.arrived(numbered(5), 0);
+  (void)watch.arrived(numbered(8), 3 * kPeriod);
+  EXPECT_FALSE(watch.lost_lately(3 * kPeriod));
+}
+
+TEST(CameraWatch, KnowsAStreamOfDamagedFramesFromSilence) {
   CameraWatch watch(kPeriod);
   (void)watch.arrived(numbered(0), 0);
-  (void)watch.arrived(numbered(1, hal::kFrameAfterGap), kPeriod);
-  EXPECT_TRUE(watch.lost_lately(kPeriod));
+  watch.missed(hal::GrabStatus::damaged, 4 * kPeriod);
+  EXPECT_TRUE(watch.trouble());
+  EXPECT_TRUE(watch.damaged());
+  watch.missed(hal::GrabStatus::timeout, 8 * kPeriod);
+  EXPECT_TRUE(watch.trouble());
+  EXPECT_FALSE(watch.damaged());
+  watch.missed(hal::GrabStatus::damaged, 9 * kPeriod);
+  (void)watch.arrived(numbered(1), 10 * kPeriod);
+  EXPECT_FALSE(watch.damaged());
+}
+
+TEST(CameraWatch, DamageCountsAsLossToo) {
+  CameraWatch watch(kPeriod);
+  (void)watch.arrived(numbered(0), 0);
   watch.missed(hal::GrabStatus::damaged, 2000 * kMs);
   EXPECT_TRUE(watch.lost_lately(2000 * kMs));
 }
@@ -230,6 +250,19 @@ TEST(LightDiffers, ComparesAfterBrightness) {
   EXPECT_TRUE(light_differs(*calibration, light));
   calibration->origin.leds.clear();  // not recorded
   EXPECT_FALSE(light_differs(*calibration, light));
+}
+
+// White at brightness 128 emits 56 of 255 along a gamma of 2.2, and 128 along none.
+TEST(LightDiffers, ComparesAlongTheRingsGamma) {
+  const auto calibration = fakes::toy_calibration();
+  const hal::Light dimmed{.brightness = 128, .gamma = 2.2};
+  calibration->origin.leds.assign(std::size_t{3} * hal::kLedCount, 56);
+  EXPECT_FALSE(light_differs(*calibration, dimmed));
+  EXPECT_TRUE(light_differs(*calibration, {.brightness = 128}));
+  calibration->origin.leds.assign(std::size_t{3} * hal::kLedCount, 128);
+  EXPECT_TRUE(light_differs(*calibration, dimmed));
+  EXPECT_FALSE(light_differs(
+      *calibration, {.leds = hal::Light::all({128, 128, 128}), .brightness = 255, .gamma = 2.2}));
 }
 
 TEST(Activate, NamesTheListThatSharpeningNeeds) {

@@ -81,6 +81,13 @@ class Connecting(unittest.TestCase):
             self.assertEqual(daemon.requests[0].hello.token, "of-the-file")
             self.assertRaises(ValueError, dtact.connect, token="a", token_file="b")
 
+    def test_a_line_of_the_daemons_list_is_no_token(self):
+        with tempfile.NamedTemporaryFile("w") as file:
+            file.write("control " + 64 * "a" + " gripper\n")
+            file.flush()
+            with self.assertRaisesRegex(dtact.Error, "it is the second word"):
+                dtact.connect(token_file=file.name)
+
     def test_no_token_to_strangers(self):
         with FakeDaemon() as daemon, mock.patch("dtact.transport.is_local", return_value=False):
             with self.assertRaisesRegex(dtact.IdentityError, "fingerprint"):
@@ -267,6 +274,20 @@ class Requests(unittest.TestCase):
             daemon.answers["rezero"] = False
             self.assertRaises(dtact.TimeoutError, s.rezero)
             self.assertEqual(s.status().state, "serving")
+
+    def test_a_rezero_may_take_as_long_as_the_daemon_says(self):
+        def hello(request, reply):
+            reply.hello.major, reply.hello.rezero_within_s = 1, 60
+
+        def late(request, reply):
+            time.sleep(0.5)
+            refuse(5, "the picture is not still")(request, reply)
+
+        with FakeDaemon() as daemon:
+            daemon.answers |= {"hello": hello, "rezero": late}
+            with dtact.connect(daemon.address, timeout=0.2) as s:
+                with self.assertRaisesRegex(dtact.Refused, "not still"):
+                    s.rezero()
 
 
 class Spaces(unittest.TestCase):

@@ -27,8 +27,9 @@ def channel(number, topic):
     return record(4, struct.pack("<HH", number, 1) + text(topic) + text("protobuf") + text(""))
 
 
-def message(number, content):
-    return record(5, struct.pack("<HIQQ", number, 0, 1, 1) + content.SerializeToString())
+def message(number, content, log_time=1):
+    data = content if isinstance(content, bytes) else content.SerializeToString()
+    return record(5, struct.pack("<HIQQ", number, 0, log_time, log_time) + data)
 
 
 def chunk(records, compression="zstd", size=None):
@@ -55,6 +56,22 @@ class Read(unittest.TestCase):
                        CHANNELS + chunk(inside), CHANNELS + inside):
             self.assertEqual(self.read(MAGIC, record(1, b"any"), packed, record(2, b""), MAGIC),
                              [1, -7, 2])
+
+    def test_a_frame_gets_the_jpeg_that_stands_before_it(self):
+        def jpeg(data):  # a CompressedImage: timestamp, data, format, frame_id
+            return (b"\x0a\x02\x08\x05" + b"\x12" + bytes([len(data)]) + data + b"\x1a\x04jpeg"
+                    + b"\x22\x01f")
+
+        inside = (message(6, jpeg(b"first"), 10) + message(3, frame(1).frame, 10)
+                  + message(3, frame(2).frame, 20) + message(6, jpeg(b"lone"), 30)
+                  + message(3, frame(3).frame, 31)
+                  + message(6, jpeg(b"last"), 40) + message(3, frame(4).frame, 40))
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder, "press.mcap")
+            file.write_bytes(MAGIC + CHANNELS + channel(6, "/camera/jpeg") + chunk(inside))
+            frames = list(dtact.read(file))
+        self.assertEqual([f.jpeg if f.has_jpeg else None for f in frames],
+                         [b"first", None, None, b"last"])
 
     def test_one_that_was_cut_off(self):
         first, second = chunk(message(3, frame(1).frame)), chunk(message(3, frame(2).frame))

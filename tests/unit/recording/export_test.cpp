@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
 #include <sstream>
 
 #include "clients/ctl/ctl.hpp"
@@ -96,6 +97,20 @@ TEST_F(Export, Tables) {
   EXPECT_EQ(read("events.csv"),
             "time_ns,sequence,monotonic_ns,event,detail\n"
             "1700000000233333338,14,1233333338,contact_made,deepest_mm=0.5\n");
+}
+
+// Of a longer recording in another format, say. What is no export's stays.
+TEST_F(Export, ForceReplacesAnEarlierExport) {
+  ASSERT_EQ(run({"--to", "png"}), 0) << said_;
+  base::write_file_atomically(out_ / "depth-notes.png", "mine");
+  ASSERT_EQ(run({"--to", "png", "--force", "--frames", "1:3"}), 0) << said_;
+  std::set<std::string> names;
+  for (const auto& entry : fs::directory_iterator(out_)) names.insert(entry.path().filename());
+  EXPECT_THAT(names, ElementsAre("depth-000001.png", "depth-000002.png", "depth-notes.png",
+                                 "events.csv", "frames.csv"));
+  ASSERT_EQ(run({"--to", "npy", "--force"}), 0) << said_;
+  EXPECT_FALSE(fs::exists(out_ / "depth-000001.png"));
+  EXPECT_TRUE(fs::exists(out_ / "depth-notes.png"));
 }
 
 TEST_F(Export, SaysWhatIsWrong) {

@@ -95,7 +95,7 @@ int EmulatedNodes::answer(const EmulatedNode& node, unsigned long request,
       auto& size = as<v4l2_frmsizeenum>(argument);
       if (node.width == 0) {
         size.type = V4L2_FRMSIZE_TYPE_STEPWISE;
-        size.stepwise = {64, 16384, 2, 64, 16384, 2};
+        size.stepwise = {64, 16384, 2, 48, 8192, 2};
       } else {
         size.type = V4L2_FRMSIZE_TYPE_DISCRETE;
         size.discrete = {node.width, node.height};

@@ -18,7 +18,7 @@ struct EmulatedNode {
   const char* bus = "";
   bool has_input = false;
   std::uint32_t fourcc = 0;  ///< 0 = no format.
-  std::uint32_t width = 0;   ///< 0 = every size from 64×64 to 16384×16384.
+  std::uint32_t width = 0;   ///< 0 = every size from 64×48 to 16384×8192.
   std::uint32_t height = 0;
 };
 

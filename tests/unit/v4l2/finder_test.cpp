@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "hal/v4l2/error_of.hpp"
+#include "hal/v4l2/modes.hpp"
 #include "tests/unit/v4l2/emulated_camera.hpp"
 #include "tests/unit/v4l2/emulated_nodes.hpp"
 
@@ -190,6 +191,20 @@ TEST(ListNodes, SaysWhyEachIsNotTaken) {
             "/dev/video10: it converts images, as a codec does\n"
             "/dev/video13: it delivers no images\n"
             "/dev/video14: it has no video input: it converts what a program hands to it\n");
+}
+
+// A range has a lower and an upper bound for each direction.
+TEST(ListModes, ReadsARangeOfSizes) {
+  EmulatedNode any = kPort;
+  any.width = any.height = 0;
+  const EmulatedNodes nodes({any});
+  const DeviceName::Opened camera = DeviceName("/dev/video2").open();
+  const std::vector<Mode> modes = list_modes(camera.fd.get());
+  ASSERT_EQ(modes.size(), 1U);
+  EXPECT_EQ(modes[0].min_width, 64);
+  EXPECT_EQ(modes[0].min_height, 48);
+  EXPECT_EQ(modes[0].width, 16384);
+  EXPECT_EQ(modes[0].height, 8192);
 }
 
 TEST(StableName, IsNeverALinkThatUdevIsStillMaking) {

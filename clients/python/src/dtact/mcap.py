@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
@@ -13,29 +14,38 @@ from google.protobuf.message import DecodeError
 from .errors import Error
 from .event import Event, event_of
 from .frame import Frame
-from .messages import message_class
+from .messages import COMPRESSED_IMAGE, message_class
 
 _MAGIC = b"\x89MCAP0\r\n"
 _CHANNEL, _MESSAGE, _CHUNK = 0x04, 0x05, 0x06
 # A record, and a chunk once it is decompressed, has at most so many bytes in files of dtactctl.
 _MOST_RECORD = 256 << 20
-_FRAMES, _EVENTS = "/dtact/frame", "/dtact/event"
+_FRAMES, _EVENTS, _JPEGS = "/dtact/frame", "/dtact/event", "/camera/jpeg"
+
+
+@dataclass
+class _State:
+    """What earlier records of the file say about the ones to come."""
+
+    topics: dict[int, str] = field(default_factory=dict)
+    #: Log time and bytes of the newest JPEG: it stands before the frame that it belongs to.
+    jpeg: tuple[int, bytes] | None = None
 
 
 def read(path: str | Path) -> Iterator[Frame | Event]:
-    """The frames and events of a recording, in the order of the file. One whose writer was killed is
+    """The frames, with their JPEGs, and events of a recording, in the order of the file. One whose writer was killed is
     read as far as it goes. Error for a file that is no MCAP, or is damaged inside."""
     with open(path, "rb") as file:
         if file.read(len(_MAGIC)) != _MAGIC:
             raise Error(f"{path} is no MCAP file")
-        topics: dict[int, str] = {}
+        state = _State()
         try:
             for opcode, body in _records(file):
                 if opcode == _CHUNK:
                     for inner, part in _in_chunk(body):
-                        yield from _take(inner, part, topics)
+                        yield from _take(inner, part, state)
                 else:
-                    yield from _take(opcode, body, topics)
+                    yield from _take(opcode, body, state)
         except (struct.error, ValueError, DecodeError, zstandard.ZstdError) as e:
             raise Error(f"{path} is damaged: {e}") from e
 
@@ -73,17 +83,25 @@ def _in_chunk(body: bytes) -> Iterator[tuple[int, memoryview]]:
         records = records[9 + length :]
 
 
-def _take(opcode: int, body: bytes | memoryview, topics: dict[int, str]) -> Iterator[Frame | Event]:
+def _take(opcode: int, body: bytes | memoryview, state: _State) -> Iterator[Frame | Event]:
     if opcode == _CHANNEL:
         number, size = struct.unpack_from("<H2xI", body)
-        topics[number] = bytes(body[8 : 8 + size]).decode()
+        state.topics[number] = bytes(body[8 : 8 + size]).decode()
     elif opcode == _MESSAGE:
-        (channel,) = struct.unpack_from("<H", body)
+        channel, log_time = struct.unpack_from("<H4xQ", body)
+        topic = state.topics.get(channel)
+        if topic not in (_FRAMES, _EVENTS, _JPEGS):
+            return
         data = bytes(body[22:])
-        topic = topics.get(channel)
         if topic == _FRAMES:
-            yield Frame(message_class("Frame").FromString(data))
-        elif topic == _EVENTS:
+            frame = message_class("Frame").FromString(data)
+            if state.jpeg is not None and state.jpeg[0] == log_time:
+                frame.jpeg.data = state.jpeg[1]
+                state.jpeg = None
+            yield Frame(frame)
+        elif topic == _JPEGS:
+            state.jpeg = log_time, COMPRESSED_IMAGE.FromString(data).data
+        else:
             event = event_of(message_class("Event").FromString(data))
             if event is not None:
                 yield event

@@ -23,6 +23,28 @@ for _file in descriptor_pb2.FileDescriptorSet.FromString(
 ).file:
     _pool.AddSerializedFile(_file.SerializeToString())
 
+# Of foxglove.CompressedImage what recordings are read for; its other fields are passed over.
+_pool.AddSerializedFile(
+    descriptor_pb2.FileDescriptorProto(
+        name="compressed_image.proto",
+        package="foxglove",
+        syntax="proto3",
+        message_type=[
+            descriptor_pb2.DescriptorProto(
+                name="CompressedImage",
+                field=[
+                    descriptor_pb2.FieldDescriptorProto(
+                        name="data",
+                        number=2,
+                        type=descriptor_pb2.FieldDescriptorProto.TYPE_BYTES,
+                        label=descriptor_pb2.FieldDescriptorProto.LABEL_OPTIONAL,
+                    )
+                ],
+            )
+        ],
+    ).SerializeToString()
+)
+
 # protobuf 4.22 brought GetMessageClass, 5 took GetPrototype away.
 if hasattr(message_factory, "GetMessageClass"):
     _class_of = message_factory.GetMessageClass
@@ -35,6 +57,7 @@ def message_class(name: str) -> Any:
     return _class_of(_pool.FindMessageTypeByName(f"dtact.v1.{name}"))
 
 
+COMPRESSED_IMAGE = _class_of(_pool.FindMessageTypeByName("foxglove.CompressedImage"))
 ClientMessage = message_class("ClientMessage")
 ServerMessage = message_class("ServerMessage")
 

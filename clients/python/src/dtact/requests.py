@@ -36,6 +36,8 @@ class Request(Generic[T]):
     needs: frozenset[str] = frozenset()
     #: Calibrations are parsed, and some written to a disk, before the request is answered.
     slow: bool = False
+    #: Frames are averaged before the request is answered.
+    averages: bool = False
 
 
 def _nothing(reply: Message) -> None:
@@ -100,7 +102,7 @@ def set_reconstruction(method: str | None, sharpen: str | None,
 def rezero(force: bool) -> Request[None]:
     message = ClientMessage()
     message.rezero.force = force
-    return Request(message, _nothing)
+    return Request(message, _nothing, averages=True)
 
 
 def status() -> Request[Status]:

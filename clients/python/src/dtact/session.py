@@ -193,6 +193,8 @@ class Session:
         self._lost_at = None
 
     def _patience(self, request: Request[T]) -> float:
+        if request.averages and self._server is not None:
+            return self._timeout + self._server.rezero_within_s
         return max(self._timeout, _SLOW_S) if request.slow else self._timeout
 
     def _subscribe_request(self, subscription: Subscription | None) -> Request[None]:
@@ -271,8 +273,10 @@ def read_token(file: Path) -> str:
     if status.st_mode & _others(file, status):
         raise Error(f"{file} can be read by others: chmod 600 {file}")
     token = lines[0].rstrip() if lines else ""
-    if not 1 <= len(token.encode()) <= _MOST_TOKEN_BYTES:
-        raise Error(f"the first line of {file} is no token: it has 1 to {_MOST_TOKEN_BYTES} bytes")
+    # The daemon's own file has lines like "control TOKEN NAME".
+    if not 1 <= len(token.encode()) <= _MOST_TOKEN_BYTES or " " in token:
+        raise Error(f"the first line of {file} is no token: it has 1 to {_MOST_TOKEN_BYTES} bytes "
+                    "and no blanks. Of a line for the daemon (dtactctl token) it is the second word")
     return token
 
 

@@ -199,8 +199,9 @@ class Server:
     name: str
     serial: str  #: the camera's, as far as it tells one
     frame_id: str  #: of the surface frame
+    rezero_within_s: float = 0  #: a re-zero is answered within this time
 
     @classmethod
     def of(cls, m: Message) -> Server:
         return cls(m.program, m.major, m.minor, frozenset(m.features), name_of("Rights", m.rights),
-                   m.name, m.serial, m.surface_frame.frame_id)
+                   m.name, m.serial, m.surface_frame.frame_id, m.rezero_within_s)

@@ -6,14 +6,11 @@ import {
   BufferGeometry,
   GLSL3,
   Points,
-  Quaternion,
   RawShaderMaterial,
-  Vector3,
 } from "three";
-import { ObjectPose_Tracking } from "../../gen/dtact_pb";
-import type { ObjectPose } from "../../gen/dtact_pb";
 import { el, say } from "../dom";
 import type { Cloud, Frame } from "../session/messages";
+import { placeAxes } from "./axes";
 import { Space } from "./space";
 
 const AXES_MM = 3;
@@ -55,11 +52,6 @@ void main() {
 
 const PARTS = ["x", "y", "z", "normalX", "normalY", "normalZ"];
 
-/** A vector of the surface frame as the scene has it. */
-function toScene(vector: { x: number; y: number; z: number } | undefined): Vector3 {
-  return vector ? new Vector3(vector.x, -vector.y, -vector.z) : new Vector3();
-}
-
 export class CloudView {
   private readonly space: Space;
   private readonly uniforms = { mmPerUnit: { value: 0.001 }, pixels: { value: 1 } };
@@ -85,7 +77,7 @@ export class CloudView {
   show(frame: Frame): void {
     if (frame.contact?.touching === false) return this.clear();
     if (frame.cloud) this.draw(frame.cloud);
-    this.place(frame.pose);
+    placeAxes(this.axes, frame.pose);
     this.space.render();
   }
 
@@ -126,22 +118,5 @@ export class CloudView {
       }
     }
     return 0.1;
-  }
-
-  private place(pose: ObjectPose | undefined): void {
-    const known =
-      pose !== undefined &&
-      pose.tracking !== ObjectPose_Tracking.LOST &&
-      pose.tracking !== ObjectPose_Tracking.SEARCHING;
-    this.axes.visible = known;
-    if (!known) return;
-    const turn = toScene(pose.rotationDeg).multiplyScalar(Math.PI / 180);
-    const angle = turn.length();
-    const rotation = new Quaternion();
-    if (angle > 0) rotation.setFromAxisAngle(turn.divideScalar(angle), angle);
-    // A point p of the object lies at rotation(p) + translation now.
-    const centre = toScene(pose.centreMm).applyQuaternion(rotation);
-    this.axes.position.copy(centre.add(toScene(pose.translationMm)));
-    this.axes.quaternion.copy(rotation);
   }
 }

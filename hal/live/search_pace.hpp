@@ -5,10 +5,13 @@
 #include <string>
 #include <utility>
 
-namespace dtact::hal::libcamera_backend {
+#include "hal/live/source.hpp"
 
-/// When it is worth while to look for cameras: every so often, and in each try while the nodes of
-/// cameras are new. Beginning a manager opens every media device of the machine.
+namespace dtact::hal::live {
+
+/// When it is worth while to look for cameras: every two seconds, and in each try while the nodes
+/// of cameras are new. Looking opens every video or media device of the machine, and some of them
+/// start firmware.
 class SearchPace {
  public:
   static constexpr std::chrono::seconds kPeriod{2};
@@ -25,4 +28,8 @@ class SearchPace {
   std::optional<std::chrono::steady_clock::time_point> last_;
 };
 
-}  // namespace dtact::hal::libcamera_backend
+/// `open`, called as often as `pace` allows after it has failed; in between the last failure is
+/// thrown again.
+[[nodiscard]] Opener paced(Opener open, SearchPace pace = SearchPace());
+
+}  // namespace dtact::hal::live

@@ -1,13 +1,14 @@
-#include "hal/libcamera/search_pace.hpp"
+#include "hal/live/search_pace.hpp"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 #include <fstream>
 
+#include "hal/live/device_error.hpp"
 #include "tests/fakes/own_path.hpp"
 
-namespace dtact::hal::libcamera_backend {
+namespace dtact::hal::live {
 namespace {
 
 using namespace std::chrono_literals;
@@ -44,5 +45,39 @@ TEST(SearchPace, LooksSeldomWithoutAFolderOfDevices) {
   EXPECT_FALSE(pace.due(begin + 1s, std::chrono::system_clock::now()));
 }
 
+// Of several attempts a second one looks; the others say what it found.
+TEST(Paced, FailsWithoutALookUntilItIsTime) {
+  int looks = 0;
+  const Opener open = paced(
+      [&]() -> Opened {
+        ++looks;
+        throw DeviceError(CameraState::busy, "another program uses it: end it");
+      },
+      SearchPace("/nonexistent"));
+  for (int i = 0; i < 5; ++i) {
+    try {
+      (void)open();
+      ADD_FAILURE();
+    } catch (const DeviceError& e) {
+      EXPECT_EQ(e.state(), CameraState::busy);
+      EXPECT_STREQ(e.what(), "another program uses it: end it");
+    }
+  }
+  EXPECT_EQ(looks, 1);
+}
+
+TEST(Paced, ACameraThatWasOpenIsLookedForAtOnce) {
+  int looks = 0;
+  const Opener open = paced(
+      [&]() -> Opened {
+        ++looks;
+        return {};
+      },
+      SearchPace("/nonexistent"));
+  (void)open();
+  (void)open();
+  EXPECT_EQ(looks, 2);
+}
+
 }  // namespace
-}  // namespace dtact::hal::libcamera_backend
+}  // namespace dtact::hal::live

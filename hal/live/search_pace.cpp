@@ -1,11 +1,14 @@
-#include "hal/libcamera/search_pace.hpp"
+#include "hal/live/search_pace.hpp"
 
 #include <sys/stat.h>
 
 #include <filesystem>
 #include <system_error>
+#include <utility>
 
-namespace dtact::hal::libcamera_backend {
+#include "hal/live/device_error.hpp"
+
+namespace dtact::hal::live {
 namespace {
 
 /// Whether a node of a camera has been made or changed within SearchPace::kPeriod. A clock that is
@@ -33,4 +36,20 @@ bool SearchPace::due(std::chrono::steady_clock::time_point now,
   return true;
 }
 
-}  // namespace dtact::hal::libcamera_backend
+Opener paced(Opener open, SearchPace pace) {
+  return [open = std::move(open), pace = std::move(pace),
+          failed = std::optional<DeviceError>()]() mutable -> Opened {
+    const bool due = pace.due(std::chrono::steady_clock::now(), std::chrono::system_clock::now());
+    if (failed && !due) throw DeviceError(*failed);
+    try {
+      Opened opened = open();
+      failed.reset();
+      return opened;
+    } catch (const DeviceError& e) {
+      failed = e;
+      throw;
+    }
+  };
+}
+
+}  // namespace dtact::hal::live

@@ -1,0 +1,89 @@
+// What a client of the Foxglove protocol is sent while its link is slow.
+#include "clients/web/foxglove/foxglove_client.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/buffers_iterator.hpp>
+#include <boost/asio/io_context.hpp>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace dtact::web::foxglove {
+namespace {
+
+namespace asio = boost::asio;
+
+/// A socket whose writes end when the test says so.
+class SlowSocket final : public WebSocket {
+ public:
+  explicit SlowSocket(asio::io_context& io) : io_(io) {}
+
+  void read_some(asio::mutable_buffer into, OnRead done) override {
+    into_ = into;
+    read_ = std::move(done);
+  }
+  void write(const Parts& parts, bool /*text*/, Done done) override {
+    sent.emplace_back(asio::buffers_begin(parts), asio::buffers_end(parts));
+    written_ = std::move(done);
+  }
+  void end(std::shared_ptr<void> /*held*/) override {}
+  void close() override {
+    read_ = nullptr;
+    written_ = nullptr;
+  }
+  asio::any_io_executor executor() override { return io_.get_executor(); }
+
+  void receive(const std::string& text) {
+    asio::buffer_copy(into_, asio::buffer(text));
+    std::exchange(read_, nullptr)({}, {text.size(), true, true});
+  }
+  /// Ends the write under way. False: there is none.
+  bool finish_write() {
+    if (!written_) return false;
+    std::exchange(written_, nullptr)({}, sent.back().size());
+    return true;
+  }
+
+  std::vector<std::string> sent;
+
+ private:
+  asio::io_context& io_;
+  asio::mutable_buffer into_;
+  OnRead read_;
+  Done written_;
+};
+
+TEST(FoxgloveClient, OnASlowLinkTheNewestMapWaits) {
+  asio::io_context io;
+  const auto socket = std::make_shared<SlowSocket>(io);
+  const auto station =
+      std::make_shared<Station>(std::make_shared<Source>(io, "left", client::Options{}));
+  const auto client =
+      std::make_shared<FoxgloveClient>(socket, std::vector<Place>{{station, "", {}}},
+                                       net::Rights::view, "test", [](const std::string&) {});
+  client->start();
+  while (socket->finish_write()) {
+  }
+  socket->receive(R"({"op":"subscribe","subscriptions":[{"id":7,"channelId":)" +
+                  std::to_string(index(Topic::depth) + 1) + "}]}");
+  socket->sent.clear();
+  const auto tell = [&](const char* map) {
+    client->on_message(*station, Topic::depth, std::make_shared<const Message>(Message{1, map}));
+  };
+  tell("first");  // on its way at once
+  tell("second");
+  tell("third");
+  while (socket->finish_write()) {
+  }
+  ASSERT_EQ(socket->sent.size(), 2U);
+  EXPECT_TRUE(socket->sent[0].ends_with("first"));
+  EXPECT_TRUE(socket->sent[1].ends_with("third"));
+  client->close("over");
+}
+
+}  // namespace
+}  // namespace dtact::web::foxglove
