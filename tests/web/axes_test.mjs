@@ -5,9 +5,6 @@ import test from "node:test";
 
 const { placeAxes } = await import(path.resolve(process.env.PAGE_NODE, "axes.mjs"));
 
-const TRACKED = 2;
-const LOST = 3;
-
 /** Axes that keep what they are given. */
 function axes() {
   const kept = { visible: false, at: undefined, turn: undefined };
@@ -24,7 +21,7 @@ function axes() {
 test("the axes lie at the pose's centre, turned as the object", () => {
   const shown = axes();
   placeAxes(shown, {
-    tracking: TRACKED,
+    valid: true,
     centreMm: { x: 4, y: -2, z: 1 },
     translationMm: { x: 0.5, y: 3, z: 0 },
     rotationDeg: { x: 0, y: 0, z: 90 },
@@ -37,7 +34,7 @@ test("the axes lie at the pose's centre, turned as the object", () => {
 
 test("axes are hidden without a pose and while it is lost", () => {
   const shown = axes();
-  for (const pose of [undefined, { tracking: LOST }]) {
+  for (const pose of [undefined, { valid: false }]) {
     shown.visible = true;
     placeAxes(shown, pose);
     assert.equal(shown.visible, false);

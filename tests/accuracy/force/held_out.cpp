@@ -153,7 +153,7 @@ std::string make_calibration(double thickness_mm, Calibrating calibrating, std::
   const std::string made = (folder / "calibration").string();
   (void)calibrate({"depth", "--reference", (folder / "reference").string(), "--ball",
                    (folder / "ball").string(), "--radius-mm", "4.0", "--mm-per-px", "0.0413793",
-                   "--centre", "300,400", "--crop", "580,580", "-o", made});
+                   "--centre", "400,300", "--crop", "580,580", "-o", made});
   std::string csv = "frames,force\n";
   for (std::size_t i = 1; i < presses; ++i) {
     const std::string name = fmt::format("load{}.png", i);

@@ -16,7 +16,6 @@
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/difference.hpp"
 #include "clients/perceive/pose/tracker.hpp"
-#include "tests/accuracy/pose/normal_flow.hpp"
 #include "tests/accuracy/real/ball_press.hpp"
 #include "tests/unit/perceive/balls.hpp"
 
@@ -49,10 +48,8 @@ class RealPose : public testing::TestWithParam<Sensor> {
 
   struct Result {
     perceive::test::Error worst;
-    perceive::test::Error flow;  ///< The worst of NormalFlow's method, in what ours sees.
     int lost = 0;
-    int flow_lost = 0;
-    std::size_t hidden = 0;
+    std::size_t unobservable = 0;
   };
 
   [[nodiscard]] Result follow(const char* object, double slide_mm, double twist_deg) {
@@ -67,7 +64,6 @@ class RealPose : public testing::TestWithParam<Sensor> {
     cv::divide(images.frame, images.reference, loss);
     cv::GaussianBlur(loss, loss, {}, 1.5);
     Tracker tracker;
-    pose::NormalFlow flow;
     perceive::CloudMaker maker;
     perceive::PointCloud cloud;
     Result result;
@@ -84,26 +80,17 @@ class RealPose : public testing::TestWithParam<Sensor> {
       maker.make(grid, 1, cloud);
       const ContactView view(grid, cloud, maker.table(), 30);
       const auto& found = tracker.follow(view, static_cast<std::uint64_t>(step));
-      const auto& flown = flow.follow(grid, cloud, view);
       if (found.state == Tracker::State::lost) {
         ++result.lost;
         continue;
       }
-      result.hidden = found.alignment.unobservable.size();
+      result.unobservable = found.unobservable.size();
       keep(result.worst, perceive::test::error_of(found.alignment, truth));
-      if (flown.lost) {
-        ++result.flow_lost;
-        continue;
-      }
-      perceive::Alignment theirs = found.alignment;
-      theirs.motion = flown.motion;
-      keep(result.flow, perceive::test::error_of(theirs, truth));
     }
     fmt::print(
-        "{} {}, {:.0f} mm {:.0f} deg, {} hidden: worst {:.0f} um {:.2f} deg, {} lost; NormalFlow's "
-        "{:.0f} um {:.2f} deg, {} lost\n",
-        GetParam().name, object, slide_mm, twist_deg, result.hidden, result.worst.um,
-        result.worst.degrees, result.lost, result.flow.um, result.flow.degrees, result.flow_lost);
+        "{} {}, {:.0f} mm {:.0f} deg, {} unobservable: worst {:.0f} um {:.2f} deg, {} lost\n",
+        GetParam().name, object, slide_mm, twist_deg, result.unobservable, result.worst.um,
+        result.worst.degrees, result.lost);
     return result;
   }
 
@@ -120,8 +107,8 @@ class RealPose : public testing::TestWithParam<Sensor> {
                                                 const Motion& motion) {
     const double middle_x = 0.5 * (loss.cols - 1);
     const double middle_y = 0.5 * (loss.rows - 1);
-    const Eigen::Matrix3d& turn = motion.rotation;
-    const Eigen::Vector3d shift = motion.translation * 1e3 / model.mm_per_px;
+    const Eigen::Matrix3d turn = motion.linear();
+    const Eigen::Vector3d shift = motion.translation() * 1e3 / model.mm_per_px;
     const cv::Mat1d move =
         (cv::Mat1d(2, 3) << turn(0, 0), turn(0, 1),
          middle_x + shift.x() - turn(0, 0) * middle_x - turn(0, 1) * middle_y, turn(1, 0),
@@ -155,18 +142,19 @@ TEST_P(RealPose, ABoardOfPinsSlidesAndTwists) {
   for (const auto& [slide_mm, twist_deg] : {std::pair{kSlideMm, 0.0}, {0.0, kTwistDeg}}) {
     const Result result = follow("board", slide_mm, twist_deg);
     EXPECT_EQ(result.lost, 0);
-    EXPECT_EQ(result.hidden, 0U);
+    EXPECT_EQ(result.unobservable, 0U);
     EXPECT_LT(result.worst.um, 15);
     EXPECT_LT(result.worst.degrees, 0.2);
   }
 }
 
-// sensor_b's lopsided press looks as if it showed two of a ball's three turns.
+// sensor_b's lopsided press looks as if it showed two of a ball's three turns, and slides by up to
+// 0.13 mm where it turns.
 TEST_P(RealPose, ABallSlidesAndTurns) {
   for (const auto& [slide_mm, twist_deg] : {std::pair{kSlideMm, 0.0}, {0.0, kTwistDeg}}) {
     const Result result = follow("ball", slide_mm, twist_deg);
     EXPECT_EQ(result.lost, 0);
-    EXPECT_LT(result.worst.um, 50);
+    EXPECT_LT(result.worst.um, 150);
     EXPECT_LT(result.worst.degrees, 2);
   }
 }

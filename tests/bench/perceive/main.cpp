@@ -156,7 +156,7 @@ void measure(const Sensor& sensor, const Frames& of, CloudMaker& maker, Measured
     if (i > 0) measured.pose.ms.push_back(ms + measured.box.ms.back());
   }
   const Motion& motion = tracker.pose().alignment.motion;
-  const double off_mm = (1e3 * motion.translation - Vector3d(kSlideMm, 0, 0)).norm();
+  const double off_mm = (1e3 * motion.translation() - Vector3d(kSlideMm, 0, 0)).norm();
   if (tracker.pose().state != Tracker::State::tracked || !(off_mm < 0.03)) {
     throw std::runtime_error(fmt::format("{}: the slide is {:.3f} mm off", sensor.name, off_mm));
   }

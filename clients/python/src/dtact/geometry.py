@@ -110,7 +110,8 @@ class ObjectPose:
     points: int  #: that count
     object: str = ""  #: the known object's name; empty: the motion since the contact was made
     alternatives: int = 0  #: other placements of the known object that explain the contact as well
-    followed_in_s: float = 0.0  #: what following took
+    followed_in_s: float = 0.0  #: processing time
+    valid: bool = False  #: the motion of this frame is known: started, tracked or recovered
 
     @classmethod
     def of(cls, m: Message) -> ObjectPose:
@@ -122,7 +123,7 @@ class ObjectPose:
                    np.array(vector(m.translation_mm)), np.array(vector(m.rotation_deg)),
                    np.array(hidden).reshape(-1, 6), np.array(vector(m.centre_mm)),
                    float(m.arm_mm), float(m.residual_um), int(m.points), str(m.object),
-                   int(m.alternatives), m.track_ns * 1e-9)
+                   int(m.alternatives), m.track_ns * 1e-9, bool(m.valid))
 
     def matrix(self) -> NDArray[np.float64]:
         """4 × 4, millimetres."""

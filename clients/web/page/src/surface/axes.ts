@@ -1,7 +1,6 @@
 // The axes of the object in contact, in the scene of its points.
 import { Vector3 } from "three";
 import type { Object3D } from "three";
-import { ObjectPose_Tracking } from "../../gen/dtact_pb";
 import type { ObjectPose } from "../../gen/dtact_pb";
 
 /** A vector of the surface frame as the scene has it. */
@@ -14,10 +13,7 @@ export function placeAxes(
   axes: Pick<Object3D, "visible" | "position" | "quaternion">,
   pose: ObjectPose | undefined,
 ): void {
-  const known =
-    pose !== undefined &&
-    pose.tracking !== ObjectPose_Tracking.LOST &&
-    pose.tracking !== ObjectPose_Tracking.SEARCHING;
+  const known = pose !== undefined && pose.valid;
   axes.visible = known;
   if (!known) return;
   // The centre is that of the present contact: it has moved with the object already.
