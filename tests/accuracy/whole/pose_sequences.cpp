@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/sim/placement.hpp"
 #include "proto/framing.hpp"
 #include "tests/accuracy/whole/moving_objects.hpp"
 #include "tests/accuracy/whole/program.hpp"
@@ -32,7 +31,7 @@ struct Arguments {
   std::vector<std::string> objects;
   std::vector<std::string> motions;
   fs::path out;
-  std::string head;  ///< A scene's tables that come before the press.
+  fs::path head;  ///< A scene's tables that come before the press; empty: none.
 };
 
 /// Everything when nothing is named.
@@ -45,13 +44,12 @@ const char* phase_of(const MotionFrames& frames, std::uint64_t n) {
   return n < frames.end ? "motion" : "end";
 }
 
-std::string truth_line(const hal::sim::Truth& truth, const MotionFrames& frames, std::uint64_t n) {
-  const hal::sim::Pose pose = truth.pose(0, n).value();
-  const cv::Matx33d rotation = hal::sim::rotation_of(pose.turn_deg);
+std::string truth_line(const hal::sim::Truth& truth, const Eigen::Isometry3d& map_from_scene,
+                       const MotionFrames& frames, std::uint64_t n) {
+  const Eigen::Isometry3d pose = map_from_scene * isometry_of(truth.pose(0, n).value());
   std::string line = fmt::format("{},{}", n, truth.force_n(n) > 0 ? 1 : 0);
-  for (const double value : rotation.val) line += fmt::format(",{:.12g}", value);
-  for (const double value : {pose.x_mm, pose.y_mm, pose.z_mm})
-    line += fmt::format(",{:.9g}", value);
+  for (int i = 0; i < 9; ++i) line += fmt::format(",{:.12g}", pose.linear()(i / 3, i % 3));
+  for (const double value : pose.translation()) line += fmt::format(",{:.9g}", value);
   return line + fmt::format(",{}\n", phase_of(frames, n));
 }
 
@@ -78,6 +76,7 @@ void record(const std::shared_ptr<const hal::sim::Truth>& truth, const fs::path&
             const MovingObject& object, const std::vector<ObjectMotion>& motions,
             const std::vector<MotionFrames>& choreography, const fs::path& out) {
   Program program(truth, calibration);
+  const Eigen::Isometry3d map_from_scene = map_frame(truth->scene(), calibration).from_scene;
   std::uint64_t n = 0;
   for (std::size_t i = 0; i < motions.size(); ++i) {
     const MotionFrames& frames = choreography[i];
@@ -92,7 +91,7 @@ void record(const std::shared_ptr<const hal::sim::Truth>& truth, const fs::path&
       const auto length = wire::encode_length(frame.size());
       written.write(reinterpret_cast<const char*>(length.data()), std::ssize(length));
       written.write(frame.data(), std::ssize(frame));
-      csv += truth_line(*truth, frames, n);
+      csv += truth_line(*truth, map_from_scene, frames, n);
     }
     if (!written.flush()) throw std::runtime_error(fmt::format("cannot write {}", file.string()));
     base::write_file_atomically(out / (name + ".truth.csv"), csv);
@@ -102,6 +101,7 @@ void record(const std::shared_ptr<const hal::sim::Truth>& truth, const fs::path&
 }
 
 void write_all(const Arguments& arguments) {
+  const std::string head = arguments.head.empty() ? "" : base::read_file(arguments.head);
   std::vector<ObjectMotion> motions;
   std::ranges::copy_if(kObjectMotions, std::back_inserter(motions), [&](const auto& motion) {
     return is_wanted(arguments.motions, motion.name);
@@ -109,7 +109,7 @@ void write_all(const Arguments& arguments) {
   for (const MovingObject& object : kMovingObjects) {
     if (!is_wanted(arguments.objects, object.name)) continue;
     hal::sim::Scene scene = hal::sim::parse_scene(
-        fmt::format("{}\n[[press]]\n{}\nkeys = [{{ t = 0.0 }}]\n", arguments.head, object.lines),
+        fmt::format("{}\n[[press]]\n{}\nkeys = [{{ t = 0.0 }}]\n", head, object.lines),
         object.name);
     const auto choreography = choreograph(object, motions, scene);
     std::vector<fs::path> folders;
@@ -145,7 +145,8 @@ int main(int argc, char** argv) {
                    "the shapes alone are written");
     app.add_option("--object", arguments.objects, "One object; may be repeated. None: all");
     app.add_option("--motion", arguments.motions, "One motion; may be repeated. None: all");
-    app.add_option("--scene-head", arguments.head, "Tables of a scene: [camera], [surface], …");
+    app.add_option("--scene-head", arguments.head,
+                   "File with tables of a scene: [camera], [surface], …");
     app.add_option("--out", arguments.out, "Folder")->required();
     CLI11_PARSE(app, argc, argv);
     dtact::whole::write_all(arguments);

@@ -22,15 +22,7 @@ constexpr double kLeastArmMm = 0.5;
 double degrees(double radians) { return radians * 180 / M_PI; }
 
 Eigen::Isometry3d pose_at(const hal::sim::Scene& scene, const PressKey& key) {
-  const hal::sim::Pose pose = pose_of(scene.surface, scene.presses[0].object, key);
-  const cv::Matx33d rotation = hal::sim::rotation_of(pose.turn_deg);
-  Eigen::Isometry3d isometry;
-  for (int i = 0; i < 3; ++i) {
-    for (int k = 0; k < 3; ++k) isometry.matrix()(i, k) = rotation(i, k);
-  }
-  isometry.matrix().row(3) << 0, 0, 0, 1;
-  isometry.translation() << pose.x_mm, pose.y_mm, pose.z_mm;
-  return isometry;
+  return isometry_of(pose_of(scene.surface, scene.presses[0].object, key));
 }
 
 /// The key that puts the object there.
@@ -84,6 +76,15 @@ Eigen::Isometry3d moved(const Eigen::Isometry3d& pose, const Direction& by, doub
 }
 
 }  // namespace
+
+Eigen::Isometry3d isometry_of(const hal::sim::Pose& pose) {
+  const Eigen::Vector3d turn(pose.turn_deg[0], pose.turn_deg[1], pose.turn_deg[2]);
+  Eigen::Isometry3d isometry(Eigen::Translation3d(pose.x_mm, pose.y_mm, pose.z_mm));
+  if (turn.norm() > 0) {
+    isometry.rotate(Eigen::AngleAxisd(turn.norm() * M_PI / 180, turn.normalized()));
+  }
+  return isometry;
+}
 
 std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& scene,
                                                std::uint64_t sequence) {

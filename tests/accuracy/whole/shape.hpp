@@ -4,10 +4,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "hal/sim/placement.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/accuracy/whole/pose_track.hpp"
 
 namespace dtact::whole {
+
+/// From the object's frame to the simulator's surface frame, millimetres.
+[[nodiscard]] Eigen::Isometry3d isometry_of(const hal::sim::Pose& pose);
 
 /// A direction of motion, and how much of it the layer shows.
 struct ShownDirection {
