@@ -53,18 +53,33 @@ std::string truth_line(const hal::sim::Truth& truth, const Eigen::Isometry3d& ma
   return line + fmt::format(",{}\n", phase_of(frames, n));
 }
 
-/// How much the layer shows of six directions of motion, at five moments of one.
-std::string shape_csv(const hal::sim::Scene& scene, const MotionFrames& frames) {
-  std::string csv =
-      "sequence,x_mm,y_mm,z_mm,arm_mm,shown,turn_x,turn_y,turn_z,shift_x,shift_y,shift_z\n";
+/// How much the layer shows of six directions of motion in a frame.
+struct Shown {
+  std::uint64_t sequence = 0;
+  std::array<ShownDirection, 6> directions;
+};
+
+/// At five moments of a motion.
+std::vector<Shown> shown_of(const hal::sim::Scene& scene, const MotionFrames& frames) {
   constexpr std::uint64_t kParts = 4;
+  std::vector<Shown> shown;
   for (std::uint64_t part = 0; part <= kParts; ++part) {
     const std::uint64_t n = frames.motion + (frames.end - frames.motion) * part / kParts;
-    for (const ShownDirection& one : shown_directions(scene, n)) {
-      csv += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.4f},{:.5f}", n, one.direction.centre.x(),
-                         one.direction.centre.y(), one.direction.centre.z(), one.direction.arm,
-                         one.shown);
-      for (const double value : one.direction.twist) csv += fmt::format(",{:.6f}", value);
+    shown.push_back({n, shown_directions(scene, n)});
+  }
+  return shown;
+}
+
+std::string shape_csv(const std::vector<Shown>& shown, const Eigen::Isometry3d& map_from_scene) {
+  std::string csv =
+      "sequence,x_mm,y_mm,z_mm,arm_mm,shown,turn_x,turn_y,turn_z,shift_x,shift_y,shift_z\n";
+  for (const Shown& moment : shown) {
+    for (const ShownDirection& one : moment.directions) {
+      const Direction direction = carried(one.direction, map_from_scene);
+      csv += fmt::format("{}", moment.sequence);
+      for (const double value : direction.centre) csv += fmt::format(",{:.4f}", value);
+      csv += fmt::format(",{:.4f},{:.5f}", direction.arm, one.shown);
+      for (const double value : direction.twist) csv += fmt::format(",{:.6f}", value);
       csv += '\n';
     }
   }
@@ -74,7 +89,9 @@ std::string shape_csv(const hal::sim::Scene& scene, const MotionFrames& frames) 
 /// Runs the program from its start and keeps what belongs to a motion.
 void record(const std::shared_ptr<const hal::sim::Truth>& truth, const fs::path& calibration,
             const MovingObject& object, const std::vector<ObjectMotion>& motions,
-            const std::vector<MotionFrames>& choreography, const fs::path& out) {
+            const std::vector<MotionFrames>& choreography,
+            const std::vector<std::vector<Shown>>& shown, const fs::path& out) {
+  fs::create_directories(out);
   Program program(truth, calibration);
   const Eigen::Isometry3d map_from_scene = map_frame(truth->scene(), calibration).from_scene;
   std::uint64_t n = 0;
@@ -94,6 +111,7 @@ void record(const std::shared_ptr<const hal::sim::Truth>& truth, const fs::path&
       csv += truth_line(*truth, map_from_scene, frames, n);
     }
     if (!written.flush()) throw std::runtime_error(fmt::format("cannot write {}", file.string()));
+    base::write_file_atomically(out / (name + ".shape.csv"), shape_csv(shown[i], map_from_scene));
     base::write_file_atomically(out / (name + ".truth.csv"), csv);
     fmt::print("{}\n", (out / name).string());
     std::fflush(stdout);
@@ -103,8 +121,11 @@ void record(const std::shared_ptr<const hal::sim::Truth>& truth, const fs::path&
 void write_all(const Arguments& arguments) {
   const std::string head = arguments.head.empty() ? "" : base::read_file(arguments.head);
   std::vector<ObjectMotion> motions;
-  std::ranges::copy_if(kObjectMotions, std::back_inserter(motions), [&](const auto& motion) {
+  std::ranges::copy_if(common_motions(), std::back_inserter(motions), [&](const auto& motion) {
     return is_wanted(arguments.motions, motion.name);
+  });
+  std::ranges::copy_if(long_motions(), std::back_inserter(motions), [&](const auto& motion) {
+    return !arguments.motions.empty() && is_wanted(arguments.motions, motion.name);
   });
   for (const MovingObject& object : kMovingObjects) {
     if (!is_wanted(arguments.objects, object.name)) continue;
@@ -112,23 +133,12 @@ void write_all(const Arguments& arguments) {
         fmt::format("{}\n[[press]]\n{}\nkeys = [{{ t = 0.0 }}]\n", head, object.lines),
         object.name);
     const auto choreography = choreograph(object, motions, scene);
-    std::vector<fs::path> folders;
-    for (const fs::path& calibration : arguments.calibrations) {
-      folders.push_back(arguments.out / calibration.filename());
-    }
-    if (folders.empty()) folders.push_back(arguments.out);
-    for (std::size_t i = 0; i < motions.size(); ++i) {
-      const std::string shape = shape_csv(scene, choreography[i]);
-      for (const fs::path& folder : folders) {
-        fs::create_directories(folder);
-        base::write_file_atomically(
-            folder / fmt::format("{}.{}.shape.csv", object.name, motions[i].name), shape);
-      }
-    }
-    if (arguments.calibrations.empty()) continue;
+    std::vector<std::vector<Shown>> shown;
+    for (const MotionFrames& frames : choreography) shown.push_back(shown_of(scene, frames));
     const auto truth = std::make_shared<const hal::sim::Truth>(scene);
-    for (std::size_t i = 0; i < folders.size(); ++i) {
-      record(truth, arguments.calibrations[i], object, motions, choreography, folders[i]);
+    for (const fs::path& calibration : arguments.calibrations) {
+      record(truth, calibration, object, motions, choreography, shown,
+             arguments.out / calibration.filename());
     }
   }
 }
@@ -141,10 +151,13 @@ int main(int argc, char** argv) {
     CLI::App app("Objects that move on the simulated sensor, as the daemon sends them");
     dtact::whole::Arguments arguments;
     app.add_option("--calibration", arguments.calibrations,
-                   "Folder; its frames come into a folder of the same name. May be repeated. None: "
-                   "the shapes alone are written");
+                   "Folder; its frames come into a folder of the same name. May be repeated")
+        ->required();
     app.add_option("--object", arguments.objects, "One object; may be repeated. None: all");
-    app.add_option("--motion", arguments.motions, "One motion; may be repeated. None: all");
+    app.add_option(
+        "--motion", arguments.motions,
+        "One motion: turn, slide, roll, deeper, all, minute or drag; may be repeated. None: "
+        "all but the last two");
     app.add_option("--scene-head", arguments.head,
                    "File with tables of a scene: [camera], [surface], …");
     app.add_option("--out", arguments.out, "Folder")->required();

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <sstream>
 #include <stdexcept>
 #include <string_view>
@@ -40,32 +42,66 @@ Twist about(const Direction& direction, const Eigen::Vector3d& centre, double ar
   return twist;
 }
 
-}  // namespace
-
-std::vector<TruthRow> read_truth(const std::filesystem::path& csv) {
+/// Calls back with the fields of each line but the first. Throws where they are too few.
+void for_each_line(const std::filesystem::path& csv,
+                   const std::function<void(std::istream&)>& read) {
   std::istringstream lines(base::read_file(csv));
   std::string line;
   std::getline(lines, line);
-  std::vector<TruthRow> rows;
-  while (std::getline(lines, line)) {
+  for (int number = 2; std::getline(lines, line); ++number) {
+    std::ranges::replace(line, ',', ' ');
     std::istringstream fields(line);
-    std::string field;
-    const auto next = [&] {
-      if (std::getline(fields, field, ',')) return field;
-      throw std::runtime_error(
-          fmt::format("{}, line {}: too few columns: write it again with "
-                      "pose_sequences",
-                      csv.string(), rows.size() + 2));
-    };
-    TruthRow row;
-    row.sequence = std::stoull(next());
-    (void)next();  // in_contact
-    row.pose = Eigen::Isometry3d::Identity();
-    for (int i = 0; i < 9; ++i) row.pose.linear()(i / 3, i % 3) = std::stod(next());
-    for (int i = 0; i < 3; ++i) row.pose.translation()[i] = std::stod(next());
-    row.phase = next();
-    rows.push_back(row);
+    read(fields);
+    if (!fields.fail()) continue;
+    throw std::runtime_error(
+        fmt::format("{}, line {}: too few columns: write the file again", csv.string(), number));
   }
+}
+
+void read_pose(std::istream& fields, Eigen::Isometry3d& pose) {
+  pose.setIdentity();
+  for (int i = 0; i < 9; ++i) fields >> pose.linear()(i / 3, i % 3);
+  for (double& value : pose.translation()) fields >> value;
+}
+
+}  // namespace
+
+std::vector<TruthRow> read_truth(const std::filesystem::path& csv) {
+  std::vector<TruthRow> rows;
+  for_each_line(csv, [&](std::istream& fields) {
+    TruthRow& row = rows.emplace_back();
+    bool touching = false;
+    fields >> row.sequence >> touching;
+    read_pose(fields, row.pose);
+    fields >> row.phase;
+  });
+  return rows;
+}
+
+std::vector<TrackRow> read_track(const std::filesystem::path& csv) {
+  std::vector<TrackRow> rows;
+  for_each_line(csv, [&](std::istream& fields) {
+    TrackRow& row = rows.emplace_back();
+    fields >> row.sequence >> row.usable >> row.since;
+    read_pose(fields, row.motion);
+    fields >> row.frame_us;
+    row.told = row.since != 0;
+  });
+  return rows;
+}
+
+std::vector<ShapeRow> read_shape(const std::filesystem::path& csv) {
+  constexpr double kLeastShown = 0.05;
+  std::vector<ShapeRow> rows;
+  for_each_line(csv, [&](std::istream& fields) {
+    ShapeRow row;
+    double shown = 0;
+    fields >> row.sequence;
+    for (double& value : row.direction.centre) fields >> value;
+    fields >> row.direction.arm >> shown;
+    for (double& value : row.direction.twist) fields >> value;
+    if (shown < kLeastShown) rows.push_back(row);
+  });
   return rows;
 }
 
@@ -82,6 +118,14 @@ std::vector<std::string> read_frames(const std::filesystem::path& file) {
         fmt::format("{} is not whole: write it again with pose_sequences", file.string()));
   }
   return frames;
+}
+
+Direction carried(const Direction& direction, const Eigen::Isometry3d& motion) {
+  Direction moved = direction;
+  moved.centre = motion * direction.centre;
+  moved.twist.head<3>() = motion.linear() * direction.twist.head<3>();
+  moved.twist.tail<3>() = motion.linear() * direction.twist.tail<3>();
+  return moved;
 }
 
 PoseError error_of(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth,

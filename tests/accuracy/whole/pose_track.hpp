@@ -33,12 +33,28 @@ struct Direction {
 /// What a tracker says of a frame.
 struct TrackRow {
   std::uint64_t sequence = 0;
-  bool usable = false;      ///< There is a pose, and it may be used.
+  bool told = false;        ///< It says where the object is, or where it was last.
+  bool usable = false;      ///< What it says may be used.
   std::uint64_t since = 0;  ///< The frame that the motion is measured from.
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   std::vector<Direction> unobservable;
-  double frame_us = 0;  ///< Processor time, points included.
+  double frame_us = 0;  ///< Processor time.
 };
+/// A file of another tracker: sequence,usable,since,r11…r33,x_mm,y_mm,z_mm,frame_us; nothing is
+/// told where `since` is 0.
+[[nodiscard]] std::vector<TrackRow> read_track(const std::filesystem::path& csv);
+
+/// Where the object has moved by `motion`.
+[[nodiscard]] Direction carried(const Direction& direction, const Eigen::Isometry3d& motion);
+
+/// A direction that changes no depth in a frame.
+struct ShapeRow {
+  std::uint64_t sequence = 0;
+  Direction direction;
+};
+/// Of the directions in a file of pose_sequences those of which 1 mm of motion changes the depth by
+/// less than 0.05 mm.
+[[nodiscard]] std::vector<ShapeRow> read_shape(const std::filesystem::path& csv);
 
 /// Of a motion that was found against the true one, split at the contact's centre.
 struct PoseError {

@@ -86,8 +86,10 @@ Eigen::Isometry3d isometry_of(const hal::sim::Pose& pose) {
   return isometry;
 }
 
-std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& scene,
+std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& curved,
                                                std::uint64_t sequence) {
+  hal::sim::Scene scene = curved;
+  scene.surface = {};
   const hal::sim::Grid grid = hal::sim::make_grid(scene);
   const auto key = hal::sim::key_at(scene.presses.at(0), scene.time_s(sequence)).value();
   const Eigen::Isometry3d pose = pose_at(scene, key);
@@ -126,11 +128,13 @@ std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& scene,
     }
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> spectrum(normal);
+  const Eigen::Isometry3d laid_round = pose_at(curved, key) * pose.inverse();
   std::array<ShownDirection, 6> directions;
   for (int i = 0; i < 6; ++i) {
     auto& one = directions.at(static_cast<std::size_t>(i));
     one.direction = about;
     one.direction.twist = spectrum.eigenvectors().col(i);
+    one.direction = carried(one.direction, laid_round);
     one.shown = std::sqrt(std::max(0.0, spectrum.eigenvalues()[i]));
   }
   return directions;

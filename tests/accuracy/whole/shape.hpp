@@ -22,7 +22,8 @@ struct ShownDirection {
 
 /// Six directions, the least shown first: the principal axes of how the true indentation changes
 /// when the object of the scene's first press is moved, from where it is at frame `sequence`, by
-/// 0.2 mm (rotations: at the contact's edge) and the layer is solved again. Of a flat layer.
+/// 0.2 mm (rotations: at the contact's edge) and the layer is solved again. Of a curved surface
+/// the plane that touches it stands for it.
 [[nodiscard]] std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& scene,
                                                              std::uint64_t sequence);
 
