@@ -106,7 +106,8 @@ std::vector<ShapeRow> read_shape(const std::filesystem::path& csv) {
 }
 
 std::vector<std::string> read_frames(const std::filesystem::path& file) {
-  const std::string bytes = base::read_file(file);
+  constexpr std::size_t kMost = std::size_t{4} << 30U;
+  const std::string bytes = base::read_file(file, kMost);
   std::string_view rest = bytes;
   wire::MessageDecoder decoder;
   std::vector<std::string> frames;
