@@ -149,8 +149,8 @@ class Icp:
 
 
 TRACKERS = {
-    "open3d_plane": {"kind": "plane", "rekey": 0.9, "velocity": True, "tukey_mm": 0.1},
-    "open3d_generalised": {"kind": "generalised", "rekey": 0.9, "velocity": True, "tukey_mm": 0},
+    "open3d_plane": {"kind": "plane", "rekey": 0.8, "velocity": True, "tukey_mm": 0.1},
+    "open3d_generalised": {"kind": "generalised", "rekey": 0.8, "velocity": True, "tukey_mm": 0},
 }
 
 

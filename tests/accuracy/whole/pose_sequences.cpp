@@ -1,25 +1,22 @@
 // Objects that move on the simulated sensor: the frames that the daemon sends to dtact-perceive,
-// and where the objects truly are. NAME.frames: each frame is a big-endian length of four bytes and
-// a v1::Frame. NAME.truth.csv: a line for each of them.
+// and where the objects truly are (sequence.hpp says in which files).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
-#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <fstream>
-#include <stdexcept>
+#include <iterator>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
-#include "proto/framing.hpp"
+#include "hal/sim/scene.hpp"
+#include "hal/sim/truth.hpp"
 #include "tests/accuracy/whole/moving_objects.hpp"
-#include "tests/accuracy/whole/program.hpp"
-#include "tests/accuracy/whole/shape.hpp"
+#include "tests/accuracy/whole/sequence.hpp"
 
 namespace dtact::whole {
 namespace {
@@ -39,85 +36,6 @@ bool is_wanted(const std::vector<std::string>& names, const char* name) {
   return names.empty() || std::ranges::find(names, name) != names.end();
 }
 
-const char* phase_of(const MotionFrames& frames, std::uint64_t n) {
-  if (n <= frames.motion) return "press";
-  return n < frames.end ? "motion" : "end";
-}
-
-std::string truth_line(const hal::sim::Truth& truth, const Eigen::Isometry3d& map_from_scene,
-                       const MotionFrames& frames, std::uint64_t n) {
-  const Eigen::Isometry3d pose = map_from_scene * isometry_of(truth.pose(0, n).value());
-  std::string line = fmt::format("{},{}", n, truth.force_n(n) > 0 ? 1 : 0);
-  for (int i = 0; i < 9; ++i) line += fmt::format(",{:.12g}", pose.linear()(i / 3, i % 3));
-  for (const double value : pose.translation()) line += fmt::format(",{:.9g}", value);
-  return line + fmt::format(",{}\n", phase_of(frames, n));
-}
-
-/// How much the layer shows of six directions of motion in a frame.
-struct Shown {
-  std::uint64_t sequence = 0;
-  std::array<ShownDirection, 6> directions;
-};
-
-/// At five moments of a motion.
-std::vector<Shown> shown_of(const hal::sim::Scene& scene, const MotionFrames& frames) {
-  constexpr std::uint64_t kParts = 4;
-  std::vector<Shown> shown;
-  for (std::uint64_t part = 0; part <= kParts; ++part) {
-    const std::uint64_t n = frames.motion + (frames.end - frames.motion) * part / kParts;
-    shown.push_back({n, shown_directions(scene, n)});
-  }
-  return shown;
-}
-
-std::string shape_csv(const std::vector<Shown>& shown, const Eigen::Isometry3d& map_from_scene) {
-  std::string csv =
-      "sequence,x_mm,y_mm,z_mm,arm_mm,shown,turn_x,turn_y,turn_z,shift_x,shift_y,shift_z\n";
-  for (const Shown& moment : shown) {
-    for (const ShownDirection& one : moment.directions) {
-      const Direction direction = carried(one.direction, map_from_scene);
-      csv += fmt::format("{}", moment.sequence);
-      for (const double value : direction.centre) csv += fmt::format(",{:.4f}", value);
-      csv += fmt::format(",{:.4f},{:.5f}", direction.arm, one.shown);
-      for (const double value : direction.twist) csv += fmt::format(",{:.6f}", value);
-      csv += '\n';
-    }
-  }
-  return csv;
-}
-
-/// Runs the program from its start and keeps what belongs to a motion.
-void record(const std::shared_ptr<const hal::sim::Truth>& truth, const fs::path& calibration,
-            const MovingObject& object, const std::vector<ObjectMotion>& motions,
-            const std::vector<MotionFrames>& choreography,
-            const std::vector<std::vector<Shown>>& shown, const fs::path& out) {
-  fs::create_directories(out);
-  Program program(truth, calibration);
-  const Eigen::Isometry3d map_from_scene = map_frame(truth->scene(), calibration).from_scene;
-  std::uint64_t n = 0;
-  for (std::size_t i = 0; i < motions.size(); ++i) {
-    const MotionFrames& frames = choreography[i];
-    for (; n < frames.first; ++n) (void)program.next();
-    const std::string name = fmt::format("{}.{}", object.name, motions[i].name);
-    const fs::path file = out / (name + ".frames");
-    std::ofstream written(file, std::ios::binary);
-    std::string csv =
-        "sequence,in_contact,r11,r12,r13,r21,r22,r23,r31,r32,r33,x_mm,y_mm,z_mm,phase\n";
-    for (; n <= frames.last; ++n) {
-      const std::string frame = program.next();
-      const auto length = wire::encode_length(frame.size());
-      written.write(reinterpret_cast<const char*>(length.data()), std::ssize(length));
-      written.write(frame.data(), std::ssize(frame));
-      csv += truth_line(*truth, map_from_scene, frames, n);
-    }
-    if (!written.flush()) throw std::runtime_error(fmt::format("cannot write {}", file.string()));
-    base::write_file_atomically(out / (name + ".shape.csv"), shape_csv(shown[i], map_from_scene));
-    base::write_file_atomically(out / (name + ".truth.csv"), csv);
-    fmt::print("{}\n", (out / name).string());
-    std::fflush(stdout);
-  }
-}
-
 void write_all(const Arguments& arguments) {
   const std::string head = arguments.head.empty() ? "" : base::read_file(arguments.head);
   std::vector<ObjectMotion> motions;
@@ -133,12 +51,17 @@ void write_all(const Arguments& arguments) {
         fmt::format("{}\n[[press]]\n{}\nkeys = [{{ t = 0.0 }}]\n", head, object.lines),
         object.name);
     const auto choreography = choreograph(object, motions, scene);
-    std::vector<std::vector<Shown>> shown;
-    for (const MotionFrames& frames : choreography) shown.push_back(shown_of(scene, frames));
+    std::vector<std::vector<ShapeRow>> shapes;
+    for (const MotionFrames& frames : choreography) shapes.push_back(shape_of(scene, frames));
     const auto truth = std::make_shared<const hal::sim::Truth>(scene);
     for (const fs::path& calibration : arguments.calibrations) {
-      record(truth, calibration, object, motions, choreography, shown,
-             arguments.out / calibration.filename());
+      const fs::path folder = arguments.out / calibration.filename();
+      record(truth, calibration, object, motions, choreography, shapes,
+             [&folder](const Sequence& sequence) {
+               save(sequence, folder);
+               fmt::print("{}\n", (folder / sequence.name).string());
+               std::fflush(stdout);
+             });
     }
   }
 }

@@ -2,11 +2,10 @@
 
 #include <array>
 #include <cstdint>
-#include <vector>
 
 #include "hal/sim/placement.hpp"
 #include "hal/sim/scene.hpp"
-#include "tests/accuracy/whole/pose_track.hpp"
+#include "tests/accuracy/whole/pose_error.hpp"
 
 namespace dtact::whole {
 
