@@ -120,6 +120,24 @@ std::string cube_stl(double side_mm) {
   return stl + "endsolid cube\n";
 }
 
+std::vector<Eigen::Isometry3d> cube_symmetries(double side_mm) {
+  const Eigen::Translation3d middle(0, 0, side_mm / 2);
+  std::vector<Eigen::Isometry3d> found;
+  for (int x = 0; x < 3; ++x) {
+    for (int y = 0; y < 3; ++y) {
+      for (const int signs : {0, 1, 2, 3}) {
+        if (x == y) continue;
+        Eigen::Matrix3d axes = Eigen::Matrix3d::Zero();
+        axes(x, 0) = signs % 2 == 0 ? 1 : -1;
+        axes(y, 1) = signs / 2 == 0 ? 1 : -1;
+        axes.col(2) = axes.col(0).cross(axes.col(1));
+        found.push_back(middle * Eigen::Isometry3d(Eigen::AngleAxisd(axes)) * middle.inverse());
+      }
+    }
+  }
+  return found;
+}
+
 std::vector<Eigen::Isometry3d> symmetries_of(const ObjectCloud& cloud) {
   const auto [low, high] =
       std::ranges::minmax(cloud.points, {}, [](const Eigen::Vector3d& point) { return point.z(); });

@@ -19,6 +19,8 @@ struct ObjectCloud {
 [[nodiscard]] std::string ply_of(const ObjectCloud& cloud);
 /// A cube that stands on the origin as an ASCII STL file.
 [[nodiscard]] std::string cube_stl(double side_mm);
+/// The 24 turns after which that cube lies where it did.
+[[nodiscard]] std::vector<Eigen::Isometry3d> cube_symmetries(double side_mm);
 
 /// The turns about the object's z, in steps of 10, 15 and 72°, with or without half a turn about x
 /// through its middle, after which its surface lies within 0.15 mm of where it was. The first is

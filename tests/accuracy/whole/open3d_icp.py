@@ -154,11 +154,12 @@ TRACKERS = {
 }
 
 
-def track(frames, begin, options):
+def track(frames, begin, every, options):
+    """Rows of every so many frames, the last one included."""
     since = frames[begin].sequence
-    rows = [(frame.sequence, 0, 0, np.eye(4), 0.0) for frame in frames[:begin]]
+    rows = []
     icp = Icp(first=cloud_of(frames[begin]), **options)
-    for frame in frames[begin:]:
+    for frame in [*frames[begin:-1:every], frames[-1]]:
         found, spent = False, 0.0
         if frame.HasField("depth"):
             cloud = cloud_of(frame)
@@ -173,6 +174,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("--only", action="append", default=[], help="sequences whose name holds this")
+    parser.add_argument("--every", type=int, default=1, help="of so many frames one is looked at")
     parser.add_argument("--set", action="append", default=[], metavar="TRACKER:KEY=VALUE",
                         help="try another setting; KEY is rekey, velocity or tukey_mm")
     parser.add_argument("--trackers", default=",".join(TRACKERS))
@@ -191,10 +193,14 @@ def main():
         begin = len(phases) - 1 - phases[::-1].index("press")
         frames = read_frames(file)
         for tracker, options in trackers.items():
-            with open(file.with_name(f"{name}.{tracker}.track.csv"), "w", encoding="utf-8") as out:
+            out_file = file.with_name(f"{name}.{tracker}.track.csv")
+            if out_file.exists() and out_file.stat().st_mtime > file.stat().st_mtime and not arguments.set:
+                continue
+            rows = track(frames, begin, arguments.every, options)
+            with open(out_file, "w", encoding="utf-8") as out:
                 out.write("sequence,usable,since," + ",".join(f"r{i}{k}" for i in "123" for k in "123")
                           + ",x_mm,y_mm,z_mm,frame_us\n")
-                for sequence, usable, since, motion, spent in track(frames, begin, options):
+                for sequence, usable, since, motion, spent in rows:
                     numbers = [*motion[:3, :3].ravel(), *motion[:3, 3]]
                     out.write(f"{sequence},{usable},{since},"
                               + ",".join(f"{n:.10g}" for n in numbers) + f",{spent:.0f}\n")

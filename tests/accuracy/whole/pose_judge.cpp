@@ -62,31 +62,32 @@ void print_head() {
 
 void print_row(const Sequence& sequence, const std::string& tracker,
                const std::vector<TrackRow>& track,
-               const std::function<PoseErrors(std::size_t)>& errors_at) {
+               const std::function<PoseErrors(const TrackRow&)>& errors_of) {
   int lost = 0;
+  int lost_in_press = 0;
   int restarts = 0;
+  const TrackRow* before = nullptr;
   std::vector<double> times;
   std::array<PoseError, kWays.size()> end;
   std::array<std::vector<double>, kWays.size()> mm;
   std::array<std::vector<double>, kWays.size()> deg;
-  const std::size_t begin = sequence.begin();
-  for (std::size_t i = begin; i < track.size(); ++i) {
-    const TrackRow& row = track[i];
+  for (const TrackRow& row : track) {
+    if (sequence.index(row.sequence) < sequence.begin()) {
+      lost_in_press += row.told && !row.usable ? 1 : 0;
+      continue;
+    }
     times.push_back(row.frame_us);
-    const bool went_on = i > begin && row.usable && track[i - 1].usable;
-    restarts += went_on && row.since != track[i - 1].since ? 1 : 0;
     lost += row.usable ? 0 : 1;
+    restarts += before != nullptr && row.usable && before->usable && row.since != before->since;
+    before = &row;
     end.fill({INFINITY, INFINITY});  // as long as nothing was told
     if (!row.told) continue;
-    end = listed(errors_at(i));
+    end = listed(errors_of(row));
     for (std::size_t way = 0; row.usable && way < kWays.size(); ++way) {
       mm.at(way).push_back(end.at(way).mm);
       deg.at(way).push_back(end.at(way).deg);
     }
   }
-  const auto lost_in_press =
-      std::count_if(track.begin(), track.begin() + static_cast<std::ptrdiff_t>(begin),
-                    [](const TrackRow& row) { return row.told && !row.usable; });
   const auto followed = [&](std::size_t way) {
     return lost == 0 && restarts == 0 && part_of(mm.at(way), 1) <= kFollowedMm &&
                    part_of(deg.at(way), 1) <= kFollowedDeg
@@ -111,7 +112,7 @@ void judge_motion(const fs::path& folder, const Sequence& sequence) {
   perceive::FrameMaker maker;
   const auto judge = [&](const std::string& tracker, const std::vector<TrackRow>& track) {
     print_row(sequence, tracker, track,
-              [&](std::size_t i) { return motion_errors(sequence, track, i); });
+              [&](const TrackRow& row) { return motion_errors(sequence, track, row); });
   };
   judge("dtact-perceive", perceive_track(sequence.frames, maker));
   std::vector<fs::path> others;
@@ -136,17 +137,16 @@ void judge_known(const fs::path& folder, const Sequence& sequence) {
   const hal::sim::Scene scene = hal::sim::parse_scene(
       fmt::format("[[press]]\n{}\nkeys = [{{ t = 0.0 }}]\n", object->lines), name);
   const ObjectCloud cloud = cloud_of(scene.presses.at(0).object);
-  const auto symmetries = symmetries_of(cloud);
-  const auto judge = [&](const std::string& tracker, const fs::path& file,
-                         const std::string& shape) {
+  const auto judge = [&](const std::string& tracker, const fs::path& file, const std::string& shape,
+                         const std::vector<Eigen::Isometry3d>& symmetries) {
     base::write_file_atomically(file, shape);
     perceive::FrameMaker maker(perceive::load_object(file, "mm"));
     const auto track = perceive_track(sequence.frames, maker, kFps);
     print_row(sequence, tracker, track,
-              [&](std::size_t i) { return place_errors(sequence, track, i, symmetries); });
+              [&](const TrackRow& row) { return place_errors(sequence, row, symmetries); });
   };
-  judge("cloud", folder / (name + ".ply"), ply_of(cloud));
-  if (name == "cube") judge("mesh", folder / (name + ".stl"), cube_stl(5));
+  judge("cloud", folder / (name + ".ply"), ply_of(cloud), symmetries_of(cloud));
+  if (name == "cube") judge("mesh", folder / (name + ".stl"), cube_stl(5), cube_symmetries(5));
 }
 
 void judge_all(const fs::path& folder, const std::vector<std::string>& only, bool known) {

@@ -58,14 +58,15 @@ Contact contact_of(const std::string& bytes) {
           std::max(kLeastArm, std::sqrt(contact.area_mm2() / std::numbers::pi))};
 }
 
-/// Of what was found in frame `i`, against what is true there.
-PoseErrors errors_of(const Sequence& sequence, std::size_t i, const TrackRow& row,
-                     const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth) {
-  const Contact contact = contact_of(sequence.frames[i]);
+/// Of what was found in a row, against what is true there.
+PoseErrors errors_of(const Sequence& sequence, const TrackRow& row, const Eigen::Isometry3d& found,
+                     const Eigen::Isometry3d& truth) {
+  const std::size_t at = sequence.index(row.sequence);
+  const Contact contact = contact_of(sequence.frames.at(at));
   const auto error = [&](const std::vector<Direction>& without) {
     return error_of(found, truth, contact.centre, contact.arm, without);
   };
-  return {error({}), error(row.unobservable), error(sequence.unobservable(i))};
+  return {error({}), error(row.unobservable), error(sequence.unobservable(at))};
 }
 
 }  // namespace
@@ -107,25 +108,27 @@ std::vector<TrackRow> read_track(const std::filesystem::path& csv) {
 }
 
 PoseErrors motion_errors(const Sequence& sequence, const std::vector<TrackRow>& track,
-                         std::size_t i) {
+                         const TrackRow& row) {
   const std::size_t begin = sequence.begin();
-  const TrackRow& row = track[i];
-  const TrackRow& base = track[begin];
-  if (base.since == row.since) {
-    return errors_of(sequence, i, row, row.motion * base.motion.inverse(),
-                     sequence.motion(begin, i));
+  const std::size_t at = sequence.index(row.sequence);
+  const auto base =
+      std::ranges::find(track, sequence.truth.at(begin).sequence, &TrackRow::sequence);
+  if (base != track.end() && base->since == row.since) {
+    return errors_of(sequence, row, row.motion * base->motion.inverse(),
+                     sequence.motion(begin, at));
   }
-  return errors_of(sequence, i, row, row.motion, sequence.motion(sequence.index(row.since), i));
+  return errors_of(sequence, row, row.motion, sequence.motion(sequence.index(row.since), at));
 }
 
-PoseErrors place_errors(const Sequence& sequence, const std::vector<TrackRow>& track, std::size_t i,
+PoseErrors place_errors(const Sequence& sequence, const TrackRow& row,
                         const std::vector<Eigen::Isometry3d>& symmetries) {
-  const double arm = contact_of(sequence.frames[i]).arm;
+  const std::size_t at = sequence.index(row.sequence);
+  const double arm = contact_of(sequence.frames.at(at)).arm;
   PoseErrors best;
   double least = INFINITY;
   for (const Eigen::Isometry3d& symmetry : symmetries) {
     const PoseErrors errors =
-        errors_of(sequence, i, track[i], track[i].motion, sequence.truth[i].pose * symmetry);
+        errors_of(sequence, row, row.motion, sequence.truth.at(at).pose * symmetry);
     const double cost = errors.reported.mm + arm * errors.reported.deg * std::numbers::pi / 180;
     if (cost >= least) continue;
     least = cost;

@@ -42,12 +42,11 @@ struct PoseErrors {
   PoseError shape;     ///< Without those of Sequence::unobservable().
 };
 /// Of the motion since the object began to move; where the tracker has begun anew meanwhile, of
-/// what it says itself. `i`: a frame that is told.
+/// what it says itself. `row`: one of `track` that is told.
 [[nodiscard]] PoseErrors motion_errors(const Sequence& sequence, const std::vector<TrackRow>& track,
-                                       std::size_t i);
+                                       const TrackRow& row);
 /// Of a known object's place, up to its symmetries.
-[[nodiscard]] PoseErrors place_errors(const Sequence& sequence, const std::vector<TrackRow>& track,
-                                      std::size_t i,
+[[nodiscard]] PoseErrors place_errors(const Sequence& sequence, const TrackRow& row,
                                       const std::vector<Eigen::Isometry3d>& symmetries);
 
 }  // namespace dtact::whole
