@@ -197,13 +197,15 @@ def main():
             if out_file.exists() and out_file.stat().st_mtime > file.stat().st_mtime and not arguments.set:
                 continue
             rows = track(frames, begin, arguments.every, options)
-            with open(out_file, "w", encoding="utf-8") as out:
-                out.write("sequence,usable,since," + ",".join(f"r{i}{k}" for i in "123" for k in "123")
-                          + ",x_mm,y_mm,z_mm,frame_us\n")
-                for sequence, usable, since, motion, spent in rows:
-                    numbers = [*motion[:3, :3].ravel(), *motion[:3, 3]]
-                    out.write(f"{sequence},{usable},{since},"
-                              + ",".join(f"{n:.10g}" for n in numbers) + f",{spent:.0f}\n")
+            lines = ["sequence,usable,since," + ",".join(f"r{i}{k}" for i in "123" for k in "123")
+                     + ",x_mm,y_mm,z_mm,frame_us"]
+            for sequence, usable, since, motion, spent in rows:
+                numbers = [*motion[:3, :3].ravel(), *motion[:3, 3]]
+                lines.append(f"{sequence},{usable},{since}," + ",".join(f"{n:.10g}" for n in numbers)
+                             + f",{spent:.0f}")
+            part = out_file.with_suffix(".part")
+            part.write_text("\n".join(lines) + "\n", encoding="utf-8")
+            part.replace(out_file)
         print(name, flush=True)
 
 

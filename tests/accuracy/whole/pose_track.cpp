@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
@@ -104,6 +105,7 @@ std::vector<TrackRow> read_track(const std::filesystem::path& csv) {
     fields >> row.frame_us;
     row.told = row.since != 0;
   });
+  if (rows.empty()) throw std::runtime_error(csv.string() + " has no frames: write it again");
   return rows;
 }
 
