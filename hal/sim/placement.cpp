@@ -175,6 +175,8 @@ std::optional<PressKey> key_at(const Press& press, double time_s) {
     key.rotation_deg = std::lerp(a.rotation_deg, next->rotation_deg, w);
     key.tilt_x_deg = std::lerp(a.tilt_x_deg, next->tilt_x_deg, w);
     key.tilt_y_deg = std::lerp(a.tilt_y_deg, next->tilt_y_deg, w);
+    key.drag_x_mm = std::lerp(a.drag_x_mm, next->drag_x_mm, w);
+    key.drag_y_mm = std::lerp(a.drag_y_mm, next->drag_y_mm, w);
   }
   return key;
 }

@@ -102,6 +102,8 @@ Press read_press(KeyReader& table, const std::filesystem::path& folder, double t
     entry.number_if("rotation", key.rotation_deg, -3600, 3600);
     entry.number_if("tilt_x", key.tilt_x_deg, -kMostTilt, kMostTilt);
     entry.number_if("tilt_y", key.tilt_y_deg, -kMostTilt, kMostTilt);
+    entry.number_if("drag_x", key.drag_x_mm, -thickness_mm, thickness_mm);
+    entry.number_if("drag_y", key.drag_y_mm, -thickness_mm, thickness_mm);
     entry.finish();
     press.keys.push_back(key);
   }

@@ -75,6 +75,9 @@ struct PressKey {
   /// After the rotation: a rotation vector in the sensor's axes, x right and y down.
   double tilt_x_deg = 0;
   double tilt_y_deg = 0;
+  /// How far the object, sticking to the gel, has dragged it along.
+  double drag_x_mm = 0;
+  double drag_y_mm = 0;
 };
 
 struct Press {

@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 
+#include "hal/sim/drag.hpp"
 #include "hal/sim/layer.hpp"
 
 namespace dtact::hal::sim {
@@ -32,6 +33,7 @@ double movement(const Press& press, double t0, double t1) {
                        std::hypot(b->tilt_x_deg - a->tilt_x_deg, b->tilt_y_deg - a->tilt_y_deg)) *
                       std::numbers::pi / 180;
   return std::max({std::hypot(b->x_mm - a->x_mm, b->y_mm - a->y_mm),
+                   std::hypot(b->drag_x_mm - a->drag_x_mm, b->drag_y_mm - a->drag_y_mm),
                    std::abs(b->depth_mm - a->depth_mm), turn * press.object.reach_mm});
 }
 
@@ -73,26 +75,35 @@ void Truth::solve_all() {
 
   // A press and its release pass through the same states: each is solved once. Lengths in
   // nanometres, so that states which differ by rounding are one.
-  using State = std::vector<std::array<long, 7>>;
+  using State = std::vector<std::array<long, 9>>;
   std::map<State, int> solved = {{{}, 0}};
   cv::Mat1d guess;
   for (const double time : solve_times(scene_)) {
     State state;
     cv::Mat1d target(grid_.height, grid_.width, -kNoSurface);
+    double drag_x_mm = 0;
+    double drag_y_mm = 0;
     for (std::size_t i = 0; i < scene_.presses.size(); ++i) {
       const auto at = state_at(scene_.presses[i], time);
       if (!at || at->depth_mm < 1e-6) continue;
       state.push_back({static_cast<long>(i), std::lround(at->x_mm * 1e6),
                        std::lround(at->y_mm * 1e6), std::lround(at->depth_mm * 1e6),
                        std::lround(at->rotation_deg * 1e6), std::lround(at->tilt_x_deg * 1e6),
-                       std::lround(at->tilt_y_deg * 1e6)});
+                       std::lround(at->tilt_y_deg * 1e6), std::lround(at->drag_x_mm * 1e6),
+                       std::lround(at->drag_y_mm * 1e6)});
+      drag_x_mm += at->drag_x_mm;
+      drag_y_mm += at->drag_y_mm;
       lower_object(scene_.surface, scene_.presses[i].object, *at, scene_.layer.thickness_mm, grid_,
                    target);
     }
     auto found = solved.find(state);
     if (found == solved.end()) {
-      const Pressed pressed = layer.solve(target, guess);
+      Pressed pressed = layer.solve(target, guess);
       guess = pressed.pressure;
+      if (drag_x_mm != 0 || drag_y_mm != 0) {
+        pressed.indentation_mm = dragged(pressed.indentation_mm, pressed.pressure, drag_x_mm,
+                                         drag_y_mm, scene_.layer.thickness_mm, grid_);
+      }
       Map map{std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size()), 0};
       for (std::size_t i = 0; i < grid_.size(); ++i) {
         map.indentation[i] = static_cast<std::int16_t>(

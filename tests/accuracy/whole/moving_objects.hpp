@@ -38,27 +38,20 @@ inline constexpr std::array kMovingObjects{
     MovingObject{"screw_cap", "object = \"screw_cap\"", 0.6, 5},
 };
 
-/// How it moves from there, all at once and at an even speed.
+/// How it moves from there.
 struct ObjectMotion {
   const char* name;
   double seconds;
-  double turn_deg = 0;  ///< About the surface's normal, clockwise as the camera sees it.
-  double slide_mm = 0;  ///< To the right and somewhat down.
-  double roll_deg = 0;  ///< About an axis in the surface.
-  double deeper_mm = 0;
+  /// By how much of each it has moved at a part, 0 … 1, of that time; `time_s` says nothing.
+  hal::sim::PressKey (*moved)(double part);
 };
-inline constexpr std::array kObjectMotions{
-    ObjectMotion{.name = "turn", .seconds = 3, .turn_deg = 60},
-    ObjectMotion{.name = "slide", .seconds = 2, .slide_mm = 4},
-    ObjectMotion{.name = "roll", .seconds = 2, .roll_deg = 15},
-    ObjectMotion{.name = "deeper", .seconds = 1, .deeper_mm = 0.3},
-    ObjectMotion{.name = "all",
-                 .seconds = 4,
-                 .turn_deg = 60,
-                 .slide_mm = 4,
-                 .roll_deg = 15,
-                 .deeper_mm = 0.3},
-};
+
+/// What every object does: turn by 60°, slide by 4 mm, roll by 15°, be pressed 0.3 mm deeper; and
+/// all of it at once.
+[[nodiscard]] std::span<const ObjectMotion> common_motions();
+/// `minute`: a loop of twelve seconds, five times, back to where it began. `drag`: the object
+/// sticks, drags the gel along by 0.3 mm, slips and slides on; then it does so back.
+[[nodiscard]] std::span<const ObjectMotion> long_motions();
 
 /// Which camera frames of a choreography belong to one motion.
 struct MotionFrames {

@@ -1,28 +1,31 @@
 // Judges poses against the truth on what pose_sequences wrote: dtact-perceive's, made here, and
 // those of other trackers that lie beside the frames as SEQUENCE.TRACKER.track.csv (open3d_icp.py).
 // Prints a line of CSV for each sequence and tracker. Errors are of the motion from the last frame
-// before the object moves, at the contact's centre: `all`, `reported` without the directions that
-// the tracker reports as unobservable, `shape` without those that change no depth
-// (SEQUENCE.shape.csv).
+// before the object moves, with --known of the object's place, at the contact's centre: `all`,
+// `reported` without the directions that the tracker reports as unobservable, `shape` without those
+// that change no depth (SEQUENCE.shape.csv).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <numbers>
-#include <sstream>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/perceive/frame_maker.hpp"
+#include "clients/perceive/object_file.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "proto/dtact.pb.h"
+#include "hal/sim/scene.hpp"
+#include "tests/accuracy/whole/known_object.hpp"
+#include "tests/accuracy/whole/moving_objects.hpp"
 #include "tests/accuracy/whole/pose_track.hpp"
-#include "tests/bench/cpu_time.hpp"
+#include "tests/accuracy/whole/sequence.hpp"
 
 namespace dtact::whole {
 namespace {
@@ -33,233 +36,134 @@ namespace fs = std::filesystem;
 constexpr double kFollowedMm = 0.3;
 constexpr double kFollowedDeg = 5;
 
-Eigen::Vector3d vector_of(const v1::Vector3& from) { return {from.x(), from.y(), from.z()}; }
+constexpr std::array kWays{"all", "reported", "shape"};
 
-/// Once ObjectPose has it, the field `valid` decides.
-bool is_usable(const v1::ObjectPose& pose) {
-  if (const auto* valid = v1::ObjectPose::descriptor()->FindFieldByName("valid")) {
-    return pose.GetReflection()->GetBool(pose, valid);
-  }
-  return pose.tracking() != v1::ObjectPose::LOST && pose.tracking() != v1::ObjectPose::SEARCHING;
+std::array<PoseError, kWays.size()> listed(const PoseErrors& errors) {
+  return {errors.all, errors.reported, errors.shape};
 }
 
-TrackRow row_of(const v1::Frame& frame) {
-  TrackRow row;
-  row.sequence = frame.sequence();
-  if (!frame.has_pose()) return row;
-  const v1::ObjectPose& pose = frame.pose();
-  row.usable = is_usable(pose);
-  row.since = pose.since_sequence();
-  const Eigen::Vector3d turn = vector_of(pose.rotation_deg()) * std::numbers::pi / 180;
-  if (turn.norm() > 0) row.motion = Eigen::AngleAxisd(turn.norm(), turn.normalized());
-  row.motion.pretranslate(vector_of(pose.translation_mm()));
-  for (const v1::Twist& twist : pose.unobservable()) {
-    Direction direction{vector_of(pose.centre_mm()), pose.arm_mm(), {}};
-    direction.twist << vector_of(twist.rotation()), vector_of(twist.translation());
-    row.unobservable.push_back(direction);
-  }
-  return row;
-}
-
-/// What dtact-perceive makes of the frames for a client that wants points and pose.
-std::vector<TrackRow> perceive_track(const std::vector<std::string>& frames) {
-  const net::FrameKind kind{.contact_box = true, .cloud = v1::CLOUD_INT16, .pose = true};
-  perceive::FrameMaker maker;
-  std::vector<TrackRow> rows;
-  for (const std::string& bytes : frames) {
-    v1::Frame frame;
-    frame.ParseFromString(bytes);
-    const double began = bench::thread_us();
-    maker.begin(std::move(frame), true);
-    const auto encoded = maker.make(kind);
-    const double took = bench::thread_us() - began;
-    v1::Frame sent;
-    sent.ParseFromString(encoded->body);
-    rows.push_back(row_of(sent));
-    rows.back().frame_us = took;
-  }
-  return rows;
-}
-
-/// sequence,usable,since,r11…r33,x_mm,y_mm,z_mm,frame_us
-std::vector<TrackRow> read_track(const fs::path& csv) {
-  std::istringstream lines(base::read_file(csv));
-  std::string line;
-  std::getline(lines, line);
-  std::vector<TrackRow> rows;
-  while (std::getline(lines, line)) {
-    std::ranges::replace(line, ',', ' ');
-    std::istringstream fields(line);
-    TrackRow row;
-    fields >> row.sequence >> row.usable >> row.since;
-    for (int i = 0; i < 9; ++i) fields >> row.motion.linear()(i / 3, i % 3);
-    for (int i = 0; i < 3; ++i) fields >> row.motion.translation()[i];
-    fields >> row.frame_us;
-    rows.push_back(row);
-  }
-  return rows;
-}
-
-/// Where the contact is, as the daemon says.
-struct Contact {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  double arm = 1;
-};
-
-Contact contact_of(const std::string& bytes) {
-  v1::Frame frame;
-  frame.ParseFromString(bytes);
-  const v1::Contact& contact = frame.contact();
-  constexpr double kLeastArm = 0.5;
-  return {{contact.x_mm(), contact.y_mm(), 0},
-          std::max(kLeastArm, std::sqrt(contact.area_mm2() / std::numbers::pi))};
-}
-
-/// The directions that change no depth in the frames up to each that was looked at.
-struct ShapeRow {
-  std::uint64_t sequence = 0;
-  Direction direction;
-};
-
-std::vector<ShapeRow> read_shape(const fs::path& csv) {
-  if (!fs::exists(csv)) return {};
-  std::istringstream lines(base::read_file(csv));
-  std::string line;
-  std::getline(lines, line);
-  std::vector<ShapeRow> rows;
-  while (std::getline(lines, line)) {
-    std::ranges::replace(line, ',', ' ');
-    std::istringstream fields(line);
-    ShapeRow row;
-    double changed = 0;
-    fields >> row.sequence;
-    for (int i = 0; i < 3; ++i) fields >> row.direction.centre[i];
-    fields >> row.direction.arm >> changed;
-    for (int i = 0; i < 6; ++i) fields >> row.direction.twist[i];
-    constexpr double kUnobservable = 0.05;  // millimetres of depth for one of motion
-    if (changed < kUnobservable) rows.push_back(row);
-  }
-  return rows;
-}
-
-double median(std::vector<double> values) {
+/// `part` of 1: the greatest. NaN of nothing.
+double part_of(std::vector<double> values, double part) {
   if (values.empty()) return NAN;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  return *middle;
+  const auto at = values.begin() + std::lround(part * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, at);
+  return *at;
 }
 
-/// The three ways to look at an error.
-struct Errors {
-  PoseError all, reported, shape;
-};
-
-void judge(const std::string& sequence, const std::string& tracker,
-           const std::vector<TruthRow>& truth, const std::vector<TrackRow>& track,
-           const std::vector<Contact>& contacts, const std::vector<ShapeRow>& shape) {
-  const auto moves =
-      std::ranges::find_if(truth, [](const auto& row) { return row.phase != "press"; });
-  const auto begin = static_cast<std::size_t>(moves - truth.begin()) - 1;
-  const std::uint64_t first = truth.front().sequence;
-  std::size_t lost = 0;
-  std::size_t restarts = 0;
-  constexpr PoseError kUnknown{INFINITY, INFINITY};  // no pose was ever told
-  Errors end;
-  Errors worst;
-  std::vector<double> times;
-  for (std::size_t i = begin; i < truth.size(); ++i) {
-    const TrackRow& row = track.at(i);
-    times.push_back(row.frame_us);
-    if (i > begin && row.usable && track[i - 1].usable && row.since != track[i - 1].since) {
-      ++restarts;
-    }
-    if (!row.usable) ++lost;
-    end = {kUnknown, kUnknown, kUnknown};
-    if (row.since == 0) continue;
-    const TrackRow& base = track[begin];
-    const bool same = base.usable && base.since == row.since;
-    const std::size_t from = same ? begin : static_cast<std::size_t>(row.since - first);
-    const Eigen::Isometry3d found = same ? row.motion * base.motion.inverse() : row.motion;
-    const Eigen::Isometry3d moved = truth[i].pose * truth.at(from).pose.inverse();
-    std::vector<Direction> hidden;
-    for (const ShapeRow& one : shape) {
-      if (one.sequence > row.sequence) break;
-      // The object has carried it along since.
-      const auto& then = truth.at(static_cast<std::size_t>(one.sequence - first));
-      const Eigen::Isometry3d carried = truth[i].pose * then.pose.inverse();
-      Direction now = one.direction;
-      now.centre = carried * now.centre;
-      now.twist.head<3>() = carried.linear() * now.twist.head<3>();
-      now.twist.tail<3>() = carried.linear() * now.twist.tail<3>();
-      hidden.push_back(now);
-    }
-    const auto error = [&](const std::vector<Direction>& without) {
-      return error_of(found, moved, contacts[i].centre, contacts[i].arm, without);
-    };
-    end = {error({}), error(row.unobservable), error(hidden)};
-    const auto raise = [](PoseError& to, const PoseError& by) {
-      to = {std::max(to.mm, by.mm), std::max(to.deg, by.deg)};
-    };
-    if (!row.usable) continue;
-    raise(worst.all, end.all);
-    raise(worst.reported, end.reported);
-    raise(worst.shape, end.shape);
+void print_head() {
+  std::string head =
+      "sequence,tracker,frames,lost,lost_in_press,restarts,followed_reported,followed_shape,"
+      "reported,shape,frame_us";
+  for (const char* when : {"end", "median", "worst"}) {
+    for (const char* way : kWays) head += fmt::format(",{0}_{1}_mm,{0}_{1}_deg", when, way);
   }
-  const auto pressed_lost =
-      std::count_if(track.begin(), track.begin() + static_cast<std::ptrdiff_t>(begin),
-                    [](const TrackRow& row) { return row.since != 0 && !row.usable; });
-  const auto followed = [&](const PoseError& at_worst) {
-    return lost == 0 && restarts == 0 && at_worst.mm <= kFollowedMm && at_worst.deg <= kFollowedDeg
+  fmt::print("{}\n", head);
+}
+
+void print_row(const Sequence& sequence, const std::string& tracker,
+               const std::vector<TrackRow>& track,
+               const std::function<PoseErrors(const TrackRow&)>& errors_of) {
+  int lost = 0;
+  int lost_in_press = 0;
+  int restarts = 0;
+  const TrackRow* before = nullptr;
+  std::vector<double> times;
+  std::array<PoseError, kWays.size()> end;
+  std::array<std::vector<double>, kWays.size()> mm;
+  std::array<std::vector<double>, kWays.size()> deg;
+  for (const TrackRow& row : track) {
+    if (sequence.index(row.sequence) < sequence.begin()) {
+      lost_in_press += row.told && !row.usable ? 1 : 0;
+      continue;
+    }
+    times.push_back(row.frame_us);
+    lost += row.usable ? 0 : 1;
+    restarts += before != nullptr && row.usable && before->usable && row.since != before->since;
+    before = &row;
+    end.fill({INFINITY, INFINITY});  // as long as nothing was told
+    if (!row.told) continue;
+    end = listed(errors_of(row));
+    for (std::size_t way = 0; row.usable && way < kWays.size(); ++way) {
+      mm.at(way).push_back(end.at(way).mm);
+      deg.at(way).push_back(end.at(way).deg);
+    }
+  }
+  const auto followed = [&](std::size_t way) {
+    return lost == 0 && restarts == 0 && part_of(mm.at(way), 1) <= kFollowedMm &&
+                   part_of(deg.at(way), 1) <= kFollowedDeg
                ? 1
                : 0;
   };
-  const auto pair = [](const PoseError& error) {
-    return fmt::format("{:.4f},{:.3f}", error.mm, error.deg);
-  };
-  fmt::print("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{:.0f}\n", sequence, tracker,
-             truth.size() - begin, lost, pressed_lost, restarts, followed(worst.reported),
-             followed(worst.shape), pair(end.all), pair(end.reported), pair(end.shape),
-             pair(worst.all), pair(worst.reported), pair(worst.shape),
-             track.back().unobservable.size(), shape.size(), median(times));
+  std::string line = fmt::format(
+      "{},{},{},{},{},{},{},{},{},{},{:.0f}", sequence.name, tracker, times.size(), lost,
+      lost_in_press, restarts, followed(1), followed(2), track.back().unobservable.size(),
+      sequence.unobservable(sequence.truth.size() - 1).size(), part_of(times, 0.5));
+  for (const PoseError& error : end) line += fmt::format(",{:.4f},{:.3f}", error.mm, error.deg);
+  for (const double part : {0.5, 1.0}) {
+    for (std::size_t way = 0; way < kWays.size(); ++way) {
+      line += fmt::format(",{:.4f},{:.3f}", part_of(mm.at(way), part), part_of(deg.at(way), part));
+    }
+  }
+  fmt::print("{}\n", line);
   std::fflush(stdout);
 }
 
-void judge_all(const fs::path& folder, const std::vector<std::string>& only) {
-  fmt::print(
-      "sequence,tracker,frames,lost,lost_in_press,restarts,followed_reported,followed_shape,"
-      "end_all_mm,end_all_deg,end_reported_mm,end_reported_deg,end_shape_mm,end_shape_deg,"
-      "worst_all_mm,worst_all_deg,worst_reported_mm,worst_reported_deg,worst_shape_mm,"
-      "worst_shape_deg,reported,shape,median_us\n");
-  std::vector<fs::path> files;
+void judge_motion(const fs::path& folder, const Sequence& sequence) {
+  perceive::FrameMaker maker;
+  const auto judge = [&](const std::string& tracker, const std::vector<TrackRow>& track) {
+    print_row(sequence, tracker, track,
+              [&](const TrackRow& row) { return motion_errors(sequence, track, row); });
+  };
+  judge("dtact-perceive", perceive_track(sequence.frames, maker));
+  std::vector<fs::path> others;
   for (const auto& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename();
-    const bool wanted = only.empty() || std::ranges::any_of(only, [&](const auto& part) {
-                          return name.find(part) != std::string::npos;
-                        });
-    if (wanted && name.ends_with(".truth.csv")) files.push_back(entry.path());
+    const std::string other = entry.path().filename();
+    if (other.starts_with(sequence.name + ".") && other.ends_with(".track.csv")) {
+      others.push_back(entry.path());
+    }
   }
-  std::ranges::sort(files);
-  for (const fs::path& file : files) {
-    const std::string whole = file.filename();
-    const std::string name = whole.substr(0, whole.size() - std::string(".truth.csv").size());
-    const auto truth = read_truth(file);
-    const auto frames = read_frames(folder / (name + ".frames"));
-    const auto shape = read_shape(folder / (name + ".shape.csv"));
-    std::vector<Contact> contacts;
-    for (const std::string& frame : frames) contacts.push_back(contact_of(frame));
-    judge(name, "dtact-perceive", truth, perceive_track(frames), contacts, shape);
-    std::vector<fs::path> others;
-    for (const auto& entry : fs::directory_iterator(folder)) {
-      const std::string other = entry.path().filename();
-      if (other.starts_with(name + ".") && other.ends_with(".track.csv")) {
-        others.push_back(entry.path());
-      }
-    }
-    std::ranges::sort(others);
-    for (const fs::path& other : others) {
-      const std::string tracker = other.stem().stem().extension().string().substr(1);
-      judge(name, tracker, truth, read_track(other), contacts, shape);
-    }
+  std::ranges::sort(others);
+  for (const fs::path& other : others) {
+    judge(other.stem().stem().extension().string().substr(1), read_track(other));
+  }
+}
+
+/// The object's shape comes from a file, as for a user.
+void judge_known(const fs::path& folder, const Sequence& sequence) {
+  constexpr double kFps = 60;
+  const std::string name = sequence.name.substr(0, sequence.name.find('.'));
+  const auto* const object = std::ranges::find(kMovingObjects, name, &MovingObject::name);
+  if (object == kMovingObjects.end()) return;
+  const hal::sim::Scene scene = hal::sim::parse_scene(
+      fmt::format("[[press]]\n{}\nkeys = [{{ t = 0.0 }}]\n", object->lines), name);
+  const ObjectCloud cloud = cloud_of(scene.presses.at(0).object);
+  const auto judge = [&](const std::string& tracker, const fs::path& file, const std::string& shape,
+                         const std::vector<Eigen::Isometry3d>& symmetries) {
+    base::write_file_atomically(file, shape);
+    perceive::FrameMaker maker(perceive::load_object(file, "mm"));
+    const auto track = perceive_track(sequence.frames, maker, kFps);
+    print_row(sequence, tracker, track,
+              [&](const TrackRow& row) { return place_errors(sequence, row, symmetries); });
+  };
+  judge("cloud", folder / (name + ".ply"), ply_of(cloud), symmetries_of(cloud));
+  if (name == "cube") judge("mesh", folder / (name + ".stl"), cube_stl(5), cube_symmetries(5));
+}
+
+void judge_all(const fs::path& folder, const std::vector<std::string>& only, bool known) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string file = entry.path().filename();
+    const bool wanted = only.empty() || std::ranges::any_of(only, [&](const auto& part) {
+                          return file.find(part) != std::string::npos;
+                        });
+    constexpr std::string_view kEnd = ".truth.csv";
+    if (wanted && file.ends_with(kEnd)) names.push_back(file.substr(0, file.size() - kEnd.size()));
+  }
+  std::ranges::sort(names);
+  print_head();
+  for (const std::string& name : names) {
+    const Sequence sequence = load(folder, name);
+    known ? judge_known(folder, sequence) : judge_motion(folder, sequence);
   }
 }
 
@@ -271,10 +175,12 @@ int main(int argc, char** argv) {
     CLI::App app("Judges poses on the sequences of a folder against the truth");
     std::string folder;
     std::vector<std::string> only;
+    bool known = false;
     app.add_option("folder", folder, "That pose_sequences wrote")->required();
     app.add_option("--only", only, "Sequences whose name holds this; may be repeated");
+    app.add_flag("--known", known, "The object's shape is known: its place, in real time");
     CLI11_PARSE(app, argc, argv);
-    dtact::whole::judge_all(folder, only);
+    dtact::whole::judge_all(folder, only, known);
     return 0;
   } catch (const std::exception& e) {
     fmt::print(stderr, "pose_judge: {}\n", e.what());

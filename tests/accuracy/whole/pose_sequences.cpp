@@ -1,25 +1,22 @@
 // Objects that move on the simulated sensor: the frames that the daemon sends to dtact-perceive,
-// and where the objects truly are. NAME.frames: each frame is a big-endian length of four bytes and
-// a v1::Frame. NAME.truth.csv: a line for each of them.
+// and where the objects truly are (sequence.hpp says in which files).
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
-#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <fstream>
-#include <stdexcept>
+#include <iterator>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/sim/placement.hpp"
-#include "proto/framing.hpp"
+#include "hal/sim/scene.hpp"
+#include "hal/sim/truth.hpp"
 #include "tests/accuracy/whole/moving_objects.hpp"
-#include "tests/accuracy/whole/program.hpp"
+#include "tests/accuracy/whole/sequence.hpp"
 
 namespace dtact::whole {
 namespace {
@@ -27,11 +24,11 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments {
-  std::vector<std::string> calibrations;  ///< "FOLDER OUT" in turn.
+  std::vector<fs::path> calibrations;
   std::vector<std::string> objects;
   std::vector<std::string> motions;
   fs::path out;
-  std::string head;  ///< A scene's tables that come before the press.
+  fs::path head;  ///< A scene's tables that come before the press; empty: none.
 };
 
 /// Everything when nothing is named.
@@ -39,65 +36,32 @@ bool is_wanted(const std::vector<std::string>& names, const char* name) {
   return names.empty() || std::ranges::find(names, name) != names.end();
 }
 
-const char* phase_of(const MotionFrames& frames, std::uint64_t n) {
-  if (n <= frames.motion) return "press";
-  return n < frames.end ? "motion" : "end";
-}
-
-std::string truth_line(const hal::sim::Truth& truth, const MotionFrames& frames, std::uint64_t n) {
-  const hal::sim::Pose pose = truth.pose(0, n).value();
-  const cv::Matx33d rotation = hal::sim::rotation_of(pose.turn_deg);
-  std::string line = fmt::format("{},{}", n, truth.force_n(n) > 0 ? 1 : 0);
-  for (const double value : rotation.val) line += fmt::format(",{:.12g}", value);
-  for (const double value : {pose.x_mm, pose.y_mm, pose.z_mm})
-    line += fmt::format(",{:.9g}", value);
-  return line + fmt::format(",{}\n", phase_of(frames, n));
-}
-
-/// Runs the program from its start and keeps what belongs to a motion.
-void record(const std::shared_ptr<const hal::sim::Truth>& truth, const fs::path& calibration,
-            const MovingObject& object, const std::vector<ObjectMotion>& motions,
-            const std::vector<MotionFrames>& choreography, const fs::path& out) {
-  fs::create_directories(out);
-  Program program(truth, calibration);
-  std::uint64_t n = 0;
-  for (std::size_t i = 0; i < motions.size(); ++i) {
-    const MotionFrames& frames = choreography[i];
-    for (; n < frames.first; ++n) (void)program.next();
-    const std::string name = fmt::format("{}.{}", object.name, motions[i].name);
-    const fs::path file = out / (name + ".frames");
-    std::ofstream written(file, std::ios::binary);
-    std::string csv =
-        "sequence,in_contact,r11,r12,r13,r21,r22,r23,r31,r32,r33,x_mm,y_mm,z_mm,phase\n";
-    for (; n <= frames.last; ++n) {
-      const std::string frame = program.next();
-      const auto length = wire::encode_length(frame.size());
-      written.write(reinterpret_cast<const char*>(length.data()), std::ssize(length));
-      written.write(frame.data(), std::ssize(frame));
-      csv += truth_line(*truth, frames, n);
-    }
-    if (!written.flush()) throw std::runtime_error(fmt::format("cannot write {}", file.string()));
-    base::write_file_atomically(out / (name + ".truth.csv"), csv);
-    fmt::print("{}\n", (out / name).string());
-    std::fflush(stdout);
-  }
-}
-
 void write_all(const Arguments& arguments) {
+  const std::string head = arguments.head.empty() ? "" : base::read_file(arguments.head);
   std::vector<ObjectMotion> motions;
-  std::ranges::copy_if(kObjectMotions, std::back_inserter(motions), [&](const auto& motion) {
+  std::ranges::copy_if(common_motions(), std::back_inserter(motions), [&](const auto& motion) {
     return is_wanted(arguments.motions, motion.name);
+  });
+  std::ranges::copy_if(long_motions(), std::back_inserter(motions), [&](const auto& motion) {
+    return !arguments.motions.empty() && is_wanted(arguments.motions, motion.name);
   });
   for (const MovingObject& object : kMovingObjects) {
     if (!is_wanted(arguments.objects, object.name)) continue;
     hal::sim::Scene scene = hal::sim::parse_scene(
-        fmt::format("{}\n[[press]]\n{}\nkeys = [{{ t = 0.0 }}]\n", arguments.head, object.lines),
+        fmt::format("{}\n[[press]]\n{}\nkeys = [{{ t = 0.0 }}]\n", head, object.lines),
         object.name);
     const auto choreography = choreograph(object, motions, scene);
+    std::vector<std::vector<ShapeRow>> shapes;
+    for (const MotionFrames& frames : choreography) shapes.push_back(shape_of(scene, frames));
     const auto truth = std::make_shared<const hal::sim::Truth>(scene);
-    for (const std::string& calibration : arguments.calibrations) {
-      record(truth, calibration, object, motions, choreography,
-             arguments.out / fs::path(calibration).filename());
+    for (const fs::path& calibration : arguments.calibrations) {
+      const fs::path folder = arguments.out / calibration.filename();
+      record(truth, calibration, object, motions, choreography, shapes,
+             [&folder](const Sequence& sequence) {
+               save(sequence, folder);
+               fmt::print("{}\n", (folder / sequence.name).string());
+               std::fflush(stdout);
+             });
     }
   }
 }
@@ -113,8 +77,12 @@ int main(int argc, char** argv) {
                    "Folder; its frames come into a folder of the same name. May be repeated")
         ->required();
     app.add_option("--object", arguments.objects, "One object; may be repeated. None: all");
-    app.add_option("--motion", arguments.motions, "One motion; may be repeated. None: all");
-    app.add_option("--scene-head", arguments.head, "Tables of a scene: [camera], [surface], …");
+    app.add_option(
+        "--motion", arguments.motions,
+        "One motion: turn, slide, roll, deeper, all, minute or drag; may be repeated. None: "
+        "all but the last two");
+    app.add_option("--scene-head", arguments.head,
+                   "File with tables of a scene: [camera], [surface], …");
     app.add_option("--out", arguments.out, "Folder")->required();
     CLI11_PARSE(app, argc, argv);
     dtact::whole::write_all(arguments);

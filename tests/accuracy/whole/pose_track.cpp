@@ -1,101 +1,142 @@
 #include "tests/accuracy/whole/pose_track.hpp"
 
-#include <fmt/format.h>
-
-#include <Eigen/QR>
+#include <algorithm>
+#include <chrono>
 #include <cmath>
-#include <cstddef>
-#include <sstream>
+#include <numbers>
 #include <stdexcept>
-#include <string_view>
+#include <thread>
+#include <utility>
 
-#include "hal/base/atomic_file.hpp"
-#include "proto/framing.hpp"
+#include "clients/perceive/frame_maker.hpp"
+#include "proto/dtact.pb.h"
+#include "tests/bench/cpu_time.hpp"
 
 namespace dtact::whole {
 namespace {
 
-using Twist = Eigen::Matrix<double, 6, 1>;
+Eigen::Vector3d vector_of(const v1::Vector3& from) { return {from.x(), from.y(), from.z()}; }
 
-/// The one twist about `centre` (rotation times `arm`) that going along for a while is `motion`.
-Twist screw_of(const Eigen::Isometry3d& motion, const Eigen::Vector3d& centre, double arm) {
-  const Eigen::AngleAxisd turn(motion.rotation());
-  const Eigen::Vector3d shift = motion * centre - centre;
-  Twist twist;
-  twist.head<3>() = arm * turn.angle() * turn.axis();
-  // The inverse of the left Jacobian of SO(3): Barfoot, State Estimation for Robotics, 7.1.3.
-  const double half = turn.angle() / 2;
-  const double cotangent = half < 1e-6 ? 1 : half / std::tan(half);
-  twist.tail<3>() = cotangent * shift + (1 - cotangent) * turn.axis() * turn.axis().dot(shift) -
-                    half * turn.axis().cross(shift);
-  return twist;
+/// Once ObjectPose has it, the field `valid` decides.
+bool is_usable(const v1::ObjectPose& pose) {
+  if (const auto* valid = v1::ObjectPose::descriptor()->FindFieldByName("valid")) {
+    return pose.GetReflection()->GetBool(pose, valid);
+  }
+  return pose.tracking() != v1::ObjectPose::LOST && pose.tracking() != v1::ObjectPose::SEARCHING;
 }
 
-/// The same direction about another centre and arm, not of unit length.
-Twist about(const Direction& direction, const Eigen::Vector3d& centre, double arm) {
-  const Eigen::Vector3d rotation = direction.twist.head<3>() / direction.arm;
-  Twist twist;
-  twist.head<3>() = arm * rotation;
-  twist.tail<3>() = direction.twist.tail<3>() + rotation.cross(centre - direction.centre);
-  return twist;
+TrackRow row_of(const v1::Frame& frame) {
+  TrackRow row;
+  row.sequence = frame.sequence();
+  if (!frame.has_pose()) return row;
+  const v1::ObjectPose& pose = frame.pose();
+  row.told = pose.tracking() != v1::ObjectPose::SEARCHING;
+  row.usable = is_usable(pose);
+  row.since = pose.since_sequence();
+  const Eigen::Vector3d turn = vector_of(pose.rotation_deg()) * std::numbers::pi / 180;
+  if (turn.norm() > 0) row.motion = Eigen::AngleAxisd(turn.norm(), turn.normalized());
+  row.motion.pretranslate(vector_of(pose.translation_mm()));
+  for (const v1::Twist& twist : pose.unobservable()) {
+    Direction direction{vector_of(pose.centre_mm()), pose.arm_mm(), {}};
+    direction.twist << vector_of(twist.rotation()), vector_of(twist.translation());
+    row.unobservable.push_back(direction);
+  }
+  return row;
+}
+
+/// Where the contact is, as the daemon says.
+struct Contact {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double arm = 1;
+};
+
+Contact contact_of(const std::string& bytes) {
+  v1::Frame frame;
+  frame.ParseFromString(bytes);
+  const v1::Contact& contact = frame.contact();
+  constexpr double kLeastArm = 0.5;
+  return {{contact.x_mm(), contact.y_mm(), 0},
+          std::max(kLeastArm, std::sqrt(contact.area_mm2() / std::numbers::pi))};
+}
+
+/// Of what was found in a row, against what is true there.
+PoseErrors errors_of(const Sequence& sequence, const TrackRow& row, const Eigen::Isometry3d& found,
+                     const Eigen::Isometry3d& truth) {
+  const std::size_t at = sequence.index(row.sequence);
+  const Contact contact = contact_of(sequence.frames.at(at));
+  const auto error = [&](const std::vector<Direction>& without) {
+    return error_of(found, truth, contact.centre, contact.arm, without);
+  };
+  return {error({}), error(row.unobservable), error(sequence.unobservable(at))};
 }
 
 }  // namespace
 
-std::vector<TruthRow> read_truth(const std::filesystem::path& csv) {
-  std::istringstream lines(base::read_file(csv));
-  std::string line;
-  std::getline(lines, line);
-  std::vector<TruthRow> rows;
-  while (std::getline(lines, line)) {
-    std::istringstream fields(line);
-    std::string field;
-    const auto next = [&] {
-      if (std::getline(fields, field, ',')) return field;
-      throw std::runtime_error(
-          fmt::format("{}, line {}: too few columns: write it again with "
-                      "pose_sequences",
-                      csv.string(), rows.size() + 2));
-    };
-    TruthRow row;
-    row.sequence = std::stoull(next());
-    (void)next();  // in_contact
-    row.pose = Eigen::Isometry3d::Identity();
-    for (int i = 0; i < 9; ++i) row.pose.linear()(i / 3, i % 3) = std::stod(next());
-    for (int i = 0; i < 3; ++i) row.pose.translation()[i] = std::stod(next());
-    row.phase = next();
-    rows.push_back(row);
+std::vector<TrackRow> perceive_track(const std::vector<std::string>& frames,
+                                     perceive::FrameMaker& maker, double fps) {
+  const net::FrameKind kind{.contact_box = true, .cloud = v1::CLOUD_INT16, .pose = true};
+  auto due = std::chrono::steady_clock::now();
+  std::vector<TrackRow> rows;
+  for (const std::string& bytes : frames) {
+    v1::Frame frame;
+    frame.ParseFromString(bytes);
+    if (fps > 0) {
+      due += std::chrono::nanoseconds(std::lround(1e9 / fps));
+      std::this_thread::sleep_until(due);
+    }
+    const double began = bench::thread_us();
+    maker.begin(std::move(frame), true);
+    const auto encoded = maker.make(kind);
+    const double took = bench::thread_us() - began;
+    v1::Frame sent;
+    sent.ParseFromString(encoded->body);
+    rows.push_back(row_of(sent));
+    rows.back().frame_us = took;
   }
   return rows;
 }
 
-std::vector<std::string> read_frames(const std::filesystem::path& file) {
-  const std::string bytes = base::read_file(file);
-  std::string_view rest = bytes;
-  wire::MessageDecoder decoder;
-  std::vector<std::string> frames;
-  while (decoder.feed(rest) == wire::MessageDecoder::Result::message) {
-    frames.push_back(decoder.message());
-  }
-  if (frames.empty() || !rest.empty()) {
-    throw std::runtime_error(
-        fmt::format("{} is not whole: write it again with pose_sequences", file.string()));
-  }
-  return frames;
+std::vector<TrackRow> read_track(const std::filesystem::path& csv) {
+  std::vector<TrackRow> rows;
+  for_each_line(csv, [&](std::istream& fields) {
+    TrackRow& row = rows.emplace_back();
+    fields >> row.sequence >> row.usable >> row.since;
+    read_pose(fields, row.motion);
+    fields >> row.frame_us;
+    row.told = row.since != 0;
+  });
+  if (rows.empty()) throw std::runtime_error(csv.string() + " has no frames: write it again");
+  return rows;
 }
 
-PoseError error_of(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth,
-                   const Eigen::Vector3d& centre, double arm,
-                   const std::vector<Direction>& without) {
-  Twist off = screw_of(found * truth.inverse(), centre, arm);
-  if (!without.empty()) {
-    Eigen::Matrix<double, 6, Eigen::Dynamic> span(6, std::ssize(without));
-    for (std::size_t i = 0; i < without.size(); ++i) {
-      span.col(static_cast<Eigen::Index>(i)) = about(without[i], centre, arm);
-    }
-    off -= span * span.colPivHouseholderQr().solve(off);
+PoseErrors motion_errors(const Sequence& sequence, const std::vector<TrackRow>& track,
+                         const TrackRow& row) {
+  const std::size_t begin = sequence.begin();
+  const std::size_t at = sequence.index(row.sequence);
+  const auto base =
+      std::ranges::find(track, sequence.truth.at(begin).sequence, &TrackRow::sequence);
+  if (base != track.end() && base->since == row.since) {
+    return errors_of(sequence, row, row.motion * base->motion.inverse(),
+                     sequence.motion(begin, at));
   }
-  return {off.tail<3>().norm(), off.head<3>().norm() / arm * 180 / M_PI};
+  return errors_of(sequence, row, row.motion, sequence.motion(sequence.index(row.since), at));
+}
+
+PoseErrors place_errors(const Sequence& sequence, const TrackRow& row,
+                        const std::vector<Eigen::Isometry3d>& symmetries) {
+  const std::size_t at = sequence.index(row.sequence);
+  const double arm = contact_of(sequence.frames.at(at)).arm;
+  PoseErrors best;
+  double least = INFINITY;
+  for (const Eigen::Isometry3d& symmetry : symmetries) {
+    const PoseErrors errors =
+        errors_of(sequence, row, row.motion, sequence.truth.at(at).pose * symmetry);
+    const double cost = errors.reported.mm + arm * errors.reported.deg * std::numbers::pi / 180;
+    if (cost >= least) continue;
+    least = cost;
+    best = errors;
+  }
+  return best;
 }
 
 }  // namespace dtact::whole

@@ -1,53 +1,52 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
+#include "tests/accuracy/whole/pose_error.hpp"
+#include "tests/accuracy/whole/sequence.hpp"
+
+namespace dtact::perceive {
+class FrameMaker;
+}
+
 namespace dtact::whole {
 
-// Lengths are millimetres, poses are in the surface frame.
-
-/// What is true of a frame, as pose_sequences writes it.
-struct TruthRow {
-  std::uint64_t sequence = 0;
-  Eigen::Isometry3d pose;  ///< From the object's frame.
-  std::string phase;       ///< "press", "motion" or "end".
-};
-/// Throws std::runtime_error naming file and line.
-[[nodiscard]] std::vector<TruthRow> read_truth(const std::filesystem::path& csv);
-
-/// The serialised v1::Frames of a file of pose_sequences. Throws std::runtime_error naming it.
-[[nodiscard]] std::vector<std::string> read_frames(const std::filesystem::path& file);
-
-/// A direction of motion as on the wire: a unit twist about `centre`, its rotation times `arm`.
-struct Direction {
-  Eigen::Vector3d centre;
-  double arm = 1;
-  Eigen::Matrix<double, 6, 1> twist;  ///< Rotation, then translation.
-};
-
-/// What a tracker says of a frame.
+/// What a tracker says of a frame, millimetres.
 struct TrackRow {
   std::uint64_t sequence = 0;
-  bool usable = false;      ///< There is a pose, and it may be used.
+  bool told = false;        ///< It says where the object is, or where it was last.
+  bool usable = false;      ///< What it says may be used.
   std::uint64_t since = 0;  ///< The frame that the motion is measured from.
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   std::vector<Direction> unobservable;
-  double frame_us = 0;  ///< Processor time, points included.
+  double frame_us = 0;  ///< Processor time.
 };
 
-/// Of a motion that was found against the true one, split at the contact's centre.
-struct PoseError {
-  double mm = 0;
-  double deg = 0;
+/// What dtact-perceive makes of the frames for a client that wants points and pose. `fps`: they
+/// come at that rate, for what searches on a thread of its own; 0: as fast as they are taken.
+[[nodiscard]] std::vector<TrackRow> perceive_track(const std::vector<std::string>& frames,
+                                                   perceive::FrameMaker& maker, double fps = 0);
+/// Another tracker's file: sequence,usable,since,r11…r33,x_mm,y_mm,z_mm,frame_us; nothing is told
+/// where `since` is 0. Throws std::runtime_error naming file and line.
+[[nodiscard]] std::vector<TrackRow> read_track(const std::filesystem::path& csv);
+
+/// The three ways to look at the error in a frame.
+struct PoseErrors {
+  PoseError all;
+  PoseError reported;  ///< Without the directions that the tracker reports as unobservable.
+  PoseError shape;     ///< Without those of Sequence::unobservable().
 };
-/// Without its part along `without`. `centre` and `arm` (mm): of the contact.
-[[nodiscard]] PoseError error_of(const Eigen::Isometry3d& found, const Eigen::Isometry3d& truth,
-                                 const Eigen::Vector3d& centre, double arm,
-                                 const std::vector<Direction>& without);
+/// Of the motion since the object began to move; where the tracker has begun anew meanwhile, of
+/// what it says itself. `row`: one of `track` that is told.
+[[nodiscard]] PoseErrors motion_errors(const Sequence& sequence, const std::vector<TrackRow>& track,
+                                       const TrackRow& row);
+/// Of a known object's place, up to its symmetries.
+[[nodiscard]] PoseErrors place_errors(const Sequence& sequence, const TrackRow& row,
+                                      const std::vector<Eigen::Isometry3d>& symmetries);
 
 }  // namespace dtact::whole

@@ -1,6 +1,8 @@
 #include "tests/accuracy/whole/program.hpp"
 
+#include <Eigen/SVD>
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -143,6 +145,34 @@ net::FrameKind whole_map_kind() { return {.depth = v1::DEPTH_INT16}; }
 
 std::shared_ptr<const hal::sim::Truth> solve(std::string_view scene) {
   return std::make_shared<const hal::sim::Truth>(hal::sim::parse_scene(scene, "scene"));
+}
+
+MapFrame map_frame(const hal::sim::Scene& scene, const std::filesystem::path& calibration) {
+  const calibration::Calibration loaded = calibration::load(calibration);
+  const recon::RectifyTable& table = loaded.model->rectify;
+  const double mm_per_px = loaded.model->mm_per_px;
+  constexpr int kEvery = 20;  // pixels
+  std::vector<Eigen::Vector3d> there;
+  std::vector<Eigen::Vector3d> here;
+  for (int y = 0; y < table.height; y += kEvery) {
+    for (int x = 0; x < table.width; x += kEvery) {
+      const auto& entry = table.entries.at(static_cast<std::size_t>(y * table.width + x));
+      const auto place = hal::sim::pixel_place(scene.camera, entry.x + entry.fx / 128.0,
+                                               entry.y + entry.fy / 128.0);
+      there.emplace_back(place.x_mm, place.y_mm, 0);
+      here.emplace_back(mm_per_px * (x - 0.5 * (table.width - 1)),
+                        mm_per_px * (y - 0.5 * (table.height - 1)), 0);
+    }
+  }
+  const Eigen::Map<const Eigen::Matrix3Xd> from(there.front().data(), 3, std::ssize(there));
+  const Eigen::Map<const Eigen::Matrix3Xd> to(here.front().data(), 3, std::ssize(here));
+  const Eigen::Affine3d similar(Eigen::umeyama(from, to, true));
+  MapFrame frame;
+  frame.scale = std::cbrt(similar.linear().determinant());
+  frame.from_scene = Eigen::Translation3d(similar.translation());
+  frame.from_scene.linear() = similar.linear() / frame.scale;
+  frame.rms_mm = std::sqrt((similar * from - to).colwise().squaredNorm().mean());
+  return frame;
 }
 
 struct Program::Impl {

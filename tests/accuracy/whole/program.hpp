@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -23,6 +24,16 @@ namespace dtact::whole {
 /// Solves the contacts of a scene's text (the keys of config/scenes/default.toml), about 50 ms a
 /// map. Throws std::runtime_error naming the key that is wrong.
 [[nodiscard]] std::shared_ptr<const hal::sim::Truth> solve(std::string_view scene);
+
+/// From the simulator's surface frame to the calibration's, whose origin is the middle of the depth
+/// map, millimetres. They differ where a lens was calibrated: by where the board lay.
+struct MapFrame {
+  Eigen::Isometry3d from_scene;
+  double scale = 1;   ///< Millimetres of the map for one of the scene.
+  double rms_mm = 0;  ///< What is left: the error of the lens.
+};
+[[nodiscard]] MapFrame map_frame(const hal::sim::Scene& scene,
+                                 const std::filesystem::path& calibration);
 
 /// What the program runs with. As it stands: a daemon without a configuration.
 struct Settings {

@@ -146,6 +146,31 @@ keys = [ { t = 0.0, depth = 0.8 }, { t = 1.0, tilt_y = 15.0 } ]
   EXPECT_NEAR(truth.force_n(10), truth.force_n(0), 0.01 * truth.force_n(0));
 }
 
+TEST(Truth, DraggedGelFollowsAContactAndComesAfterItAround) {
+  const auto map_of = [](const char* drag) {
+    std::vector<float> map;
+    const Truth truth(small_scene(std::string(R"(
+[[press]]
+object = "cube"
+side_mm = 4.0
+keys = [ { t = 0.0, x = 1.0, y = -0.6, depth = 0.6)") +
+                                  drag + " } ]\n"));
+    truth.indentation_mm(0, map);
+    return map;
+  };
+  const std::vector<float> still = map_of("");
+  const std::vector<float> moved = map_of(", drag_x = 0.4, drag_y = -0.2");
+  // The contact goes from column 75 to 94: x = -1 to 3 mm.
+  for (int column = 77; column < 93; ++column) {
+    EXPECT_NEAR(moved[pixel(column, 55)], still[pixel(column, 55)], 0.005) << column;
+  }
+  // Two millimetres ahead of it and behind it the gel is where it was: 0.4 mm are two columns.
+  for (const int column : {62, 107}) {
+    EXPECT_NEAR(moved[pixel(column, 55)], still[pixel(column + 2, 54)], 0.003) << column;
+  }
+  EXPECT_GT(std::abs(moved[pixel(97, 55)] - still[pixel(97, 55)]), 0.005);
+}
+
 TEST(Truth, BarrelPutsTheBorderFartherOut) {
   CameraModel camera = small_scene().camera;
   camera.barrel = 0.25;
