@@ -18,9 +18,10 @@ constexpr int kMaxSteps = 20;
 constexpr double kConverged = 2e-7;
 /// Eigenvalues of the normal equations are mean squares of what the distances change for a unit of
 /// motion. Below kMinCore where the object touches, a direction is not told from what the normals
-/// err by: 3°, whose square is 0.003, and kNoises times their variance, which scatters by √(2/n) of
+/// err by: 4°, whose square is 0.006 (of two balls 4 mm apart 0.003, since blur makes them less
+/// round), and kNoises times their variance, which scatters by √(2/n) of
 /// itself where n of them are independent.
-constexpr double kMinCore = 0.003;
+constexpr double kMinCore = 0.006;
 constexpr double kNoises = 3;
 /// Times the number of independent places an eigenvalue below this is of an unobservable direction:
 /// the motion along it would have a standard deviation of 0.1 mm where each place errs by 0.02 mm.
