@@ -21,7 +21,7 @@ namespace sim = hal::sim;
 
 constexpr double kShallowestMm = 0.05;
 constexpr double kMostShare = 0.8;
-constexpr double kBeginS = 1;  // the reference is there by then
+constexpr double kBeginS = 0.9;  // the reference is there by then
 constexpr double kAboveMm = 0.1;
 
 /// Draws that are the same with every standard library.
@@ -142,7 +142,7 @@ class PressWriter {
     const double most = kMostShare * thickness_mm;
     depth_mm_ =
         draw_.chance(0.5) ? draw_.uniform(0.1, most) : draw_.log_uniform(kShallowestMm, most);
-    speed_ = draw_.log_uniform(0.5, 20);
+    speed_ = draw_.log_uniform(1, 20);
     press_.object = named_.object;
     add();
   }
@@ -160,7 +160,7 @@ class PressWriter {
     at_.x_mm += length * std::cos(heading);
     at_.y_mm += length * std::sin(heading);
     at_.rotation_deg += draw_.uniform(-30, 30);
-    return hold(length / draw_.log_uniform(1, 10));
+    return hold(length / draw_.log_uniform(2, 10));
   }
 
   [[nodiscard]] double time_s() const noexcept { return time_s_; }
@@ -207,7 +207,7 @@ class SceneWriter {
     for (const double part : {0.4, 0.8}) judge(std::lerp(from_s, to_s, part), phase);
   }
   void judge_after(double lifted_s) {
-    for (const double seconds : {0.2, 0.4}) judge(lifted_s + seconds, Phase::after);
+    for (const double seconds : {0.15, 0.3}) judge(lifted_s + seconds, Phase::after);
   }
 
   /// Presses in and holds. Returns the time at its end.
@@ -215,7 +215,7 @@ class SceneWriter {
     const double from = writer.time_s();
     const double pressed = writer.press();
     judge_between(from, pressed, Phase::moving);
-    const double held = writer.hold(draw_.uniform(0.4, 1.2));
+    const double held = writer.hold(draw_.uniform(0.3, 0.8));
     judge(pressed + 0.15, Phase::rest);
     judge(held - 0.05, Phase::rest);
     return held;
@@ -237,7 +237,7 @@ void draw_presses(RandomScene& out, Draw& draw) {
   const double kind = draw.uniform(0, 1);
   if (kind < 0.05) {
     out.what = "untouched";
-    for (const double seconds : {1.5, 2.5, 3.5}) scene.judge(seconds, Phase::after);
+    for (const double seconds : {1.5, 2.5}) scene.judge(seconds, Phase::after);
     return;
   }
   PressWriter first(draw, kBeginS, thickness);
@@ -383,6 +383,7 @@ RandomSensor draw_sensor(std::uint64_t seed, int number) {
   scene.presses.clear();
   scene.loop_from_s = scene.loop_to_s = 0;
   sim::LayerModel& layer = scene.layer;
+  layer.grid_mm = 0.15;
   layer.youngs_modulus_mpa = draw.log_uniform(0.06, 0.25);
   if (draw.chance(0.3)) layer.poisson = draw.uniform(0.48, 0.5);
   if (draw.chance(0.5)) {
@@ -427,7 +428,7 @@ RandomScene draw_scene(const RandomSensor& sensor, int number) {
 
 std::shared_ptr<const hal::sim::Truth> solve_eased(RandomScene& scene) {
   constexpr double kEase = 0.7;
-  constexpr double kSlideStepMm = 0.1;  // blended contacts lie beside each other else
+  constexpr double kSlideStepMm = 0.2;  // blended contacts lie beside each other else
   double eased = 1;
   while (newtons_at_keys(scene.scene) > kMostNewtons) {
     eased *= kEase;
