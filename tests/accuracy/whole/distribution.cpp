@@ -26,10 +26,10 @@ const std::vector<Quantity>& quantities() {
   static const std::vector<Quantity> all = {
       {"depth where it touches", "mm", [](const FrameErrors& f) { return f.inside; }},
       {"depth where it touches / stated", "",
-       [](const FrameErrors& f) { return ratio(f.inside, f.stated); }},
+       [](const FrameErrors& f) { return f.inside_ratio(); }},
       {"depth within 1 mm beside", "mm", [](const FrameErrors& f) { return f.beside; }},
       {"depth within 1 mm beside / stated", "",
-       [](const FrameErrors& f) { return ratio(f.beside, f.stated); }},
+       [](const FrameErrors& f) { return f.touching ? ratio(f.beside, f.stated) : NAN; }},
       {"depth elsewhere", "mm", [](const FrameErrors& f) { return f.away; }},
       {"depth elsewhere / stated", "",
        [](const FrameErrors& f) { return ratio(f.away, f.stated); }},
@@ -69,7 +69,9 @@ Distribution distribution_of(const std::vector<SceneReport>& scenes, std::string
   if (quantity == quantities().end()) throw std::out_of_range(std::string(name));
   std::vector<double> values;
   for (const SceneReport& scene : scenes) {
-    for (const FrameErrors& frame : scene.frames) values.push_back(quantity->value(frame));
+    for (const FrameErrors& frame : scene.frames) {
+      if (!frame.is_flagged()) values.push_back(quantity->value(frame));
+    }
   }
   return distribution_of(std::move(values));
 }
@@ -78,6 +80,10 @@ ContactMistakes contact_mistakes(const std::vector<SceneReport>& scenes) {
   ContactMistakes out;
   for (const SceneReport& scene : scenes) {
     for (const FrameErrors& frame : scene.frames) {
+      if (frame.is_flagged()) {
+        ++out.flagged;
+        continue;
+      }
       if (!frame.pressed && frame.frame.phase != Phase::moving) {
         ++out.untouched_frames;
         out.false_touches += frame.touching ? 1 : 0;
@@ -105,11 +111,15 @@ std::string to_markdown(const std::vector<SceneReport>& scenes) {
                    is_ratio ? fmt::format("{:.1f} %", 100 * d.above_2) : "");
   }
   const ContactMistakes contacts = contact_mistakes(scenes);
-  fmt::format_to(to,
-                 "\nContact: {} of {} frames without an object say \"touching\"; {} of {} frames "
-                 "at rest with more than {} mm² deeper than the threshold do not.\n",
-                 contacts.false_touches, contacts.untouched_frames, contacts.missed,
-                 contacts.contact_frames, kSurelyMm2);
+  std::size_t judged = 0;
+  for (const SceneReport& scene : scenes) judged += scene.frames.size();
+  fmt::format_to(
+      to,
+      "\n{} of {} judged frames have a flag and are left out above and below.\n\nContact: {} of {} "
+      "frames without an object say \"touching\"; {} of {} frames "
+      "at rest with more than {} mm² deeper than the threshold do not.\n",
+      contacts.flagged, judged, contacts.false_touches, contacts.untouched_frames, contacts.missed,
+      contacts.contact_frames, kSurelyMm2);
 
   fmt::format_to(to,
                  "\n| health flag | scenes that show it | without cause: scenes | frames |\n"

@@ -28,7 +28,7 @@ struct Quantity {
   double (*value)(const FrameErrors& frame);
 };
 [[nodiscard]] const std::vector<Quantity>& quantities();
-/// The quantity of this name. Throws std::out_of_range.
+/// The quantity of this name, in frames without a flag. Throws std::out_of_range.
 [[nodiscard]] Distribution distribution_of(const std::vector<SceneReport>& scenes,
                                            std::string_view name);
 
@@ -38,6 +38,7 @@ struct ContactMistakes {
   int untouched_frames = 0;
   int missed = 0;
   int contact_frames = 0;
+  int flagged = 0;  ///< Left out.
 };
 [[nodiscard]] ContactMistakes contact_mistakes(const std::vector<SceneReport>& scenes);
 

@@ -36,6 +36,7 @@ int main(int argc, char** argv) {
     app.add_option("--sensors", wanted.sensors, "How many")->capture_default_str();
     app.add_option("--scenes", wanted.scenes_each, "On each sensor")->capture_default_str();
     app.add_option("--threads", wanted.threads, "How many")->capture_default_str();
+    app.add_option("--only", wanted.only, "The name of the one scene to judge: s03.11");
     app.add_option("--work", wanted.folder, "Folder of calibrations; those there are used")
         ->required();
     app.add_option("--out", out, "Folder of the figures")->required();

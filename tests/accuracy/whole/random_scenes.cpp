@@ -25,13 +25,16 @@ std::vector<SceneReport> run(const RandomRun& wanted) {
     for (int number = next++; number < wanted.sensors; number = next++) {
       try {
         const RandomSensor sensor = draw_sensor(wanted.seed, number);
+        if (!wanted.only.starts_with(wanted.only.empty() ? "" : sensor.name)) continue;
         const fs::path calibration = wanted.folder / sensor.name;
         if (!fs::exists(calibration)) {
           base::write_file_atomically(wanted.folder / (sensor.name + ".txt"),
                                       calibrate(sensor, calibration));
         }
         for (int i = 0; i < wanted.scenes_each; ++i) {
-          SceneReport report = judge(draw_scene(sensor, i), calibration);
+          const RandomScene scene = draw_scene(sensor, i);
+          if (!wanted.only.empty() && scene.name != wanted.only) continue;
+          SceneReport report = judge(scene, calibration);
           const std::scoped_lock lock(mutex);
           fmt::print("{} {:.2f} {}\n", report.name, report.worst_ratio, report.what);
           std::fflush(stdout);

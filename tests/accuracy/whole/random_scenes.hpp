@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "tests/accuracy/whole/scene_judge.hpp"
@@ -13,6 +14,7 @@ struct RandomRun {
   int sensors = 10;
   int scenes_each = 20;
   int threads = 2;
+  std::string only;              ///< The name of the one scene to judge; empty: all.
   std::filesystem::path folder;  ///< Of calibrations; one that is there is used.
 };
 

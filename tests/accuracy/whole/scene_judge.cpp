@@ -238,6 +238,13 @@ void keep_maps(const cv::Mat1s& depth, const TrueMap& truth, SceneReport& out) {
 
 }  // namespace
 
+bool FrameErrors::is_flagged() const noexcept {
+  pipeline::HealthSet harmless;
+  harmless.set(pipeline::Health::not_realtime);
+  harmless.set(pipeline::Health::beyond_calibration);
+  return (health & ~harmless.bits()) != 0;
+}
+
 SceneReport judge(RandomScene scene, const std::filesystem::path& calibration) {
   const auto truth = solve_eased(scene);
   const auto model = calibration::load(calibration).model;
@@ -288,8 +295,8 @@ SceneReport judge(RandomScene scene, const std::filesystem::path& calibration) {
       const cv::Mat1s depth = depth_of(frame.depth());
       judge_depth(frame.depth(), depth, map, errors);
       judge_contact(frame, map, frame.depth().mm_per_px(), errors);
-      const double ratio = (errors.pressed ? errors.inside : errors.away) / errors.stated;
-      if (ratio > report.worst_ratio) {
+      const double ratio = errors.pressed ? errors.inside_ratio() : errors.away / errors.stated;
+      if (!errors.is_flagged() && ratio > report.worst_ratio) {
         report.worst_ratio = ratio;
         keep_maps(depth, map, report);
       }

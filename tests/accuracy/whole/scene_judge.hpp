@@ -34,6 +34,12 @@ struct FrameErrors {
   double true_force = 0;
   double stated_force = NAN;
   std::uint32_t health = 0;  ///< Bits of pipeline::Health.
+
+  /// A flag says that the picture is not what depth is measured by, which no uncertainty covers.
+  /// Pixels deeper than calibrated are untrusted and take nothing from the others.
+  [[nodiscard]] bool is_flagged() const noexcept;
+  /// What is stated is "inside the contact": NaN where none is told.
+  [[nodiscard]] double inside_ratio() const noexcept { return touching ? inside / stated : NAN; }
 };
 
 struct SceneReport {
@@ -49,7 +55,8 @@ struct SceneReport {
   std::array<int, pipeline::kHealthCount> false_alarms{};
   int beyond_missed = 0;  ///< Judged frames truly deeper than calibrated that do not say so.
 
-  /// Of the frame that errs most against what it states: every kMapStep-th pixel, micrometres.
+  /// Of the frame without a flag that errs most against what it states: every kMapStep-th pixel,
+  /// micrometres.
   int map_width = 0;
   std::vector<std::int16_t> true_map;
   std::vector<std::int16_t> map;
