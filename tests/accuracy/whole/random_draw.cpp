@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <random>
 #include <stdexcept>
@@ -21,7 +20,7 @@ namespace sim = hal::sim;
 
 constexpr double kShallowestMm = 0.05;
 constexpr double kMostShare = 0.8;
-constexpr double kBeginS = 0.9;  // the reference is there by then
+constexpr double kBeginS = 0.8;  // the reference is there by then
 constexpr double kAboveMm = 0.1;
 
 /// Draws that are the same with every standard library.
@@ -207,7 +206,7 @@ class SceneWriter {
     for (const double part : {0.4, 0.8}) judge(std::lerp(from_s, to_s, part), phase);
   }
   void judge_after(double lifted_s) {
-    for (const double seconds : {0.15, 0.3}) judge(lifted_s + seconds, Phase::after);
+    for (const double seconds : {0.1, 0.25}) judge(lifted_s + seconds, Phase::after);
   }
 
   /// Presses in and holds. Returns the time at its end.
@@ -215,7 +214,7 @@ class SceneWriter {
     const double from = writer.time_s();
     const double pressed = writer.press();
     judge_between(from, pressed, Phase::moving);
-    const double held = writer.hold(draw_.uniform(0.3, 0.8));
+    const double held = writer.hold(draw_.uniform(0.3, 0.5));
     judge(pressed + 0.15, Phase::rest);
     judge(held - 0.05, Phase::rest);
     return held;
@@ -251,7 +250,7 @@ void draw_presses(RandomScene& out, Draw& draw) {
     const double from = end;
     end = first.slide();
     scene.judge_between(from, end, Phase::slide);
-    end = first.hold(0.4);
+    end = first.hold(0.25);
     scene.judge(end - 0.05, Phase::rest);
     scene.judge_after(first.lift());
     scene.add(first);
@@ -272,7 +271,7 @@ void draw_presses(RandomScene& out, Draw& draw) {
   }
   const double lifted = first.lift();
   scene.judge_after(lifted);
-  PressWriter second(draw, lifted + 0.5, thickness);
+  PressWriter second(draw, lifted + 0.3, thickness);
   (void)scene.press(second);
   scene.judge_after(second.lift());
   scene.add(first);
@@ -320,21 +319,19 @@ void draw_light(RandomScene& out, Draw& draw) {
   }
 }
 
-/// The most that presses with it, infinite where a contact has no solution.
-double newtons_at_keys(sim::Scene scene) {
-  scene.layer.solve_step_mm = 5;
+/// Nothing where a contact has no solution or more than kMostNewtons press.
+std::shared_ptr<const sim::Truth> solve_if_light(const sim::Scene& scene) {
   try {
-    const sim::Truth truth(scene);
-    double most = 0;
+    auto truth = std::make_shared<const sim::Truth>(scene);
     for (const sim::Press& press : scene.presses) {
       for (const sim::PressKey& key : press.keys) {
         const double sequence = std::round(key.time_s * scene.camera.fps);
-        most = std::max(most, truth.force_n(static_cast<std::uint64_t>(sequence)));
+        if (truth->force_n(static_cast<std::uint64_t>(sequence)) > kMostNewtons) return nullptr;
       }
     }
-    return most;
+    return truth;
   } catch (const std::runtime_error&) {
-    return std::numeric_limits<double>::infinity();
+    return nullptr;
   }
 }
 
@@ -429,8 +426,12 @@ RandomScene draw_scene(const RandomSensor& sensor, int number) {
 std::shared_ptr<const hal::sim::Truth> solve_eased(RandomScene& scene) {
   constexpr double kEase = 0.7;
   constexpr double kSlideStepMm = 0.2;  // blended contacts lie beside each other else
+  const bool slides = std::ranges::any_of(
+      scene.judged, [](const JudgedFrame& frame) { return frame.phase == Phase::slide; });
+  if (slides) scene.scene.layer.solve_step_mm = kSlideStepMm;
   double eased = 1;
-  while (newtons_at_keys(scene.scene) > kMostNewtons) {
+  auto truth = solve_if_light(scene.scene);
+  for (; !truth; truth = solve_if_light(scene.scene)) {
     eased *= kEase;
     for (sim::Press& press : scene.scene.presses) {
       for (sim::PressKey& key : press.keys) {
@@ -439,10 +440,7 @@ std::shared_ptr<const hal::sim::Truth> solve_eased(RandomScene& scene) {
     }
   }
   if (eased < 1) scene.what += fmt::format("; eased to {:.2f} of the depth", eased);
-  const bool slides = std::ranges::any_of(
-      scene.judged, [](const JudgedFrame& frame) { return frame.phase == Phase::slide; });
-  if (slides) scene.scene.layer.solve_step_mm = kSlideStepMm;
-  return std::make_shared<const sim::Truth>(scene.scene);
+  return truth;
 }
 
 }  // namespace dtact::whole
