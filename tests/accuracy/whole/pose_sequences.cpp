@@ -20,6 +20,7 @@
 #include "proto/framing.hpp"
 #include "tests/accuracy/whole/moving_objects.hpp"
 #include "tests/accuracy/whole/program.hpp"
+#include "tests/accuracy/whole/shape.hpp"
 
 namespace dtact::whole {
 namespace {
@@ -27,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments {
-  std::vector<std::string> calibrations;  ///< "FOLDER OUT" in turn.
+  std::vector<fs::path> calibrations;
   std::vector<std::string> objects;
   std::vector<std::string> motions;
   fs::path out;
@@ -54,11 +55,28 @@ std::string truth_line(const hal::sim::Truth& truth, const MotionFrames& frames,
   return line + fmt::format(",{}\n", phase_of(frames, n));
 }
 
+/// How much the layer shows of six directions of motion, at five moments of one.
+std::string shape_csv(const hal::sim::Scene& scene, const MotionFrames& frames) {
+  std::string csv =
+      "sequence,x_mm,y_mm,z_mm,arm_mm,shown,turn_x,turn_y,turn_z,shift_x,shift_y,shift_z\n";
+  constexpr std::uint64_t kParts = 4;
+  for (std::uint64_t part = 0; part <= kParts; ++part) {
+    const std::uint64_t n = frames.motion + (frames.end - frames.motion) * part / kParts;
+    for (const ShownDirection& one : shown_directions(scene, n)) {
+      csv += fmt::format("{},{:.4f},{:.4f},{:.4f},{:.4f},{:.5f}", n, one.direction.centre.x(),
+                         one.direction.centre.y(), one.direction.centre.z(), one.direction.arm,
+                         one.shown);
+      for (const double value : one.direction.twist) csv += fmt::format(",{:.6f}", value);
+      csv += '\n';
+    }
+  }
+  return csv;
+}
+
 /// Runs the program from its start and keeps what belongs to a motion.
 void record(const std::shared_ptr<const hal::sim::Truth>& truth, const fs::path& calibration,
             const MovingObject& object, const std::vector<ObjectMotion>& motions,
             const std::vector<MotionFrames>& choreography, const fs::path& out) {
-  fs::create_directories(out);
   Program program(truth, calibration);
   std::uint64_t n = 0;
   for (std::size_t i = 0; i < motions.size(); ++i) {
@@ -94,10 +112,23 @@ void write_all(const Arguments& arguments) {
         fmt::format("{}\n[[press]]\n{}\nkeys = [{{ t = 0.0 }}]\n", arguments.head, object.lines),
         object.name);
     const auto choreography = choreograph(object, motions, scene);
+    std::vector<fs::path> folders;
+    for (const fs::path& calibration : arguments.calibrations) {
+      folders.push_back(arguments.out / calibration.filename());
+    }
+    if (folders.empty()) folders.push_back(arguments.out);
+    for (std::size_t i = 0; i < motions.size(); ++i) {
+      const std::string shape = shape_csv(scene, choreography[i]);
+      for (const fs::path& folder : folders) {
+        fs::create_directories(folder);
+        base::write_file_atomically(
+            folder / fmt::format("{}.{}.shape.csv", object.name, motions[i].name), shape);
+      }
+    }
+    if (arguments.calibrations.empty()) continue;
     const auto truth = std::make_shared<const hal::sim::Truth>(scene);
-    for (const std::string& calibration : arguments.calibrations) {
-      record(truth, calibration, object, motions, choreography,
-             arguments.out / fs::path(calibration).filename());
+    for (std::size_t i = 0; i < folders.size(); ++i) {
+      record(truth, arguments.calibrations[i], object, motions, choreography, folders[i]);
     }
   }
 }
@@ -110,8 +141,8 @@ int main(int argc, char** argv) {
     CLI::App app("Objects that move on the simulated sensor, as the daemon sends them");
     dtact::whole::Arguments arguments;
     app.add_option("--calibration", arguments.calibrations,
-                   "Folder; its frames come into a folder of the same name. May be repeated")
-        ->required();
+                   "Folder; its frames come into a folder of the same name. May be repeated. None: "
+                   "the shapes alone are written");
     app.add_option("--object", arguments.objects, "One object; may be repeated. None: all");
     app.add_option("--motion", arguments.motions, "One motion; may be repeated. None: all");
     app.add_option("--scene-head", arguments.head, "Tables of a scene: [camera], [surface], …");
