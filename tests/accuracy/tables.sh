@@ -43,7 +43,7 @@ for part in "$@"; do
       ;;
     whole)
       "$bin/whole/whole_random_scenes" --work "$bin/whole/random" --out "$here/whole"
-      /usr/bin/python3 "$here/whole/page.py" "$here/whole" "$bin/whole/random/maps"
+      /usr/bin/python3 "$here/whole/worst.py" "$bin/whole/random/maps" "$here/whole/worst.png"
       echo "whole: tests/accuracy/whole/README.md"
       ;;
     *)

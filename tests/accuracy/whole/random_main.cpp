@@ -45,7 +45,9 @@ int main(int argc, char** argv) {
     const auto maps = wanted.folder / "maps";
     std::filesystem::remove_all(maps);
     for (const auto& folder : {out, maps}) std::filesystem::create_directories(folder);
-    for (const auto& scene : scenes) write_maps(scene, maps);
+    for (const auto& scene : scenes) {
+      if (scene.map_width > 0) write_maps(scene, maps);
+    }
     dtact::base::write_file_atomically(out / "scenes.csv", dtact::whole::to_csv(scenes));
     dtact::base::write_file_atomically(out / "scenes.md", dtact::whole::to_markdown(scenes));
     return 0;

@@ -25,7 +25,8 @@ namespace sim = hal::sim;
 
 constexpr double kPeriodS = 1;  // from one press to the next
 constexpr std::uint64_t kUntouched = 32;
-constexpr std::uint64_t kImages = 24;
+constexpr std::uint64_t kImages = 24;  // of a press that a lookup table or a lens is made from
+constexpr std::uint64_t kForceImages = 4;
 constexpr double kNewtonsPerGram = 0.00980665;
 
 struct Load {
@@ -42,8 +43,8 @@ class Bench {
       : renderer_(with(sensor.scene, loads), sensor.seed), folder_(std::move(folder)) {}
 
   std::string untouched() { return images("untouched", 0, kUntouched); }
-  std::string load(std::size_t index) {
-    return images(fmt::format("load{}", index), frame_of(index), kImages);
+  std::string load(std::size_t index, std::uint64_t count = kImages) {
+    return images(fmt::format("load{}", index), frame_of(index), count);
   }
   double newtons(std::size_t index) const { return renderer_.truth().force_n(frame_of(index)); }
 
@@ -140,7 +141,8 @@ void calibrate_force(const RandomSensor& sensor, const fs::path& work, const fs:
                                         bench.untouched()};
   for (std::size_t i = 0; i < loads.size(); ++i) {
     const double newtons = std::round(bench.newtons(i) / kNewtonsPerGram) * kNewtonsPerGram;
-    arguments.insert(arguments.end(), {"--pair", fmt::format("{}@{:.3f}", bench.load(i), newtons)});
+    arguments.insert(arguments.end(),
+                     {"--pair", fmt::format("{}@{:.3f}", bench.load(i, kForceImages), newtons)});
   }
   try {
     printed += run(arguments);

@@ -10,8 +10,10 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+from PIL import Image
 
 WORST = 10
+COLOURS = 96  # keep the picture small
 UNTRUSTED = -32768
 
 
@@ -33,6 +35,7 @@ def draw(axes, true, measured, title):
     axes[1].set_title(f"to {deepest:.2f} mm", fontsize=7)
     axes[2].set_title(f"± {most:.3f} mm", fontsize=7)
     for axis in axes:
+        axis.set_axis_on()
         axis.set_facecolor("black")
         axis.set_xticks([])
         axis.set_yticks([])
@@ -42,6 +45,8 @@ def main():
     folder, out = sys.argv[1:]
     worst = sorted(pathlib.Path(folder).glob("*.i16"), reverse=True)[:WORST]
     figure, axes = plt.subplots(WORST // 2, 6, figsize=(7.6, 7.2))
+    for axis in axes.flat:
+        axis.set_axis_off()
     for index, file in enumerate(worst):
         ratio, name, true, measured = maps_of(file)
         column = 3 * (index % 2)
@@ -49,6 +54,7 @@ def main():
         draw(row, true, measured, f"{name}: {ratio:.1f} × stated")
     figure.tight_layout(pad=0.3)
     figure.savefig(out, dpi=80)
+    Image.open(out).quantize(COLOURS).save(out, optimize=True)
 
 
 main()
