@@ -72,9 +72,9 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   out.contact_absence = ContactAbsence::none;
   out.contact = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
   contact_.weigh(model.force, out.sharpen_steps, out.contact);
-  beyond_ = reconstructor.beyond_pixels() * out.made_decimation * out.made_decimation >
-            config_.beyond_pixels;
-  judge(untouched.trust(), bend_um(sums, model.mm_per_px), out);
+  const int beyond = reconstructor.beyond_pixels();
+  beyond_ = beyond * out.made_decimation * out.made_decimation > config_.beyond_pixels;
+  judge(untouched.trust(), bend_um(sums, model.mm_per_px) * rim_factor(sums.made, beyond), out);
   out.times.inspect_ns = steps.sums_ns + clock_.monotonic_ns() - began_ns;
 }
 
