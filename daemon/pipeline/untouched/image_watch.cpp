@@ -48,6 +48,7 @@ void ImageWatch::set_reference(std::span<const std::uint16_t> reference_q8, int 
 void ImageWatch::forget() noexcept {
   drifted_ = false;
   until_check_ = 0;
+  active_then_ = 0;
   banded_ = 0;
   conditions_ = {};
 }
@@ -74,10 +75,14 @@ std::optional<LightCompared> ImageWatch::compare_light(const CellReport& report,
   if (!have_reference_ || report.active_cells * kActiveShare < report.cells) {
     drifted_ = false;
     until_check_ = 0;
+    active_then_ = 0;
     return std::nullopt;
   }
-  if (until_check_-- > 0) return std::nullopt;
+  // Light that changes while something touches is not left untold until the next look is due.
+  const bool jumps = (report.active_cells - active_then_) * kActiveShare >= report.cells;
+  if (until_check_-- > 0 && !jumps) return std::nullopt;
   until_check_ = kCheckEvery - 1;
+  active_then_ = report.active_cells;
   measure(luma, now_);
   const TouchVerdict verdict = check_.compare(reference_, now_, region_, kDriftDegree, field_);
   double change = 0;

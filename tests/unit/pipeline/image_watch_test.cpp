@@ -101,6 +101,15 @@ TEST_F(ImageWatchTest, LightIsLookedAtEverySixteenFrames) {
   EXPECT_TRUE(has(Health::light_drifted));
 }
 
+TEST_F(ImageWatchTest, LightThatChangesUnderAPressIsLookedAtAtOnce) {
+  report_.active_cells = 30;
+  look();
+  pixels_.assign(pixels_.size(), 90);
+  report_.active_cells = 80;
+  look();
+  EXPECT_TRUE(has(Health::light_drifted));
+}
+
 TEST_F(ImageWatchTest, BandsMustLastSixFrames) {
   report_.frame.ripple = 0.6;
   for (int i = 0; i < 5; ++i) look();
