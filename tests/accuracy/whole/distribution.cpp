@@ -14,8 +14,13 @@
 namespace dtact::whole {
 namespace {
 
-/// Truly pressed so far that a contact at rest has to be told.
+/// Truly pressed so far that a contact at rest has to be told: deeper than the threshold by twice
+/// what is stated.
 constexpr double kSurelyMm2 = 1;
+bool surely_pressed(const FrameErrors& frame) {
+  return frame.true_area > kSurelyMm2 &&
+         frame.true_deepest > pipeline::ContactRules{}.made_mm + 2 * frame.stated;
+}
 constexpr std::size_t kWorst = 10;
 
 double ratio(double error, double stated) { return std::abs(error) / stated; }
@@ -88,7 +93,7 @@ ContactMistakes contact_mistakes(const std::vector<SceneReport>& scenes) {
         ++out.untouched_frames;
         out.false_touches += frame.touching ? 1 : 0;
       }
-      if (frame.frame.phase == Phase::rest && frame.true_area > kSurelyMm2) {
+      if (frame.frame.phase == Phase::rest && surely_pressed(frame)) {
         ++out.contact_frames;
         out.missed += frame.touching ? 0 : 1;
       }
@@ -117,9 +122,9 @@ std::string to_markdown(const std::vector<SceneReport>& scenes) {
       to,
       "\n{} of {} judged frames have a flag and are left out above and below.\n\nContact: {} of {} "
       "frames without an object say \"touching\"; {} of {} frames "
-      "at rest with more than {} mm² deeper than the threshold do not.\n",
+      "at rest that reach deeper than the threshold by twice what is stated do not.\n",
       contacts.flagged, judged, contacts.false_touches, contacts.untouched_frames, contacts.missed,
-      contacts.contact_frames, kSurelyMm2);
+      contacts.contact_frames);
 
   fmt::format_to(to,
                  "\n| health flag | scenes that show it | without cause: scenes | frames |\n"

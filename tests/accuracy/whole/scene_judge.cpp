@@ -212,7 +212,8 @@ void judge_points(const v1::PointCloud& cloud, const TruthReader& truth, FrameEr
 std::uint32_t without_cause(const RandomScene& scene, double true_deepest, double calibrated_mm) {
   using pipeline::Health;
   pipeline::HealthSet causes;
-  causes.set(Health::not_realtime);  // says nothing of depth
+  causes.set(Health::not_realtime);     // says nothing of depth
+  causes.set(Health::image_saturated);  // a bulge in bright light is white
   causes.set(Health::light_drifted, scene.light == LightCase::led_fails);
   causes.set(Health::beyond_calibration, true_deepest > 0.9 * calibrated_mm - 0.03);
   return ~causes.bits();
