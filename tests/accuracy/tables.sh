@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Makes the tables, plots and pages that lie beside this file from the simulated sensor:
-# tables.sh BIN [table|objects|model|atlas|thickness|study|pose ...], all of them without a name. BIN: where the accuracy
+# tables.sh BIN [table|objects|model|atlas|thickness|study|pose|whole ...], all of them without a name. BIN: where the accuracy
 # tests were built.
 set -euo pipefail
 here=$(dirname "$(readlink -f "$0")")
 bin=$1
 shift
-(($#)) || set -- table objects model atlas thickness study pose
+(($#)) || set -- table objects model atlas thickness study pose whole
 for part in "$@"; do
   case $part in
     table)
@@ -41,8 +41,13 @@ for part in "$@"; do
       mv "$here/pose/known.md.new" "$here/pose/known.md"
       echo "pose: tests/accuracy/pose/README.md"
       ;;
+    whole)
+      "$bin/whole/whole_random_scenes" --work "$bin/whole/random" --out "$here/whole"
+      /usr/bin/python3 "$here/whole/worst.py" "$bin/whole/random/maps" "$here/whole/worst.png"
+      echo "whole: tests/accuracy/whole/README.md"
+      ;;
     *)
-      echo "tables.sh: '$part' is none of table, objects, model, atlas, thickness, study, pose" >&2
+      echo "tables.sh: '$part' is none of table, objects, model, atlas, thickness, study, pose, whole" >&2
       exit 2
       ;;
   esac

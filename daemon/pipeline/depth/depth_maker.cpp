@@ -71,9 +71,9 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   out.contact_um = rules.made_um;
   out.contact_absence = ContactAbsence::none;
   out.contact = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
-  beyond_ = reconstructor.beyond_pixels() * out.made_decimation * out.made_decimation >
-            config_.beyond_pixels;
-  judge(untouched.trust(), bend_um(sums, model.mm_per_px), out);
+  const int beyond = reconstructor.beyond_pixels();
+  beyond_ = beyond * out.made_decimation * out.made_decimation > config_.beyond_pixels;
+  judge(untouched.trust(), bend_um(sums, model.mm_per_px) * rim_factor(sums.made, beyond), out);
   add_force(resolution, resolution.coarse ? resolution.coarse->depth_um : out.depth_um, beyond_,
             out.uncertainty_um, out.contact);
   out.times.inspect_ns = steps.sums_ns + clock_.monotonic_ns() - began_ns;

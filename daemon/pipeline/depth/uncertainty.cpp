@@ -44,6 +44,11 @@ double bend_um(const recon::DepthSums& sums, double mm_per_px) noexcept {
          (distance * distance);
 }
 
+double rim_factor(std::int64_t made, std::int64_t beyond) noexcept {
+  if (made == 0) return 1;
+  return std::sqrt(1 + static_cast<double>(beyond) / static_cast<double>(made));
+}
+
 double uncertainty_um(double list_um, double bend_um) noexcept {
   return std::hypot(list_um, kBlurPerBend * bend_um);
 }

@@ -21,9 +21,10 @@ class ImageWatch {
   /// Depth is measured against this from now on: Q8 luma, frame sized. `region`: as for TouchCheck.
   void set_reference(std::span<const std::uint16_t> reference_q8, int width, int height,
                      const CellRegion& region) noexcept;
-  /// The next frame. Cheap, but for every sixteenth one while a quarter of the picture is active:
-  /// then the light is compared, in up to half a millisecond. `light`: the factor on the reference
-  /// that is followed. Returns what the comparison found, where there was one.
+  /// The next frame. Cheap, but while a quarter of the picture is active for every sixteenth one
+  /// and where another quarter becomes active: then the light is compared, in up to half a
+  /// millisecond. `light`: the factor on the reference that is followed. Returns what the
+  /// comparison found, where there was one.
   std::optional<LightCompared> look(const CellReport& report, const hal::LumaView& luma,
                                     double light) noexcept;
   /// No depth is measured at present, so nothing is said about it.
@@ -45,7 +46,8 @@ class ImageWatch {
   bool have_reference_ = false;
   bool drifted_ = false;
   int until_check_ = 0;
-  int banded_ = 0;  // frames with ripple, less those without
+  int active_then_ = 0;  // cells when the light was compared last
+  int banded_ = 0;       // frames with ripple, less those without
   HealthSet conditions_;
 };
 

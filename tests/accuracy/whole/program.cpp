@@ -44,6 +44,7 @@ class Camera final : public hal::Camera, private hal::FrameOwner {
         sensor_(truth->scene().sensor),
         clock_(clock),
         renderer_(truth, truth->scene(), settings.seed),
+        lighting_(settings.lighting),
         output_(hal::sim::output_from_name(settings.output)),
         encoder_(output_, model_.width, model_.height),
         decoder_(model_.width, model_.height),
@@ -74,8 +75,9 @@ class Camera final : public hal::Camera, private hal::FrameOwner {
   [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
                                      std::chrono::nanoseconds /*timeout*/) noexcept override {
     const std::uint64_t sequence = next_++;
-    renderer_.render(sequence, hal::sim::led_levels({}), exposed_.data(), exposed_.stride(),
-                     model_.height);
+    const Lighting light = lighting_ ? lighting_(sequence) : Lighting{};
+    renderer_.set_gain(light.gain);
+    renderer_.render(sequence, light.leds, exposed_.data(), exposed_.stride(), model_.height);
     const std::span bytes = std::span(payload_).first(encoder_.encode(exposed_.view(), payload_));
     if (!receive(bytes)) return hal::GrabStatus::damaged;
     const double due_ns = static_cast<double>(sequence + 1) * 1e9 / model_.fps;
@@ -112,6 +114,7 @@ class Camera final : public hal::Camera, private hal::FrameOwner {
   const std::string sensor_;
   fakes::FakeClock& clock_;
   hal::sim::Renderer renderer_;
+  const std::function<Lighting(std::uint64_t)> lighting_;
   const hal::sim::Output output_;
   hal::sim::PayloadEncoder encoder_;
   hal::mjpeg::GreyDecoder decoder_;

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include "daemon/pipeline/depth_frame.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/serve/frame_kind.hpp"
+#include "hal/sim/light_field.hpp"
 #include "hal/sim/truth.hpp"
 
 namespace dtact::whole {
@@ -35,12 +37,20 @@ struct MapFrame {
 [[nodiscard]] MapFrame map_frame(const hal::sim::Scene& scene,
                                  const std::filesystem::path& calibration);
 
+/// What light a frame is exposed in.
+struct Lighting {
+  hal::sim::LedLevels leds = hal::sim::led_levels({});
+  double gain = 1;  ///< So many times as bright, 0.25 … 4.
+};
+
 /// What the program runs with. As it stands: a daemon without a configuration.
 struct Settings {
   pipeline::PipelineConfig daemon;
   net::FrameKind kind = perceive_kind();
   std::uint64_t seed = 1;        ///< Of the camera's noise.
   std::string output = "mjpeg";  ///< What the camera delivers: "luma", "yuyv" or "mjpeg".
+  /// Of each frame; none: all LEDs as the ring shows them.
+  std::function<Lighting(std::uint64_t sequence)> lighting;
 };
 
 /// The simulated camera, the daemon's capture loop and its frame encoder in one thread and in the

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -67,12 +68,44 @@ TEST_F(ImageWatchTest, PressOnAThirdIsNoDrift) {
   EXPECT_FALSE(has(Health::light_drifted));
 }
 
+// The bulge is highest beside the press; light is as bright everywhere.
+TEST_F(ImageWatchTest, BulgeRoundAWidePressIsNoDriftButBrighterLightIs) {
+  report_.active_cells = 80;
+  const auto press = [&](double bulge, double light) {
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const double distance = std::hypot(x - 70, y - 55);
+        const double grey = distance < 25 ? 80 : 100 + bulge * (1 - distance / 120);
+        pixels_[static_cast<std::size_t>(y * kWidth + x)] =
+            static_cast<std::uint8_t>(std::lround(light * grey));
+      }
+    }
+    watch_.forget();
+    look();
+  };
+  press(9, 1);
+  EXPECT_FALSE(has(Health::light_drifted));
+  press(0, 1.03);
+  EXPECT_TRUE(has(Health::light_drifted));
+  press(9, 0.9);
+  EXPECT_TRUE(has(Health::light_drifted));
+}
+
 TEST_F(ImageWatchTest, LightIsLookedAtEverySixteenFrames) {
   report_.active_cells = 80;
   look();
   pixels_.assign(pixels_.size(), 90);
   for (int i = 1; i < 16; ++i) look();
   EXPECT_FALSE(has(Health::light_drifted));
+  look();
+  EXPECT_TRUE(has(Health::light_drifted));
+}
+
+TEST_F(ImageWatchTest, LightThatChangesUnderAPressIsLookedAtAtOnce) {
+  report_.active_cells = 30;
+  look();
+  pixels_.assign(pixels_.size(), 90);
+  report_.active_cells = 80;
   look();
   EXPECT_TRUE(has(Health::light_drifted));
 }

@@ -75,6 +75,12 @@ TEST(Bend, ReachIsASixthOfAMillimetreAndAtLeastOnePixel) {
   EXPECT_EQ(bend_reach(0.5), 1);
 }
 
+TEST(Uncertainty, RimOfWhatIsTooDeepBendsMoreThanIsSeen) {
+  EXPECT_DOUBLE_EQ(rim_factor(500, 0), 1);
+  EXPECT_DOUBLE_EQ(rim_factor(400, 500), 1.5);
+  EXPECT_DOUBLE_EQ(rim_factor(0, 700), 1);
+}
+
 TEST(Uncertainty, AddsListAndBlurInSquares) {
   EXPECT_DOUBLE_EQ(uncertainty_um(30, 0), 30);
   EXPECT_DOUBLE_EQ(uncertainty_um(28, 3), 35);  // √(28² + 21²)

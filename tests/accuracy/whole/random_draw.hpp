@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "hal/sim/scene.hpp"
+#include "tests/accuracy/whole/program.hpp"
+
+namespace dtact::whole {
+
+/// A simulated sensor of its own gel, optics, light and camera, without presses.
+struct RandomSensor {
+  std::string name;  ///< "s03".
+  std::uint64_t seed = 0;
+  hal::sim::Scene scene;
+  /// A user has to measure the lens: the camera distorts.
+  [[nodiscard]] bool has_lens() const noexcept { return scene.camera.barrel > 0; }
+};
+
+/// How the light differs from that of the calibration.
+enum class LightCase : std::uint8_t {
+  same,
+  brighter,  ///< Another brightness of the whole field, from the start.
+  led,       ///< One LED is dimmer or dead, from the start.
+  drift,     ///< The whole field drifts by at most what the daemon follows, 2 % a minute.
+  led_fails  ///< One LED dims or dies after the reference was taken.
+};
+[[nodiscard]] const char* name_of(LightCase light) noexcept;
+
+/// What a judged frame shows.
+enum class Phase : std::uint8_t { before, moving, rest, slide, after };
+[[nodiscard]] const char* name_of(Phase phase) noexcept;
+
+struct JudgedFrame {
+  std::uint64_t sequence = 0;
+  Phase phase = Phase::before;
+};
+
+/// What happens on one sensor.
+struct RandomScene {
+  std::string name;  ///< "s03.11".
+  std::string what;  ///< Objects, sizes, depths, motion and light in words.
+  std::uint64_t seed = 0;
+  hal::sim::Scene scene;
+  LightCase light = LightCase::same;
+  std::function<Lighting(std::uint64_t sequence)> lighting;
+  std::vector<JudgedFrame> judged;  ///< Ascending.
+};
+
+/// Sensor `number` of those that `seed` draws.
+[[nodiscard]] RandomSensor draw_sensor(std::uint64_t seed, int number);
+
+/// Scene `number` on a sensor. Depth reaches 0.8 of the gel.
+[[nodiscard]] RandomScene draw_scene(const RandomSensor& sensor, int number);
+
+/// Solves its contacts, with all presses made shallower until no more than kMostNewtons press.
+[[nodiscard]] std::shared_ptr<const hal::sim::Truth> solve_eased(RandomScene& scene);
+inline constexpr double kMostNewtons = 30;
+
+}  // namespace dtact::whole

@@ -1,0 +1,322 @@
+#include "tests/accuracy/whole/scene_judge.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <memory>
+#include <opencv2/imgproc.hpp>
+#include <span>
+#include <stdexcept>
+
+#include "clients/perceive/frame_maker.hpp"
+#include "daemon/calibration/calibration.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::whole {
+namespace {
+
+constexpr double kContactMm = pipeline::ContactRules{}.made_mm;
+constexpr double kContactMm2 = pipeline::ContactRules{}.area_mm2;
+
+/// A mean of absolute values; NaN without any.
+class MeanError {
+ public:
+  void add(double error) {
+    sum_ += std::abs(error);
+    ++count_;
+  }
+  [[nodiscard]] double value() const { return count_ > 0 ? sum_ / count_ : NAN; }
+
+ private:
+  double sum_ = 0;
+  int count_ = 0;
+};
+
+/// What is true at the pixels of the depth map.
+struct TrueMap {
+  cv::Mat1f indentation_mm;
+  cv::Mat1b touched;
+};
+
+class TruthReader {
+ public:
+  TruthReader(const hal::sim::Truth& truth, const recon::RectifyTable& table)
+      : truth_(truth),
+        columns_(table.height, table.width),
+        rows_(table.height, table.width),
+        grid_values_(truth.grid().size()) {
+    auto entry = table.entries.begin();
+    for (int y = 0; y < table.height; ++y) {
+      for (int x = 0; x < table.width; ++x, ++entry) {
+        columns_(y, x) = static_cast<float>(entry->x + entry->fx / 128.0);
+        rows_(y, x) = static_cast<float>(entry->y + entry->fy / 128.0);
+      }
+    }
+  }
+
+  TrueMap at(std::uint64_t sequence) {
+    const hal::sim::CameraModel& camera = truth_.scene().camera;
+    truth_.indentation_mm(sequence, indentation_);
+    truth_.contact(sequence, contact_);
+    const cv::Mat1f indentation(camera.height, camera.width, indentation_.data());
+    const cv::Mat1b contact(camera.height, camera.width, contact_.data());
+    TrueMap map;
+    cv::remap(indentation, map.indentation_mm, columns_, rows_, cv::INTER_LINEAR);
+    cv::remap(contact, map.touched, columns_, rows_, cv::INTER_NEAREST);
+    truth_.blend(truth_.moment(sequence), grid_values_);
+    return map;
+  }
+
+  /// Distance of a point from the true surface of the frame last read, mm, to first order.
+  [[nodiscard]] double distance(double x_mm, double y_mm, double depth_mm) const {
+    const hal::sim::Grid& grid = truth_.grid();
+    const double column = (x_mm - grid.x0_mm) / grid.spacing_mm;
+    const double row = (y_mm - grid.y0_mm) / grid.spacing_mm;
+    const int x = std::clamp(static_cast<int>(column), 0, grid.width - 2);
+    const int y = std::clamp(static_cast<int>(row), 0, grid.height - 2);
+    const auto value = [&](int dx, int dy) {
+      const auto index = static_cast<std::size_t>(y + dy) * static_cast<std::size_t>(grid.width) +
+                         static_cast<std::size_t>(x + dx);
+      return grid_values_[index] / static_cast<double>(hal::sim::Truth::kPerMm);
+    };
+    const double fx = column - x;
+    const double fy = row - y;
+    const double upper = std::lerp(value(0, 0), value(1, 0), fx);
+    const double lower = std::lerp(value(0, 1), value(1, 1), fx);
+    const double slope_x =
+        std::lerp(value(1, 0) - value(0, 0), value(1, 1) - value(0, 1), fy) / grid.spacing_mm;
+    const double slope_y = (lower - upper) / grid.spacing_mm;
+    return std::abs(depth_mm - std::lerp(upper, lower, fy)) /
+           std::sqrt(1 + slope_x * slope_x + slope_y * slope_y);
+  }
+
+ private:
+  const hal::sim::Truth& truth_;
+  cv::Mat1f columns_;
+  cv::Mat1f rows_;
+  std::vector<float> indentation_;
+  std::vector<std::uint8_t> contact_;
+  std::vector<std::int16_t> grid_values_;
+};
+
+v1::Frame parsed(const std::string& bytes) {
+  v1::Frame frame;
+  if (!frame.ParseFromString(bytes)) throw std::runtime_error("the frame cannot be parsed");
+  return frame;
+}
+
+std::uint32_t bits_of(const v1::Frame& frame) {
+  pipeline::HealthSet set;
+  for (const int health : frame.health()) set.set(static_cast<pipeline::Health>(health - 1));
+  return set.bits();
+}
+
+cv::Mat1s depth_of(const v1::DepthMap& map) {
+  cv::Mat1s depth(static_cast<int>(map.height()), static_cast<int>(map.width()));
+  if (map.data().size() != depth.total() * sizeof(std::int16_t)) {
+    throw std::runtime_error("the depth map has another size than it says");
+  }
+  static_assert(std::endian::native == std::endian::little, "as the wire");
+  std::memcpy(depth.data, map.data().data(), map.data().size());
+  return depth;
+}
+
+void judge_depth(const v1::DepthMap& map, const cv::Mat1s& depth, const TrueMap& truth,
+                 FrameErrors& out) {
+  out.stated = 0.001 * map.uncertainty_um();
+  cv::Mat1b near;
+  const int reach = 2 * static_cast<int>(std::lround(kBesideMm / map.mm_per_px())) + 1;
+  cv::dilate(truth.touched, near,
+             cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(reach, reach)));
+  MeanError inside;
+  MeanError beside;
+  MeanError away;
+  int untrusted = 0;
+  const int touched = cv::countNonZero(truth.touched);
+  for (int y = 0; y < depth.rows; ++y) {
+    for (int x = 0; x < depth.cols; ++x) {
+      const bool contact = truth.touched(y, x) != 0;
+      if (depth(y, x) == map.untrusted_value()) {
+        untrusted += contact ? 1 : 0;
+        continue;
+      }
+      const double error =
+          0.001 * depth(y, x) * map.um_per_unit() - static_cast<double>(truth.indentation_mm(y, x));
+      (contact ? inside : near(y, x) != 0 ? beside : away).add(error);
+    }
+  }
+  out.inside = inside.value();
+  out.beside = beside.value();
+  out.away = away.value();
+  if (touched > 0) out.untrusted = static_cast<double>(untrusted) / touched;
+}
+
+void judge_contact(const v1::Frame& frame, const TrueMap& truth, double mm_per_px,
+                   FrameErrors& out) {
+  const v1::Contact& contact = frame.contact();
+  double weight = 0;
+  double x_sum = 0;
+  double y_sum = 0;
+  for (int y = 0; y < truth.indentation_mm.rows; ++y) {
+    for (int x = 0; x < truth.indentation_mm.cols; ++x) {
+      const auto depth = static_cast<double>(truth.indentation_mm(y, x));
+      out.true_deepest = std::max(out.true_deepest, depth);
+      if (depth <= kContactMm) continue;
+      out.true_area += mm_per_px * mm_per_px;
+      weight += depth;
+      x_sum += depth * x;
+      y_sum += depth * y;
+    }
+  }
+  out.touching = contact.touching();
+  if (!out.touching || !out.pressed) return;
+  if (out.true_area < kContactMm2) return;
+  out.area = contact.area_mm2() / out.true_area - 1;
+  const double x_mm = (x_sum / weight - 0.5 * (truth.indentation_mm.cols - 1)) * mm_per_px;
+  const double y_mm = (y_sum / weight - 0.5 * (truth.indentation_mm.rows - 1)) * mm_per_px;
+  out.centroid = std::hypot(contact.x_mm() - x_mm, contact.y_mm() - y_mm);
+  out.deepest = contact.deepest_mm() - out.true_deepest;
+  if (contact.has_force_n()) {
+    out.force = contact.force_n() - out.true_force;
+    out.stated_force = contact.force_uncertainty_n();
+  }
+}
+
+void judge_points(const v1::PointCloud& cloud, const TruthReader& truth, FrameErrors& out) {
+  const std::size_t size = static_cast<std::size_t>(cloud.width()) * cloud.height();
+  std::vector<float> values(6 * size);
+  if (cloud.data().size() != values.size() * sizeof(float)) {
+    throw std::runtime_error("the points are not as many as they say");
+  }
+  std::memcpy(values.data(), cloud.data().data(), cloud.data().size());
+  std::vector<double> distances;
+  double sum = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    if (std::isnan(values[i])) continue;
+    const auto mm = [&](std::size_t part) {
+      return 1000 * cloud.metres_per_unit() * static_cast<double>(values[part * size + i]);
+    };
+    distances.push_back(truth.distance(mm(0), mm(1), -mm(2)));
+    sum += distances.back();
+  }
+  if (distances.empty()) return;
+  out.points = sum / static_cast<double>(distances.size());
+  const auto at = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() * 95 / 100);
+  std::ranges::nth_element(distances, at);
+  out.points_95 = *at;
+}
+
+/// Flags that nothing in a scene gives cause for.
+std::uint32_t without_cause(const RandomScene& scene, double true_deepest, double calibrated_mm) {
+  using pipeline::Health;
+  pipeline::HealthSet causes;
+  causes.set(Health::not_realtime);     // says nothing of depth
+  causes.set(Health::image_saturated);  // a bulge in bright light is white
+  causes.set(Health::light_drifted, scene.light == LightCase::led_fails);
+  causes.set(Health::beyond_calibration, true_deepest > 0.9 * calibrated_mm - 0.03);
+  return ~causes.bits();
+}
+
+bool is_beyond(const TrueMap& truth, double calibrated_mm) {
+  return cv::countNonZero(truth.indentation_mm > 1.1 * calibrated_mm + 0.03) >
+         2 * pipeline::PipelineConfig{}.beyond_pixels;
+}
+
+void keep_maps(const cv::Mat1s& depth, const TrueMap& truth, SceneReport& out) {
+  out.map.clear();
+  out.true_map.clear();
+  out.map_width = (depth.cols + kMapStep - 1) / kMapStep;
+  for (int y = 0; y < depth.rows; y += kMapStep) {
+    for (int x = 0; x < depth.cols; x += kMapStep) {
+      out.map.push_back(depth(y, x));
+      out.true_map.push_back(
+          static_cast<std::int16_t>(std::lround(1000 * truth.indentation_mm(y, x))));
+    }
+  }
+}
+
+}  // namespace
+
+bool FrameErrors::is_flagged() const noexcept {
+  pipeline::HealthSet harmless;
+  harmless.set(pipeline::Health::not_realtime);
+  harmless.set(pipeline::Health::beyond_calibration);
+  return (health & ~harmless.bits()) != 0;
+}
+
+SceneReport judge(RandomScene scene, const std::filesystem::path& calibration) {
+  const auto truth = solve_eased(scene);
+  const auto model = calibration::load(calibration).model;
+  SceneReport report;
+  report.name = scene.name;
+  report.what = scene.what;
+  report.light = scene.light;
+  report.thickness_mm = scene.scene.layer.thickness_mm;
+  const recon::DepthList& list = model->list;
+  report.calibrated_mm =
+      0.001 * list.um.at(static_cast<std::size_t>(list.covered_to_q6 - list.first_q6));
+
+  Settings settings;
+  settings.seed = scene.seed;
+  settings.lighting = scene.lighting;
+  Program program(truth, calibration, settings);
+  TruthReader reader(*truth, model->rectify);
+  net::FrameKind points;
+  points.cloud = v1::CLOUD_FLOAT32;
+  points.contact_box = true;
+  perceive::FrameMaker maker;
+  std::uint32_t undue = 0;
+  std::uint64_t n = 0;
+  for (const JudgedFrame& judged : scene.judged) {
+    for (; n <= judged.sequence; ++n) {
+      const std::string frame = program.next();
+      if (n < scene.judged.front().sequence) continue;
+      ++report.watched;
+      const std::uint32_t health = bits_of(parsed(frame));
+      float deepest = 0;
+      if (health != 0) {
+        const TrueMap map = reader.at(n);
+        deepest = static_cast<float>(*std::ranges::max_element(map.indentation_mm));
+      }
+      undue = without_cause(scene, static_cast<double>(deepest), report.calibrated_mm);
+      for (std::size_t i = 0; i < report.flagged.size(); ++i) {
+        report.flagged.at(i) += static_cast<int>(health >> i & 1U);
+        report.false_alarms.at(i) += static_cast<int>((health & undue) >> i & 1U);
+      }
+    }
+    const v1::Frame frame = parsed(program.as(whole_map_kind()));
+    FrameErrors errors{.frame = judged};
+    errors.health = bits_of(frame);
+    const TrueMap map = reader.at(judged.sequence);
+    errors.pressed = cv::countNonZero(map.touched) > 0;
+    errors.true_force = truth->force_n(judged.sequence);
+    if (frame.has_depth()) {
+      const cv::Mat1s depth = depth_of(frame.depth());
+      judge_depth(frame.depth(), depth, map, errors);
+      judge_contact(frame, map, frame.depth().mm_per_px(), errors);
+      const double ratio = errors.pressed ? errors.inside_ratio() : errors.away / errors.stated;
+      if (!errors.is_flagged() && ratio > report.worst_ratio) {
+        report.worst_ratio = ratio;
+        keep_maps(depth, map, report);
+      }
+      if (is_beyond(map, report.calibrated_mm)) {
+        pipeline::HealthSet beyond;
+        beyond.set(pipeline::Health::beyond_calibration);
+        report.beyond_missed += (errors.health & beyond.bits()) == 0 ? 1 : 0;
+      }
+    }
+    if (errors.touching && errors.pressed) {
+      maker.begin(parsed(program.as(perceive_kind())), false);
+      if (const auto made = maker.make(points)) {
+        const v1::Frame cloud = parsed(made->body);
+        if (cloud.has_cloud()) judge_points(cloud.cloud(), reader, errors);
+      }
+    }
+    report.frames.push_back(errors);
+  }
+  return report;
+}
+
+}  // namespace dtact::whole

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/pipeline/health.hpp"
+#include "tests/accuracy/whole/random_draw.hpp"
+
+namespace dtact::whole {
+
+/// One judged frame, as clients got it beside the truth. Lengths in mm; NaN: nothing to compare.
+struct FrameErrors {
+  JudgedFrame frame;
+  double stated = NAN;     ///< DepthMap.uncertainty_um.
+  double inside = NAN;     ///< Mean absolute error where the object touches, …
+  double beside = NAN;     ///< … within kBesideMm round it, …
+  double away = NAN;       ///< … and everywhere else.
+  double untrusted = NAN;  ///< Share of the pixels where it touches.
+  bool touching = false;
+  bool pressed = false;   ///< An object touches the gel, truly and within the map.
+  double true_area = 0;   ///< mm² truly deeper than the contact threshold.
+  double area = NAN;      ///< Said, as a share of the true one, minus 1.
+  double centroid = NAN;  ///< Distance from the true one.
+  double deepest = NAN;   ///< Said minus true.
+  double true_deepest = 0;
+  double points = NAN;     ///< Mean distance of the contact's points from the true surface, …
+  double points_95 = NAN;  ///< … and 95 % within.
+  double force = NAN;      ///< Said minus true, newtons.
+  double true_force = 0;
+  double stated_force = NAN;
+  std::uint32_t health = 0;  ///< Bits of pipeline::Health.
+
+  /// A flag says that the picture is not what depth is measured by, which no uncertainty covers.
+  /// Pixels deeper than calibrated are untrusted and take nothing from the others.
+  [[nodiscard]] bool is_flagged() const noexcept;
+  /// What is stated is "inside the contact": NaN where none is told.
+  [[nodiscard]] double inside_ratio() const noexcept { return touching ? inside / stated : NAN; }
+};
+
+struct SceneReport {
+  std::string name;
+  std::string what;
+  LightCase light = LightCase::same;
+  double thickness_mm = 0;
+  double calibrated_mm = 0;  ///< As deep as the lookup table reaches.
+  std::vector<FrameErrors> frames;
+  /// Frames from the first judged one on, and of those: with the flag, and with it without cause.
+  int watched = 0;
+  std::array<int, pipeline::kHealthCount> flagged{};
+  std::array<int, pipeline::kHealthCount> false_alarms{};
+  int beyond_missed = 0;  ///< Judged frames truly deeper than calibrated that do not say so.
+
+  /// Of the frame without a flag that errs most against what it states: every kMapStep-th pixel,
+  /// micrometres.
+  int map_width = 0;
+  std::vector<std::int16_t> true_map;
+  std::vector<std::int16_t> map;
+  double worst_ratio = 0;
+};
+
+inline constexpr double kBesideMm = 1;
+inline constexpr int kMapStep = 4;
+
+/// Plays a scene through the whole program on the sensor's calibration.
+[[nodiscard]] SceneReport judge(RandomScene scene, const std::filesystem::path& calibration);
+
+}  // namespace dtact::whole
