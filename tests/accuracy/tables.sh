@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Makes the tables, plots and pages that lie beside this file from the simulated sensor:
-# tables.sh BIN [table|objects|model|atlas|thickness|study|pose|whole ...], all of them without a name. BIN: where the accuracy
+# tables.sh BIN [table|objects|model|atlas|thickness|study|whole ...], all of them without a name. BIN: where the accuracy
 # tests were built.
 set -euo pipefail
 here=$(dirname "$(readlink -f "$0")")
 bin=$1
 shift
-(($#)) || set -- table objects model atlas thickness study pose whole
+(($#)) || set -- table objects model atlas thickness study whole
 for part in "$@"; do
   case $part in
     table)
@@ -33,21 +33,14 @@ for part in "$@"; do
       "$bin/study/robot_study" --out "$here/study" >/dev/null
       echo "study: tests/accuracy/study/study.md"
       ;;
-    pose)
-      rm -rf "$bin/pose/sequences"
-      "$bin/pose/pose_sequences" --out "$bin/pose/sequences"
-      /usr/bin/python3 "$here/pose/comparison.py" "$bin/pose/sequences" "$here/pose"
-      "$bin/pose/pose_known_objects" >"$here/pose/known.md.new"
-      mv "$here/pose/known.md.new" "$here/pose/known.md"
-      echo "pose: tests/accuracy/pose/README.md"
-      ;;
     whole)
+      "$here/whole/pose.sh" "$bin/../.."
       "$bin/whole/whole_random_scenes" --work "$bin/whole/random" --out "$here/whole"
       /usr/bin/python3 "$here/whole/worst.py" "$bin/whole/random/maps" "$here/whole/worst.png"
       echo "whole: tests/accuracy/whole/README.md"
       ;;
     *)
-      echo "tables.sh: '$part' is none of table, objects, model, atlas, thickness, study, pose, whole" >&2
+      echo "tables.sh: '$part' is none of table, objects, model, atlas, thickness, study, whole" >&2
       exit 2
       ;;
   esac

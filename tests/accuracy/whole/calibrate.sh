@@ -4,6 +4,7 @@
 #   one_press    one press of a ball of 4 mm radius, as ./dev run makes it
 #   six_presses  six of the presses that a guided calibration asks for
 #   lens         one press through a lens with barrel distortion, which a board of pins told
+#   sphere, cylinder  one_press, with the shape of a finger of 30 mm of radius written into it
 set -euo pipefail
 source=$(dirname "$(readlink -f "$0")")/../../..
 build=$1 kind=$2 folder=$3
@@ -55,8 +56,15 @@ case $kind in
     "$calibrate" lens --board-reference "$work/reference" --board "$work/board" -o "$work/lens.toml"
     depth --ball "$work/ball" --lens "$work/lens.toml"
     ;;
+  sphere | cylinder)
+    "$0" "$build" one_press "$work/flat"
+    cp -r "$work/flat" "$folder"
+    surface="shape = \"$kind\"\nradius_mm = 30\nair_mm = 20\ngel_mm = 8\nrefraction = 1"
+    [[ $kind == cylinder ]] && surface+="\naxis_deg = 0"
+    sed -i "s/^\[surface\].*/&\n$surface/" "$folder/calibration.toml"
+    ;;
   *)
-    echo "calibrate.sh: '$kind' is none of one_press, six_presses, lens" >&2
+    echo "calibrate.sh: '$kind' is none of one_press, six_presses, lens, sphere, cylinder" >&2
     exit 2
     ;;
 esac

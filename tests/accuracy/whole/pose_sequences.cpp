@@ -88,7 +88,7 @@ int main(int argc, char** argv) {
     dtact::whole::write_all(arguments);
     return 0;
   } catch (const std::exception& e) {
-    fmt::print(stderr, "whole_pose_sequences: {}\n", e.what());
+    fmt::print(stderr, "pose_sequences: {}\n", e.what());
     return 1;
   }
 }
