@@ -22,7 +22,8 @@ cv::Mat1d blurred_across(const cv::Mat1d& map, double sigma) {
       const int first = std::max(0, column - reach);
       const int last = std::min(map.cols - 1, column + reach);
       for (int k = first; k <= last; ++k) {
-        out(column, row) += map(row, k) * taps[static_cast<std::size_t>(k - column + reach)] / sum;
+        const int tap = k - column + reach;
+        out(column, row) += map(row, k) * taps[static_cast<std::size_t>(tap)] / sum;
       }
     }
   }

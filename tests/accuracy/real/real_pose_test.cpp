@@ -116,8 +116,10 @@ class RealPose : public testing::TestWithParam<Sensor> {
       deepest = std::max<int>(deepest, um[i]);
       area += model.mm_per_px * model.mm_per_px;
       sum += um[i];
-      x += um[i] * (static_cast<double>(i % width) - 0.5 * (width - 1));
-      y += um[i] * (static_cast<double>(i / width) - 0.5 * (height - 1));
+      const std::size_t column = i % width;
+      const std::size_t row = i / width;
+      x += um[i] * (static_cast<double>(column) - 0.5 * (width - 1));
+      y += um[i] * (static_cast<double>(row) - 0.5 * (height - 1));
     }
     v1::Frame frame;
     v1::Contact& contact = *frame.mutable_contact();

@@ -26,7 +26,7 @@ using hal::sim::PressKey;
 
 /// One press of a ball; made once for all tests of this build.
 std::filesystem::path calibration() {
-  const std::filesystem::path folder = DTACT_BUILD_DIR "/calibrations/one_press";
+  std::filesystem::path folder = DTACT_BUILD_DIR "/calibrations/one_press";
   const std::string command = fmt::format("{}/tests/accuracy/whole/calibrate.sh {} one_press {}",
                                           DTACT_SOURCE_DIR, DTACT_BUILD_DIR, folder.string());
   EXPECT_EQ(std::system(command.c_str()), 0) << command;

@@ -38,7 +38,7 @@ net::Subscription accepted(const v1::Subscribe& request, net::Serves serves) {
 /// hal::sim::SimCamera without its thread and with a truth that others share.
 class Camera final : public hal::Camera, private hal::FrameOwner {
  public:
-  Camera(std::shared_ptr<const hal::sim::Truth> truth, const Settings& settings,
+  Camera(const std::shared_ptr<const hal::sim::Truth>& truth, const Settings& settings,
          fakes::FakeClock& clock)
       : model_(truth->scene().camera),
         sensor_(truth->scene().sensor),
@@ -179,10 +179,10 @@ MapFrame map_frame(const hal::sim::Scene& scene, const std::filesystem::path& ca
 }
 
 struct Program::Impl {
-  Impl(std::shared_ptr<const hal::sim::Truth> truth,
+  Impl(const std::shared_ptr<const hal::sim::Truth>& truth,
        const std::shared_ptr<const calibration::Calibration>& calibration, const Settings& wanted)
       : settings(wanted),
-        camera(std::move(truth), wanted, clock),
+        camera(truth, wanted, clock),
         exchange(room_for(calibration->model->rectify)),
         light(std::make_unique<hal::null::NullRing>(), settings.daemon.light, clock, exchange),
         loop({camera, light, exchange, clock}, settings.daemon,
@@ -203,11 +203,10 @@ struct Program::Impl {
   const pipeline::DepthFrame* frame = nullptr;
 };
 
-Program::Program(std::shared_ptr<const hal::sim::Truth> truth,
+Program::Program(const std::shared_ptr<const hal::sim::Truth>& truth,
                  const std::filesystem::path& calibration, const Settings& settings)
     : impl_(std::make_unique<Impl>(
-          std::move(truth),
-          std::make_shared<const calibration::Calibration>(calibration::load(calibration)),
+          truth, std::make_shared<const calibration::Calibration>(calibration::load(calibration)),
           settings)) {}
 
 Program::~Program() { impl_->loop.untouched().stop(); }

@@ -60,8 +60,8 @@ class Program {
  public:
   /// Throws std::runtime_error when `calibration`, a folder, cannot be read, and
   /// std::invalid_argument when it is for another camera mode.
-  Program(std::shared_ptr<const hal::sim::Truth> truth, const std::filesystem::path& calibration,
-          const Settings& settings = {});
+  Program(const std::shared_ptr<const hal::sim::Truth>& truth,
+          const std::filesystem::path& calibration, const Settings& settings = {});
   ~Program();
   Program(const Program&) = delete;
   Program& operator=(const Program&) = delete;
