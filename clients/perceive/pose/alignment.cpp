@@ -18,10 +18,10 @@ constexpr int kMaxSteps = 20;
 constexpr double kConverged = 2e-7;
 /// Eigenvalues of the normal equations are mean squares of what the distances change for a unit of
 /// motion. Below kMinCore where the object touches, a direction is not told from what the normals
-/// err by: 4°, whose square is 0.006 (of two balls 4 mm apart 0.003, since blur makes them less
-/// round), and kNoises times their variance, which scatters by √(2/n) of
-/// itself where n of them are independent.
-constexpr double kMinCore = 0.006;
+/// err by: 3°, whose square is 0.003, and kNoises times their variance, which scatters by √(2/n) of
+/// itself where n of them are independent. Twice as much would leave out the turn of two balls
+/// about the line between them, which blur makes less round, and loses sensor_b's lopsided ball.
+constexpr double kMinCore = 0.003;
 constexpr double kNoises = 3;
 /// Times the number of independent places an eigenvalue below this is of an unobservable direction:
 /// the motion along it would have a standard deviation of 0.1 mm where each place errs by 0.02 mm.
@@ -77,7 +77,7 @@ std::vector<Pair> associate(std::span<const Surfel> surfels, const ContactView& 
       if (!at_edge) continue;
       below = pair.share * std::max(0.0, at_edge->below);
     }
-    if (std::max(gel->depth, below) < ContactView::kPressed) continue;
+    if (std::max(gel->depth, below) < view.pressed()) continue;
     // The mean of both normals has half the noise of one.
     const Vector3d turned = motion.linear() * surfel.normal;
     pair.normal = (turned + gel->normal).normalized();

@@ -9,6 +9,10 @@
 namespace dtact::perceive {
 namespace {
 
+/// Three standard deviations of the noise of an untouched map, metres; and what a reference that
+/// has aged may be off by, as a share of the deepest point.
+constexpr double kNoise = 3e-5;
+constexpr double kPressedShare = 0.05;
 /// The depth's curvature is taken over so far to both sides, metres.
 constexpr double kReach = 3.5e-4;
 /// A sum of both second derivatives of the depth above this is a shoulder, 1/metre: what noise does
@@ -28,12 +32,15 @@ ContactView::ContactView(const DepthGrid& depth, const PointCloud& cloud, const 
       x0_((depth.x - 0.5 * (depth.full_width - 1)) * px_),
       y0_((depth.y - 0.5 * (depth.full_height - 1)) * px_),
       uncertainty_(1e-6 * uncertainty_um) {
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (this->depth(i) > deepest_) deepest_ = this->depth(i);
+  }
+  pressed_ = std::max(kNoise, kPressedShare * deepest_);
   for (int row = 0; row < cloud.height; ++row) {
     for (int column = 0; column < cloud.width; ++column) {
       const std::size_t i = index(column, row);
       if (!is_pressed(i)) continue;
       ++pixels_;
-      deepest_ = std::max(deepest_, this->depth(i));
       centre_ += point(i);
       if (table_ != nullptr) upright_ += upright_at(column, row);
     }
@@ -136,7 +143,7 @@ std::vector<Surfel> ContactView::surfels(std::size_t count) const {
         return sample ? sample->depth : 0.0;
       };
       const double edge = below(nearest->point);
-      if (edge > kPressed) {
+      if (edge > pressed_) {
         surfel.edge = nearest->point;
         surfel.share = std::clamp(below(surfel.point) / edge, 0.0, 1.0);
       }

@@ -23,10 +23,6 @@ struct Surfel {
 /// beside it the gel's shoulders, which move with the object.
 class ContactView {
  public:
-  /// Depth at which a pixel counts as pressed, metres: three standard deviations of the noise of an
-  /// untouched map.
-  static constexpr double kPressed = 3e-5;
-
   /// `cloud` is what a CloudMaker makes of `depth` at stride 1, `table` its table (null: a plane);
   /// both must outlive the view. `uncertainty_um`: of the depth, as the frame states it.
   ContactView(const DepthGrid& depth, const PointCloud& cloud, const SurfaceTable* table,
@@ -49,6 +45,8 @@ class ContactView {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(cloud_.width) +
            static_cast<std::size_t>(column);
   }
+  /// Depth from which on a pixel counts as pressed, metres.
+  [[nodiscard]] double pressed() const noexcept { return pressed_; }
   /// At most about `count` of the pressed pixels, on a square grid.
   [[nodiscard]] std::vector<Surfel> surfels(std::size_t count) const;
   /// Mean of the pressed points, metres.
@@ -78,7 +76,7 @@ class ContactView {
 
  private:
   [[nodiscard]] double mean_depth(int column, int row) const;
-  [[nodiscard]] bool is_pressed(std::size_t i) const noexcept { return depth(i) > kPressed; }
+  [[nodiscard]] bool is_pressed(std::size_t i) const noexcept { return depth(i) > pressed_; }
   /// The undeformed surface's normal at a pixel of the cloud.
   [[nodiscard]] Eigen::Vector3d upright_at(int column, int row) const;
   DepthGrid depth_;
@@ -92,6 +90,7 @@ class ContactView {
   Eigen::Vector3d upright_ = Eigen::Vector3d::Zero();
   std::size_t pixels_ = 0;
   double deepest_ = 0;
+  double pressed_ = 0;
 };
 
 }  // namespace dtact::perceive

@@ -110,7 +110,7 @@ std::size_t Tracker::oldest_shared(const ContactView& view, const Motion& from) 
     std::size_t met = 0;
     for (std::size_t k = 0; k < surfels.size(); k += every, ++probes) {
       const auto sample = view.at(from * surfels[k].point);
-      if (sample && sample->depth > ContactView::kPressed) ++met;
+      if (sample && sample->depth > view.pressed()) ++met;
     }
     const double part = static_cast<double>(met) / static_cast<double>(probes);
     if (part >= kShared) return i;

@@ -86,7 +86,7 @@ constexpr ObjectMotion kTurnAndSlide{"turn_and_slide", 1, [](double part) {
                                      }};
 
 INSTANTIATE_TEST_SUITE_P(Objects, MovingObjectIsFollowed,
-                         testing::Values(Case{"m4_nut", kTurnAndSlide, 0.1, 1},
+                         testing::Values(Case{"m4_nut", kTurnAndSlide, 0.1, 3},
                                          Case{"key", kSlide, 0.05, 0.5},
                                          Case{"ball_array", kTurn, 0.05, 0.5}),
                          [](const auto& tested) { return std::string(tested.param.object); });

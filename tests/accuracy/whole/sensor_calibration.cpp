@@ -104,7 +104,7 @@ std::string lens_of(const RandomSensor& sensor, const fs::path& work, std::strin
 void calibrate_depth(const RandomSensor& sensor, const fs::path& work, const fs::path& folder,
                      std::string& printed) {
   std::vector<std::string> map = {"--mm-per-px", "0.0413793", "--centre",
-                                  "300,400",     "--crop",    "580,580"};
+                                  "400,300",     "--crop",    "580,580"};
   if (sensor.has_lens()) map.insert(map.end(), {"--lens", lens_of(sensor, work, printed)});
   constexpr std::array kShares{0.5, 0.6, 0.7};
   std::vector<Load> loads;

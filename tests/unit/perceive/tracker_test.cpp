@@ -205,7 +205,7 @@ TEST(Tracker, FollowsALightPressOfAnUncertainCalibration) {
 // area doubles too late.
 TEST(Tracker, ABallThatIsPressedInOutgrowsTheShouldersOfItsFirstTouch) {
   Tracker tracker;
-  for (unsigned i = 0; i <= 40; ++i) {
+  for (unsigned i = 0; i <= 30; ++i) {
     const double depth_mm = 0.14 + 0.022 * i;
     const Frame frame(
         [&](const SurfacePoint& at) {
