@@ -60,6 +60,12 @@ void print_head() {
   fmt::print("{}\n", head);
 }
 
+std::size_t unobservable_at_end(const Sequence& sequence) {
+  return static_cast<std::size_t>(std::ranges::count_if(sequence.shape, [&](const ShapeRow& row) {
+    return row.sequence == sequence.shape.back().sequence && row.shown < ShapeRow::kLeastShown;
+  }));
+}
+
 void print_row(const Sequence& sequence, const std::string& tracker,
                const std::vector<TrackRow>& track,
                const std::function<PoseErrors(const TrackRow&)>& errors_of) {
@@ -94,10 +100,10 @@ void print_row(const Sequence& sequence, const std::string& tracker,
                ? 1
                : 0;
   };
-  std::string line = fmt::format(
-      "{},{},{},{},{},{},{},{},{},{},{:.0f}", sequence.name, tracker, times.size(), lost,
-      lost_in_press, restarts, followed(1), followed(2), track.back().unobservable.size(),
-      sequence.unobservable(sequence.truth.size() - 1).size(), part_of(times, 0.5));
+  std::string line = fmt::format("{},{},{},{},{},{},{},{},{},{},{:.0f}", sequence.name, tracker,
+                                 times.size(), lost, lost_in_press, restarts, followed(1),
+                                 followed(2), track.back().unobservable.size(),
+                                 unobservable_at_end(sequence), part_of(times, 0.5));
   for (const PoseError& error : end) line += fmt::format(",{:.4f},{:.3f}", error.mm, error.deg);
   for (const double part : {0.5, 1.0}) {
     for (std::size_t way = 0; way < kWays.size(); ++way) {
