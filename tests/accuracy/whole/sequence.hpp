@@ -25,7 +25,7 @@ struct TruthRow {
   std::string phase;                                       ///< "press", "motion" or "end".
 };
 
-/// A direction of motion in a frame, and how much of it the layer shows.
+/// A direction of motion in a frame, and how much of it the gel shows.
 struct ShapeRow {
   std::uint64_t sequence = 0;
   Direction direction;
@@ -52,7 +52,7 @@ struct Sequence {
   [[nodiscard]] std::vector<Direction> unobservable(std::size_t at) const;
 };
 
-/// How much the layer shows at five moments of a motion, in the simulator's surface frame.
+/// How much the gel shows at five moments of a motion, in the simulator's surface frame.
 [[nodiscard]] std::vector<ShapeRow> shape_of(const hal::sim::Scene& scene,
                                              const MotionFrames& frames);
 
