@@ -50,14 +50,39 @@ double part_of(std::vector<double> values, double part) {
   return *at;
 }
 
-void print_head() {
-  std::string head =
-      "sequence,tracker,frames,lost,lost_in_press,restarts,followed_reported,followed_shape,"
-      "reported,shape,frame_us";
-  for (const char* when : {"end", "median", "worst"}) {
-    for (const char* way : kWays) head += fmt::format(",{0}_{1}_mm,{0}_{1}_deg", when, way);
+void print_head(bool each_frame) {
+  std::string head = "sequence,tracker,";
+  head += each_frame ? "frame,usable,since,reported"
+                     : "frames,lost,lost_in_press,restarts,followed_reported,followed_shape,"
+                       "reported,shape,frame_us";
+  const std::vector<std::string> when = each_frame
+                                            ? std::vector<std::string>{""}
+                                            : std::vector<std::string>{"end_", "median_", "worst_"};
+  for (const std::string& one : when) {
+    for (const char* way : kWays) head += fmt::format(",{0}{1}_mm,{0}{1}_deg", one, way);
   }
   fmt::print("{}\n", head);
+}
+
+/// A line for each frame of the motion.
+void print_frames(const Sequence& sequence, const std::string& tracker,
+                  const std::vector<TrackRow>& track,
+                  const std::function<PoseErrors(const TrackRow&)>& errors_of) {
+  for (const TrackRow& row : track) {
+    if (sequence.index(row.sequence) < sequence.begin() || !row.told) continue;
+    std::string line = fmt::format("{},{},{},{},{},{}", sequence.name, tracker, row.sequence,
+                                   row.usable ? 1 : 0, row.since, row.unobservable.size());
+    for (const PoseError& error : listed(errors_of(row))) {
+      line += fmt::format(",{:.4f},{:.3f}", error.mm, error.deg);
+    }
+    fmt::print("{}\n", line);
+  }
+}
+
+std::size_t unobservable_at_end(const Sequence& sequence) {
+  return static_cast<std::size_t>(std::ranges::count_if(sequence.shape, [&](const ShapeRow& row) {
+    return row.sequence == sequence.shape.back().sequence && row.shown < ShapeRow::kLeastShown;
+  }));
 }
 
 void print_row(const Sequence& sequence, const std::string& tracker,
@@ -94,10 +119,10 @@ void print_row(const Sequence& sequence, const std::string& tracker,
                ? 1
                : 0;
   };
-  std::string line = fmt::format(
-      "{},{},{},{},{},{},{},{},{},{},{:.0f}", sequence.name, tracker, times.size(), lost,
-      lost_in_press, restarts, followed(1), followed(2), track.back().unobservable.size(),
-      sequence.unobservable(sequence.truth.size() - 1).size(), part_of(times, 0.5));
+  std::string line = fmt::format("{},{},{},{},{},{},{},{},{},{},{:.0f}", sequence.name, tracker,
+                                 times.size(), lost, lost_in_press, restarts, followed(1),
+                                 followed(2), track.back().unobservable.size(),
+                                 unobservable_at_end(sequence), part_of(times, 0.5));
   for (const PoseError& error : end) line += fmt::format(",{:.4f},{:.3f}", error.mm, error.deg);
   for (const double part : {0.5, 1.0}) {
     for (std::size_t way = 0; way < kWays.size(); ++way) {
@@ -108,11 +133,12 @@ void print_row(const Sequence& sequence, const std::string& tracker,
   std::fflush(stdout);
 }
 
-void judge_motion(const fs::path& folder, const Sequence& sequence) {
+void judge_motion(const fs::path& folder, const Sequence& sequence, bool each_frame) {
   perceive::FrameMaker maker;
   const auto judge = [&](const std::string& tracker, const std::vector<TrackRow>& track) {
-    print_row(sequence, tracker, track,
-              [&](const TrackRow& row) { return motion_errors(sequence, track, row); });
+    (each_frame ? print_frames : print_row)(sequence, tracker, track, [&](const TrackRow& row) {
+      return motion_errors(sequence, track, row);
+    });
   };
   judge("dtact-perceive", perceive_track(sequence.frames, maker));
   std::vector<fs::path> others;
@@ -129,7 +155,7 @@ void judge_motion(const fs::path& folder, const Sequence& sequence) {
 }
 
 /// The object's shape comes from a file, as for a user.
-void judge_known(const fs::path& folder, const Sequence& sequence) {
+void judge_known(const fs::path& folder, const Sequence& sequence, bool each_frame) {
   constexpr double kFps = 60;
   const std::string name = sequence.name.substr(0, sequence.name.find('.'));
   const auto* const object = std::ranges::find(kMovingObjects, name, &MovingObject::name);
@@ -142,14 +168,23 @@ void judge_known(const fs::path& folder, const Sequence& sequence) {
     base::write_file_atomically(file, shape);
     perceive::FrameMaker maker(perceive::load_object(file, "mm"));
     const auto track = perceive_track(sequence.frames, maker, kFps);
-    print_row(sequence, tracker, track,
-              [&](const TrackRow& row) { return place_errors(sequence, row, symmetries); });
+    (each_frame ? print_frames : print_row)(sequence, tracker, track, [&](const TrackRow& row) {
+      return place_errors(sequence, row, symmetries);
+    });
   };
   judge("cloud", folder / (name + ".ply"), ply_of(cloud), symmetries_of(cloud));
   if (name == "cube") judge("mesh", folder / (name + ".stl"), cube_stl(5), cube_symmetries(5));
 }
 
-void judge_all(const fs::path& folder, const std::vector<std::string>& only, bool known) {
+struct Arguments {
+  fs::path folder;
+  std::vector<std::string> only;
+  bool known = false;
+  bool each_frame = false;
+};
+
+void judge_all(const Arguments& arguments) {
+  const auto& [folder, only, known, each_frame] = arguments;
   std::vector<std::string> names;
   for (const auto& entry : fs::directory_iterator(folder)) {
     const std::string file = entry.path().filename();
@@ -160,10 +195,10 @@ void judge_all(const fs::path& folder, const std::vector<std::string>& only, boo
     if (wanted && file.ends_with(kEnd)) names.push_back(file.substr(0, file.size() - kEnd.size()));
   }
   std::ranges::sort(names);
-  print_head();
+  print_head(each_frame);
   for (const std::string& name : names) {
     const Sequence sequence = load(folder, name);
-    known ? judge_known(folder, sequence) : judge_motion(folder, sequence);
+    (known ? judge_known : judge_motion)(folder, sequence, each_frame);
   }
 }
 
@@ -173,14 +208,14 @@ void judge_all(const fs::path& folder, const std::vector<std::string>& only, boo
 int main(int argc, char** argv) {
   try {
     CLI::App app("Judges poses on the sequences of a folder against the truth");
-    std::string folder;
-    std::vector<std::string> only;
-    bool known = false;
-    app.add_option("folder", folder, "That pose_sequences wrote")->required();
-    app.add_option("--only", only, "Sequences whose name holds this; may be repeated");
-    app.add_flag("--known", known, "The object's shape is known: its place, in real time");
+    dtact::whole::Arguments arguments;
+    app.add_option("folder", arguments.folder, "That pose_sequences wrote")->required();
+    app.add_option("--only", arguments.only, "Sequences whose name holds this; may be repeated");
+    app.add_flag("--known", arguments.known,
+                 "The object's shape is known: its place, in real time");
+    app.add_flag("--each-frame", arguments.each_frame, "A line for each frame of the motion");
     CLI11_PARSE(app, argc, argv);
-    dtact::whole::judge_all(folder, only, known);
+    dtact::whole::judge_all(arguments);
     return 0;
   } catch (const std::exception& e) {
     fmt::print(stderr, "pose_judge: {}\n", e.what());

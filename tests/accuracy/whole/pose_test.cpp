@@ -85,8 +85,11 @@ constexpr ObjectMotion kTurnAndSlide{"turn_and_slide", 1, [](double part) {
                                                        .tilt_x_deg = 3 * part};
                                      }};
 
+// The nut's turn shows in its chamfer alone.
 INSTANTIATE_TEST_SUITE_P(Objects, MovingObjectIsFollowed,
-                         testing::Values(Case{"m4_nut", kTurnAndSlide, 0.1, 3},
+                         testing::Values(Case{"m3_long_nut", kTurn, 0.05, 0.5},
+                                         Case{"cube", kSlide, 0.05, 0.5},
+                                         Case{"m4_nut", kTurnAndSlide, 0.1, 3},
                                          Case{"key", kSlide, 0.05, 0.5},
                                          Case{"ball_array", kTurn, 0.05, 0.5}),
                          [](const auto& tested) { return std::string(tested.param.object); });

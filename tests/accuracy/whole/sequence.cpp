@@ -58,11 +58,10 @@ Eigen::Isometry3d Sequence::motion(std::size_t from, std::size_t to) const {
 }
 
 std::vector<Direction> Sequence::unobservable(std::size_t at) const {
-  constexpr double kLeastShown = 0.05;
   std::vector<Direction> now;
   for (const ShapeRow& row : shape) {
     if (row.sequence > truth.at(at).sequence) break;
-    if (row.shown >= kLeastShown) continue;
+    if (row.shown >= ShapeRow::kLeastShown) continue;
     now.push_back(carried(row.direction, motion(index(row.sequence), at)));
   }
   return now;

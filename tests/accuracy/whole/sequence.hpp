@@ -25,11 +25,13 @@ struct TruthRow {
   std::string phase;                                       ///< "press", "motion" or "end".
 };
 
-/// A direction of motion in a frame, and how much of it the layer shows.
+/// A direction of motion in a frame, and how much of it the gel shows.
 struct ShapeRow {
   std::uint64_t sequence = 0;
   Direction direction;
   double shown = 0;  ///< ShownDirection::shown.
+  /// What shows less counts as unobservable.
+  static constexpr double kLeastShown = 0.05;
 };
 
 /// One object that is pressed in and then moves, as the daemon sends it and as it is.
@@ -45,12 +47,12 @@ struct Sequence {
   [[nodiscard]] std::size_t index(std::uint64_t sequence) const;
   /// How the object has moved from one frame to another, both numbers in `truth`.
   [[nodiscard]] Eigen::Isometry3d motion(std::size_t from, std::size_t to) const;
-  /// The directions of which one millimetre changed the depth by less than 0.05 mm in a frame up to
-  /// this one, where the object has carried them.
+  /// The directions that were unobservable in a frame up to this one, where the object has carried
+  /// them.
   [[nodiscard]] std::vector<Direction> unobservable(std::size_t at) const;
 };
 
-/// How much the layer shows at five moments of a motion, in the simulator's surface frame.
+/// How much the gel shows at five moments of a motion, in the simulator's surface frame.
 [[nodiscard]] std::vector<ShapeRow> shape_of(const hal::sim::Scene& scene,
                                              const MotionFrames& frames);
 

@@ -41,10 +41,10 @@ PressKey key_of(const hal::sim::Scene& scene, const Eigen::Isometry3d& pose) {
   return key;
 }
 
-/// The layer under the object at any pose.
-class Presser {
+/// The gel under the object at any pose.
+class GelSolver {
  public:
-  Presser(const hal::sim::Scene& scene, const hal::sim::Grid& grid)
+  GelSolver(const hal::sim::Scene& scene, const hal::sim::Grid& grid)
       : scene_(scene),
         grid_(grid),
         layer_(grid_.width, grid_.height, grid_.spacing_mm, scene_.layer.thickness_mm,
@@ -93,8 +93,8 @@ std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& curved,
   const hal::sim::Grid grid = hal::sim::make_grid(scene);
   const auto key = hal::sim::key_at(scene.presses.at(0), scene.time_s(sequence)).value();
   const Eigen::Isometry3d pose = pose_at(scene, key);
-  Presser presser(scene, grid);
-  const hal::sim::Pressed here = presser.press(pose);
+  GelSolver gel(scene, grid);
+  const hal::sim::Pressed here = gel.press(pose);
 
   Direction about{Eigen::Vector3d::Zero(), 0, Eigen::Matrix<double, 6, 1>::Zero()};
   int touching = 0;
@@ -115,8 +115,8 @@ std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& curved,
   for (std::size_t i = 0; i < change.size(); ++i) {
     Direction one = about;
     one.twist[static_cast<Eigen::Index>(i)] = 1;
-    const cv::Mat1d there = presser.press(moved(pose, one, kStepMm)).indentation_mm;
-    const cv::Mat1d back = presser.press(moved(pose, one, -kStepMm)).indentation_mm;
+    const cv::Mat1d there = gel.press(moved(pose, one, kStepMm)).indentation_mm;
+    const cv::Mat1d back = gel.press(moved(pose, one, -kStepMm)).indentation_mm;
     change.at(i) = cv::Mat1d::zeros(grid.height, grid.width);
     cv::Mat1d((there - back) / (2 * kStepMm)).copyTo(change.at(i), deep);
   }

@@ -12,16 +12,15 @@ namespace dtact::whole {
 /// From the object's frame to the simulator's surface frame, millimetres.
 [[nodiscard]] Eigen::Isometry3d isometry_of(const hal::sim::Pose& pose);
 
-/// A direction of motion, and how much of it the layer shows.
+/// A direction of motion, and how much of it the gel shows.
 struct ShownDirection {
   Direction direction;
-  double shown =
-      0;  ///< Millimetres of depth, root mean square over the contact, for one of motion.
+  double shown = 0;  ///< RMS change of depth over the contact, mm for a mm of motion.
 };
 
 /// Six directions, the least shown first: the principal axes of how the true indentation changes
 /// when the object of the scene's first press is moved, from where it is at frame `sequence`, by
-/// 0.2 mm (rotations: at the contact's edge) and the layer is solved again. Of a curved surface
+/// 0.2 mm (rotations: at the contact's edge) and the gel is solved again. Of a curved surface
 /// the plane that touches it stands for it.
 [[nodiscard]] std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& scene,
                                                              std::uint64_t sequence);
