@@ -31,8 +31,10 @@ constexpr double kMinInformation = 0.04;
 /// Noise is alike over the smoothing's 7 × 7 pixels of 0.0414 mm: one independent place in each of
 /// these areas, square metres.
 constexpr double kCorrelatedArea = 8.39e-8;
-/// Variance along a direction that is not determined, and the one from which it is reported, m².
-constexpr double kUnknownVariance = 1e-4;
+/// Variance along a direction that is not determined, and the one from which it is reported, m²:
+/// much larger would report a ball's sliding, too, where two of its turns are about centres 0.05 mm
+/// apart.
+constexpr double kUnknownVariance = 4e-6;
 constexpr double kReportedVariance = 9e-8;
 /// Distance from which on a pair has no weight, metres: some four times the uncertainty of a depth
 /// map, so that the shoulders count, whose distances are larger than those of a flat face.
