@@ -100,6 +100,10 @@ void run_unpinned(const cpu_set_t& cpus, const std::function<void()>& body) {
   ::pthread_attr_init(&attributes);
   ::pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
   ::pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
+  // Said, although 0 is the default: glibc takes a priority nobody set from the thread that calls,
+  // and refuses SCHED_OTHER with that of a real-time thread.
+  const sched_param parameters{.sched_priority = 0};
+  ::pthread_attr_setschedparam(&attributes, &parameters);
   ::pthread_attr_setaffinity_np(&attributes, sizeof cpus, &cpus);
   pthread_t thread{};
   const int error = ::pthread_create(
