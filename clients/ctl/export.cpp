@@ -165,8 +165,9 @@ std::string line_of(const v1::Event& event, std::uint64_t time) {
       break;
     case v1::Event::kReconstruction:
       what = "reconstruction";
-      detail = fmt::format("method={} sharpen={} max_error_um={}", event.reconstruction().method(),
-                           event.reconstruction().sharpen(), event.reconstruction().max_error_um());
+      detail = fmt::format("resolution={} sharpen={} max_error_um={}",
+                           event.reconstruction().resolution(), event.reconstruction().sharpen(),
+                           event.reconstruction().max_error_um());
       break;
     case v1::Event::WHAT_NOT_SET:
       break;

@@ -13,21 +13,21 @@ namespace dtact::ctl {
 namespace {
 
 struct ReconstructionOptions {
-  std::optional<std::string> method;
+  std::optional<std::string> resolution;
   std::optional<std::string> sharpen;
   std::optional<double> max_error_um;
 };
 
 v1::Reconstruction run(const Context& context, const ReconstructionOptions& options) {
   client::Client client(context.target);
-  if (!options.method && !options.sharpen && !options.max_error_um) {
+  if (!options.resolution && !options.sharpen && !options.max_error_um) {
     const v1::Status status = client.status();
     if (status.has_reconstruction()) return status.reconstruction();
     throw client::Refused(v1::ERROR_UNSUPPORTED,
                           "this daemon does not tell how it makes depth: update dtactd");
   }
   v1::SetReconstruction change;
-  if (options.method) change.set_method(*options.method);
+  if (options.resolution) change.set_resolution(*options.resolution);
   if (options.sharpen) change.set_sharpen(*options.sharpen);
   if (options.max_error_um) change.set_max_error_um(*options.max_error_um);
   return client.set_reconstruction(change);
@@ -41,7 +41,7 @@ void add_reconstruction(CLI::App& app, Context& context) {
       "Change how depth is made, speed against accuracy, until the daemon ends; without options, "
       "show it");
   const auto options = std::make_shared<ReconstructionOptions>();
-  command->add_option("--method", options->method,
+  command->add_option("--resolution", options->resolution,
                       "The map's share of the calibration's resolution: full, half, quarter, or "
                       "auto: the coarsest within --max-error-um, for each frame");
   command->add_option("--sharpen", options->sharpen,

@@ -5,8 +5,8 @@
 namespace dtact::ctl {
 
 std::string text_of(const v1::Reconstruction& how) {
-  std::string text = fmt::format("method {}, sharpen {}", how.method(), how.sharpen());
-  if (how.method() == "auto" || how.sharpen() == "auto") {
+  std::string text = fmt::format("resolution {}, sharpen {}", how.resolution(), how.sharpen());
+  if (how.resolution() == "auto" || how.sharpen() == "auto") {
     text += fmt::format(", within {:g} um where that can be had", how.max_error_um());
   }
   return text;

@@ -6,7 +6,7 @@
 
 namespace dtact::ctl {
 
-/// "method auto, sharpen off, within 50 um where that can be had".
+/// "resolution auto, sharpen off, within 50 um where that can be had".
 [[nodiscard]] std::string text_of(const v1::Reconstruction& how);
 
 }  // namespace dtact::ctl

@@ -116,8 +116,8 @@ std::vector<Key> bind_keys(Config& c) {
       integer("capture.fifo_priority", p.fifo_priority, 0, 99, "(0 = normal scheduling)"),
       boolean("capture.lock_memory", p.lock_memory),
 
-      named("reconstruction.method", p.reconstruction.decimation,
-            {pipeline::kMethodNames.begin(), pipeline::kMethodNames.end()}),
+      named("reconstruction.resolution", p.reconstruction.decimation,
+            {pipeline::kResolutionNames.begin(), pipeline::kResolutionNames.end()}),
       named_or("reconstruction.sharpen", p.reconstruction.sharpen,
                {pipeline::kSharpenNames.begin(), pipeline::kSharpenNames.end()}, {1, 2}),
       real("reconstruction.max_error_um", p.reconstruction.max_error_um, Rules::kLeastErrorUm,

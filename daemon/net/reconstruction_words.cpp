@@ -16,8 +16,8 @@ namespace {
 using Words = std::vector<std::pair<std::string, int>>;
 using pipeline::ReconstructionRules;
 
-const Words& methods() {
-  static const Words words(pipeline::kMethodNames.begin(), pipeline::kMethodNames.end());
+const Words& resolutions() {
+  static const Words words(pipeline::kResolutionNames.begin(), pipeline::kResolutionNames.end());
   return words;
 }
 
@@ -53,8 +53,8 @@ std::string read(const Words& words, std::string_view field, const std::string& 
 std::string change(const v1::SetReconstruction& request, ReconstructionRules& rules) {
   ReconstructionRules changed = rules;
   std::string wrong;
-  if (request.has_method()) {
-    wrong = read(methods(), "method", request.method(), changed.decimation);
+  if (request.has_resolution()) {
+    wrong = read(resolutions(), "resolution", request.resolution(), changed.decimation);
   }
   if (wrong.empty() && request.has_sharpen()) {
     wrong = read(sharpenings(), "sharpen", request.sharpen(), changed.sharpen);
@@ -74,7 +74,7 @@ std::string change(const v1::SetReconstruction& request, ReconstructionRules& ru
 }
 
 void fill(const ReconstructionRules& rules, v1::Reconstruction& out) {
-  out.set_method(word_of(methods(), rules.decimation));
+  out.set_resolution(word_of(resolutions(), rules.decimation));
   out.set_sharpen(word_of(sharpenings(), rules.sharpen));
   out.set_max_error_um(rules.max_error_um);
 }

@@ -37,7 +37,7 @@ struct ReconstructionRules {
 };
 
 /// What ReconstructionRules::decimation and sharpen are called, but for 1 and 2 steps.
-inline constexpr std::array<std::pair<const char*, int>, 4> kMethodNames{
+inline constexpr std::array<std::pair<const char*, int>, 4> kResolutionNames{
     {{"full", 1}, {"half", 2}, {"quarter", 4}, {"auto", 0}}};
 inline constexpr std::array<std::pair<const char*, int>, 2> kSharpenNames{
     {{"off", 0}, {"auto", ReconstructionRules::kAutoSharpen}}};

@@ -91,7 +91,7 @@ void add_requests(const Corpus& corpus) {
       {"get_reference", request([](M& m) { m.mutable_get_reference(); })},
       {"ping", request([](M& m) { m.mutable_ping(); })},
       {"set_reconstruction", request([](M& m) {
-         m.mutable_set_reconstruction()->set_method("half");
+         m.mutable_set_reconstruction()->set_resolution("half");
          m.mutable_set_reconstruction()->set_sharpen("auto");
          m.mutable_set_reconstruction()->set_max_error_um(30);
        })}};

@@ -73,8 +73,8 @@ test("depth is made as the panel says, and its worth and time are on the chart",
   await panel.locator("summary").click();
   await panel.getByRole("radio", { name: "Quarter" }).click();
   await until(
-    () => status(left).reconstruction.method,
-    (method) => method === "quarter",
+    () => status(left).reconstruction.resolution,
+    (resolution) => resolution === "quarter",
     10_000,
   );
   await until(
@@ -107,7 +107,7 @@ test("depth is made as the panel says, and its worth and time are on the chart",
   await panel.getByLabel("Error bound").press("Enter");
   await until(
     () => status(left).reconstruction,
-    ({ method, max_error_um: bound }) => method === "auto" && bound === 200,
+    ({ resolution, max_error_um: bound }) => resolution === "auto" && bound === 200,
     10_000,
   );
   await until(

@@ -98,17 +98,17 @@ def check_reference(c, status):
 
 def check_reconstruction(c):
     before = c.call(get_status=M.GetStatus()).reconstruction
-    how = c.call(set_reconstruction=M.SetReconstruction(method="half"))
-    demand((how.method, how.sharpen, how.max_error_um) == ("half", before.sharpen, before.max_error_um),
+    how = c.call(set_reconstruction=M.SetReconstruction(resolution="half"))
+    demand((how.resolution, how.sharpen, how.max_error_um) == ("half", before.sharpen, before.max_error_um),
            "unset fields stay as they are", how)
     with Connection.open() as other:
         other.subscribe(depth=E.DEPTH_INT16)
         depth = other.frame(where=lambda f: f.HasField("depth")).depth
     demand(depth.decimation == 2, "answered once frames are made so", depth.decimation)
-    c.refused(E.ERROR_INVALID, "method", set_reconstruction=M.SetReconstruction(method="best"))
-    again = c.call(set_reconstruction=M.SetReconstruction(method=before.method))
+    c.refused(E.ERROR_INVALID, "resolution", set_reconstruction=M.SetReconstruction(resolution="best"))
+    again = c.call(set_reconstruction=M.SetReconstruction(resolution=before.resolution))
     demand(again == before, "the way that depth was made before", again)
-    passed(f"depth made at half resolution, and again {before.method}")
+    passed(f"depth made at half resolution, and again {before.resolution}")
 
 
 def png_data(png):

@@ -156,16 +156,16 @@ class Commands(unittest.TestCase):
             before = s.status().reconstruction
             s.subscribe()
             try:
-                how = s.set_reconstruction(method="quarter")
-                self.assertEqual((how.method, how.sharpen), ("quarter", before.sharpen))
+                how = s.set_reconstruction(resolution="quarter")
+                self.assertEqual((how.resolution, how.sharpen), ("quarter", before.sharpen))
                 f = next(f for f in s.frames() if f.has_depth and f.message.depth.decimation == 4)
                 self.assertEqual(f.depth_mm.shape, (145, 145))
                 with self.assertRaisesRegex(dtact.Invalid, "max_error_um: 0; allowed are 1 to 10000"):
                     s.set_reconstruction(max_error_um=0)
             finally:
-                s.set_reconstruction(method=before.method)
+                s.set_reconstruction(resolution=before.resolution)
             events = [e for e in s.events(timeout=1) if isinstance(e, dtact.ReconstructionEvent)]
-            self.assertEqual([e.reconstruction.method for e in events], ["quarter", before.method])
+            self.assertEqual([e.reconstruction.resolution for e in events], ["quarter", before.resolution])
 
     def test_clocks_and_reference(self):
         with dtact.connect(daemon.address) as s:

@@ -82,6 +82,7 @@ TEST(Completion, OffersValues) {
               UnorderedElementsAre("auto", "list", "model"));
   EXPECT_THAT(complete("dtactctl calibrate --method auto --rad"),
               UnorderedElementsAre("--radius-mm"));
+  EXPECT_THAT(complete("dtactctl reconstruction --resolution q"), UnorderedElementsAre("quarter"));
   EXPECT_THAT(complete("dtactctl led --brightness \"\""), UnorderedElementsAre());
   EXPECT_THAT(complete("dtactctl export press.mcap --to p"),
               UnorderedElementsAre("pcd", "ply", "png"));

@@ -102,7 +102,7 @@ TEST_F(Guarded, LetsViewersViewAndNothingElse) {
         message_of([](M& m) { m.mutable_rezero(); }),
         message_of([](M& m) { m.mutable_upload_calibration()->set_name("x"); }),
         message_of([](M& m) { m.mutable_activate_calibration()->set_number(1); }),
-        message_of([](M& m) { m.mutable_set_reconstruction()->set_method("half"); })}) {
+        message_of([](M& m) { m.mutable_set_reconstruction()->set_resolution("half"); })}) {
     const auto reply = viewer.request(request);
     EXPECT_EQ(reply.error().code(), v1::ERROR_DENIED) << request.ShortDebugString();
     EXPECT_THAT(reply.error().message(), HasSubstr("allows viewing only"));

@@ -32,8 +32,8 @@ TEST(SetReconstruction, ChangesOnlyWhatIsSetAndTellsEveryone) {
   client.hello();
   RawClient other(rig.tcp_port());
   other.hello();
-  const auto reply = client.request(asking([](auto& change) { change.set_method("auto"); }));
-  EXPECT_EQ(reply.reconstruction().method(), "auto");
+  const auto reply = client.request(asking([](auto& change) { change.set_resolution("auto"); }));
+  EXPECT_EQ(reply.reconstruction().resolution(), "auto");
   EXPECT_EQ(reply.reconstruction().sharpen(), "off");
   EXPECT_EQ(reply.reconstruction().max_error_um(), 50);
   const auto command = rig.port.wait_command(0);
@@ -41,7 +41,7 @@ TEST(SetReconstruction, ChangesOnlyWhatIsSetAndTellsEveryone) {
   EXPECT_EQ(std::get<pipeline::SetReconstruction>(command->what).rules,
             (ReconstructionRules{.decimation = 0}));
   const auto event = other.event();
-  EXPECT_EQ(event.reconstruction().method(), "auto");
+  EXPECT_EQ(event.reconstruction().resolution(), "auto");
   EXPECT_EQ(event.sequence(), 4U);
   EXPECT_EQ(event.monotonic_ns(), 5);
   EXPECT_EQ(event.wall_ns(), 6);
@@ -51,10 +51,11 @@ TEST(SetReconstruction, TakesEveryWord) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   client.hello();
-  for (const char* method : {"full", "half", "quarter", "auto"}) {
+  for (const char* resolution : {"full", "half", "quarter", "auto"}) {
     const auto reply =
-        client.request(asking([&](auto& change) { change.set_method(method); })).reconstruction();
-    EXPECT_EQ(reply.method(), method);
+        client.request(asking([&](auto& change) { change.set_resolution(resolution); }))
+            .reconstruction();
+    EXPECT_EQ(reply.resolution(), resolution);
   }
   for (const char* sharpen : {"off", "1", "2", "auto"}) {
     const auto reply =
@@ -67,8 +68,9 @@ TEST(SetReconstruction, NamesTheFieldThatIsWrong) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   client.hello();
-  expect_invalid(client, asking([](auto& change) { change.set_method("best"); }),
-                 "set_reconstruction.method: \"best\" is unknown; known are full, half, quarter");
+  expect_invalid(
+      client, asking([](auto& change) { change.set_resolution("best"); }),
+      "set_reconstruction.resolution: \"best\" is unknown; known are full, half, quarter");
   expect_invalid(client, asking([](auto& change) { change.set_sharpen("3"); }),
                  "set_reconstruction.sharpen: \"3\" is unknown; known are off, auto, 1, 2");
   for (const double bound : {0.0, -5.0, 10001.0, std::numeric_limits<double>::quiet_NaN()}) {
@@ -81,17 +83,17 @@ TEST(SetReconstruction, IsDoneOneAtATime) {
   Rig rig;
   RawClient client(rig.tcp_port());
   client.hello();
-  auto message = asking([](auto& change) { change.set_method("half"); });
+  auto message = asking([](auto& change) { change.set_resolution("half"); });
   message.set_id(77);
   client.send(message);
   const auto command = rig.port.wait_command(0);
   ASSERT_TRUE(command.has_value());
   RawClient other(rig.tcp_port());
   other.hello();
-  const auto again = asking([](auto& change) { change.set_method("quarter"); });
+  const auto again = asking([](auto& change) { change.set_resolution("quarter"); });
   EXPECT_EQ(other.request(again).error().code(), v1::ERROR_BUSY);
   rig.port.emit(CommandDone{command->ticket, Outcome::done, ""});
-  EXPECT_EQ(other.event().reconstruction().method(), "half");
+  EXPECT_EQ(other.event().reconstruction().resolution(), "half");
 }
 
 TEST(SetReconstruction, WhatThePipelineRefusesIsToldToNobodyElse) {

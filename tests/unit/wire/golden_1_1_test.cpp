@@ -144,7 +144,7 @@ TEST(Golden11, ContactWithoutForce) {
 
 TEST(Golden11, SetReconstruction) {
   expect_golden<ClientMessage>(
-      R"(id: 4 set_reconstruction { method: "m" sharpen: "s" max_error_um: 30 })",
+      R"(id: 4 set_reconstruction { resolution: "m" sharpen: "s" max_error_um: 30 })",
       "08 04 6a 0f 0a 01 6d 12 01 73 19 00 00 00 00 00 00 3e 40");
 }
 
@@ -157,13 +157,13 @@ TEST(Golden11, SubscribeToPointsAndPose) {
 
 TEST(Golden11, Reconstruction) {
   expect_golden<ServerMessage>(
-      R"(reply { id: 9 reconstruction { method: "m" sharpen: "s" max_error_um: 1 } })",
+      R"(reply { id: 9 reconstruction { resolution: "m" sharpen: "s" max_error_um: 1 } })",
       "0a 13 08 09 5a 0f 0a 01 6d 12 01 73 19 00 00 00 00 00 00 f0 3f");
 }
 
 TEST(Golden11, ReconstructionEvent) {
   expect_golden<ServerMessage>(
-      R"(event { reconstruction { method: "m" sharpen: "s" max_error_um: 1 } sequence: 1 )"
+      R"(event { reconstruction { resolution: "m" sharpen: "s" max_error_um: 1 } sequence: 1 )"
       R"(monotonic_ns: 2 wall_ns: 3 })",
       "1a 17 30 01 38 04 40 06 4a 0f 0a 01 6d 12 01 73 19 00 00 00 00 00 00 f0 3f");
 }
@@ -171,7 +171,7 @@ TEST(Golden11, ReconstructionEvent) {
 TEST(Golden11, StatusWithReconstruction) {
   expect_golden<ServerMessage>(
       R"(reply { id: 9 status { calibration { name: "n" sharpen_steps: 1 sharpen_steps: 2 } )"
-      R"(reconstruction { method: "m" sharpen: "s" max_error_um: 1 } } })",
+      R"(reconstruction { resolution: "m" sharpen: "s" max_error_um: 1 } } })",
       "0a 1f 08 09 32 1b 3a 07 0a 01 6e 5a 02 01 02 b2 01 0f 0a 01 6d 12 01 73 19 00 00 00 "
       "00 00 00 f0 3f");
 }

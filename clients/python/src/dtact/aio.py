@@ -161,9 +161,9 @@ class Client(Session):
                         leds: Sequence[tuple[int, int, int]] | None = None) -> Light:
         return await self._ask(requests.set_light(brightness, scheme, leds))
 
-    async def set_reconstruction(self, method: str | None = None, sharpen: str | None = None,
+    async def set_reconstruction(self, resolution: str | None = None, sharpen: str | None = None,
                                  max_error_um: float | None = None) -> Reconstruction:
-        return await self._ask(requests.set_reconstruction(method, sharpen, max_error_um))
+        return await self._ask(requests.set_reconstruction(resolution, sharpen, max_error_um))
 
     async def rezero(self, force: bool = False) -> None:
         await self._ask(requests.rezero(force))

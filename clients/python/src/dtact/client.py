@@ -100,12 +100,12 @@ class Client(Session):
         0 … 255. `scheme`: "all", "scheme1" … "scheme4". `leds`: eight colours (r, g, b)."""
         return self._ask(requests.set_light(brightness, scheme, leds))
 
-    def set_reconstruction(self, method: str | None = None, sharpen: str | None = None,
+    def set_reconstruction(self, resolution: str | None = None, sharpen: str | None = None,
                            max_error_um: float | None = None) -> Reconstruction:
         """How depth is made from now on, until the daemon ends; what is left out stays. Returns once
-        frames are made so. `method`: "full", "half", "quarter", "auto". `sharpen`: "off", "1", "2",
+        frames are made so. `resolution`: "full", "half", "quarter", "auto". `sharpen`: "off", "1", "2",
         "auto". `max_error_um`: 1 … 10000, for "auto"."""
-        return self._ask(requests.set_reconstruction(method, sharpen, max_error_um))
+        return self._ask(requests.set_reconstruction(resolution, sharpen, max_error_um))
 
     def rezero(self, force: bool = False) -> None:
         """Takes the present picture as untouched; `force`: although something touches."""

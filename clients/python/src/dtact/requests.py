@@ -84,13 +84,13 @@ def set_light(brightness: int | None, scheme: str | None,
     return Request(message, lambda reply: Light.of(reply.light))
 
 
-def set_reconstruction(method: str | None, sharpen: str | None,
+def set_reconstruction(resolution: str | None, sharpen: str | None,
                        max_error_um: float | None) -> Request[Reconstruction]:
     message = ClientMessage()
     request = message.set_reconstruction
     request.SetInParent()
-    if method is not None:
-        request.method = method
+    if resolution is not None:
+        request.resolution = resolution
     if sharpen is not None:
         request.sharpen = sharpen
     if max_error_um is not None:

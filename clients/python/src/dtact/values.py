@@ -72,13 +72,13 @@ class Light:
 class Reconstruction:
     """How depth is made; dtactd.toml explains the words under [reconstruction]."""
 
-    method: str  #: "full", "half", "quarter", "auto"
+    resolution: str  #: "full", "half", "quarter", "auto"
     sharpen: str  #: "off", "1", "2", "auto"
     max_error_um: float  #: 1 … 10000, for "auto"
 
     @classmethod
     def of(cls, m: Message) -> Reconstruction:
-        return cls(m.method, m.sharpen, m.max_error_um)
+        return cls(m.resolution, m.sharpen, m.max_error_um)
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ import type { Frame } from "../session/messages";
 import type { Sensor } from "../session/sensor";
 import { fixed, um } from "../words";
 
-const METHODS = { full: "Full", half: "Half", quarter: "Quarter", auto: "Auto" };
+const RESOLUTIONS = { full: "Full", half: "Half", quarter: "Quarter", auto: "Auto" };
 const SHARPEN = { off: "Off", once: "1", twice: "2", auto: "Auto" };
 /** As the wire has it; as keys of an object numbers would come first. */
 const STEPS = { off: "off", once: "1", twice: "2", auto: "auto" };
-type Method = keyof typeof METHODS;
+type Resolution = keyof typeof RESOLUTIONS;
 type Sharpen = keyof typeof SHARPEN;
 
 const [WIDTH, HEIGHT, LEFT, BOTTOM] = [280, 150, 34, 26];
@@ -23,7 +23,7 @@ const REDRAW_MS = 250;
 const MOST_SEEN = 12;
 
 interface Change {
-  method?: Method;
+  resolution?: Resolution;
   sharpen?: string;
   maxErrorUm?: number;
 }
@@ -48,8 +48,8 @@ export class ReconstructionPanel {
     step: "5",
     "aria-label": "Error bound, µm",
   });
-  private readonly methods = new Choice<Method>("Resolution", METHODS, "full", (method) =>
-    this.set({ method }),
+  private readonly resolutions = new Choice<Resolution>("Resolution", RESOLUTIONS, "full", (resolution) =>
+    this.set({ resolution }),
   );
   private readonly sharpening = new Choice<Sharpen>("Sharpen", SHARPEN, "off", (sharpen) =>
     this.set({ sharpen: STEPS[sharpen] }),
@@ -65,7 +65,7 @@ export class ReconstructionPanel {
   private readonly controls = el(
     "div",
     { class: "controls" },
-    el("div", { class: "row wrap" }, el("span", { class: "quiet" }, "Map"), this.methods.element),
+    el("div", { class: "row wrap" }, el("span", { class: "quiet" }, "Map"), this.resolutions.element),
     el(
       "div",
       { class: "row wrap" },
@@ -111,7 +111,7 @@ export class ReconstructionPanel {
 
   show(how: Reconstruction): void {
     this.how = how;
-    this.methods.mark(how.method as Method);
+    this.resolutions.mark(how.resolution as Resolution);
     const steps = (Object.keys(STEPS) as Sharpen[]).find((key) => STEPS[key] === how.sharpen);
     if (steps) this.sharpening.mark(steps);
     if (document.activeElement !== this.bound) this.bound.value = String(how.maxErrorUm);
@@ -155,7 +155,7 @@ export class ReconstructionPanel {
   private draw(): void {
     if (!this.element.open) return;
     const all = [...this.seen.values()];
-    const automatic = this.how?.method === "auto" || this.how?.sharpen === "auto";
+    const automatic = this.how?.resolution === "auto" || this.how?.sharpen === "auto";
     const bound = automatic ? this.how?.maxErrorUm : undefined;
     const topMs = 1.15 * Math.max(0.3, ...all.map(({ ms }) => ms));
     const topUm = 1.15 * Math.max(60, bound ?? 0, ...all.map(({ errorUm }) => errorUm));
