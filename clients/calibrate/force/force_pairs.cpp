@@ -31,6 +31,16 @@ bool number(std::string_view text, auto& value) {
   return parsed.ec == std::errc() && parsed.ptr == text.data() + text.size();
 }
 
+/// Where the path of a recording ends in `frames`, before the range of its frames; npos: these are
+/// images, also those in a folder whose name ends like a recording's.
+std::size_t end_of_recording(const std::string& frames) {
+  const auto found = frames.rfind(kRecording);
+  if (found == std::string::npos) return found;
+  const std::size_t end = found + kRecording.size();
+  const bool named = end == frames.size() || frames[end] == ':';
+  return named && !fs::is_directory(frames) ? end : std::string::npos;
+}
+
 std::string_view trimmed(std::string_view text) {
   const auto from = text.find_first_not_of(" \t\r");
   if (from == std::string_view::npos) return {};
@@ -146,19 +156,18 @@ std::vector<Reading> read_readings(const fs::path& csv) {
 }
 
 Pair ContactReader::measure(const std::string& frames) const {
-  const auto found = frames.rfind(kRecording);
-  if (found == std::string::npos) {
+  const std::size_t after = end_of_recording(frames);
+  if (after == std::string::npos) {
     return measure(ctl::load_images({frames}, "--pair").frames(), frames);
   }
-  const std::size_t after = found + kRecording.size();
   std::uint64_t first = 0;
   std::uint64_t end = UINT64_MAX;
   if (after != frames.size()) {
     const std::string_view range = std::string_view(frames).substr(after + 1);
     const auto colon = range.find(':');
     const bool single = colon == std::string_view::npos;
-    const bool parsed = frames[after] == ':' && number(range.substr(0, colon), first) &&
-                        (single || number(range.substr(colon + 1), end));
+    const bool parsed =
+        number(range.substr(0, colon), first) && (single || number(range.substr(colon + 1), end));
     if (single) end = first + 1;
     if (!parsed || end <= first) {
       throw std::runtime_error(frames +

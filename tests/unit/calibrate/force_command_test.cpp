@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -90,6 +91,19 @@ TEST_F(Force, ReadsAPictureAsTheDaemonDoes) {
   EXPECT_NEAR(volume_mm3(reader.measure(at("press.png")).contact), 11.5, 0.6);
   write("untouched.png", Ball{}.untouched());
   EXPECT_NEAR(volume_mm3(reader.measure(at("untouched.png")).contact), 0, 0.1);
+}
+
+// A recording is told by the end of its name alone.
+TEST_F(Force, ReadsAPictureBelowAFolderThatIsNamedLikeARecording) {
+  const calibration::Calibration cal = calibration::load(at("cal"));
+  const ContactReader reader(cal, cal.model->reference_q8);
+  for (const char* folder : {"press.mcap", "press.mcap.pictures"}) {
+    std::filesystem::create_directory(at(folder));
+    const std::string name = std::string(folder) + "/press.png";
+    write(name, Ball{.depth_mm = 1.0}.frame());
+    EXPECT_NEAR(volume_mm3(reader.measure(at(name)).contact), 11.5, 0.6) << name;
+    EXPECT_NEAR(volume_mm3(reader.measure(at(folder)).contact), 11.5, 0.6) << folder;
+  }
 }
 
 TEST_F(Force, IsFittedIntoACalibrationOfItsOwn) {
