@@ -16,7 +16,7 @@ void add_listen_options(CLI::App& command, net::NetConfig& settings) {
   command
       .add_option("--tokens", settings.token_file,
                   "Whoever connects needs one of these tokens: a file like the daemon's "
-                  "net.token_file")
+                  "net.tokens")
       ->type_name("FILE");
   command
       .add_option("--tls-certificate", settings.tls_certificate,

@@ -140,11 +140,11 @@ std::vector<Key> bind_keys(Config& c) {
 
       text("net.address", c.net.address, "an IPv4 or IPv6 address in quotes, or \"\""),
       integer("net.port", c.net.port, 0, 65535, "(0 = any free one)"),
-      boolean("net.insecure", c.net.insecure),
+      boolean("net.listen_insecure", c.net.insecure),
       path("net.unix_socket", c.net.unix_socket, "a path for the socket, or \"\""),
       secret("net.tls_certificate", c.net.tls_certificate, "a PEM file, or \"\""),
       secret("net.tls_key", c.net.tls_key, "a PEM file, or \"\""),
-      secret("net.token_file", c.net.token_file, "a file with a token on each line, or \"\""),
+      secret("net.tokens", c.net.token_file, "a file with a token on each line, or \"\""),
       integer("net.max_clients", c.net.max_clients, 1, 1024, ""),
       integer("net.max_clients_per_address", c.net.max_clients_per_address, 1, 1024, ""),
       integer("net.max_requests_per_s", c.net.max_requests_per_s, 1, 100000, "(requests a second)"),

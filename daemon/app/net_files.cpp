@@ -13,7 +13,7 @@ namespace dtact::app {
 void resolve_credentials(net::NetConfig& config) {
   config.tls_certificate = resolve_credential("net.tls_certificate", config.tls_certificate);
   config.tls_key = resolve_credential("net.tls_key", config.tls_key);
-  config.token_file = resolve_credential("net.token_file", config.token_file);
+  config.token_file = resolve_credential("net.tokens", config.token_file);
 }
 
 void check_net_files(net::NetConfig config) {

@@ -17,7 +17,7 @@ namespace {
 constexpr std::array<std::string_view, 8> kLive = {"log_level",
                                                    "net.tls_certificate",
                                                    "net.tls_key",
-                                                   "net.token_file",
+                                                   "net.tokens",
                                                    "net.max_clients",
                                                    "net.max_clients_per_address",
                                                    "net.max_requests_per_s",
@@ -56,7 +56,7 @@ Reload merge(const Config& running, const Config& fresh) {
   const net::NetConfig& net = reload.config.net;
   for (const auto& [key, file] :
        {std::pair("net.tls_certificate", &net.tls_certificate),
-        std::pair("net.tls_key", &net.tls_key), std::pair("net.token_file", &net.token_file)}) {
+        std::pair("net.tls_key", &net.tls_key), std::pair("net.tokens", &net.token_file)}) {
     if (file->empty()) continue;
     (file->string().starts_with(kCredential) ? reload.credentials : reload.files).push_back(key);
   }

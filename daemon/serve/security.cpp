@@ -34,13 +34,13 @@ void check_security(const NetConfig& config) {
   }
   if (config.token_file.empty()) {
     if (!missing.empty()) missing += " and ";
-    missing += "net.token_file (dtactctl token --new control prints a line for it)";
+    missing += "net.tokens (dtactctl token --new control prints a line for it)";
   }
-  throw std::runtime_error(
-      fmt::format("net.address = \"{}\" opens the sensor to other machines, which needs TLS and a "
-                  "token: set {}; or net.insecure = true, if whoever can reach it may watch and "
-                  "command; or net.address = \"127.0.0.1\"",
-                  config.address, missing));
+  throw std::runtime_error(fmt::format(
+      "net.address = \"{}\" opens the sensor to other machines, which needs TLS and a "
+      "token: set {}; or net.listen_insecure = true, if whoever can reach it may watch and "
+      "command; or net.address = \"127.0.0.1\"",
+      config.address, missing));
 }
 
 NetConfig checked(NetConfig config) {
@@ -48,10 +48,11 @@ NetConfig checked(NetConfig config) {
   if (is_insecure(config)) {
     config.log(
         {LogLevel::warning,
-         fmt::format("net.insecure: whoever can reach {} may {} the sensor, since there is no "
-                     "{}",
-                     config.address, config.token_file.empty() ? "watch and command" : "watch",
-                     config.token_file.empty() ? "token" : "TLS to keep a token secret")});
+         fmt::format(
+             "net.listen_insecure: whoever can reach {} may {} the sensor, since there is no "
+             "{}",
+             config.address, config.token_file.empty() ? "watch and command" : "watch",
+             config.token_file.empty() ? "token" : "TLS to keep a token secret")});
   }
   config.log = limited(std::move(config.log));
   return config;

@@ -77,7 +77,7 @@ class LateAddress : public ::testing::Test {
   void serves_once_it_comes(const std::string& address, const std::function<void()>& bring) {
     const TempFolder state;
     DaemonProcess daemon({"--set", "camera.backend=null", "--set", "ring.backend=null", "--set",
-                          "net.address=" + address, "--set", "net.insecure=true", "--set",
+                          "net.address=" + address, "--set", "net.listen_insecure=true", "--set",
                           "net.port=0", "--set", "state_dir=" + state.path().string()});
     EXPECT_NE(daemon.log().find("no interface has the address " + address + " yet"),
               std::string::npos)

@@ -47,7 +47,7 @@ start_daemon() {
   local name=$1 settings=()
   shift
   for setting in "$@"; do settings+=(--set "$setting"); done
-  "$daemon" --set camera.backend=null --set ring.backend=null --set net.port=0 --set net.insecure=true \
+  "$daemon" --set camera.backend=null --set ring.backend=null --set net.port=0 --set net.listen_insecure=true \
     --set "state_dir=$folder/$name" "${settings[@]}" >"$folder/$name.log" 2>&1 &
   jobs+=($!)
   within 30 says "$name" 'listening on'

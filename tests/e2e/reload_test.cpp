@@ -57,7 +57,7 @@ class Reload : public testing::Test {
   /// `more` begins at line 9 of the file, in [net].
   [[nodiscard]] static std::string configuration(const std::string& pair, const std::string& more) {
     return "state_dir = 'state'\ncamera.backend = 'null'\nring.backend = 'null'\n[net]\nport = 0\n"
-           "token_file = 'tokens'\ntls_certificate = '" +
+           "tokens = 'tokens'\ntls_certificate = '" +
            pair + "/dtactd.crt'\ntls_key = '" + pair + "/dtactd.key'\n" + more;
   }
   /// Sends SIGHUP. Returns the status that the service manager is told when it is done.
@@ -139,10 +139,10 @@ TEST_F(Reload, SaysThatNewCredentialsNeedARestart) {
   std::string handed_in = configuration("old", "");
   handed_in.replace(handed_in.find("'tokens'"), 8, "'credential:tokens'");
   write("dtactd.toml", handed_in);
-  EXPECT_THAT(reload(), HasSubstr("; new credentials need a restart: net.token_file; listening"));
+  EXPECT_THAT(reload(), HasSubstr("; new credentials need a restart: net.tokens; listening"));
   EXPECT_THAT(daemon_->log(), HasSubstr("configuration read again, and with it the files of "
                                         "net.tls_certificate, net.tls_key; changed: "
-                                        "net.token_file"));
+                                        "net.tokens"));
   EXPECT_EQ(connect(old_, kOldToken)->server().rights(), v1::RIGHTS_CONTROL);
 }
 
@@ -202,10 +202,10 @@ class CheckOfFiles : public testing::Test {
 // Otherwise `systemctl reload` would succeed where the daemon keeps what it has.
 TEST_F(CheckOfFiles, FindsBrokenTokens) {
   const std::string tokens = write("tokens", std::string("view ") + kNewToken + "\n");
-  EXPECT_EQ(check({"token_file=" + tokens}), "");
+  EXPECT_EQ(check({"tokens=" + tokens}), "");
   (void)write("tokens", "view short\n");
-  EXPECT_THAT(check({"token_file=" + tokens}), HasSubstr(tokens + ":1: the token has 5 bytes"));
-  EXPECT_THAT(check({"token_file=" + tokens + "-gone"}), HasSubstr("tokens-gone: No such file"));
+  EXPECT_THAT(check({"tokens=" + tokens}), HasSubstr(tokens + ":1: the token has 5 bytes"));
+  EXPECT_THAT(check({"tokens=" + tokens + "-gone"}), HasSubstr("tokens-gone: No such file"));
 }
 
 TEST_F(CheckOfFiles, FindsAKeyOfAnotherCertificate) {
@@ -228,7 +228,7 @@ TEST(Check, LooksAtTheCalibration) {
 }
 
 TEST_F(CheckOfFiles, LooksAtCredentialsWhereThereAreAny) {
-  const std::vector<std::string> all = {"token_file=credential:tokens", "tls_key=credential:key",
+  const std::vector<std::string> all = {"tokens=credential:tokens", "tls_key=credential:key",
                                         "tls_certificate=credential:certificate"};
   EXPECT_EQ(check(all), "");
   ::setenv("CREDENTIALS_DIRECTORY", folder_.path().c_str(), 1);
@@ -239,14 +239,14 @@ TEST_F(CheckOfFiles, LooksAtCredentialsWhereThereAreAny) {
 
 TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {
   std::string output;
-  const auto status = told_by_failing({"--set", "net.token_file=credential:tokens", "--set",
+  const auto status = told_by_failing({"--set", "net.tokens=credential:tokens", "--set",
                                        "camera.backend=null", "--set", "ring.backend=null"},
                                       output);
   EXPECT_THAT(output, AllOf(HasSubstr("/etc/credstore/dtactd.tokens"),
                             HasSubstr("what else this machine lacks: dtactd --doctor")));
   // What systemctl status shows of a daemon that cannot start.
   EXPECT_THAT(status.value_or(""),
-              AllOf(StartsWith("STATUS=net.token_file = "), EndsWith("dtactd --doctor")));
+              AllOf(StartsWith("STATUS=net.tokens = "), EndsWith("dtactd --doctor")));
 }
 
 }  // namespace

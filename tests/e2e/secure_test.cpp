@@ -42,7 +42,7 @@ class Secure : public testing::Test {
         fs::path(), true,
         std::vector<std::string>{
             "net.tls_certificate=" + file("dtactd.crt"), "net.tls_key=" + file("dtactd.key"),
-            "net.token_file=" + file("tokens"), "net.unix_socket=" + file("sock")});
+            "net.tokens=" + file("tokens"), "net.unix_socket=" + file("sock")});
   }
 
   [[nodiscard]] std::string file(const char* name) const {

@@ -200,7 +200,7 @@ class Rights(unittest.TestCase):
         token.write_text(VIEW)
         for file in (tokens, token):
             file.chmod(0o600)
-        daemon = Daemon(HERE, "guarded", f"net.token_file={tokens}")
+        daemon = Daemon(HERE, "guarded", f"net.tokens={tokens}")
         gate = Gateway(HERE, "--daemon", f"left=127.0.0.1:{daemon.port},token-file={token}")
         with Viewer(gate.port) as viewer:
             viewer.notice(lambda told: told["connected"])

@@ -21,7 +21,7 @@ dtactctl token --new view > $tokens
 chown dtactd: $tokens
 cut -d ' ' -f 2 $tokens > /tmp/token
 chmod 600 $tokens /tmp/token
-sed -i "/^\[net\]/,/^\[metrics\]/s|^token_file = \"\"|token_file = \"$tokens\"|" "$config"
+sed -i "/^\[net\]/,/^\[metrics\]/s|^tokens = \"\"|tokens = \"$tokens\"|" "$config"
 systemctl restart dtactd
 within 120 dtactctl --token-file /tmp/token status
 before=$(pid)

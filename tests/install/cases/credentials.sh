@@ -12,7 +12,7 @@ chmod 600 /tmp/token
 sed -i '/^\[net\]/,/^\[metrics\]/{
   s|^tls_certificate = ""|tls_certificate = "credential:tls-certificate"|
   s|^tls_key = ""|tls_key = "credential:tls-key"|
-  s|^token_file = ""|token_file = "credential:tokens"|
+  s|^tokens = ""|tokens = "credential:tokens"|
 }' "$config"
 systemctl restart dtactd
 tls=(--host 127.0.0.1 --fingerprint "$fingerprint")
@@ -32,7 +32,7 @@ runuser -u dtactd -- test -r $store/dtactd.tokens && fail "the daemon's user rea
 dtactctl token --new view > /tmp/token-line
 install -m 600 /tmp/token-line $store/dtactd.tokens
 systemctl reload dtactd
-within 60 bash -c 'systemctl show -p StatusText dtactd | grep "new credentials need a restart: .*net.token_file"'
+within 60 bash -c 'systemctl show -p StatusText dtactd | grep "new credentials need a restart: .*net.tokens"'
 systemctl restart dtactd
 dtactctl "${tls[@]}" --token-file /tmp/token status && fail "the revoked token is taken"
 cut -d ' ' -f 2 /tmp/token-line > /tmp/token

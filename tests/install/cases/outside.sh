@@ -8,7 +8,7 @@ ip link set veth0 up
 ip -n other address add 192.168.7.2/24 dev veth1
 ip -n other link set veth1 up
 cp "$config" /tmp/good.toml
-sed -i '/^\[net\]/,/^\[metrics\]/s/^address = "127.0.0.1"/address = "192.168.7.1"/; s/^insecure = false/insecure = true/' "$config"
+sed -i '/^\[net\]/,/^\[metrics\]/s/^address = "127.0.0.1"/address = "192.168.7.1"/; s/^listen_insecure = false/listen_insecure = true/' "$config"
 systemctl restart dtactd
 within 120 systemctl is-active dtactd
 within 60 bash -c 'ss -ltn | grep -q 192.168.7.1:7377'

@@ -103,13 +103,13 @@ TEST_F(ConfigFile, SharpensByANumberOrAName) {
 
 TEST_F(ConfigFile, ASecretMayBeACredential) {
   const Config config = load(
-      "[net]\ntoken_file = 'credential:tokens'\ntls_key = 'keys/a.key'\n"
+      "[net]\ntokens = 'credential:tokens'\ntls_key = 'keys/a.key'\n"
       "tls_certificate = 'keys/a.crt'\n");
   EXPECT_EQ(config.net.token_file, "credential:tokens");
   EXPECT_EQ(config.net.tls_key, folder_ / "keys/a.key");
-  EXPECT_THAT(error("[net]\ntoken_file = 'credential:../tokens'\n"),
+  EXPECT_THAT(error("[net]\ntokens = 'credential:../tokens'\n"),
               HasSubstr("or \"credential:NAME\""));
-  EXPECT_THAT(error("[net]\ntoken_file = 'credential:'\n"), HasSubstr("net.token_file"));
+  EXPECT_THAT(error("[net]\ntokens = 'credential:'\n"), HasSubstr("net.tokens"));
 }
 
 TEST_F(ConfigFile, UnknownKeyNamesFileLineAndWhatIsAllowed) {
@@ -222,12 +222,12 @@ TEST_F(ConfigFile, EnvironmentSetsTheLogLevel) {
 
 TEST_F(ConfigFile, OpensTheNetworkOnlyWithTlsAndTokens) {
   EXPECT_THAT(error("[net]\naddress = '0.0.0.0'\n"),
-              AllOf(HasSubstr("net.tls_certificate"), HasSubstr("net.token_file"),
-                    HasSubstr("net.insecure = true")));
-  EXPECT_TRUE(load("[net]\naddress = '0.0.0.0'\ninsecure = true\n").net.insecure);
+              AllOf(HasSubstr("net.tls_certificate"), HasSubstr("net.tokens"),
+                    HasSubstr("net.listen_insecure = true")));
+  EXPECT_TRUE(load("[net]\naddress = '0.0.0.0'\nlisten_insecure = true\n").net.insecure);
   const Config config = load(
       "[net]\naddress = '::'\ntls_certificate = 'a.crt'\ntls_key = 'a.key'\n"
-      "token_file = '/etc/tokens'\nunix_socket = '/run/s'\nmax_clients_per_address = 3\n"
+      "tokens = '/etc/tokens'\nunix_socket = '/run/s'\nmax_clients_per_address = 3\n"
       "max_requests_per_s = 7\n");
   EXPECT_EQ(config.net.tls_certificate, folder_ / "a.crt");
   EXPECT_EQ(config.net.tls_key, folder_ / "a.key");

@@ -35,12 +35,12 @@ TEST(Reload, TokensAndTlsChangeFromFileToFileOnly) {
   Config running;
   Config fresh = running;
   fresh.net.token_file = "/etc/dtactd/tokens";
-  EXPECT_THAT(merge(running, fresh).restart, ElementsAre("net.token_file"));
+  EXPECT_THAT(merge(running, fresh).restart, ElementsAre("net.tokens"));
   EXPECT_TRUE(merge(running, fresh).config.net.token_file.empty());
-  EXPECT_THAT(merge(fresh, running).restart, ElementsAre("net.token_file"));
+  EXPECT_THAT(merge(fresh, running).restart, ElementsAre("net.tokens"));
   Config other = fresh;
   other.net.token_file = "credential:tokens";
-  EXPECT_THAT(merge(fresh, other).changed, ElementsAre("net.token_file"));
+  EXPECT_THAT(merge(fresh, other).changed, ElementsAre("net.tokens"));
   EXPECT_EQ(merge(fresh, other).config.net.token_file, "credential:tokens");
 }
 
@@ -59,11 +59,11 @@ TEST(Reload, SaysThatNewCredentialsNeedARestart) {
             "configuration read again, and with it the files of net.tls_certificate; changed: "
             "net.max_clients");
   EXPECT_EQ(what_waits(merge(config, fresh)),
-            "new credentials need a restart: net.tls_key, net.token_file");
+            "new credentials need a restart: net.tls_key, net.tokens");
   fresh.net.port = 1;
   EXPECT_EQ(what_waits(merge(config, fresh)),
             "needs a restart: net.port; new credentials need a restart: net.tls_key, "
-            "net.token_file");
+            "net.tokens");
 }
 
 TEST(Reload, EveryLiveKeyIsAKey) {

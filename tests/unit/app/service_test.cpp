@@ -87,9 +87,9 @@ TEST(Service, ACredentialIsTheFileThatSystemdHandedIn) {
   std::filesystem::create_directories(folder);
   std::ofstream(folder / "tokens") << "x";
   ::setenv("CREDENTIALS_DIRECTORY", folder.c_str(), 1);
-  EXPECT_EQ(resolve_credential("net.token_file", "credential:tokens"), folder / "tokens");
-  EXPECT_EQ(resolve_credential("net.token_file", "/etc/tokens"), "/etc/tokens");
-  EXPECT_EQ(resolve_credential("net.token_file", ""), "");
+  EXPECT_EQ(resolve_credential("net.tokens", "credential:tokens"), folder / "tokens");
+  EXPECT_EQ(resolve_credential("net.tokens", "/etc/tokens"), "/etc/tokens");
+  EXPECT_EQ(resolve_credential("net.tokens", ""), "");
   const auto missing = [](const char* name) {
     try {
       return resolve_credential("net.tls_key", name).string();

@@ -142,7 +142,7 @@ TEST(Security, TellsWhereAnybodyMayCome) {
   config.insecure = true;
   Rig rig(config);
   EXPECT_THAT(rig.log(),
-              HasSubstr("net.insecure: whoever can reach 0.0.0.0 may watch and command"));
+              HasSubstr("net.listen_insecure: whoever can reach 0.0.0.0 may watch and command"));
   RawClient client(rig.tcp_port());
   client.hello();
   const auto status =
@@ -173,7 +173,7 @@ TEST(Security, NeedsTlsAndATokenBeyondThisMachine) {
     EXPECT_THAT(refusal(config),
                 AllOf(HasSubstr("net.address = \"" + std::string(beyond) + "\""),
                       HasSubstr("dtactctl cert"), HasSubstr("dtactctl token --new control"),
-                      HasSubstr("net.insecure = true"), HasSubstr("\"127.0.0.1\"")));
+                      HasSubstr("net.listen_insecure = true"), HasSubstr("\"127.0.0.1\"")));
   }
   config.token_file = "/etc/tokens";
   EXPECT_THAT(refusal(config),
@@ -183,7 +183,7 @@ TEST(Security, NeedsTlsAndATokenBeyondThisMachine) {
   config.tls_key = "/etc/key";
   EXPECT_EQ(refusal(config), "");
   config.token_file.clear();
-  EXPECT_THAT(refusal(config), AllOf(HasSubstr("net.token_file"), Not(HasSubstr("dtactctl cert"))));
+  EXPECT_THAT(refusal(config), AllOf(HasSubstr("net.tokens"), Not(HasSubstr("dtactctl cert"))));
   config.insecure = true;
   EXPECT_EQ(refusal(config), "");
 }
