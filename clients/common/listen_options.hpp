@@ -9,8 +9,8 @@ class App;
 namespace dtact::cli {
 
 /// Where a program that serves the wire listens and whom it lets in: --listen, --listen-port,
-/// --tokens, --tls-certificate and --tls-key. What `settings` holds is the default; it must outlive
-/// the parsing.
+/// --tokens, --tls-certificate, --tls-key and --listen-insecure. What `settings` holds is the
+/// default; it must outlive the parsing.
 void add_listen_options(CLI::App& command, net::NetConfig& settings);
 
 }  // namespace dtact::cli

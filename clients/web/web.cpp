@@ -18,7 +18,7 @@
 namespace dtact::web {
 namespace {
 
-/// What "serve" is told.
+/// What the command line says.
 struct Arguments {
   Settings settings;
   std::vector<std::string> daemons;
@@ -67,60 +67,53 @@ void serve(const cli::Context& context, const Arguments& arguments) {
   io.run();
 }
 
-void add_serve(CLI::App& app, cli::Context& context) {
-  auto* command = app.add_subcommand(
-      "serve", "Serve the page and the WebSockets behind it, until Ctrl-C or SIGTERM");
-  const auto arguments = std::make_shared<Arguments>();
-  net::NetConfig& net = arguments->settings.net;
-  net.port = wire::kWebPort;
-  net.max_clients = 64;
-  net.max_clients_per_address = 48;
-  arguments->settings.work_folder = "dtact-calibrations";
-  command
-      ->add_option("--daemon", arguments->daemons,
-                   "A daemon and its name on the page; behind the address, each after a comma, "
-                   "what it is connected to with: fingerprint=SHA256, ca-file=FILE, "
-                   "token-file=FILE, insecure. Without one it is that of --host, named sensor")
-      ->type_name("NAME=ADDRESS")
-      ->take_all();
-  cli::add_listen_options(*command, net);
-  command->add_flag(
-      "--listen-insecure", net.insecure,
-      "Listen beyond this machine without TLS or tokens: whoever reaches it may watch "
-      "and command");
-  command
-      ->add_option("--name", arguments->settings.host_names,
-                   "A name by which browsers may reach this machine, besides its own and its "
-                   "addresses")
-      ->type_name("HOST")
-      ->take_all();
-  command
-      ->add_option("--foxglove-origin", arguments->settings.foxglove_origins,
-                   "An address whose pages may open /foxglove; in place of Foxglove's own")
-      ->type_name("ORIGIN")
-      ->take_all();
-  command
-      ->add_option("--work-folder", arguments->settings.work_folder,
-                   "Below it guided calibrations save what they take")
-      ->type_name("FOLDER")
-      ->envname("STATE_DIRECTORY")
-      ->capture_default_str();
-  command
-      ->add_option("--page", arguments->page,
-                   "Serve the files of this folder in place of the page that is built in")
-      ->type_name("FOLDER");
-  command->callback([&context, arguments] { serve(context, *arguments); });
-}
-
 }  // namespace
 
 void set_up(CLI::App& app, cli::Context& context) {
   app.name("dtact-web")
       ->description(
           "Shows DTact tactile sensors in a browser, and steers them: a client of any number of "
-          "dtactd, and a server of a page and of WebSockets that carry the daemons' own wire.");
+          "dtactd, and a server of a page and of WebSockets that carry the daemons' own wire.\n"
+          "Serves until Ctrl-C or SIGTERM.");
   cli::add_global_options(app, context);
-  add_serve(app, context);
+  app.require_subcommand(0);
+  const auto arguments = std::make_shared<Arguments>();
+  net::NetConfig& net = arguments->settings.net;
+  net.port = wire::kWebPort;
+  net.max_clients = 64;
+  net.max_clients_per_address = 48;
+  arguments->settings.work_folder = "dtact-calibrations";
+  CLI::Option* const daemons =
+      app.add_option("--daemon", arguments->daemons,
+                     "A daemon and its name on the page; behind the address, each after a comma, "
+                     "what it is connected to with: fingerprint=SHA256, ca-file=FILE, "
+                     "token-file=FILE, insecure. Without one it is that of --host, named sensor")
+          ->type_name("NAME=ADDRESS")
+          ->take_all();
+  // Those are about the one daemon of --host.
+  for (const char* one :
+       {"--host", "--port", "--token-file", "--fingerprint", "--ca-file", "--insecure"}) {
+    daemons->excludes(one);
+  }
+  cli::add_listen_options(app, net);
+  app.add_option("--name", arguments->settings.host_names,
+                 "A name by which browsers may reach this machine, besides its own and its "
+                 "addresses")
+      ->type_name("HOST")
+      ->take_all();
+  app.add_option("--foxglove-origin", arguments->settings.foxglove_origins,
+                 "An address whose pages may open /foxglove; in place of Foxglove's own")
+      ->type_name("ORIGIN")
+      ->take_all();
+  app.add_option("--work-folder", arguments->settings.work_folder,
+                 "Below it guided calibrations save what they take")
+      ->type_name("FOLDER")
+      ->envname("STATE_DIRECTORY")
+      ->capture_default_str();
+  app.add_option("--page", arguments->page,
+                 "Serve the files of this folder in place of the page that is built in")
+      ->type_name("FOLDER");
+  app.callback([&context, arguments] { serve(context, *arguments); });
 }
 
 int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& error) {

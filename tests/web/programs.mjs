@@ -109,7 +109,6 @@ export async function startGateway(daemons, words = []) {
   ]);
   const page = process.env.PAGE_DIST ? ["--page", process.env.PAGE_DIST] : [];
   const gateway = new Program(DTACT_WEB, [
-    "serve",
     "--listen-port",
     "0",
     ...names,
@@ -129,7 +128,7 @@ export async function startPerceive(port, listenPort = 0) {
 }
 
 export function status(daemon) {
-  const words = ["--port", String(daemon.port), "--json", "status"];
+  const words = ["--port", String(daemon.port), "status", "--json"];
   return JSON.parse(execFileSync(DTACTCTL, words, { encoding: "utf8" }));
 }
 

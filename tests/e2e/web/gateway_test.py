@@ -359,7 +359,7 @@ class BadMessages(unittest.TestCase):
 
 class Security(unittest.TestCase):
     def refusal(self, *arguments: str) -> str:
-        done = subprocess.run([os.environ["DTACT_WEB"], "serve", "--listen-port", "0", *arguments],
+        done = subprocess.run([os.environ["DTACT_WEB"], "--listen-port", "0", *arguments],
                               capture_output=True, text=True, timeout=60, check=False)
         self.assertEqual(done.returncode, 1, done.stdout)
         return done.stderr

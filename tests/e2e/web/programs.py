@@ -77,5 +77,5 @@ class Perceive(Program):
 class Gateway(Program):
     def __init__(self, folder: pathlib.Path, *arguments: str) -> None:
         number = len(list(folder.glob("web-*.log")))
-        super().__init__([os.environ["DTACT_WEB"], "serve", "--listen-port", "0", *arguments],
+        super().__init__([os.environ["DTACT_WEB"], "--listen-port", "0", *arguments],
                          folder / f"web-{number}.log", r"listening on https?://[\d.]+:(\d+)/")
