@@ -12,9 +12,9 @@ void set_up(CLI::App& app, cli::Context& context) {
       ->description(
           "Makes calibrations for dtactd, the daemon for DTact tactile sensors, and judges them.");
   cli::add_global_options(app, context);
-  cli::add_json_option(app, context);
   ctl::add_guided(app, context);
   ctl::add_offline_commands(app, context.json);
+  cli::add_json_option(*app.get_subcommand("evaluate"), context);
   force::add_force(app, context);
   reprocess::add_reprocess(app, context);
 }

@@ -71,6 +71,7 @@ void add_guided(CLI::App& app, cli::Context& context) {
   guided->add_flag("--force", plan->force,
                    "Make the calibration although list and ball disagree: a wrong scale or radius, "
                    "another light, a contact that is cut off");
+  cli::add_json_option(*guided, context);
   guided->callback([&context, guided, plan, method] {
     plan->method = list_method(*method);
     plan->again = cli::command_line(*guided);

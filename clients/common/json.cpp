@@ -1,20 +1,135 @@
 #include "clients/common/json.hpp"
 
-#include <google/protobuf/util/json_util.h>
+#include <fmt/format.h>
+#include <google/protobuf/descriptor.h>
+#include <openssl/evp.h>
 
-#include <stdexcept>
+#include <algorithm>
+#include <array>
+#include <cmath>
 
 namespace dtact::cli {
+namespace {
 
-std::string json_line(const google::protobuf::Message& message) {
-  google::protobuf::util::JsonPrintOptions options;
-  options.preserve_proto_field_names = true;
-  options.always_print_primitive_fields = true;
-  std::string text;
-  const auto status = google::protobuf::util::MessageToJsonString(message, &text, options);
-  // Only a text that is not UTF-8 can fail.
-  if (!status.ok()) throw std::runtime_error("no JSON: " + status.ToString());
-  return text + '\n';
+using google::protobuf::EnumValueDescriptor;
+using google::protobuf::FieldDescriptor;
+using google::protobuf::Message;
+using google::protobuf::Reflection;
+
+/// The number of bytes of the code point that `text` begins with; 0: it begins with none.
+std::size_t code_point_size(std::string_view text) {
+  constexpr std::array<std::uint32_t, 5> kSmallest{0, 0, 0x80, 0x800, 0x10000};
+  const auto lead = static_cast<unsigned char>(text.front());
+  if (lead < 0x80) return 1;
+  const std::size_t size = lead < 0xc0 ? 0 : lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+  if (size == 0 || lead >= 0xf8 || size > text.size()) return 0;
+  std::uint32_t code = lead & (0x7fU >> size);
+  for (const char sign : text.substr(1, size - 1)) {
+    const auto byte = static_cast<unsigned char>(sign);
+    if ((byte & 0xc0U) != 0x80) return 0;
+    code = code << 6U | (byte & 0x3fU);
+  }
+  const bool surrogate = code >= 0xd800 && code < 0xe000;
+  return code < kSmallest.at(size) || surrogate || code > 0x10ffff ? 0 : size;
+}
+
+template <class Number>
+std::string number(Number value) {
+  return std::isfinite(value) ? fmt::format("{}", value) : "null";
+}
+
+std::string object(const Message& message);
+
+std::string named(const EnumValueDescriptor& value) {
+  return json_string(std::string(value.name()));
+}
+
+/// `at`: the place in a repeated field; -1: the field is singular.
+std::string value_of(const Message& message, const FieldDescriptor& field, int at) {
+  const Reflection& values = *message.GetReflection();
+  const auto get = [&](auto single, auto repeated) {
+    return at < 0 ? (values.*single)(message, &field) : (values.*repeated)(message, &field, at);
+  };
+  switch (field.cpp_type()) {
+    case FieldDescriptor::CPPTYPE_INT32:
+      return fmt::to_string(get(&Reflection::GetInt32, &Reflection::GetRepeatedInt32));
+    case FieldDescriptor::CPPTYPE_INT64:
+      return fmt::to_string(get(&Reflection::GetInt64, &Reflection::GetRepeatedInt64));
+    case FieldDescriptor::CPPTYPE_UINT32:
+      return fmt::to_string(get(&Reflection::GetUInt32, &Reflection::GetRepeatedUInt32));
+    case FieldDescriptor::CPPTYPE_UINT64:
+      return fmt::to_string(get(&Reflection::GetUInt64, &Reflection::GetRepeatedUInt64));
+    case FieldDescriptor::CPPTYPE_DOUBLE:
+      return number(get(&Reflection::GetDouble, &Reflection::GetRepeatedDouble));
+    case FieldDescriptor::CPPTYPE_FLOAT:
+      return number(get(&Reflection::GetFloat, &Reflection::GetRepeatedFloat));
+    case FieldDescriptor::CPPTYPE_BOOL:
+      return get(&Reflection::GetBool, &Reflection::GetRepeatedBool) ? "true" : "false";
+    case FieldDescriptor::CPPTYPE_ENUM:
+      return named(*get(&Reflection::GetEnum, &Reflection::GetRepeatedEnum));
+    case FieldDescriptor::CPPTYPE_STRING: {
+      const std::string text = get(&Reflection::GetString, &Reflection::GetRepeatedString);
+      return field.type() == FieldDescriptor::TYPE_BYTES ? '"' + base64(text) + '"'
+                                                         : json_string(text);
+    }
+    case FieldDescriptor::CPPTYPE_MESSAGE:
+      return object(at < 0 ? values.GetMessage(message, &field)
+                           : values.GetRepeatedMessage(message, &field, at));
+  }
+  return "null";
+}
+
+std::string object(const Message& message) {
+  const Reflection& values = *message.GetReflection();
+  std::string text = "{";
+  for (int i = 0; i < message.GetDescriptor()->field_count(); ++i) {
+    const FieldDescriptor& field = *message.GetDescriptor()->field(i);
+    if (field.has_presence() && !values.HasField(message, &field)) continue;
+    text += fmt::format("{}\"{}\":", text.size() > 1 ? "," : "", field.name());
+    if (!field.is_repeated()) {
+      text += value_of(message, field, -1);
+      continue;
+    }
+    text += '[';
+    for (int at = 0; at < values.FieldSize(message, &field); ++at) {
+      text += (at > 0 ? "," : "") + value_of(message, field, at);
+    }
+    text += ']';
+  }
+  return text + '}';
+}
+
+}  // namespace
+
+std::string json_line(const Message& message) { return object(message) + '\n'; }
+
+std::string json_string(std::string_view text) {
+  std::string json = "\"";
+  while (!text.empty()) {
+    const std::size_t size = code_point_size(text);
+    const char sign = text.front();
+    if (size == 0) {
+      json += "\xef\xbf\xbd";
+    } else if (sign == '"' || sign == '\\') {
+      json += '\\';
+      json += sign;
+    } else if (static_cast<unsigned char>(sign) < 0x20) {
+      json += fmt::format("\\u{:04x}", static_cast<unsigned char>(sign));
+    } else {
+      json += text.substr(0, size);
+    }
+    text.remove_prefix(std::max<std::size_t>(size, 1));
+  }
+  return json + '"';
+}
+
+std::string base64(std::string_view bytes) {
+  std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');
+  const int size = ::EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
+                                     reinterpret_cast<const unsigned char*>(bytes.data()),
+                                     static_cast<int>(bytes.size()));
+  text.resize(static_cast<std::size_t>(size));
+  return text;
 }
 
 }  // namespace dtact::cli

@@ -111,8 +111,8 @@ void add_global_options(CLI::App& app, Context& context) {
                "Send the token over plain TCP to another machine, where others may read it");
 }
 
-void add_json_option(CLI::App& app, Context& context) {
-  app.add_flag("--json", context.json, "Print JSON, one object a line");
+CLI::Option* add_json_option(CLI::App& command, Context& context) {
+  return command.add_flag("--json", context.json, "Print JSON, one object a line");
 }
 
 int run(CLI::App& app, std::vector<std::string> arguments, std::ostream& out, std::ostream& error) {

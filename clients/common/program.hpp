@@ -21,8 +21,8 @@ struct Context {
 /// program by its name and version.
 void add_global_options(CLI::App& app, Context& context);
 
-/// --json, of a program that prints what it was asked for.
-void add_json_option(CLI::App& app, Context& context);
+/// --json, of a command that prints what it was asked for.
+CLI::Option* add_json_option(CLI::App& command, Context& context);
 
 /// The command line that `command` was parsed from, for a shell: the program, its options, the
 /// command and its options, each with its value.

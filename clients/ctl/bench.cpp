@@ -149,6 +149,7 @@ void add_bench(CLI::App& app, Context& context) {
       ->capture_default_str();
   command->add_flag("--encodings", options->encodings,
                     "Every encoding of depth one after another, not the plain one alone");
+  cli::add_json_option(*command, context);
   command->callback([&context, options] { Bench(context, *options).run(); });
 }
 

@@ -115,6 +115,7 @@ void print_cameras(const std::vector<SurveyedCamera>& cameras, bool json, bool t
 void add_cameras(CLI::App& app, Context& context) {
   CLI::App* command =
       app.add_subcommand("cameras", "List the cameras attached to this machine (needs no daemon)");
+  cli::add_json_option(*command, context);
   command->callback([&context] {
     const bool terminal = &context.out == &std::cout && ::isatty(STDOUT_FILENO) == 1;
     print_cameras(hal::v4l2::survey_cameras(), context.json, terminal, context.out);

@@ -11,7 +11,6 @@ namespace dtact::ctl {
 void set_up(CLI::App& app, cli::Context& context, const std::vector<std::string>& arguments) {
   app.name("dtactctl")->description("Talks to dtactd, the daemon for DTact tactile sensors.");
   cli::add_global_options(app, context);
-  cli::add_json_option(app, context);
   add_status(app, context);
   add_watch(app, context);
   add_bench(app, context);

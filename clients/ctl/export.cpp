@@ -316,6 +316,7 @@ void add_export(CLI::App& app, cli::Context& context) {
   command->add_flag(
       "--force", options->force,
       "Also into a folder that is not empty: replaces what an earlier export wrote there");
+  cli::add_json_option(*command, context);
   command->callback([&context, options] { run_export(context, *options); });
 }
 

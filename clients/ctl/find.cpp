@@ -48,6 +48,7 @@ void add_find(CLI::App& app, Context& context) {
   command->add_option("--seconds", *seconds, "Look at most so long")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  cli::add_json_option(*command, context);
   command->callback([&context, seconds] { find(context, *seconds); });
 }
 

@@ -87,6 +87,7 @@ void add_led(CLI::App& app, Context& context) {
           "stepping the brightness for some seconds, and print the line for the "
           "configuration. Nothing may touch; the light is as before afterwards")
       ->excludes("--brightness", "--scheme", "--led");
+  cli::add_json_option(*command, context);
   command->callback([&context, options] {
     if (options->measure) {
       measure_light_delay(context);

@@ -216,6 +216,7 @@ void add_record(CLI::App& app, Context& context) {
   command->add_flag("--force", options->force, "Replace the file if it exists");
   command->add_flag("--progress", options->progress,
                     "Show rate and size also where standard error is no terminal");
+  cli::add_json_option(*command, context);
   command->callback([&context, options] { run_record(context, *options); });
 }
 

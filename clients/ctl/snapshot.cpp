@@ -126,6 +126,7 @@ void add_snapshot(CLI::App& app, Context& context) {
   command->add_option("--timeout", options->timeout_s, "Seconds to wait for a frame")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
+  cli::add_json_option(*command, context);
   command->callback([&context, options] { run_snapshot(context, *options); });
 }
 

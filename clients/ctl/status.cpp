@@ -109,15 +109,17 @@ void print(const v1::Status& status, std::ostream& out) {
 }  // namespace
 
 void add_status(CLI::App& app, Context& context) {
-  app.add_subcommand("status", "Show the daemon's state, health and what to do about it")
-      ->callback([&context] {
-        const auto status = client::Client(context.target).status();
-        if (context.json) {
-          context.out << cli::json_line(status);
-        } else {
-          print(status, context.out);
-        }
-      });
+  auto* command =
+      app.add_subcommand("status", "Show the daemon's state, health and what to do about it");
+  cli::add_json_option(*command, context);
+  command->callback([&context] {
+    const auto status = client::Client(context.target).status();
+    if (context.json) {
+      context.out << cli::json_line(status);
+    } else {
+      print(status, context.out);
+    }
+  });
 }
 
 }  // namespace dtact::ctl

@@ -226,16 +226,14 @@ void add_watch(CLI::App& app, Context& context) {
           ->check(CLI::NonNegativeNumber);
   auto* summary = command->add_flag("--summary", options->summary,
                                     "Fetch contact and health only, without the depth maps");
+  auto* json = cli::add_json_option(*command, context);
   command
       ->add_flag("--draw", options->draw,
                  "Draw the depth in the terminal's colours, at most 20 times a second")
       ->excludes(min_fps)
-      ->excludes(summary);
-  command->callback([&context, options] {
-    if (options->draw && context.json)
-      throw cli::Failure(cli::kUsage, "--draw and --json exclude each other");
-    Watch(context, *options).run();
-  });
+      ->excludes(summary)
+      ->excludes(json);
+  command->callback([&context, options] { Watch(context, *options).run(); });
 }
 
 }  // namespace dtact::ctl

@@ -91,7 +91,6 @@ void set_up(CLI::App& app, cli::Context& context) {
           "from "
           "the frames of dtactd, on the same wire, only while something touches.");
   cli::add_global_options(app, context);
-  cli::add_json_option(app, context);
   add_serve(app, context);
   add_watch(app, context);
 }

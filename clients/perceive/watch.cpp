@@ -119,6 +119,7 @@ void add_watch(CLI::App& app, cli::Context& context) {
   const auto seconds = std::make_shared<double>(0);
   command->add_option("--seconds", *seconds, "End by itself after so long")
       ->check(CLI::PositiveNumber);
+  cli::add_json_option(*command, context);
   command->callback([&app, &context, seconds] {
     if (app.count("--port") == 0) context.target.port = wire::kPerceivePort;
     watch(context, *seconds);

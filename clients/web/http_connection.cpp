@@ -34,10 +34,6 @@ constexpr const char* kPolicy =
     "blob:; font-src 'self'; connect-src 'self'; worker-src 'self'; manifest-src 'self'; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
-Answer refusal(http::status status, std::string sentence) {
-  return {.status = status, .text = std::move(sentence)};
-}
-
 template <typename Stream>
 class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream>> {
  public:

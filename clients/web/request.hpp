@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "clients/web/web_socket.hpp"
@@ -23,6 +24,10 @@ struct Answer {
   std::string_view bytes = {};  ///< … unless this is it, which lives as long as the program.
   std::string tag = {};         ///< Of its version; empty: it is not kept.
 };
+
+inline Answer refusal(boost::beast::http::status status, std::string sentence) {
+  return {.status = status, .text = std::move(sentence)};
+}
 
 /// What becomes of a WebSocket, or why there is none.
 struct Upgrade {

@@ -6,7 +6,7 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
-#include "clients/web/json_text.hpp"
+#include "clients/common/json.hpp"
 #include "daemon/serve/subscription.hpp"
 #include "version.hpp"
 
@@ -67,14 +67,14 @@ void Sensor::admit(std::shared_ptr<WebSocket> socket, net::Peer peer) {
 }
 
 std::string Sensor::entry() const {
-  std::string text = fmt::format(R"({{"name":{},"connected":{})", json_string(source_->name()),
+  std::string text = fmt::format(R"({{"name":{},"connected":{})", cli::json_string(source_->name()),
                                  source_->connected());
   if (!source_->connected()) {
     // Whoever has shown no token is not told of addresses.
     const std::string error = config_.token_file.empty()
                                   ? source_->reason()
                                   : "its daemon is away: dtact-web's log says why";
-    text += fmt::format(R"(,"error":{})", json_string(error));
+    text += fmt::format(R"(,"error":{})", cli::json_string(error));
   }
   return text + "}";
 }

@@ -30,10 +30,6 @@ std::string_view path_of(const Request& request) {
   return target.substr(0, target.find('?'));
 }
 
-Answer refusal(http::status status, std::string sentence) {
-  return {.status = status, .text = std::move(sentence)};
-}
-
 Answer misdirected(const Request& request) {
   return refusal(
       http::status::misdirected_request,

@@ -139,6 +139,7 @@ void add_force(CLI::App& app, cli::Context& context) {
       ->add_option("-o,--output", options->output,
                    "Calibration folder to write; left out: the same one")
       ->type_name("FOLDER");
+  cli::add_json_option(*force, context);
   force->callback([&context, options] { run(*options, context); });
 }
 

@@ -273,6 +273,7 @@ void add_reprocess(CLI::App& app, cli::Context& context) {
                    "no untouched image")
       ->check(CLI::Range(1, 1000));
   command->add_flag("--force", options->force, "Replace the file if it exists");
+  cli::add_json_option(*command, context);
   command->callback([&context, options] { run(context, *options); });
 }
 

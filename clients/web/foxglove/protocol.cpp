@@ -3,14 +3,13 @@
 #include <fmt/format.h>
 #include <google/protobuf/struct.pb.h>
 #include <google/protobuf/util/json_util.h>
-#include <openssl/evp.h>
 
 #include <array>
 #include <cmath>
 #include <stdexcept>
 
+#include "clients/common/json.hpp"
 #include "clients/recording/pictures.hpp"
-#include "clients/web/json_text.hpp"
 
 namespace dtact::web::foxglove {
 namespace {
@@ -47,15 +46,6 @@ const std::array<ServiceInfo, kServices>& services() {
        R"({"type":"object","properties":{"force":{"type":"boolean"}}})", R"({"type":"object"})"},
   }};
   return all;
-}
-
-std::string base64(const std::string& bytes) {
-  std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');
-  const int size = ::EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
-                                     reinterpret_cast<const unsigned char*>(bytes.data()),
-                                     static_cast<int>(bytes.size()));
-  text.resize(static_cast<std::size_t>(size));
-  return text;
 }
 
 template <typename Number>
@@ -99,7 +89,7 @@ const google::protobuf::ListValue& list_of(const google::protobuf::Struct& objec
 std::string schema_part(const char* type, const char* schema) {
   return fmt::format(
       R"({{"encoding":"json","schemaName":{},"schemaEncoding":"jsonschema","schema":{}}})",
-      json_string(type), json_string(schema));
+      cli::json_string(type), cli::json_string(schema));
 }
 
 }  // namespace
@@ -108,7 +98,7 @@ std::string server_info(std::string_view program) {
   return fmt::format(
       R"({{"op":"serverInfo","name":{},"capabilities":["services"],"supportedEncodings":["json"],)"
       R"("metadata":{{}}}})",
-      json_string(program));
+      cli::json_string(program));
 }
 
 std::string advertise(const std::vector<Channels>& all) {
@@ -117,11 +107,11 @@ std::string advertise(const std::vector<Channels>& all) {
     for (const TopicInfo& info : topics()) {
       if (!of.topics.test(index(info.topic))) continue;
       if (!channels.empty()) channels += ',';
-      channels += fmt::format(R"({{"id":{},"topic":{},"encoding":"protobuf","schemaName":{},)"
-                              R"("schemaEncoding":"protobuf","schema":"{}"}})",
-                              channel_id(of.sensor, info.topic), json_string(of.prefix + info.name),
-                              json_string(info.type->full_name()),
-                              base64(recording::schema_of(*info.type)));
+      channels += fmt::format(
+          R"({{"id":{},"topic":{},"encoding":"protobuf","schemaName":{},)"
+          R"("schemaEncoding":"protobuf","schema":"{}"}})",
+          channel_id(of.sensor, info.topic), cli::json_string(of.prefix + info.name),
+          cli::json_string(info.type->full_name()), cli::base64(recording::schema_of(*info.type)));
     }
   }
   return fmt::format(R"({{"op":"advertise","channels":[{}]}})", channels);
@@ -146,7 +136,7 @@ std::string advertise_services(const std::vector<std::string>& prefixes) {
       all +=
           fmt::format(R"({{"id":{},"name":{},"type":{},"request":{},"response":{}}})",
                       service_id(sensor, static_cast<Service>(i)),
-                      json_string(prefixes[sensor] + info.name), json_string(info.type),
+                      cli::json_string(prefixes[sensor] + info.name), cli::json_string(info.type),
                       schema_part(info.type, info.request), schema_part(info.type, info.response));
     }
   }
@@ -154,12 +144,13 @@ std::string advertise_services(const std::vector<std::string>& prefixes) {
 }
 
 std::string status(int level, std::string_view sentence) {
-  return fmt::format(R"({{"op":"status","level":{},"message":{}}})", level, json_string(sentence));
+  return fmt::format(R"({{"op":"status","level":{},"message":{}}})", level,
+                     cli::json_string(sentence));
 }
 
 std::string service_failure(std::uint32_t service, std::uint32_t call, std::string_view sentence) {
   return fmt::format(R"({{"op":"serviceCallFailure","serviceId":{},"callId":{},"message":{}}})",
-                     service, call, json_string(sentence));
+                     service, call, cli::json_string(sentence));
 }
 
 std::string service_response(std::uint32_t service, std::uint32_t call, std::string_view json) {
@@ -221,14 +212,7 @@ v1::ClientMessage request_of(Service service, std::string_view json) {
 }
 
 std::string answer_of(const v1::Reply& reply) {
-  std::string json = "{}";
-  if (!reply.has_light()) return json;
-  util::JsonPrintOptions options;
-  options.preserve_proto_field_names = true;
-  options.always_print_primitive_fields = true;
-  json.clear();
-  (void)util::MessageToJsonString(reply.light(), &json, options);
-  return json;
+  return reply.has_light() ? cli::json_line(reply.light()) : "{}";
 }
 
 }  // namespace dtact::web::foxglove

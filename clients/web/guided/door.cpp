@@ -61,9 +61,8 @@ fs::path folder_for(const fs::path& work, const std::string& name, bool resume) 
 /// dtact-calibrate's command line.
 std::vector<std::string> words_for(const client::Options& daemon, const cli::GuidedStart& start,
                                    const fs::path& folder) {
-  std::vector<std::string> words = {
-      cli::sibling(kProgram),     "--json", "--host", daemon.host, "--port",
-      std::to_string(daemon.port)};
+  std::vector<std::string> words = {cli::sibling(kProgram), "--host", daemon.host, "--port",
+                                    std::to_string(daemon.port)};
   const auto add = [&](const char* option, std::string value) {
     words.emplace_back(option);
     words.push_back(std::move(value));
@@ -72,7 +71,7 @@ std::vector<std::string> words_for(const client::Options& daemon, const cli::Gui
   if (daemon.tls && !daemon.tls->ca_file.empty()) add("--ca-file", daemon.tls->ca_file.string());
   if (!daemon.token.empty()) add("--token-file", Child::kSecretFile);
   if (daemon.insecure) words.emplace_back("--insecure");
-  words.emplace_back("guided");
+  words.insert(words.end(), {"guided", "--json"});
   add("--radius-mm", fmt::to_string(start.radius_mm()));
   add("--mm-per-px", fmt::to_string(start.mm_per_px()));
   if (!start.crop().empty()) add("--crop", fmt::to_string(fmt::join(start.crop(), ",")));

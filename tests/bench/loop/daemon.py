@@ -99,12 +99,9 @@ class Daemon:
         raise SystemExit(f"bench: dtactd did not start:\n{self._log()}")
 
     def status(self):
-        done = subprocess.run([self.programs.dtactctl, "--port", str(self.port), "--json", "status"],
+        done = subprocess.run([self.programs.dtactctl, "--port", str(self.port), "status", "--json"],
                               check=True, capture_output=True, text=True)
-        # Protobuf's JSON writes 64-bit integers as strings.
-        return json.loads(done.stdout, object_hook=lambda item: {
-            key: int(value) if isinstance(value, str) and value.isdigit() else value
-            for key, value in item.items()})
+        return json.loads(done.stdout)
 
     def wait_serving(self):
         for _ in range(300):

@@ -61,11 +61,11 @@ class Depth(unittest.TestCase):
 
                     thread = threading.Thread(target=collect)
                     thread.start()
-                    report = json.loads(daemon.dtactctl("--json", "snapshot", "-o", str(file)))
+                    report = json.loads(daemon.dtactctl("snapshot", "--json", "-o", str(file)))
                     time.sleep(0.1)
                     stop.set()
                     thread.join()
-                    f = frames.get(int(report["frame"]["sequence"]))
+                    f = frames.get(report["frame"]["sequence"])
                     if f is not None and f.has_depth and np.nanmax(f.depth_mm) > 0.3:
                         break
                 else:

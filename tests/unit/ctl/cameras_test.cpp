@@ -53,8 +53,8 @@ TEST(Cameras, AreListedWithNamesModesAndControls) {
       R"("modes":[{"format":"MJPEG","usable":true,"width":800,"height":600,"min_width":800,)"
       R"("min_height":600,"fps_is_range":false,"fps":[60,30]},{"format":"H264","usable":false,)"
       R"("width":800,"height":600,"min_width":800,"min_height":600,"fps_is_range":false,)"
-      R"("fps":[60,30]}],"controls":[{"name":"gain","minimum":"0","maximum":"100","step":"1",)"
-      R"("default":"5","value":"10"}],"not_taken":""}]})"
+      R"("fps":[60,30]}],"controls":[{"name":"gain","minimum":0,"maximum":100,"step":1,)"
+      R"("default":5,"value":10}],"not_taken":""}]})"
       "\n");
 }
 

@@ -199,7 +199,7 @@ class Reading(unittest.TestCase):
         # As dtactctl find prints it.
         program = pathlib.Path(folder, "dtactctl")
         program.write_text("""#!/bin/sh
-[ "$*" = "--json find --seconds 1" ] || exit 2
+[ "$*" = "find --json --seconds 1" ] || exit 2
 echo '{"name":"a","address":"192.0.2.7","port":7377,"serial":"S1","tls":true}'
 echo '{"name":"b","address":"fe80::1","port":7378}'
 """)

@@ -60,7 +60,7 @@ ROOMS = {
     # A client and a server: what serves the wire is the daemon's own.
     "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/perceive/geometry", "clients/perceive/pose"],
     # The same for browsers.
-    "clients/web/foxglove": ["proto", "daemon/serve", "clients/cpp", "clients/recording", "clients/web"],
+    "clients/web/foxglove": ["proto", "daemon/serve", "clients/cpp", "clients/common", "clients/recording", "clients/web"],
     "clients/web": ["hal/base", "proto", "daemon/serve", "clients/common", "clients/cpp", "clients/web/foxglove"],
     # A daemon's administration: neither a fit nor OpenCV.
     "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],

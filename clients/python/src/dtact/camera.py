@@ -131,7 +131,7 @@ class Camera:
         found = _of_this_machine()
         program = shutil.which("dtactctl")
         if program is not None:
-            ran = subprocess.run([program, "--json", "find", "--seconds", "1"], capture_output=True,
+            ran = subprocess.run([program, "find", "--json", "--seconds", "1"], capture_output=True,
                                  text=True, check=False)
             for line in ran.stdout.splitlines():
                 one = json.loads(line)
