@@ -174,12 +174,13 @@ void add_calibration(CLI::App& app, Context& context) {
   add_id(use, "As in the list")->required();
   use->callback([&context, options] { activate(context, options->id); });
 
-  auto* fetch = command->add_subcommand("export", "Save one as a calibration folder");
+  auto* fetch = command->add_subcommand("download", "Save one as a calibration folder");
   add_id(fetch, which);
   fetch->add_option("-o,--output", options->folder, "The folder to write")
       ->type_name("FOLDER")
       ->required();
   fetch->add_flag("--force", options->force, "Replace the calibration that is in the folder");
+  for (CLI::App* verb : command->get_subcommands({})) cli::add_json_option(*verb, context);
   fetch->callback(
       [&context, options] { save(context, options->number(), options->folder, options->force); });
 }

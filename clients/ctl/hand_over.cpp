@@ -70,7 +70,7 @@ void add_handed_over(CLI::App& app, const std::vector<std::string>& arguments) {
   add("calibrate",
       "Make a calibration: guided, or depth, lens or force from images (dtact-calibrate)");
   add("reprocess", "Make the depth of a recording anew with another calibration (dtact-calibrate)");
-  add("reconstruct", "Reconstruct the depth of an image (dtact-calibrate)");
+  add("apply", "Make the depth of an image (dtact-calibrate)");
   add("evaluate", "Compare a calibration with the press of a ball (dtact-calibrate)");
 }
 

@@ -43,6 +43,6 @@ scene=config/scenes/calibrate_ball.toml
   --mm-per-px 0.0413793 --centre 400,300 --crop 580,580 -o "$out/simulated"
 # Frame 540 of the built-in scene: an M4 nut pressed 0.9 mm deep.
 "$bin/dtact-sim-render" --frames 540 -o "$out/nut.png"
-"$bin/dtact-calibrate" reconstruct --calibration "$out/simulated" --reference "$out/reference" \
+"$bin/dtact-calibrate" apply --calibration "$out/simulated" --reference "$out/reference" \
   --frame "$out/nut.png" -o tests/accuracy/m4_nut.png
 echo "pictures: $out/sensor_*/index.html, tests/accuracy/m4_nut.png"

@@ -184,7 +184,7 @@ TEST_F(TwoCalibrations, ADaemonWhoseUploadedOneIsDamagedStartsAndCanBeMended) {
 TEST_F(TwoCalibrations, AreExportedAsTheyWereUploaded) {
   const auto folder = sensor_.folder.path() / "copy";
   std::string output;
-  ASSERT_EQ(ctl(sensor_, {"calibration", "export", "configured", "-o", folder.string()}, &output),
+  ASSERT_EQ(ctl(sensor_, {"calibration", "download", "configured", "-o", folder.string()}, &output),
             0)
       << output;
   for (const char* file : {"calibration.toml", "reference.png"}) {

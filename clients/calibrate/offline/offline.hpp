@@ -11,8 +11,8 @@ namespace dtact::ctl {
 void add_calibrate(CLI::App& app);
 /// lens --board-reference R.png --board B.png -o lens.toml
 void add_calibrate_lens(CLI::App& app);
-/// reconstruct --calibration cal/ --reference R.png --frame F.png -o depth.{npy,png,ply}
-void add_reconstruct(CLI::App& app);
+/// apply --calibration cal/ --reference R.png --frame F.png -o depth.{npy,png,ply}
+void add_apply(CLI::App& app);
 /// evaluate --calibration cal/ --reference R.png --ball B.png --radius-mm 4.0, or --folder DIR.
 /// `json`: read when the command runs; one JSON object instead of sentences.
 void add_evaluate(CLI::App& app, const bool& json);
@@ -21,7 +21,7 @@ void add_evaluate(CLI::App& app, const bool& json);
 inline void add_offline_commands(CLI::App& app, const bool& json) {
   add_calibrate(app);
   add_calibrate_lens(app);
-  add_reconstruct(app);
+  add_apply(app);
   add_evaluate(app, json);
 }
 

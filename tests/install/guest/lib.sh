@@ -35,7 +35,7 @@ instance() {
 # byte.
 export_calibration() {
   rm -rf /tmp/export
-  dtactctl calibration export -o /tmp/export
+  dtactctl calibration download -o /tmp/export
 }
 same() {
   cmp -s "/job/calibrations/$1/calibration.toml" /tmp/export/calibration.toml \

@@ -50,12 +50,12 @@ TEST(Calibration, GoesUpAndComesBack) {
   EXPECT_EQ(result.out, "the daemon uses calibration ball (4) from now on\n");
   EXPECT_EQ(ctl(rig, {"calibration", "show"}).out, "# calibration ball (4)\nversion = 1\n");
   const std::string copy = (temporary / "copy").string();
-  result = ctl(rig, {"calibration", "export", "-o", copy});
+  result = ctl(rig, {"calibration", "download", "-o", copy});
   EXPECT_EQ(result.out, copy + ": calibration ball (4)\n");
   EXPECT_EQ(base::read_file(copy + "/reference.png"), "png");
   EXPECT_EQ(base::read_file(copy + "/calibration.toml"), "version = 1\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "other", "--json"});
-  EXPECT_EQ(result.out, R"({"name":"other","folder":"","number":"5"})"
+  EXPECT_EQ(result.out, R"({"number":5,"name":"other","folder":""})"
                         "\n");
   result = ctl(rig, {"calibration", "upload", folder.string(), "--name", "no good"});
   EXPECT_EQ(result.code, 1);
@@ -68,20 +68,20 @@ TEST(Calibration, IsExportedOnceUnlessForced) {
   std::string name = (fs::temp_directory_path() / "dtact-ctl-XXXXXX").string();
   const fs::path temporary = ::mkdtemp(name.data());
   const std::string folder = (temporary / "factory").string();
-  auto result = ctl(rig, {"calibration", "export", "configured", "-o", folder, "--json"});
+  auto result = ctl(rig, {"calibration", "download", "configured", "-o", folder, "--json"});
   EXPECT_EQ(result.code, 0) << result.error;
-  EXPECT_EQ(result.out, R"({"name":"factory","folder":")" + folder + "\",\"number\":\"0\"}\n");
-  result = ctl(rig, {"calibration", "export", "2", "-o", folder});
+  EXPECT_EQ(result.out, R"({"number":0,"name":"factory","folder":")" + folder + "\"}\n");
+  result = ctl(rig, {"calibration", "download", "2", "-o", folder});
   EXPECT_EQ(result.code, 1);
   EXPECT_THAT(result.error, AllOf(HasSubstr(folder + " exists"), HasSubstr("--force")));
   EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "toml of factory");
-  EXPECT_EQ(ctl(rig, {"calibration", "export", "2", "-o", folder, "--force"}).code, 0);
+  EXPECT_EQ(ctl(rig, {"calibration", "download", "2", "-o", folder, "--force"}).code, 0);
   EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "bad");
   // What is no part of a calibration is not lost, forced or not.
   base::write_file_atomically(folder + "/notes.txt", "mine");
-  EXPECT_EQ(ctl(rig, {"calibration", "export", "1", "-o", folder, "--force"}).code, 1);
+  EXPECT_EQ(ctl(rig, {"calibration", "download", "1", "-o", folder, "--force"}).code, 1);
   EXPECT_EQ(base::read_file(folder + "/calibration.toml"), "bad");
-  EXPECT_EQ(ctl(rig, {"calibration", "export", "9", "-o", (temporary / "x").string()}).code, 1);
+  EXPECT_EQ(ctl(rig, {"calibration", "download", "9", "-o", (temporary / "x").string()}).code, 1);
   EXPECT_FALSE(fs::exists(temporary / "x"));
   fs::remove_all(temporary);
 }
@@ -107,7 +107,7 @@ TEST(Calibration, IsListed) {
   const std::string json = ctl(rig, {"calibration", "list", "--json"}).out;
   EXPECT_THAT(
       json,
-      StartsWith(R"({"number":"0","name":"factory","uploaded":"","current":false,"summary":{)"
+      StartsWith(R"({"number":0,"name":"factory","uploaded":"","current":false,"summary":{)"
                  R"("name":"factory","method":"list","mm_per_px":0.0414,"width":580,"height":580,)"
                  R"("covered_from_mm":-0.02,"covered_to_mm":1.4,"created":"","frame_width":800,)"
                  R"("frame_height":600,"sharpen_steps":[]},"in_use":false})"
@@ -148,12 +148,12 @@ TEST(Calibration, IsShownAndActivatedByItsId) {
   EXPECT_EQ(ctl(rig, {"calibration", "show", "1", "--json"}).out,
             // The files in base64.
             R"({"name":"first","calibration_toml":"dG9tbCBvZiBmaXJzdA==",)"
-            R"("reference_png":"cG5nIG9mIGZpcnN0","number":"1"})"
+            R"("reference_png":"cG5nIG9mIGZpcnN0","number":1})"
             "\n");
   EXPECT_EQ(ctl(rig, {"calibration", "activate", "configured"}).out,
             "the daemon uses calibration configured from now on\n");
   EXPECT_EQ(ctl(rig, {"calibration", "activate", "1", "--json"}).out,
-            R"({"name":"","folder":"","number":"1"})"
+            R"({"number":1,"name":"","folder":""})"
             "\n");
   const auto refused = ctl(rig, {"calibration", "activate", "2"});
   EXPECT_EQ(refused.code, 1);
@@ -163,7 +163,7 @@ TEST(Calibration, IsShownAndActivatedByItsId) {
   EXPECT_THAT(wrong.error, HasSubstr("a number that dtactctl calibration list shows"));
   EXPECT_EQ(ctl(rig, {"calibration", "show", "0"}).code, 2);
   EXPECT_EQ(ctl(rig, {"calibration", "activate"}).code, 2);
-  EXPECT_EQ(ctl(rig, {"calibration", "export"}).code, 2);
+  EXPECT_EQ(ctl(rig, {"calibration", "download"}).code, 2);
 }
 
 }  // namespace

@@ -61,13 +61,13 @@ std::set<std::string> options_of(Run run, std::vector<std::string> command) {
 }
 
 TEST(Completion, OffersCommands) {
-  EXPECT_THAT(complete("dtactctl re"), UnorderedElementsAre("rezero", "record", "reprocess",
-                                                            "reconstruct", "reconstruction"));
+  EXPECT_THAT(complete("dtactctl re"),
+              UnorderedElementsAre("rezero", "record", "reprocess", "reconstruction"));
   EXPECT_THAT(complete("dtactctl --port 7 s"), UnorderedElementsAre("status", "snapshot"));
   EXPECT_THAT(complete("dtactctl calibration \"\""),
-              UnorderedElementsAre("upload", "list", "show", "activate", "export", "--help"));
+              UnorderedElementsAre("upload", "list", "show", "activate", "download", "--help"));
   EXPECT_THAT(complete("dtactctl calibrate d"), UnorderedElementsAre("depth"));
-  EXPECT_THAT(complete("dtact-calibrate re"), UnorderedElementsAre("reconstruct", "reprocess"));
+  EXPECT_THAT(complete("dtact-calibrate re"), UnorderedElementsAre("reprocess"));
 }
 
 TEST(Completion, OffersValues) {
@@ -115,16 +115,10 @@ TEST(Completion, KnowsEveryOptionOfEveryCommand) {
                   {"calibration", "list"},
                   {"calibration", "show"},
                   {"calibration", "activate"},
-                  {"calibration", "export"}});
-  expect_options("dtact-calibrate", calibrate::run,
-                 {{},
-                  {"guided"},
-                  {"depth"},
-                  {"lens"},
-                  {"reconstruct"},
-                  {"reprocess"},
-                  {"evaluate"},
-                  {"force"}});
+                  {"calibration", "download"}});
+  expect_options(
+      "dtact-calibrate", calibrate::run,
+      {{}, {"guided"}, {"depth"}, {"lens"}, {"apply"}, {"reprocess"}, {"evaluate"}, {"force"}});
   // What dtactctl hands over.
   EXPECT_THAT(options_of(calibrate::run, {"depth"}),
               IsSubsetOf(complete("dtactctl calibrate depth --")));

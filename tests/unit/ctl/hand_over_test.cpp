@@ -32,8 +32,8 @@ TEST(HandOver, GlobalOptionsGoAlong) {
 TEST(HandOver, OtherCommandsStayAsTheyAre) {
   EXPECT_THAT(for_calibrate({"evaluate", "--folder", "calibrate"}),
               ElementsAre("evaluate", "--folder", "calibrate"));
-  EXPECT_THAT(for_calibrate({"reconstruct", "--frame", "f.png"}),
-              ElementsAre("reconstruct", "--frame", "f.png"));
+  EXPECT_THAT(for_calibrate({"apply", "--frame", "f.png"}),
+              ElementsAre("apply", "--frame", "f.png"));
   EXPECT_THAT(for_calibrate({}), ElementsAre());
 }
 

@@ -123,7 +123,7 @@ TEST_F(Zsh, OffersValuesAndFiles) {
       {"dtactctl export ", files},
       {"dtactd --config ", files},
       {"dtactctl calibration upload ", {"calibration"}},
-      {"dtact-calibrate reconstruct --calibration ", {"calibration"}},
+      {"dtact-calibrate apply --calibration ", {"calibration"}},
       {"dtactctl led --brightness ", {}},
       // Not what cannot stand beside it: --summary.
       {"dtactctl watch --draw --s", {"--seconds"}},

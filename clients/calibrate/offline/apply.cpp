@@ -14,14 +14,14 @@
 namespace dtact::ctl {
 namespace {
 
-struct ReconstructionOptions {
+struct Options {
   std::string calibration;
   std::vector<std::string> reference;
   std::string frame;
   std::string output;
 };
 
-void run(const ReconstructionOptions& options) {
+void run(const Options& options) {
   const cli::DepthEncoder encode = cli::encoder_for(options.output, encode_colour_png);
   const calibration::Calibration calibration = calibration::load(options.calibration);
   const ImageSet reference = load_images(options.reference, "--reference");
@@ -54,27 +54,26 @@ void run(const ReconstructionOptions& options) {
 
 }  // namespace
 
-void add_reconstruct(CLI::App& app) {
-  CLI::App* reconstruct =
-      app.add_subcommand("reconstruct", "Reconstruct the depth of an image, as the daemon does");
-  const auto options = std::make_shared<ReconstructionOptions>();
-  reconstruct->add_option("--calibration", options->calibration, "Calibration folder")
+void add_apply(CLI::App& app) {
+  CLI::App* apply = app.add_subcommand("apply", "Make the depth of an image, as the daemon does");
+  const auto options = std::make_shared<Options>();
+  apply->add_option("--calibration", options->calibration, "Calibration folder")
       ->type_name("FOLDER")
       ->required();
-  reconstruct
+  apply
       ->add_option("--reference", options->reference,
                    "Untouched surface: PNG files, or a folder of them (averaged)")
       ->type_name("FILE")
       ->required();
-  reconstruct->add_option("--frame", options->frame, "The image: a PNG file")
+  apply->add_option("--frame", options->frame, "The image: a PNG file")
       ->type_name("FILE")
       ->required();
-  reconstruct
+  apply
       ->add_option("-o,--output", options->output,
                    "depth.npy (float32 mm), depth.png (colours), depth.ply or .pcd (points)")
       ->type_name("FILE")
       ->required();
-  reconstruct->callback([options] { run(*options); });
+  apply->callback([options] { run(*options); });
 }
 
 }  // namespace dtact::ctl
