@@ -22,6 +22,7 @@
 #include "clients/perceive/object_file.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/sim/scene.hpp"
+#include "proto/dtact.pb.h"
 #include "tests/accuracy/whole/known_object.hpp"
 #include "tests/accuracy/whole/moving_objects.hpp"
 #include "tests/accuracy/whole/pose_track.hpp"
@@ -64,6 +65,17 @@ void print_head(bool each_frame) {
   fmt::print("{}\n", head);
 }
 
+/// The first frame of the motion without contact, or the number of frames: an object that rolls on
+/// a curved surface may leave it, and nothing is left to follow.
+std::size_t contact_end(const Sequence& sequence) {
+  std::size_t at = sequence.begin();
+  for (v1::Frame frame; at < sequence.frames.size(); ++at) {
+    frame.ParseFromString(sequence.frames[at]);
+    if (!frame.contact().touching()) break;
+  }
+  return at;
+}
+
 /// A line for each frame of the motion.
 void print_frames(const Sequence& sequence, const std::string& tracker,
                   const std::vector<TrackRow>& track,
@@ -92,6 +104,7 @@ void print_row(const Sequence& sequence, const std::string& tracker,
   int lost_in_press = 0;
   int restarts = 0;
   const TrackRow* before = nullptr;
+  const std::size_t contact_ends = contact_end(sequence);
   std::vector<double> times;
   std::array<PoseError, kWays.size()> end;
   std::array<std::vector<double>, kWays.size()> mm;
@@ -101,6 +114,7 @@ void print_row(const Sequence& sequence, const std::string& tracker,
       lost_in_press += row.told && !row.usable ? 1 : 0;
       continue;
     }
+    if (sequence.index(row.sequence) >= contact_ends) break;
     times.push_back(row.frame_us);
     lost += row.usable ? 0 : 1;
     restarts += before != nullptr && row.usable && before->usable && row.since != before->since;
