@@ -4,9 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
-
-#include "clients/perceive/geometry/height_map.hpp"
 
 namespace dtact::perceive {
 namespace {
@@ -87,28 +84,9 @@ std::optional<SurfacePoint> leave_round(const recon::Surface& surface, const Vec
       {out[0] / surface.radius_mm, out[1] / surface.radius_mm, out[2] / surface.radius_mm}};
 }
 
-/// The same of a height map.
-std::optional<SurfacePoint> leave_heights(const HeightMap& heights, const Vector& entry,
-                                          const Vector& direction) {
-  const auto t = heights.reached(entry, direction);
-  if (!t) return std::nullopt;
-  const Vector at = along(entry, *t, direction);
-  const auto height = heights.at(at[0], at[1]);
-  if (!height) return std::nullopt;
-  const double length = std::hypot(height->slope_x, height->slope_y, 1);
-  return SurfacePoint{{at[0] * kMetre, at[1] * kMetre, at[2] * kMetre},
-                      {-height->slope_x / length, -height->slope_y / length, 1 / length}};
-}
+}  // namespace
 
-std::optional<HeightMap> heights_of(const recon::Surface& surface) {
-  if (surface.kind != Kind::height_map) return std::nullopt;
-  if (!surface.heights) throw std::invalid_argument("a height map without heights");
-  return HeightMap(*surface.heights);
-}
-
-std::optional<SurfacePoint> cast(const recon::Surface& surface,
-                                 const std::optional<HeightMap>& heights, double x_mm,
-                                 double y_mm) {
+std::optional<SurfacePoint> cast_ray(const recon::Surface& surface, double x_mm, double y_mm) {
   if (surface.kind == Kind::plane) {
     return SurfacePoint{{x_mm * kMetre, y_mm * kMetre, 0}, {0, 0, 1}};
   }
@@ -116,14 +94,7 @@ std::optional<SurfacePoint> cast(const recon::Surface& surface,
   const double inwards = radius > 0 ? entry_radius(surface, radius) / radius : 0;
   const Vector entry{inwards * x_mm, inwards * y_mm, -surface.gel_mm};
   const Vector direction{x_mm - entry[0], y_mm - entry[1], surface.gel_mm};
-  return heights ? leave_heights(*heights, entry, direction)
-                 : leave_round(surface, entry, direction);
-}
-
-}  // namespace
-
-std::optional<SurfacePoint> cast_ray(const recon::Surface& surface, double x_mm, double y_mm) {
-  return cast(surface, heights_of(surface), x_mm, y_mm);
+  return leave_round(surface, entry, direction);
 }
 
 SurfaceTable make_surface_table(const recon::Surface& surface, int width, int height,
@@ -133,12 +104,11 @@ SurfaceTable make_surface_table(const recon::Surface& surface, int width, int he
   for (auto* part : {&table.point, &table.normal}) {
     for (auto& values : *part) values.assign(size, std::numeric_limits<float>::quiet_NaN());
   }
-  const std::optional<HeightMap> heights = heights_of(surface);
   std::size_t pixel = 0;
   for (int row = 0; row < height; ++row) {
     for (int column = 0; column < width; ++column, ++pixel) {
-      const auto found = cast(surface, heights, (column - 0.5 * (width - 1)) * mm_per_px,
-                              (row - 0.5 * (height - 1)) * mm_per_px);
+      const auto found = cast_ray(surface, (column - 0.5 * (width - 1)) * mm_per_px,
+                                  (row - 0.5 * (height - 1)) * mm_per_px);
       if (!found) continue;
       for (std::size_t i = 0; i < 3; ++i) {
         table.point[i][pixel] = static_cast<float>(found->point[i]);

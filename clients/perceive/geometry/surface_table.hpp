@@ -17,8 +17,7 @@ struct SurfacePoint {
 
 /// Where the camera ray leaves the gel that crosses the plane z = 0 at (x, y), in millimetres: what
 /// a depth map's pixel means, since a lens is calibrated on that plane. The ray is refracted where
-/// it enters the gel's flat back (Snell's law). Nothing where it passes beside the surface. Throws
-/// std::invalid_argument for a height map whose sizes contradict each other.
+/// it enters the gel's flat back (Snell's law). Nothing where it passes beside the surface.
 [[nodiscard]] std::optional<SurfacePoint> cast_ray(const recon::Surface& surface, double x_mm,
                                                    double y_mm);
 

@@ -23,7 +23,6 @@
 #include "clients/perceive/pose/tracker.hpp"
 #include "tests/bench/cpu_time.hpp"
 #include "tests/unit/perceive/balls.hpp"
-#include "tests/unit/perceive/sampled.hpp"
 
 namespace dtact::perceive {
 namespace {
@@ -165,8 +164,7 @@ void measure(const Sensor& sensor, const Frames& of, CloudMaker& maker, Measured
 int run(int runs) {
   const recon::Surface sphere{Kind::sphere, 30, 0, 20, 8, 1.41};
   const std::array sensors{sensor("plane", {}), sensor("sphere", sphere),
-                           sensor("cylinder", {Kind::cylinder, 30, 30, 20, 8, 1.41}),
-                           sensor("heights", test::sampled(sphere, 27, 1))};
+                           sensor("cylinder", {Kind::cylinder, 30, 30, 20, 8, 1.41})};
   std::vector<Frames> frames;
   std::vector<CloudMaker> makers;
   for (const Sensor& one : sensors) {
