@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "clients/common/exit_codes.hpp"
-#include "clients/perceive/geometry/cloud_file.hpp"
+#include "clients/geometry/cloud_file.hpp"
 #include "hal/image/png.hpp"
 
 namespace dtact::cli {

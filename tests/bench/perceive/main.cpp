@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/geometry/point_cloud.hpp"
 #include "clients/perceive/pose/tracker.hpp"
 #include "tests/bench/cpu_time.hpp"
 #include "tests/unit/perceive/balls.hpp"

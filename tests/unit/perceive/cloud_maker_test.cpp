@@ -9,8 +9,8 @@
 #include <random>
 #include <vector>
 
-#include "clients/perceive/geometry/point_cloud.hpp"
-#include "clients/perceive/geometry/rows.hpp"
+#include "clients/geometry/point_cloud.hpp"
+#include "clients/geometry/rows.hpp"
 
 namespace dtact::perceive {
 namespace {

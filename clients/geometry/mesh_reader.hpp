@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "clients/perceive/geometry/mesh_file.hpp"
+#include "clients/geometry/mesh_file.hpp"
 
 namespace dtact::perceive {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/geometry/point_cloud.hpp"
 
 namespace dtact::perceive {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "clients/perceive/geometry/mesh_reader.hpp"
+#include "clients/geometry/mesh_reader.hpp"
 
 // PLY: http://paulbourke.net/dataformats/ply/
 

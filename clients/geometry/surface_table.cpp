@@ -1,4 +1,4 @@
-#include "clients/perceive/geometry/surface_table.hpp"
+#include "clients/geometry/surface_table.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 #include <fmt/format.h>
 
-#include "clients/perceive/geometry/mesh_reader.hpp"
+#include "clients/geometry/mesh_reader.hpp"
 
 // STL: https://en.wikipedia.org/wiki/STL_(file_format)
 

@@ -1,10 +1,10 @@
-#include "clients/perceive/geometry/rows.hpp"
+#include "clients/geometry/rows.hpp"
 
 #include <algorithm>
 #include <cmath>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "clients/perceive/geometry/rows.cpp"
+#define HWY_TARGET_INCLUDE "clients/geometry/rows.cpp"
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 // After foreach_target.h:
 #include <hwy/highway.h>

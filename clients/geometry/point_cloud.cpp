@@ -1,4 +1,4 @@
-#include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/geometry/point_cloud.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/perceive/geometry/rows.hpp"
+#include "clients/geometry/rows.hpp"
 
 namespace dtact::perceive {
 namespace {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "clients/perceive/geometry/surface_table.hpp"
+#include "clients/geometry/surface_table.hpp"
 
 namespace dtact::perceive {
 

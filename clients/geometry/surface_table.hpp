@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "clients/perceive/geometry/vector.hpp"
+#include "clients/geometry/vector.hpp"
 #include "daemon/recon/surface.hpp"
 
 namespace dtact::perceive {

@@ -1,4 +1,4 @@
-#include "clients/perceive/geometry/mesh_file.hpp"
+#include "clients/geometry/mesh_file.hpp"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "clients/perceive/geometry/mesh_reader.hpp"
+#include "clients/geometry/mesh_reader.hpp"
 
 namespace dtact::perceive {
 namespace {
