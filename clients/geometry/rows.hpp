@@ -5,10 +5,8 @@
 
 namespace dtact::perceive {
 
-// The loops over a row's pixels, for every instruction set that Highway knows; the fastest one at
-// run time. All give the same bits: nothing is contracted, and a root's inverse is Newton's from a
-// first guess of integer arithmetic, right to 3·10⁻⁷ and less than half the work of root and
-// division.
+// Plain loops over a row's pixels that -O3 turns into vector code. Nothing is contracted, so that
+// they give the same bits on every processor.
 
 /// Bit k: whether a value of [k · tile, (k + 1) · tile) is not 0. A tile is a multiple of
 /// kTilePixels; there are at most 64.
