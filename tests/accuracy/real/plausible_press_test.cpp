@@ -10,8 +10,8 @@
 #include <string>
 
 #include "clients/calibrate/fit/plausibility.hpp"
-#include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "tests/accuracy/real/ball_press.hpp"
+#include "tests/accuracy/real/folder_evaluation.hpp"
 
 namespace dtact::ctl {
 namespace {

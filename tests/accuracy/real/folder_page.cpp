@@ -9,8 +9,8 @@
 #include "clients/calibrate/offline/board_images.hpp"
 #include "clients/calibrate/offline/colour_map.hpp"
 #include "clients/calibrate/offline/drawing.hpp"
-#include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "hal/base/atomic_folder.hpp"
+#include "tests/accuracy/real/folder_evaluation.hpp"
 
 namespace dtact::ctl {
 namespace {

@@ -1,4 +1,4 @@
-#include "clients/calibrate/offline/folder_evaluation.hpp"
+#include "tests/accuracy/real/folder_evaluation.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

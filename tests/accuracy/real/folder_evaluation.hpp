@@ -7,8 +7,8 @@
 
 #include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/offline/images.hpp"
-#include "clients/calibrate/offline/pin_depths.hpp"
 #include "daemon/calibration/calibration.hpp"
+#include "tests/accuracy/real/pin_depths.hpp"
 
 namespace dtact::ctl {
 

@@ -1,4 +1,4 @@
-#include "clients/calibrate/offline/pin_depths.hpp"
+#include "tests/accuracy/real/pin_depths.hpp"
 
 #include <fmt/format.h>
 
