@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 Calibration load(const fs::path& folder) {
   if (!fs::is_directory(folder)) {
     throw std::runtime_error(folder.string() +
-                             ": no such folder; make a calibration with dtactctl calibrate depth");
+                             ": no such folder; make a calibration with dtact-calibrate depth");
   }
   const fs::path toml = folder / kTomlName;
   const std::string text = base::read_file(toml);

@@ -53,7 +53,7 @@ std::optional<recon::Lens> read_lens(tomlfile::KeyReader reader, int frame_width
 }
 
 std::string format(const LensFile& file) {
-  std::string t = "# A lens of dtactd. Written by dtactctl calibrate lens.\n";
+  std::string t = "# A lens of dtactd. Written by dtact-calibrate lens.\n";
   for (const std::string& note : file.notes) t += fmt::format("# {}\n", note);
   t += fmt::format("version = {}\n\n[frame]\nwidth = {}\nheight = {}\n\n[lens]\n", kFormatVersion,
                    file.frame_width, file.frame_height);
@@ -66,7 +66,7 @@ LensFile load_lens(const std::filesystem::path& path) {
     const Calibration calibration = load(path);
     if (!calibration.lens) {
       throw std::runtime_error(
-          path.string() + ": this calibration has no lens; make one with dtactctl calibrate lens");
+          path.string() + ": this calibration has no lens; make one with dtact-calibrate lens");
     }
     return {calibration.model->rectify.frame_width,
             calibration.model->rectify.frame_height,
@@ -88,7 +88,7 @@ LensFile load_lens(const std::filesystem::path& path) {
   file.gain_told = top.has("gain");
   if (file.gain_told) file.gain = read_gain(top.table("gain"));
   top.finish();
-  if (!lens) top.fail("lens", "is empty; make a lens with dtactctl calibrate lens");
+  if (!lens) top.fail("lens", "is empty; make a lens with dtact-calibrate lens");
   file.lens = *lens;
   return file;
 }

@@ -12,7 +12,7 @@
 namespace dtact::calibration {
 
 /// A lens and the camera frame it was measured in, and what the same images told of the gain: what
-/// `dtactctl calibrate lens` writes.
+/// `dtact-calibrate lens` writes.
 struct LensFile {
   int frame_width = 0;
   int frame_height = 0;

@@ -52,7 +52,7 @@ void read_camera_and_light(tomlfile::KeyReader& top, Origin& origin) {
 
 std::string format_sensor(const Origin& origin) {
   return fmt::format(
-             "# Camera and light of the images in this folder. Written by dtactctl calibrate.\n"
+             "# Camera and light of the images in this folder. Written by dtact-calibrate.\n"
              "version = {}\n\n",
              kFormatVersion) +
          format_camera_and_light(origin);
