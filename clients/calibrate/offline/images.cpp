@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "daemon/calibration/sha256.hpp"
+#include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::ctl {

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "daemon/calibration/sha256.hpp"
+#include "daemon/calibration/calibration.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
 #include "tests/unit/calibration/sample.hpp"
