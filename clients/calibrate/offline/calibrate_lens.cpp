@@ -9,7 +9,6 @@
 #include "clients/calibrate/lens/chessboard.hpp"
 #include "clients/calibrate/lens/pin_gain.hpp"
 #include "clients/calibrate/lens/pins.hpp"
-#include "clients/calibrate/offline/board_images.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "daemon/calibration/sensor_files.hpp"

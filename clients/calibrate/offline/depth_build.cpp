@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/fit/model/layered_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
-#include "clients/calibrate/fit/plausibility.hpp"
 #include "daemon/calibration/sensor_files.hpp"
 
 namespace dtact::ctl {

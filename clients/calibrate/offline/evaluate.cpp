@@ -4,7 +4,6 @@
 
 #include <memory>
 
-#include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "clients/common/json.hpp"

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/difference.hpp"
-#include "clients/calibrate/offline/colour_map.hpp"
+#include "clients/calibrate/offline/drawing.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "hal/base/atomic_file.hpp"

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "clients/calibrate/fit/plausibility.hpp"
-#include "clients/calibrate/offline/board_images.hpp"
+#include "clients/calibrate/fit/evaluate.hpp"
+#include "clients/calibrate/offline/images.hpp"
 
 namespace dtact::ctl {
 namespace {

@@ -6,9 +6,8 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "clients/calibrate/offline/board_images.hpp"
-#include "clients/calibrate/offline/colour_map.hpp"
 #include "clients/calibrate/offline/drawing.hpp"
+#include "clients/calibrate/offline/images.hpp"
 #include "hal/base/atomic_folder.hpp"
 #include "tests/accuracy/real/folder_evaluation.hpp"
 

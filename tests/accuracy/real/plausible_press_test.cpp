@@ -9,7 +9,7 @@
 #include <cmath>
 #include <string>
 
-#include "clients/calibrate/fit/plausibility.hpp"
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "tests/accuracy/real/ball_press.hpp"
 #include "tests/accuracy/real/folder_evaluation.hpp"
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/calibrate/offline/colour_map.hpp"
 #include "clients/calibrate/offline/depth_build.hpp"
+#include "clients/calibrate/offline/drawing.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"

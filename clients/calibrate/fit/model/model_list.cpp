@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/calibrate/fit/list_shape.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
 #include "clients/calibrate/fit/list_worth.hpp"
 #include "clients/calibrate/fit/model/radial_transform.hpp"
 
