@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
-#include <opencv2/core.hpp>
-#include <span>
 #include <stdexcept>
+
+#include "clients/calibrate/fit/least_squares.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -27,41 +27,6 @@ constexpr int kGainRounds = 3;
 constexpr double kNearOne = 2.5e-5;
 /// Weight of a measured depth, in pixels.
 constexpr double kMeasured = 1e5;
-
-/// Rows of a least-squares problem added into its normal equations.
-class Normal {
- public:
-  explicit Normal(int unknowns)
-      : matrix_(cv::Mat::zeros(unknowns, unknowns, CV_64F)),
-        right_(cv::Mat::zeros(unknowns, 1, CV_64F)) {}
-
-  struct Term {
-    int unknown = 0;
-    double factor = 0;
-  };
-  /// Σ factor · unknown = value.
-  void add(std::span<const Term> terms, double value, double weight) {
-    for (const Term& a : terms) {
-      if (a.factor == 0) continue;
-      right_.at<double>(a.unknown) += weight * a.factor * value;
-      for (const Term& b : terms) {
-        matrix_.at<double>(a.unknown, b.unknown) += weight * a.factor * b.factor;
-      }
-    }
-  }
-  [[nodiscard]] cv::Mat solve() const {
-    cv::Mat x;
-    // Presses in one place determine no gain; the least of all solutions will do.
-    if (!cv::solve(matrix_, right_, x, cv::DECOMP_CHOLESKY)) {
-      cv::solve(matrix_, right_, x, cv::DECOMP_SVD);
-    }
-    return x;
-  }
-
- private:
-  cv::Mat matrix_;
-  cv::Mat right_;
-};
 
 /// Slope of a list at a darkening, millimetres a grey level.
 double slope_at(const std::vector<Knot>& knots, double level) {
@@ -111,27 +76,25 @@ ChainFit solve_once(const std::vector<SagProfile>& presses, const std::vector<do
   const double step = deepest / knots;
   const auto terms = static_cast<int>(before == nullptr ? 0 : gain.size());
   // Unknowns: the knots 1 … n (knot 0 is zero), the presses' depths, the gain's change.
-  const auto unknown = [](int knot) { return knot - 1; };
-  const auto depth_of = [&](std::size_t press) { return knots + static_cast<int>(press); };
-  const int first_term = depth_of(presses.size());
-  Normal normal(first_term + terms);
+  const auto depth_of = [&](std::size_t press) { return knots + static_cast<Eigen::Index>(press); };
+  const Eigen::Index first_term = depth_of(presses.size());
+  LeastSquares squares(first_term + terms);
   double straight = 0;
-  std::vector<Normal::Term> row;
+  std::vector<LeastSquares::Term> row;
   for (std::size_t p = 0; p < presses.size(); ++p) {
     const double here = gain_at(gain, presses[p].place);
     double pixels = 0;
     for (const auto& ring : presses[p].rings) {
       pixels += ring.weight;
       const double level = std::max(0.0, here * ring.level);
-      const int below = std::min(knots - 1, static_cast<int>(level / step));
-      const double part = level / step - below;
-      row = {{unknown(below + 1), part}, {depth_of(p), -1}};
-      if (below > 0) row.push_back({unknown(below), 1 - part});
+      const auto [below, part] = between_knots(level / step, knots + 1);
+      row = {{below, part}, {depth_of(p), -1}};
+      if (below > 0) row.push_back({below - 1, 1 - part});
       for (int t = 0; t < terms; ++t) {
         row.push_back({first_term + t, slope_at(before->knots, level) * ring.level *
                                            presses[p].place[static_cast<std::size_t>(t)]});
       }
-      normal.add(row, -ring.sag_mm, ring.weight);
+      squares.add(row, -ring.sag_mm, ring.weight);
     }
     straight += kStraight * pixels;
     if (terms > 0) {
@@ -139,30 +102,27 @@ ChainFit solve_once(const std::vector<SagProfile>& presses, const std::vector<do
       for (int t = 0; t < terms; ++t) {
         row.push_back({first_term + t, presses[p].place[static_cast<std::size_t>(t)]});
       }
-      normal.add(row, 1 - here, kNearOne * pixels);
+      squares.add(row, 1 - here, kNearOne * pixels);
     }
     const std::optional<double>& measured = presses[p].depth_mm;
-    if (measured) normal.add(std::array{Normal::Term{depth_of(p), 1}}, *measured, kMeasured);
+    if (measured) squares.add({{depth_of(p), 1}}, *measured, kMeasured);
   }
-  for (int knot = 1; knot < knots; ++knot) {
-    row = {{unknown(knot), -2}, {unknown(knot + 1), 1}};
-    if (knot > 1) row.push_back({unknown(knot - 1), 1});
-    normal.add(row, 0, straight);
-  }
-  const cv::Mat x = normal.solve();
+  squares.add({{0, -2}, {1, 1}}, 0, straight);
+  squares.straighten(0, knots, straight);
+  const Eigen::VectorXd x = squares.solve();
 
   ChainFit fit;
   double risen = 0;
   for (int knot = 1; knot <= knots; ++knot) {
-    risen = std::max(risen, x.at<double>(unknown(knot)));
+    risen = std::max(risen, x[knot - 1]);
     fit.knots.push_back({knot * step, risen, 1});
   }
   for (std::size_t p = 0; p < presses.size(); ++p) {
-    fit.depth_mm.push_back(x.at<double>(depth_of(p)));
+    fit.depth_mm.push_back(x[depth_of(p)]);
   }
   fit.gain = gain;
   for (int t = 0; t < terms; ++t) {
-    fit.gain[static_cast<std::size_t>(t)] += x.at<double>(first_term + t);
+    fit.gain[static_cast<std::size_t>(t)] += x[first_term + t];
   }
   return fit;
 }
