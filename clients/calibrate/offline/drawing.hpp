@@ -22,6 +22,6 @@ void draw_text(Picture& picture, cv::Point corner, const std::string& text,
 [[nodiscard]] image::Rgb8 to_image(const Picture& picture);
 
 /// PNG: the map in colours beside a legend in millimetres, a bar of the scale below.
-[[nodiscard]] std::string encode_colour_png(const cli::DepthImage& depth);
+[[nodiscard]] std::string encode_legend_png(const cli::DepthImage& depth);
 
 }  // namespace dtact::ctl

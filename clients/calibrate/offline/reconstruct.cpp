@@ -22,7 +22,7 @@ struct ReconstructionOptions {
 };
 
 void run(const ReconstructionOptions& options) {
-  const cli::DepthEncoder encode = cli::encoder_for(options.output, encode_colour_png);
+  const cli::DepthEncoder encode = cli::encoder_for(options.output, encode_legend_png);
   const calibration::Calibration calibration = calibration::load(options.calibration);
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet frame = load_images({options.frame}, "--frame");

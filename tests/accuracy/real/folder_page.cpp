@@ -84,7 +84,7 @@ std::string depth_png(const recon::Model& model, const ImageSet& reference, cons
   std::vector<float> mm =
       calibration::mean_depth_um(model, reference.mean_q8().pixels, press.frames());
   for (float& value : mm) value *= 0.001F;
-  return encode_colour_png({model.rectify.width, model.rectify.height, model.mm_per_px, mm});
+  return encode_legend_png({model.rectify.width, model.rectify.height, model.mm_per_px, mm});
 }
 
 struct Figure {

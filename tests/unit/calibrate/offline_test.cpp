@@ -260,7 +260,7 @@ TEST(DepthFile, PointsLeaveUntrustedOutAndPressDown) {
 
 TEST(DepthFile, APictureOfNothingStillHasItsLegend) {
   const std::vector<float> mm(4, std::numeric_limits<float>::quiet_NaN());
-  EXPECT_GT(encode_colour_png({2, 2, 0.1, mm}).size(), 100U);
+  EXPECT_GT(encode_legend_png({2, 2, 0.1, mm}).size(), 100U);
 }
 
 }  // namespace
