@@ -6,7 +6,7 @@
 #include <iostream>
 #include <memory>
 
-#include "clients/calibrate/guided/json_console.hpp"
+#include "clients/calibrate/guided/console.hpp"
 #include "clients/calibrate/guided/session.hpp"
 #include "clients/common/exit_codes.hpp"
 #include "clients/common/interruptible.hpp"

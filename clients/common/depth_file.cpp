@@ -9,8 +9,9 @@
 #include <filesystem>
 #include <vector>
 
+#include "clients/common/colours.hpp"
 #include "clients/common/exit_codes.hpp"
-#include "clients/perceive/geometry/cloud_file.hpp"
+#include "clients/geometry/cloud_file.hpp"
 #include "hal/image/png.hpp"
 
 namespace dtact::cli {
@@ -56,6 +57,23 @@ std::string encode_micrometre_png(const DepthImage& depth) {
   for (const float mm : depth.mm) {
     const float um = std::isnan(mm) ? 0 : std::clamp(1000 * mm, 0.0F, 65535.0F);
     picture.pixels.push_back(static_cast<std::uint16_t>(std::lround(um)));
+  }
+  return image::encode_png(picture);
+}
+
+double deepest_mm(std::span<const float> mm) {
+  double deepest = 0;
+  for (const float value : mm) deepest = std::fmax(deepest, value);
+  return deepest;
+}
+
+std::string encode_colour_png(const DepthImage& depth) {
+  const double full_mm = full_scale_mm(deepest_mm(depth.mm));
+  image::Rgb8 picture{depth.width, depth.height, {}};
+  picture.pixels.reserve(3 * depth.mm.size());
+  for (const float mm : depth.mm) {
+    const Colour colour = std::isnan(mm) ? kUntrustedColour : colour_of(mm / full_mm);
+    picture.pixels.insert(picture.pixels.end(), {colour.r, colour.g, colour.b});
   }
   return image::encode_png(picture);
 }

@@ -31,6 +31,11 @@ struct DepthImage {
 /// A 16-bit PNG in micrometres: 0 where untrusted or less, 65535 where more.
 [[nodiscard]] std::string encode_micrometre_png(const DepthImage& depth);
 
+/// A PNG in colours (colours.hpp), from no indentation to full_scale_mm() of the deepest.
+[[nodiscard]] std::string encode_colour_png(const DepthImage& depth);
+/// The deepest, millimetres; 0 where nothing is pressed.
+[[nodiscard]] double deepest_mm(std::span<const float> mm);
+
 using DepthEncoder = std::string (*)(const DepthImage&);
 
 /// What writes a file of this name: by its ending .npy, .ply or .pcd (points with normals, in the

@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
-#include <memory>
 
 #include "clients/cpp/errors.hpp"
 #include "daemon/recon/surface_limits.hpp"
@@ -29,8 +27,6 @@ Kind kind_of(v1::Surface::Shape shape) {
       return Kind::sphere;
     case v1::Surface::CYLINDER:
       return Kind::cylinder;
-    case v1::Surface::HEIGHT_MAP:
-      return Kind::height_map;
     default:
       refuse(fmt::format("has a shape, {}, that is not known here", static_cast<int>(shape)));
   }
@@ -38,26 +34,6 @@ Kind kind_of(v1::Surface::Shape shape) {
 
 /// False for NaN.
 bool within(double value, double low, double high) { return value >= low && value <= high; }
-
-std::shared_ptr<const recon::SurfaceHeights> heights_of(const v1::HeightMap& map) {
-  const bool sized =
-      within(map.width(), Limits::kLeastNodes, Limits::kMostNodes) &&
-      within(map.height(), Limits::kLeastNodes, Limits::kMostNodes) &&
-      static_cast<std::uint64_t>(map.z_um_size()) == std::uint64_t{map.width()} * map.height();
-  constexpr std::int32_t kMostUm = 1000 * static_cast<std::int32_t>(Limits::kMostHeightMm);
-  const bool bounded = std::ranges::all_of(
-      map.z_um(), [](std::int32_t z_um) { return z_um >= -kMostUm && z_um <= kMostUm; });
-  if (!sized || !bounded ||
-      !within(map.spacing_mm(), Limits::kLeastSpacingMm, Limits::kMostSpacingMm)) {
-    refuse(fmt::format("of {} heights on {}x{} nodes, {} mm apart, contradicts itself",
-                       map.z_um_size(), map.width(), map.height(), map.spacing_mm()));
-  }
-  return std::make_shared<const recon::SurfaceHeights>(
-      recon::SurfaceHeights{.width = static_cast<int>(map.width()),
-                            .height = static_cast<int>(map.height()),
-                            .spacing_mm = map.spacing_mm(),
-                            .z_um = {map.z_um().begin(), map.z_um().end()}});
-}
 
 }  // namespace
 
@@ -68,18 +44,13 @@ recon::Surface surface_of(const v1::Surface& surface) {
   made.air_mm = surface.air_mm();
   made.gel_mm = surface.gel_mm();
   made.refraction = surface.refraction();
-  bool possible = within(made.air_mm, Limits::kLeastDistanceMm, Limits::kMostDistanceMm) &&
-                  within(made.gel_mm, Limits::kLeastDistanceMm, Limits::kMostDistanceMm) &&
-                  within(made.refraction, 1, Limits::kMostRefraction);
-  if (made.kind == Kind::height_map) {
-    made.heights = heights_of(surface.heights());
-  } else {
-    made.radius_mm = surface.radius_mm();
-    made.axis_deg = surface.axis_deg();
-    possible = possible && within(made.radius_mm, Limits::kLeastRadiusMm, Limits::kMostRadiusMm) &&
-               within(made.axis_deg, -180, 180);
-  }
-  if (!possible) {
+  made.radius_mm = surface.radius_mm();
+  made.axis_deg = surface.axis_deg();
+  if (!within(made.air_mm, Limits::kLeastDistanceMm, Limits::kMostDistanceMm) ||
+      !within(made.gel_mm, Limits::kLeastDistanceMm, Limits::kMostDistanceMm) ||
+      !within(made.refraction, 1, Limits::kMostRefraction) ||
+      !within(made.radius_mm, Limits::kLeastRadiusMm, Limits::kMostRadiusMm) ||
+      !within(made.axis_deg, -180, 180)) {
     refuse(fmt::format(
         "of {} mm radius, its axis at {} degrees, behind {} mm of air and {} mm of "
         "gel of index {} cannot be",

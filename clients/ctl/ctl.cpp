@@ -2,13 +2,12 @@
 
 #include "clients/ctl/cameras.hpp"
 #include "clients/ctl/export.hpp"
-#include "clients/ctl/hand_over.hpp"
 #include "clients/ctl/online.hpp"
 #include "clients/ctl/secrets.hpp"
 
 namespace dtact::ctl {
 
-void set_up(CLI::App& app, cli::Context& context, const std::vector<std::string>& arguments) {
+void set_up(CLI::App& app, cli::Context& context) {
   app.name("dtactctl")->description("Talks to dtactd, the daemon for DTact tactile sensors.");
   cli::add_global_options(app, context);
   add_status(app, context);
@@ -25,13 +24,12 @@ void set_up(CLI::App& app, cli::Context& context, const std::vector<std::string>
   add_cameras(app, context);
   add_cert(app, context);
   add_token(app, context);
-  add_handed_over(app, arguments);
 }
 
 int run(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& error) {
   CLI::App app;
   cli::Context context{{}, false, out};
-  set_up(app, context, arguments);
+  set_up(app, context);
   return cli::run(app, arguments, out, error);
 }
 

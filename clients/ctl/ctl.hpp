@@ -9,9 +9,9 @@
 
 namespace dtact::ctl {
 
-/// Gives `app` dtactctl's name, options and commands; what parses later fills `context` and hands
-/// `arguments` (the same as run()'s) on. All three must outlive `app`'s parsing.
-void set_up(CLI::App& app, cli::Context& context, const std::vector<std::string>& arguments);
+/// Gives `app` dtactctl's name, options and commands; what parses later fills `context`. Both must
+/// outlive `app`'s parsing.
+void set_up(CLI::App& app, cli::Context& context);
 
 /// The program, for main() and tests: runs the command that `arguments` (without the program's own
 /// name) asks for. Returns an ExitCode.

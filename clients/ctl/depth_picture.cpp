@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 
 #include "clients/cpp/maps.hpp"
@@ -12,18 +11,8 @@
 namespace dtact::ctl {
 namespace {
 
-constexpr Colour kUntrusted{96, 96, 96};  // none of the scale's colours is grey
-constexpr int kColours = 20;              // columns of the legend
-constexpr int kDepthColumns = 12;         // " 0.2 mm deep"
-
-/// The least of 1, 2, 5 times a power of ten that is at least `value` (above 0).
-double round_up(double value) {
-  const double decade = std::pow(10, std::floor(std::log10(value)));
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (factor * decade >= value * (1 - 1e-9)) return factor * decade;
-  }
-  return 10 * decade;
-}
+constexpr int kColours = 20;       // columns of the legend
+constexpr int kDepthColumns = 12;  // " 0.2 mm deep"
 
 /// The nearest of xterm's 6 × 6 × 6 colours: levels 0, 95, 135, … 255.
 int nearest_of_256(Colour colour) {
@@ -94,8 +83,8 @@ class Pixels {
         ++trusted;
       }
     }
-    if (2 * trusted < (right - left) * (bottom - top)) return kUntrusted;
-    return colour_of(sum / trusted / full_scale_mm);
+    if (2 * trusted < (right - left) * (bottom - top)) return cli::kUntrustedColour;
+    return cli::colour_of(sum / trusted / full_scale_mm);
   }
 
  private:
@@ -117,11 +106,11 @@ std::string legend(double full_scale_mm, double mm_per_column, const Canvas& can
   Pen pen(canvas.palette);
   const int colours = std::min(kColours, canvas.columns - kDepthColumns);
   for (int i = 0; i < colours; ++i) {
-    const Colour colour = colour_of((i + 0.5) / colours);
+    const Colour colour = cli::colour_of((i + 0.5) / colours);
     pen.put(" ", colour, colour);
   }
   std::string text = pen.finish(fmt::format(" {:g} mm deep", full_scale_mm));
-  const double length_mm = round_up(4 * mm_per_column);
+  const double length_mm = cli::round_up(4 * mm_per_column);
   const int length = static_cast<int>(std::lround(length_mm / mm_per_column));
   constexpr int kLengthColumns = 10;  // "  " and " 0.2 mm"
   if (colours + kDepthColumns + length + kLengthColumns > canvas.columns) return text;
@@ -131,21 +120,6 @@ std::string legend(double full_scale_mm, double mm_per_column, const Canvas& can
 }
 
 }  // namespace
-
-Colour colour_of(double share) {
-  const double lambda = 0.1 + 0.83 * std::clamp(share, 0.0, 1.0);
-  const double angle = 2 * std::numbers::pi * (0.2 / 3 + 1 - 0.6 * lambda);
-  const double amplitude = 1.3 * lambda * (1 - lambda) / 2;
-  const double cosine = std::cos(angle);
-  const double sine = std::sin(angle);
-  const auto part = [&](double of_cosine, double of_sine) {
-    const double value = lambda + amplitude * (of_cosine * cosine + of_sine * sine);
-    return static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
-  };
-  return {part(-0.14861, 1.78277), part(-0.29227, -0.90649), part(1.97294, 0)};
-}
-
-double full_scale_mm(double deepest_mm) { return round_up(std::max(deepest_mm, 0.2)); }
 
 std::vector<std::string> picture_of(const v1::Frame& frame, double full_scale_mm,
                                     const Canvas& canvas) {

@@ -4,21 +4,12 @@
 #include <string>
 #include <vector>
 
+#include "clients/common/colours.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::ctl {
 
-/// A colour of the screen, each part 0 … 255.
-struct Colour {
-  std::uint8_t r = 0;
-  std::uint8_t g = 0;
-  std::uint8_t b = 0;
-  bool operator==(const Colour&) const = default;
-};
-
-/// From dark violet (0) over green to pale yellow (1): lightness grows all the way, so the order is
-/// seen without telling hues apart. Green's cubehelix (Bull. Astr. Soc. India 39, 289, 2011).
-[[nodiscard]] Colour colour_of(double share);
+using cli::Colour;
 
 /// How a terminal is told a colour.
 enum class Palette : std::uint8_t { xterm256, rgb };
@@ -31,10 +22,6 @@ struct Canvas {
 };
 inline constexpr int kLeastColumns = 24;
 inline constexpr int kLeastRows = 9;
-
-/// The least of 0.2, 0.5, 1, 2, 5, … mm that `deepest_mm` does not exceed: the depth of the
-/// brightest colour.
-[[nodiscard]] double full_scale_mm(double deepest_mm);
 
 /// The depth map of `frame` as lines of a terminal, at most columns × (rows − 1), no smaller than
 /// kLeastColumns × kLeastRows: two pixels a character, a cross at the middle of the contact, a

@@ -1,7 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <ostream>
@@ -25,29 +23,6 @@ struct SnapshotOptions {
   bool luma = false;
   double timeout_s = 5;
 };
-
-/// The map as a picture: the deeper, the lighter, from the shallowest pixel to the deepest; what is
-/// not to be believed is orange. dtact-calibrate has colours and a legend.
-std::string encode_grey_png(const cli::DepthImage& depth) {
-  float low = 0;
-  float high = 0.1F;
-  for (const float mm : depth.mm) {
-    if (std::isnan(mm)) continue;
-    low = std::min(low, mm);
-    high = std::max(high, mm);
-  }
-  image::Rgb8 picture{depth.width, depth.height, {}};
-  picture.pixels.reserve(3 * depth.mm.size());
-  for (const float mm : depth.mm) {
-    if (std::isnan(mm)) {
-      picture.pixels.insert(picture.pixels.end(), {230, 90, 0});
-    } else {
-      const auto grey = static_cast<std::uint8_t>(std::lround(255 * (mm - low) / (high - low)));
-      picture.pixels.insert(picture.pixels.end(), 3, grey);
-    }
-  }
-  return image::encode_png(picture);
-}
 
 /// The next frame that holds what is asked for.
 v1::Frame fetch(client::Client& client, const SnapshotOptions& options) {
@@ -82,12 +57,12 @@ std::string encode(const v1::Frame& frame, const SnapshotOptions& options) {
                                           client::pixels_of(frame.luma())});
   }
   const auto mm = client::millimetres_of(frame.depth());
-  return cli::encoder_for(options.output, encode_grey_png)(cli::depth_image(frame, mm));
+  return cli::encoder_for(options.output, cli::encode_colour_png)(cli::depth_image(frame, mm));
 }
 
 void run_snapshot(const Context& context, const SnapshotOptions& options) {
   if (!options.luma) {
-    (void)cli::encoder_for(options.output, encode_grey_png);
+    (void)cli::encoder_for(options.output, cli::encode_colour_png);
   } else if (std::filesystem::path(options.output).extension() != ".png") {
     throw CLI::ValidationError("-o " + options.output, "with --luma the name must end in .png");
   }
@@ -116,10 +91,10 @@ void add_snapshot(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand("snapshot", "Save one frame of the running daemon");
   const auto options = std::make_shared<SnapshotOptions>();
   command
-      ->add_option(
-          "-o,--output", options->output,
-          "depth.npy (float32 mm, NaN where untrusted), depth.png (the deeper, the lighter) "
-          "or depth.ply or .pcd (points with normals, m); with --luma a .png")
+      ->add_option("-o,--output", options->output,
+                   "depth.npy (float32 mm, NaN where untrusted), depth.png (colours, the deeper, "
+                   "the lighter) "
+                   "or depth.ply or .pcd (points with normals, m); with --luma a .png")
       ->type_name("FILE")
       ->required();
   command->add_flag("--luma", options->luma, "The camera's grey image instead of the depth");

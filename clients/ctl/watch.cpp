@@ -121,7 +121,7 @@ class Watch {
     }
     // The line may need two of a narrow terminal.
     const Canvas above{canvas.columns, canvas.rows - 1, canvas.palette};
-    std::vector<std::string> lines = picture_of(last_, full_scale_mm(all_.deepest_mm()), above);
+    std::vector<std::string> lines = picture_of(last_, cli::full_scale_mm(all_.deepest_mm()), above);
     const auto width = static_cast<std::size_t>(canvas.columns);
     std::size_t end = below_.size() <= width ? below_.size() : below_.rfind("  ", width);
     end = std::min(end, below_.size());

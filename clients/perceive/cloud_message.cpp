@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "clients/perceive/geometry/rows.hpp"
+#include "clients/geometry/rows.hpp"
 #include "proto/dtact.pb.h"
 
 static_assert(std::endian::native == std::endian::little);

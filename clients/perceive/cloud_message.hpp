@@ -1,6 +1,6 @@
 #pragma once
 
-#include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/geometry/point_cloud.hpp"
 
 namespace dtact::v1 {
 class PointCloud;

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "clients/geometry/point_cloud.hpp"
 #include "clients/perceive/depth_part.hpp"
-#include "clients/perceive/geometry/point_cloud.hpp"
 #include "clients/perceive/pose/object_tracker.hpp"
 #include "clients/perceive/pose/tracker.hpp"
 #include "daemon/serve/encoded_frame.hpp"

@@ -4,7 +4,7 @@
 
 #include <stdexcept>
 
-#include "clients/perceive/geometry/mesh_file.hpp"
+#include "clients/geometry/mesh_file.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::perceive {

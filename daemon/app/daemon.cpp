@@ -66,8 +66,8 @@ std::shared_ptr<const calibration::Calibration> load_calibration(const fs::path&
                                                                  const fs::path& configured) {
   if (folder.empty()) {
     spdlog::warn(
-        "no calibration: serving the camera's image only. Make one with `dtactctl calibrate "
-        "depth` and send it with `dtactctl calibration upload`");
+        "no calibration: serving the camera's image only. Make one with `dtact-calibrate depth`"
+        " and send it with `dtactctl calibration upload`");
     return nullptr;
   }
   try {

@@ -1,17 +1,40 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "daemon/calibration/layer.hpp"
 #include "daemon/recon/lens.hpp"
 #include "daemon/recon/model.hpp"
 
 namespace dtact::calibration {
+
+/// The layer as it was fitted to presses of a ball, with standard errors: for people, and for a
+/// simulator of this sensor. Depth is made without it.
+struct Layer {
+  /// A number and its standard error.
+  struct Estimate {
+    double value = 0;
+    double error = 0;
+    bool operator==(const Estimate&) const = default;
+  };
+  Estimate thickness_mm;
+  Estimate narrow_mm;  ///< Scattering, as in the model's; here with its errors.
+  Estimate wide_mm;
+  Estimate narrow_weight;
+  /// Where the response's slope is given, indentation / thickness, ascending; between them it is a
+  /// straight line, beyond them constant. Share of the local light for each thickness indented.
+  std::array<double, 5> indentation = {};
+  std::array<Estimate, 5> slope = {};
+  double bulge_factor = 1;     ///< On the slopes below zero: a kink there.
+  double residual_levels = 0;  ///< Root mean square of what the fit leaves, grey levels.
+  bool operator==(const Layer&) const = default;
+};
 
 /// One photometric control at calibration time (the shape of hal::CameraControl, without the HAL).
 struct Control {
@@ -59,5 +82,18 @@ void save(const Calibration& calibration, const std::filesystem::path& folder);
 /// origin in error messages; the calibration's name is left empty.
 [[nodiscard]] Calibration parse(const std::string& toml, const std::string& reference_png,
                                 const std::string& where);
+
+/// The rectification of a depth map: through the lens, or the crop where there is none. `outside`
+/// becomes depth-map sized with 1 where the frame does not show the pixel, or empty. Throws
+/// std::invalid_argument as recon::make_crop_table() and recon::make_lens_table().
+[[nodiscard]] recon::RectifyTable map_table(const std::optional<recon::Lens>& lens, int frame_width,
+                                            int frame_height, const recon::MapPlace& place,
+                                            std::vector<std::uint8_t>& outside);
+
+/// Marks in the model what `outside` marks.
+void add_untrusted(recon::Model& model, const std::vector<std::uint8_t>& outside);
+
+/// SHA-256 of `bytes` as 64 lower-case hexadecimal digits.
+[[nodiscard]] std::string sha256_hex(std::string_view bytes);
 
 }  // namespace dtact::calibration

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "daemon/calibration/array_text.hpp"
+#include "daemon/calibration/tables.hpp"
 
 namespace dtact::calibration {
 namespace {

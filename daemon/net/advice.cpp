@@ -25,9 +25,10 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::camera_trouble, "The camera gives no usable frames."},
     {Health::ring_trouble, "The LED ring cannot be written to."},
     {Health::uncalibrated,
-     "No calibration: dtactctl calibrate --radius-mm MM --mm-per-px S guides through one with a "
+     "No calibration: dtact-calibrate guided --radius-mm MM --mm-per-px S guides through one with "
+     "a "
      "ball "
-     "of known radius. From images: dtactctl calibrate depth, then dtactctl calibration upload."},
+     "of known radius. From images: dtact-calibrate depth, then dtactctl calibration upload."},
     {Health::camera_mismatch,
      "Camera, mode or controls differ from the calibration's: restore them in the configuration "
      "or calibrate again."},

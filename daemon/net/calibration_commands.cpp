@@ -87,7 +87,7 @@ void CalibrationCommands::get(const Who& who, const v1::GetCalibration& request)
   if (request.has_number()) number = request.number();
   if (!number && port_.status().calibration == nullptr) {
     return who.first->reply_error(who.second, v1::ERROR_UNCALIBRATED,
-                                  "there is no calibration: make one with dtactctl calibrate "
+                                  "there is no calibration: make one with dtact-calibrate "
                                   "depth and send it with dtactctl calibration upload, or take one "
                                   "that dtactctl calibration list shows");
   }

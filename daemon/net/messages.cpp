@@ -151,8 +151,6 @@ v1::Surface::Shape to_wire(recon::Surface::Kind kind) {
       return v1::Surface::SPHERE;
     case recon::Surface::Kind::cylinder:
       return v1::Surface::CYLINDER;
-    case recon::Surface::Kind::height_map:
-      return v1::Surface::HEIGHT_MAP;
   }
   return v1::Surface::PLANE;
 }
@@ -164,12 +162,6 @@ void fill(const recon::Surface& surface, v1::Surface& out) {
   out.set_air_mm(surface.air_mm);
   out.set_gel_mm(surface.gel_mm);
   out.set_refraction(surface.refraction);
-  if (!surface.heights) return;
-  v1::HeightMap& heights = *out.mutable_heights();
-  heights.set_width(static_cast<std::uint32_t>(surface.heights->width));
-  heights.set_height(static_cast<std::uint32_t>(surface.heights->height));
-  heights.set_spacing_mm(surface.heights->spacing_mm);
-  heights.mutable_z_um()->Add(surface.heights->z_um.begin(), surface.heights->z_um.end());
 }
 
 }  // namespace

@@ -13,11 +13,11 @@ constexpr const char* kUnsteadySentence =
 constexpr const char* kDarkSentence =
     "the image is too dark to be a reference: make the light brighter";
 constexpr const char* kUncalibratedSentence =
-    "there is no calibration, so nothing to re-zero: make one with dtactctl calibrate depth and "
+    "there is no calibration, so nothing to re-zero: make one with dtact-calibrate depth and "
     "send it with dtactctl calibration upload";
 constexpr const char* kNoCalibrationSentence =
-    "there is no calibration, so depth is measured against nothing: make one with dtactctl "
-    "calibrate depth and send it with dtactctl calibration upload";
+    "there is no calibration, so depth is measured against nothing: make one with "
+    "dtact-calibrate depth and send it with dtactctl calibration upload";
 constexpr const char* kNoReferenceSentence =
     "the untouched image is being taken: ask again when the state is serving";
 constexpr const char* kAwaySentence =

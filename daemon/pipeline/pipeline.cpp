@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <exception>
 #include <stdexcept>
 #include <utility>
@@ -236,14 +235,8 @@ void Pipeline::free_retired() {
   while (exchange_.retired.pop(old)) old.reset();
   const std::uint64_t in_use = exchange_.generation.load(std::memory_order_acquire);
   while (!calibrations_.empty() && calibrations_.front().generation < in_use) {
-    const auto& heights = calibrations_.front().calibration->model->surface.heights;
-    if (heights && std::ranges::find(old_heights_, heights) == old_heights_.end()) {
-      old_heights_.push_back(heights);
-    }
     calibrations_.pop_front();
   }
-  // Who alone has them nobody can get them from.
-  std::erase_if(old_heights_, [](const auto& heights) { return heights.use_count() == 1; });
 }
 
 void Pipeline::want(Wanted wanted) noexcept {

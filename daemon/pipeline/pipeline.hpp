@@ -81,9 +81,6 @@ class Pipeline final : public Port {
   ReconstructionRules rules_;  ///< As asked for last.
   std::deque<Event> own_events_;
   std::deque<Known> calibrations_;  // in use, and on their way to be
-  /// Of calibrations out of use, for as long as a frame of the pool has them: the capture thread,
-  /// which writes over those frames, must not be the one that frees them.
-  std::vector<std::shared_ptr<const recon::SurfaceHeights>> old_heights_;
   std::map<std::uint64_t, std::shared_ptr<ReferenceCopy>> copies_;  // being made, by ticket
   std::uint64_t generations_ = 0;
   base::RtThread capture_;  // last: it uses all the others

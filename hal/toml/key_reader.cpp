@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
@@ -91,40 +90,6 @@ std::vector<std::int64_t> KeyReader::integers(const std::string& key, std::int64
 std::vector<double> KeyReader::numbers(const std::string& key, double low, double high) {
   return array<double>(key, fmt::format("numbers from {} to {}", low, high),
                        [&](double value) { return value >= low && value <= high; });
-}
-
-std::vector<std::vector<double>> KeyReader::rows(const std::string& key, double low, double high) {
-  const std::string allowed =
-      fmt::format("rows of numbers from {} to {}, all of the same length", low, high);
-  const auto* array = take(key, allowed).as_array();
-  if (array == nullptr) fail(key, "wrong type; expected " + allowed);
-  std::vector<std::vector<double>> rows;
-  const auto refuse = [&](const toml::node& node, const std::string& what) {
-    throw std::runtime_error(fmt::format("{}:{}: {}{}: row {}{}; expected {}", where_,
-                                         node.source().begin.line, prefix_, key, rows.size() + 1,
-                                         what, allowed));
-  };
-  for (const toml::node& node : *array) {
-    const auto* entries = node.as_array();
-    if (entries == nullptr || entries->empty()) refuse(node, " is no row of numbers");
-    if (!rows.empty() && entries->size() != rows.front().size()) {
-      refuse(node, fmt::format(" has {} numbers where the first has {}", entries->size(),
-                               rows.front().size()));
-    }
-    std::vector<double> row;
-    row.reserve(entries->size());
-    for (const toml::node& entry : *entries) {
-      const double none = std::numeric_limits<double>::quiet_NaN();
-      const double value = entry.is_number() ? entry.value_or(none) : none;
-      if (!(value >= low && value <= high)) {
-        refuse(entry, fmt::format(", entry {} is not allowed", row.size() + 1));
-      }
-      row.push_back(value);
-    }
-    rows.push_back(std::move(row));
-  }
-  if (rows.empty()) fail(key, "is empty; expected " + allowed);
-  return rows;
 }
 
 KeyReader KeyReader::table(const std::string& key) {

@@ -26,9 +26,6 @@ class KeyReader {
   [[nodiscard]] std::vector<std::int64_t> integers(const std::string& key, std::int64_t low,
                                                    std::int64_t high);
   [[nodiscard]] std::vector<double> numbers(const std::string& key, double low, double high);
-  /// At least one row of at least one number each, all of the same length.
-  [[nodiscard]] std::vector<std::vector<double>> rows(const std::string& key, double low,
-                                                      double high);
   [[nodiscard]] KeyReader table(const std::string& key);
 
   // The value stays as it is when the key is absent.

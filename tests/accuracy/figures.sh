@@ -16,7 +16,7 @@ evaluate() {
     echo "skipped: $images is not there"
     return
   fi
-  "$bin/dtact-calibrate" evaluate --folder "$images" -o "$out/$1"
+  build/dev/tests/accuracy/real/evaluate_folder "$images" "$out/$1"
 }
 evaluate sensor_a
 evaluate sensor_b

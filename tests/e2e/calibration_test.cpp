@@ -48,7 +48,7 @@ TEST(Calibration, UncalibratedServesLumaAndSaysHowToCalibrate) {
   }));
   const v1::Status status = client.status();
   EXPECT_EQ(status.state(), v1::STATE_UNCALIBRATED);
-  EXPECT_THAT(status.advice(), HasSubstr("dtactctl calibrate"));
+  EXPECT_THAT(status.advice(), HasSubstr("dtact-calibrate"));
 }
 
 TEST(Calibration, UploadBringsDepthAndOutlivesARestart) {
@@ -220,23 +220,6 @@ TEST(Ctl, SaysWhatIsWrong) {
   EXPECT_EQ(sensor.daemon->stop(SIGTERM), 0);
   EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "--port", "1", "status"}, &output), 3);
   EXPECT_THAT(output, HasSubstr("dtactd"));
-}
-
-TEST(Ctl, StartsTheProgramThatMakesCalibrations) {
-  std::string output;
-  EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "--version", "calibrate"}, &output), 0);
-  EXPECT_THAT(output, HasSubstr("dtactctl "));
-  EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "calibrate", "depth", "--help"}, &output), 0);
-  EXPECT_THAT(output, HasSubstr("--ball"));
-  EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "evaluate"}, &output), 1);
-  EXPECT_THAT(output, HasSubstr("dtact-calibrate: give --folder, or"));
-  // Neither beside dtactctl nor in PATH.
-  const TempFolder folder;
-  const std::string alone = (folder.path() / "dtactctl").string();
-  std::filesystem::copy_file(DTACTCTL_PROGRAM, alone);
-  EXPECT_EQ(run_program({"/usr/bin/env", "PATH=/", alone, "calibrate", "depth"}, &output), 1);
-  EXPECT_THAT(output, AllOf(HasSubstr("dtactctl: cannot start dtact-calibrate"),
-                            HasSubstr("No such file"), HasSubstr(folder.path().string())));
 }
 
 }  // namespace

@@ -32,14 +32,13 @@ constexpr int kNotMet = 4;
 
 std::string enters(int count) { return std::string(static_cast<std::size_t>(count), '\n'); }
 
-/// `dtactctl calibrate`, which starts dtact-calibrate, in the sensor's folder, with these lines
-/// typed.
+/// `dtact-calibrate guided` in the sensor's folder, with these lines typed.
 int guide(const Sensor& sensor, const std::string& typed, std::string* output,
           const std::vector<std::string>& more = {}) {
-  std::vector<std::string> arguments = {DTACTCTL_PROGRAM,
+  std::vector<std::string> arguments = {CALIBRATE_PROGRAM,
                                         "--port",
                                         std::to_string(sensor.daemon->port()),
-                                        "calibrate",
+                                        "guided",
                                         "--radius-mm",
                                         "4.0",
                                         "--mm-per-px",
@@ -174,8 +173,8 @@ TEST(Guided, SaysWhatIsNotFit) {
   EXPECT_FALSE(there(sensor, "reference"));
   const std::uint16_t port = sensor.daemon->port();
   EXPECT_EQ(sensor.daemon->stop(SIGTERM), 0);
-  EXPECT_EQ(run_program({DTACTCTL_PROGRAM, "--port", std::to_string(port), "calibrate",
-                         "--radius-mm", "4", "--mm-per-px", "0.05"},
+  EXPECT_EQ(run_program({CALIBRATE_PROGRAM, "--port", std::to_string(port), "guided", "--radius-mm",
+                         "4", "--mm-per-px", "0.05"},
                         &output),
             kNoConnection);
   EXPECT_THAT(output, HasSubstr("dtactd"));

@@ -166,7 +166,7 @@ TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) {
   std::string said;
   ASSERT_EQ(run_program(command({"--seconds", "5"}), &said), 0) << said;
   const fs::path anew = folder.path() / "anew.mcap";
-  ASSERT_EQ(run_program({DTACTCTL_PROGRAM, "reprocess", file, "--calibration",
+  ASSERT_EQ(run_program({CALIBRATE_PROGRAM, "reprocess", file, "--calibration",
                          calibration_folder().string(), "-o", anew},
                         &said),
             0)

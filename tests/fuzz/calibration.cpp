@@ -7,7 +7,6 @@
 #include <memory>
 #include <stdexcept>
 
-#include "daemon/calibration/sha256.hpp"
 #include "daemon/calibration/text.hpp"
 #include "daemon/recon/decimate.hpp"
 #include "daemon/recon/reconstructor.hpp"

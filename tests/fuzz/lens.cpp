@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "daemon/calibration/lens_file.hpp"
+#include "daemon/calibration/sensor_files.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 namespace dtact::fuzz {

@@ -11,7 +11,7 @@
 #include "clients/calibrate/fit/list_fit.hpp"
 #include "clients/calibrate/fit/list_worth.hpp"
 #include "clients/calibrate/fit/published.hpp"
-#include "daemon/calibration/map_table.hpp"
+#include "daemon/calibration/calibration.hpp"
 
 namespace dtact::calibration {
 namespace {

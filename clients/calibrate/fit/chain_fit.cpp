@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
-#include <opencv2/core.hpp>
-#include <span>
 #include <stdexcept>
+
+#include "clients/calibrate/fit/least_squares.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -26,41 +27,6 @@ constexpr int kGainRounds = 3;
 constexpr double kNearOne = 2.5e-5;
 /// Weight of a measured depth, in pixels.
 constexpr double kMeasured = 1e5;
-
-/// Rows of a least-squares problem added into its normal equations.
-class Normal {
- public:
-  explicit Normal(int unknowns)
-      : matrix_(cv::Mat::zeros(unknowns, unknowns, CV_64F)),
-        right_(cv::Mat::zeros(unknowns, 1, CV_64F)) {}
-
-  struct Term {
-    int unknown = 0;
-    double factor = 0;
-  };
-  /// Σ factor · unknown = value.
-  void add(std::span<const Term> terms, double value, double weight) {
-    for (const Term& a : terms) {
-      if (a.factor == 0) continue;
-      right_.at<double>(a.unknown) += weight * a.factor * value;
-      for (const Term& b : terms) {
-        matrix_.at<double>(a.unknown, b.unknown) += weight * a.factor * b.factor;
-      }
-    }
-  }
-  [[nodiscard]] cv::Mat solve() const {
-    cv::Mat x;
-    // Presses in one place determine no gain; the least of all solutions will do.
-    if (!cv::solve(matrix_, right_, x, cv::DECOMP_CHOLESKY)) {
-      cv::solve(matrix_, right_, x, cv::DECOMP_SVD);
-    }
-    return x;
-  }
-
- private:
-  cv::Mat matrix_;
-  cv::Mat right_;
-};
 
 /// Slope of a list at a darkening, millimetres a grey level.
 double slope_at(const std::vector<Knot>& knots, double level) {
@@ -110,27 +76,25 @@ ChainFit solve_once(const std::vector<SagProfile>& presses, const std::vector<do
   const double step = deepest / knots;
   const auto terms = static_cast<int>(before == nullptr ? 0 : gain.size());
   // Unknowns: the knots 1 … n (knot 0 is zero), the presses' depths, the gain's change.
-  const auto unknown = [](int knot) { return knot - 1; };
-  const auto depth_of = [&](std::size_t press) { return knots + static_cast<int>(press); };
-  const int first_term = depth_of(presses.size());
-  Normal normal(first_term + terms);
+  const auto depth_of = [&](std::size_t press) { return knots + static_cast<Eigen::Index>(press); };
+  const Eigen::Index first_term = depth_of(presses.size());
+  LeastSquares squares(first_term + terms);
   double straight = 0;
-  std::vector<Normal::Term> row;
+  std::vector<LeastSquares::Term> row;
   for (std::size_t p = 0; p < presses.size(); ++p) {
     const double here = gain_at(gain, presses[p].place);
     double pixels = 0;
     for (const auto& ring : presses[p].rings) {
       pixels += ring.weight;
       const double level = std::max(0.0, here * ring.level);
-      const int below = std::min(knots - 1, static_cast<int>(level / step));
-      const double part = level / step - below;
-      row = {{unknown(below + 1), part}, {depth_of(p), -1}};
-      if (below > 0) row.push_back({unknown(below), 1 - part});
+      const auto [below, part] = between_knots(level / step, knots + 1);
+      row = {{below, part}, {depth_of(p), -1}};
+      if (below > 0) row.push_back({below - 1, 1 - part});
       for (int t = 0; t < terms; ++t) {
         row.push_back({first_term + t, slope_at(before->knots, level) * ring.level *
                                            presses[p].place[static_cast<std::size_t>(t)]});
       }
-      normal.add(row, -ring.sag_mm, ring.weight);
+      squares.add(row, -ring.sag_mm, ring.weight);
     }
     straight += kStraight * pixels;
     if (terms > 0) {
@@ -138,30 +102,27 @@ ChainFit solve_once(const std::vector<SagProfile>& presses, const std::vector<do
       for (int t = 0; t < terms; ++t) {
         row.push_back({first_term + t, presses[p].place[static_cast<std::size_t>(t)]});
       }
-      normal.add(row, 1 - here, kNearOne * pixels);
+      squares.add(row, 1 - here, kNearOne * pixels);
     }
     const std::optional<double>& measured = presses[p].depth_mm;
-    if (measured) normal.add(std::array{Normal::Term{depth_of(p), 1}}, *measured, kMeasured);
+    if (measured) squares.add({{depth_of(p), 1}}, *measured, kMeasured);
   }
-  for (int knot = 1; knot < knots; ++knot) {
-    row = {{unknown(knot), -2}, {unknown(knot + 1), 1}};
-    if (knot > 1) row.push_back({unknown(knot - 1), 1});
-    normal.add(row, 0, straight);
-  }
-  const cv::Mat x = normal.solve();
+  squares.add({{0, -2}, {1, 1}}, 0, straight);
+  squares.straighten(0, knots, straight);
+  const Eigen::VectorXd x = squares.solve();
 
   ChainFit fit;
   double risen = 0;
   for (int knot = 1; knot <= knots; ++knot) {
-    risen = std::max(risen, x.at<double>(unknown(knot)));
+    risen = std::max(risen, x[knot - 1]);
     fit.knots.push_back({knot * step, risen, 1});
   }
   for (std::size_t p = 0; p < presses.size(); ++p) {
-    fit.depth_mm.push_back(x.at<double>(depth_of(p)));
+    fit.depth_mm.push_back(x[depth_of(p)]);
   }
   fit.gain = gain;
   for (int t = 0; t < terms; ++t) {
-    fit.gain[static_cast<std::size_t>(t)] += x.at<double>(first_term + t);
+    fit.gain[static_cast<std::size_t>(t)] += x[first_term + t];
   }
   return fit;
 }
@@ -182,6 +143,125 @@ ChainFit fit_chain(const std::vector<SagProfile>& presses) {
   }
   fit.gaps = gaps_of(presses, fit);
   return fit;
+}
+
+namespace {
+
+constexpr double kSureOfSeen = 0.6;
+constexpr int kChainRounds = 4;  // until the contacts' radii have followed the depths
+
+/// The sure contact's radius for a depth. One that is far off in the first rounds must not empty or
+/// flood the contact.
+double reach_mm(const PressRings& press, double depth_mm) {
+  const double g = std::clamp(depth_mm, 0.0, press.ball_radius_mm);
+  const double cut = std::sqrt(g * (2 * press.ball_radius_mm - g));
+  return kSureOfSeen * std::clamp(kContactOfCut * cut, 0.5 * press.seen_mm, press.seen_mm);
+}
+
+SagProfile within(const PressRings& press, double reach) {
+  SagProfile inner = press.all;
+  const double limit = sag_mm(press.ball_radius_mm, reach);
+  std::erase_if(inner.rings, [limit](const auto& ring) { return !(ring.sag_mm < limit); });
+  return inner;
+}
+
+}  // namespace
+
+std::vector<double> gain_terms(const SettledPress& press, int terms) {
+  const double x = (press.contact.col - 0.5 * (press.map.width - 1)) * press.map.mm_per_px;
+  const double y = (press.contact.row - 0.5 * (press.map.height - 1)) * press.map.mm_per_px;
+  const std::array<double, 5> all{x, y, x * x, x * y, y * y};
+  return {all.begin(), all.begin() + terms};
+}
+
+PressRings rings_of(const SettledPress& press, std::optional<double> depth_mm, int terms) {
+  PressRings out{.all = {.rings = {}, .depth_mm = depth_mm, .place = gain_terms(press, terms)},
+                 .seen_mm = press.contact.radius_mm,
+                 .ball_radius_mm = press.contact.ball_radius_mm};
+  const double step = press.map.mm_per_px;
+  auto& rings = out.all.rings;
+  rings.resize(static_cast<std::size_t>(std::max(1.0, std::ceil(out.seen_mm / step))));
+  for (int y = 0; y < press.map.height; ++y) {
+    for (int x = 0; x < press.map.width; ++x) {
+      const double r = distance_mm(press.map, press.contact, x, y);
+      const double level = press.map.at(x, y);
+      if (!(r < out.seen_mm) || std::isnan(level)) continue;
+      auto& ring = rings[static_cast<std::size_t>(r / step)];
+      ring.level += level;
+      ring.sag_mm += sag_mm(out.ball_radius_mm, r);
+      ring.weight += 1;
+    }
+  }
+  std::erase_if(rings, [](const auto& ring) { return ring.weight == 0; });
+  for (auto& ring : rings) {
+    ring.level /= ring.weight;
+    ring.sag_mm /= ring.weight;
+  }
+  return out;
+}
+
+PressChain chain_presses(const std::vector<PressRings>& presses) {
+  PressChain chain;
+  for (const PressRings& press : presses) {
+    chain.sure.push_back(within(press, kSureOfSeen * press.seen_mm));
+  }
+  for (int round = 0; round < kChainRounds; ++round) {
+    chain.fit = fit_chain(chain.sure);
+    if (round + 1 == kChainRounds) break;
+    for (std::size_t p = 0; p < presses.size(); ++p) {
+      chain.sure[p] = within(presses[p], reach_mm(presses[p], chain.fit.depth_mm[p]));
+    }
+  }
+  return chain;
+}
+
+double MetPress::mean_error_mm() const {
+  double sum = 0;
+  double weight = 0;
+  for (const Ring& ring : rings) {
+    sum += std::abs(ring.error_mm) * ring.weight;
+    weight += ring.weight;
+  }
+  return weight > 0 ? sum / weight : std::numeric_limits<double>::quiet_NaN();
+}
+
+MetPress meet(const PressRings& press, const ChainFit& list) {
+  const double gain = gain_at(list.gain, press.all.place);
+  MetPress met;
+  double reach = kSureOfSeen * press.seen_mm;
+  for (int round = 0; round < kChainRounds; ++round) {
+    met.rings.clear();
+    double depth_mm = 0;
+    double weight = 0;
+    for (const auto& ring : within(press, reach).rings) {
+      const double level = gain * ring.level;
+      // Beyond what the others show nothing is claimed.
+      if (level > list.knots.back().level) continue;
+      const double read = interpolate(list.knots, std::max(0.0, level));
+      met.rings.push_back({-ring.sag_mm, read + ring.sag_mm, ring.weight});
+      depth_mm += ring.weight * (read + ring.sag_mm);
+      weight += ring.weight;
+    }
+    if (weight == 0) return met;
+    depth_mm = press.all.depth_mm.value_or(depth_mm / weight);
+    for (MetPress::Ring& ring : met.rings) {
+      ring.depth_mm += depth_mm;
+      ring.error_mm -= depth_mm;
+    }
+    reach = reach_mm(press, depth_mm);
+  }
+  return met;
+}
+
+LeftOut leave_each_out(const std::vector<PressRings>& presses) {
+  LeftOut out;
+  for (std::size_t left = 0; left < presses.size(); ++left) {
+    std::vector<PressRings> others = presses;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(left));
+    out.without.push_back(chain_presses(others).fit);
+    out.met.push_back(meet(presses[left], out.without.back()));
+  }
+  return out;
 }
 
 }  // namespace dtact::calibration

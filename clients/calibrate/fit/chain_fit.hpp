@@ -3,7 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "clients/calibrate/fit/list_shape.hpp"
+#include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
 
 namespace dtact::calibration {
 
@@ -54,5 +55,58 @@ struct ChainFit {
 inline constexpr double kBridgedMm = 0.15;
 /// From zero to the shallowest ring the list is a line to the origin: no darkening is no depth.
 inline constexpr double kBridgedFromZeroMm = 0.4;
+
+/// The layer's contact with a ball is narrower than the circle in which the ball cuts the untouched
+/// surface: 3.04 mm against 3.12 for a 4 mm ball 1.5 mm deep (solved for 2 to 2.5 mm thickness).
+inline constexpr double kContactOfCut = 0.97;
+
+/// A press as the chain takes it: rings of one pixel from the middle to the contact's edge as it is
+/// seen.
+struct PressRings {
+  SagProfile all;
+  double seen_mm = 0;  ///< Contact radius in the image.
+  double ball_radius_mm = 0;
+};
+
+/// What a gain with `terms` factors (0, 2 or 5) is linear in at a press: x, y, x², xy, y² of the
+/// contact's centre, millimetres from the map's.
+[[nodiscard]] std::vector<double> gain_terms(const SettledPress& press, int terms);
+
+/// `depth_mm`: of its lowest point, where it was measured. `terms`: of the gain to be fitted.
+[[nodiscard]] PressRings rings_of(const SettledPress& press, std::optional<double> depth_mm,
+                                  int terms);
+
+/// fit_chain() on the sure part of each contact (three fifths of its radius: nearer to the edge its
+/// scattered light tells). The radius follows from the depth, the depth from the chain: both in
+/// turn.
+struct PressChain {
+  std::vector<SagProfile> sure;
+  ChainFit fit;
+};
+[[nodiscard]] PressChain chain_presses(const std::vector<PressRings>& presses);
+
+/// A press under a list that it had no part in, as a user's press meets it. Free is one number: the
+/// depth of its lowest point, which nobody measured (where somebody did, nothing is). What is
+/// judged is the known shape: how the indentation that the list reads follows the sphere inside the
+/// sure contact. That sees slope and bends of the list and the gain at the press's place; an offset
+/// that the list has at all depths it cannot see.
+struct MetPress {
+  struct Ring {
+    double depth_mm = 0;
+    double error_mm = 0;  ///< List minus sphere.
+    double weight = 0;    ///< Pixels.
+  };
+  std::vector<Ring> rings;  ///< Those within the list.
+  /// Mean of the errors' sizes; NaN without rings.
+  [[nodiscard]] double mean_error_mm() const;
+};
+[[nodiscard]] MetPress meet(const PressRings& press, const ChainFit& list);
+
+/// Every press in turn under the chain of all the others.
+struct LeftOut {
+  std::vector<MetPress> met;      ///< In the presses' order.
+  std::vector<ChainFit> without;  ///< The chains that met them.
+};
+[[nodiscard]] LeftOut leave_each_out(const std::vector<PressRings>& presses);
 
 }  // namespace dtact::calibration

@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/list_fit.hpp"
-#include "clients/calibrate/fit/list_shape.hpp"
 
 namespace dtact::calibration {
 namespace {

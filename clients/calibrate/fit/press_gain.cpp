@@ -2,10 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include "clients/calibrate/fit/least_squares.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -36,12 +37,7 @@ struct Fit {
   Eigen::VectorXd knots;  ///< kKnotLevels apart, the first at no darkening.
 
   /// Of the list; beyond the last knot along the last two.
-  [[nodiscard]] double depth_at(double level) const {
-    const auto below = std::clamp<Eigen::Index>(static_cast<Eigen::Index>(level / kKnotLevels), 0,
-                                                knots.size() - 2);
-    return std::lerp(knots(below), knots(below + 1),
-                     level / kKnotLevels - static_cast<double>(below));
-  }
+  [[nodiscard]] double depth_at(double level) const { return value_at(knots, level / kKnotLevels); }
   [[nodiscard]] double slope_at(double level) const {
     return (depth_at(level + kKnotLevels) - depth_at(level - kKnotLevels)) / (2 * kKnotLevels);
   }
@@ -60,55 +56,48 @@ double error_of(const Fit& fit, const PressSample& s, double ball) {
 /// One round: knots anew, gain and middle moved along their slopes at `before`.
 Fit solve(std::span<const PressSample> samples, double ball, const Fit* before,
           const PressGain& start, double mean_square) {
-  const auto n = static_cast<Eigen::Index>(samples.size());
   const auto terms = before == nullptr ? 0 : terms_of(start.order);
   const auto middle = terms > 0 ? 2 : 0;  // what it gains alone is nothing, without a gain
   double deepest = kKnotLevels;
   for (const PressSample& s : samples) deepest = std::max(deepest, darkening(start, s));
   const auto knots = static_cast<Eigen::Index>(std::ceil(deepest / kKnotLevels)) + 1;
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(n, knots + terms + middle);
-  Eigen::VectorXd values(n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const PressSample& s = samples[static_cast<std::size_t>(i)];
+  LeastSquares squares(knots + terms + middle);
+  std::vector<LeastSquares::Term> row;
+  for (const PressSample& s : samples) {
     const double level = darkening(start, s);
-    const auto below = std::min(knots - 2, static_cast<Eigen::Index>(level / kKnotLevels));
-    const double part = level / kKnotLevels - static_cast<double>(below);
-    rows(i, below) = 1 - part;
-    rows(i, below + 1) = part;
+    const auto [below, part] = between_knots(level / kKnotLevels, knots);
+    row = {{below, 1 - part}, {below + 1, part}};
     const double dx = s.x_mm - start.right_mm;
     const double dy = s.y_mm - start.down_mm;
     const double r = std::hypot(dx, dy);
-    values(i) = -sag_mm(ball, r);
-    if (before == nullptr) continue;
+    double value = -sag_mm(ball, r);
+    const auto along = [&](Eigen::Index unknown, double slope, double now) {
+      row.push_back({unknown, slope});
+      value += slope * now;
+    };
     const std::array<double, 4> place = terms_at(s.x_mm, s.y_mm);
-    const double per_factor = before->slope_at(level) * s.level;
     for (Eigen::Index t = 0; t < terms; ++t) {
-      rows(i, knots + t) = per_factor * place[static_cast<std::size_t>(t)];
-      values(i) += rows(i, knots + t) * start.factors[static_cast<std::size_t>(t)];
+      const auto term = static_cast<std::size_t>(t);
+      along(knots + t, before->slope_at(level) * s.level * place[term], start.factors[term]);
     }
-    if (middle == 0) continue;
-    const double height = std::sqrt(std::max(0.01 * ball * ball, ball * ball - r * r));
-    rows(i, knots + terms) = -dx / height;
-    rows(i, knots + terms + 1) = -dy / height;
-    values(i) += rows(i, knots + terms) * start.right_mm;
-    values(i) += rows(i, knots + terms + 1) * start.down_mm;
+    if (middle > 0) {
+      const double height = std::sqrt(std::max(0.01 * ball * ball, ball * ball - r * r));
+      along(knots + terms, -dx / height, start.right_mm);
+      along(knots + terms + 1, -dy / height, start.down_mm);
+    }
+    squares.add(row, value, 1);
   }
-  Eigen::MatrixXd normal = rows.transpose() * rows;
-  const auto count = static_cast<double>(n);
-  const Eigen::RowVector3d bend(1, -2, 1);
-  for (Eigen::Index k = 0; k + 2 < knots; ++k) {
-    normal.block<3, 3>(k, k) += kStraight * count * bend.transpose() * bend;
-  }
+  const auto count = static_cast<double>(samples.size());
+  squares.straighten(0, knots, kStraight * count);
   const double expected = count / kIndependent * mean_square;
   for (Eigen::Index t = 0; t < terms; ++t) {
     const double factor = kFactors[static_cast<std::size_t>(t)];
-    normal(knots + t, knots + t) += expected / (factor * factor);
+    squares.add({{knots + t, 1}}, 0, expected / (factor * factor));
   }
   for (Eigen::Index m = 0; m < middle; ++m) {
-    normal(knots + terms + m, knots + terms + m) += expected / (kMiddleMm * kMiddleMm);
+    squares.add({{knots + terms + m, 1}}, 0, expected / (kMiddleMm * kMiddleMm));
   }
-  normal.diagonal().array() += 1e-9 * count;  // a knot that no sample sees
-  const Eigen::VectorXd found = normal.ldlt().solve(rows.transpose() * values);
+  const Eigen::VectorXd found = squares.solve();
   Fit fit{start, found.head(knots)};
   for (Eigen::Index t = 0; t < terms; ++t) {
     fit.gain.factors[static_cast<std::size_t>(t)] = found(knots + t);

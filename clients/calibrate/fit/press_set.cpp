@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/calibrate/fit/chain_fit.hpp"
 #include "clients/calibrate/fit/list_worth.hpp"
-#include "clients/calibrate/fit/press_chain.hpp"
 
 namespace dtact::calibration {
 namespace {

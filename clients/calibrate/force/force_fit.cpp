@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <opencv2/core.hpp>
 #include <stdexcept>
 
 namespace dtact::force {
@@ -68,23 +68,23 @@ class Readings {
   }
 
   /// Modulus, and modulus times zero. `left_out`: a pair that has no part in it.
-  [[nodiscard]] cv::Vec2d fit(std::size_t left_out = SIZE_MAX) const {
-    cv::Matx22d normal = cv::Matx22d::zeros();
-    cv::Vec2d right;
+  [[nodiscard]] Eigen::Vector2d fit(std::size_t left_out = SIZE_MAX) const {
+    Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d right = Eigen::Vector2d::Zero();
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       if (i == left_out) continue;
       const double weight = 1 / square(tolerance(i));
-      normal += weight * rows_[i] * rows_[i].t();
+      normal += weight * rows_[i] * rows_[i].transpose();
       right += weight * pairs_[i].newtons * rows_[i];
     }
     const double modulus = right[0] / normal(0, 0);  // without a zero
     normal(1, 1) += 1 / square(modulus * kZeroMm);
-    return normal.inv(cv::DECOMP_CHOLESKY) * right;
+    return normal.llt().solve(right);
   }
-  [[nodiscard]] double error(std::size_t i, const cv::Vec2d& numbers) const {
+  [[nodiscard]] double error(std::size_t i, const Eigen::Vector2d& numbers) const {
     return rows_[i].dot(numbers) - pairs_[i].newtons;
   }
-  [[nodiscard]] double cost(const cv::Vec2d& numbers) const {
+  [[nodiscard]] double cost(const Eigen::Vector2d& numbers) const {
     double sum = square(numbers[1] / numbers[0] / kZeroMm);
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       sum += square(error(i, numbers) / tolerance(i));
@@ -97,7 +97,7 @@ class Readings {
   [[nodiscard]] double tolerance(std::size_t i) const { return 0.02 * pairs_[i].newtons + 0.005; }
 
   const std::vector<Pair>& pairs_;
-  std::vector<cv::Vec2d> rows_;
+  std::vector<Eigen::Vector2d> rows_;
 };
 
 double fitted_thickness(const std::vector<Pair>& pairs) {
@@ -120,7 +120,7 @@ Fit fit_force(const std::vector<Pair>& pairs, std::optional<double> thickness_mm
   check(pairs);
   const double thickness = thickness_mm ? *thickness_mm : fitted_thickness(pairs);
   const Readings readings(pairs, thickness);
-  const cv::Vec2d numbers = readings.fit();
+  const Eigen::Vector2d numbers = readings.fit();
   const auto [lightest, heaviest] = std::ranges::minmax(pairs, {}, &Pair::newtons);
   Fit fit;
   double share = 0;

@@ -8,9 +8,17 @@
 #include "clients/calibrate/guided/cells.hpp"
 #include "clients/calibrate/guided/console.hpp"
 #include "clients/calibrate/guided/sensor.hpp"
-#include "clients/calibrate/guided/still.hpp"
+#include "hal/image/png.hpp"
 
 namespace dtact::ctl::guided {
+
+/// Frames of a surface that held still.
+struct Still {
+  std::vector<image::Grey8> frames;
+  CellMeans cells;          ///< Mean of all.
+  double drift_levels = 0;  ///< The largest change of a cell from the first half to the last.
+  double noise_levels = 0;  ///< Standard deviation of a pixel from frame to frame.
+};
 
 /// The user or the input ended the session.
 struct Ended {

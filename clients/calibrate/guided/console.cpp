@@ -1,14 +1,60 @@
 #include "clients/calibrate/guided/console.hpp"
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <cerrno>
 #include <ostream>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "clients/calibrate/guided/preview.hpp"
+#include "clients/common/guided.pb.h"
+#include "clients/common/json.hpp"
 
 namespace dtact::ctl::guided {
+namespace {
+
+std::string trimmed(const std::string& text) {
+  constexpr const char* kBlanks = " \t\r";
+  const std::size_t first = text.find_first_not_of(kBlanks);
+  if (first == std::string::npos) return {};
+  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
+}
+
+}  // namespace
+
+std::size_t LineInput::fetch() {
+  pollfd waiting{descriptor_, POLLIN, 0};
+  if (ended_ || ::poll(&waiting, 1, 0) <= 0) return 0;
+  std::array<char, 4096> chunk{};
+  const ssize_t count = ::read(descriptor_, chunk.data(), chunk.size());
+  if (count < 0) {
+    ended_ = errno != EINTR && errno != EAGAIN;
+    return 0;
+  }
+  ended_ = count == 0;
+  const std::string_view text(chunk.data(), static_cast<std::size_t>(count));
+  buffer_ += text;
+  return static_cast<std::size_t>(std::ranges::count(text, '\n'));
+}
+
+Typed LineInput::take() {
+  if (const std::size_t end = buffer_.find('\n'); end != std::string::npos) {
+    Typed line{Typed::Kind::line, trimmed(buffer_.substr(0, end))};
+    buffer_.erase(0, end + 1);
+    return line;
+  }
+  if (!ended_) return {};
+  // A last line need not end in a newline.
+  if (!buffer_.empty()) return {Typed::Kind::line, trimmed(std::exchange(buffer_, {}))};
+  return {Typed::Kind::end, {}};
+}
+
 namespace {
 
 /// Of a picture in the terminal.
@@ -85,6 +131,46 @@ void StreamConsole::clear_live() {
   if (live_lines_ > 1) out_ << "\x1b[" << live_lines_ - 1 << 'A';
   out_ << "\x1b[J";
   live_lines_ = 0;
+}
+
+JsonConsole::JsonConsole(int in, std::ostream& out, std::function<bool()> interrupted)
+    : in_(in), out_(out), interrupted_(std::move(interrupted)) {}
+
+Typed JsonConsole::typed() {
+  if (interrupted_()) return {Typed::Kind::interrupted, {}};
+  (void)in_.fetch();
+  return in_.take();
+}
+
+void JsonConsole::say(const std::string& text) {
+  cli::GuidedLine line;
+  line.set_said(text);
+  out_ << cli::json_line(line) << std::flush;
+}
+
+void JsonConsole::live(const Scene& scene) {
+  cli::GuidedLine line;
+  cli::GuidedScene& told = *line.mutable_scene();
+  if (scene.picture != nullptr) told.set_picture_png(image::encode_png(*scene.picture));
+  told.set_mm_per_px(scene.mm_per_px);
+  told.set_words(scene.words);
+  told.set_prompt(scene.prompt.text);
+  for (const Answer& answer : scene.prompt.answers) {
+    cli::GuidedAnswer& added = *told.add_answers();
+    added.set_key(answer.key);
+    added.set_words(answer.words);
+  }
+  for (const TakenPress& press : scene.presses) {
+    cli::GuidedPress& added = *told.add_presses();
+    added.set_name(press.name);
+    added.set_col(press.col);
+    added.set_row(press.row);
+    added.set_radius_px(press.radius_px);
+    added.set_depth_mm(press.depth_mm);
+  }
+  told.set_covered_mm(scene.covered_mm);
+  told.set_presses_wanted(static_cast<std::uint32_t>(scene.presses_wanted));
+  out_ << cli::json_line(line) << std::flush;
 }
 
 }  // namespace dtact::ctl::guided

@@ -1,15 +1,46 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <iosfwd>
 #include <string>
 #include <vector>
 
-#include "clients/calibrate/guided/line_input.hpp"
-#include "clients/calibrate/guided/taken_press.hpp"
 #include "hal/image/png.hpp"
 
 namespace dtact::ctl::guided {
+
+/// A press that was taken, on the depth map.
+struct TakenPress {
+  std::string name;
+  double col = 0;  ///< Of the contact's middle, pixels.
+  double row = 0;
+  double radius_px = 0;
+  double depth_mm = 0;  ///< Of its lowest point: as fitted, else by the contact's width.
+};
+
+/// What the user typed since it was last asked.
+struct Typed {
+  enum class Kind { nothing, line, end, interrupted };
+  Kind kind = Kind::nothing;
+  std::string line;  ///< Without blanks around it.
+};
+
+/// Lines of a descriptor, which is not owned; nothing here waits.
+class LineInput {
+ public:
+  explicit LineInput(int descriptor) : descriptor_(descriptor) {}
+
+  /// Reads what lies ready. Returns how many lines ended in it.
+  std::size_t fetch();
+  /// The next line of what was read.
+  [[nodiscard]] Typed take();
+
+ private:
+  int descriptor_;
+  std::string buffer_;
+  bool ended_ = false;
+};
 
 /// What the user may type.
 struct Answer {
@@ -86,6 +117,26 @@ class StreamConsole : public Console {
   bool interactive_;
   std::function<bool()> interrupted_;
   std::size_t live_lines_ = 0;
+};
+
+/// Speaks with a program that shows the session to a person, in lines of JSON
+/// (clients/common/guided.proto).
+class JsonConsole : public Console {
+ public:
+  /// `in`: a descriptor, not owned.
+  JsonConsole(int in, std::ostream& out, std::function<bool()> interrupted);
+
+  [[nodiscard]] bool interactive() const override { return true; }
+  [[nodiscard]] Typed typed() override;
+  [[nodiscard]] bool interrupted() const override { return interrupted_(); }
+  void say(const std::string& text) override;
+  void keep(const image::Grey8&) override {}
+  void live(const Scene& scene) override;
+
+ private:
+  LineInput in_;
+  std::ostream& out_;
+  std::function<bool()> interrupted_;
 };
 
 }  // namespace dtact::ctl::guided

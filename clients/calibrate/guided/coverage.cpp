@@ -7,7 +7,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "clients/calibrate/fit/plausibility.hpp"
+#include "clients/calibrate/fit/evaluate.hpp"
 
 namespace dtact::ctl::guided {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/calibrate/guided/taken_press.hpp"
+#include "clients/calibrate/guided/console.hpp"
 #include "clients/calibrate/offline/depth_build.hpp"
 
 namespace dtact::ctl::guided {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/calibrate/guided/still.hpp"
+#include "clients/calibrate/guided/capture.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "proto/dtact.pb.h"
 

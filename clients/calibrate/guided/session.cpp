@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "clients/calibrate/fit/plausibility.hpp"
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/guided/fitness.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"

@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "daemon/calibration/sensor_file.hpp"
+#include "daemon/calibration/sensor_files.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/base/atomic_folder.hpp"
 #include "hal/toml/key_reader.hpp"

@@ -1,5 +1,6 @@
 #include "clients/calibrate/lens/pin_fit.hpp"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 
@@ -28,9 +29,10 @@ std::vector<Point> sample(double sigma, double mm_per_px) {
 PinFit::PinFit(const cv::Mat1f& image, double pitch_mm, double mm_per_px)
     : image_(image), sigma_(pitch_mm / 5), points_(sample(sigma_, mm_per_px)) {
   constexpr int kTerms = 10;
-  cv::Mat1d design(static_cast<int>(points_.size()), kTerms);
-  weights_ = cv::Mat1d(static_cast<int>(points_.size()), 1);
-  int i = 0;
+  const auto count = static_cast<Eigen::Index>(points_.size());
+  Eigen::MatrixXd design(count, kTerms);
+  weights_.resize(count);
+  Eigen::Index i = 0;
   for (const Point& p : points_) {
     const double x = p.x / sigma_;
     const double y = p.y / sigma_;
@@ -38,57 +40,53 @@ PinFit::PinFit(const cv::Mat1f& image, double pitch_mm, double mm_per_px)
     const double terms[kTerms] = {1,     x,         y,         x * x,     x * y,
                                   y * y, x * x * x, x * x * y, x * y * y, y * y * y};
     for (int t = 0; t < kTerms; ++t) design(i, t) = weight * terms[t];
-    weights_(i++) = weight;
+    weights_[i++] = weight;
   }
-  cv::invert(design, solver_, cv::DECOMP_SVD);
+  solver_ = design.completeOrthogonalDecomposition().pseudoInverse();
 }
 
 double PinFit::height_noise(double pixel_noise) const {
-  double sum = 0;
-  for (int i = 0; i < solver_.cols; ++i) {
-    const double part = (solver_(3, i) + solver_(5, i)) * weights_(i);
-    sum += part * part;
-  }
-  return pixel_noise * std::sqrt(sum);
+  const Eigen::RowVectorXd height = solver_.row(3) + solver_.row(5);
+  return pixel_noise * height.cwiseProduct(weights_.transpose()).norm();
 }
 
 std::optional<PinFit::Peak> PinFit::find(const Lens& lens, Point start, double reach_mm) const {
   constexpr int kSteps = 40;
   Point at = start;
   for (int step = 0; step < kSteps; ++step) {
-    const std::optional<cv::Mat1d> fit = fit_at(lens, at);
+    const std::optional<Eigen::VectorXd> fit = fit_at(lens, at);
     if (!fit) return std::nullopt;
-    const cv::Mat1d& c = *fit;
-    const cv::Matx22d bend(2 * c(3), c(4), c(4), 2 * c(5));
-    const bool peak = c(3) + c(5) < 0 && cv::determinant(bend) > 0;
+    const Eigen::VectorXd& c = *fit;
+    const Eigen::Matrix2d bend{{2 * c[3], c[4]}, {c[4], 2 * c[5]}};
+    const bool peak = c[3] + c[5] < 0 && bend.determinant() > 0;
     // Uphill by half of Newton's step where the surface is a peak (the cubic terms change with
     // the place, so that the slope falls about twice as fast as the bend says and the whole step
     // swings about the peak), else along the slope; at most half a sigma, as far as the fit is to
     // be trusted.
-    const cv::Vec2d slope(c(1), c(2));
-    cv::Vec2d move = peak ? -0.5 * (bend.inv() * slope) : 1e9 * slope;
-    const double size = cv::norm(move);
+    const Eigen::Vector2d slope(c[1], c[2]);
+    Eigen::Vector2d move = peak ? Eigen::Vector2d(-0.5 * bend.inverse() * slope) : 1e9 * slope;
+    const double size = move.norm();
     if (size > 0.5) move *= 0.5 / size;
     at = {at.x + move[0] * sigma_, at.y + move[1] * sigma_};
     if (std::hypot(at.x - start.x, at.y - start.y) > reach_mm) return std::nullopt;
-    if (peak && size < 1e-3) return Peak{at, -(c(3) + c(5))};
+    if (peak && size < 1e-3) return Peak{at, -(c[3] + c[5])};
   }
   return std::nullopt;
 }
 
-std::optional<cv::Mat1d> PinFit::fit_at(const Lens& lens, Point at) const {
-  cv::Mat1d values(static_cast<int>(points_.size()), 1);
-  int i = 0;
+std::optional<Eigen::VectorXd> PinFit::fit_at(const Lens& lens, Point at) const {
+  Eigen::VectorXd values(weights_.size());
+  Eigen::Index i = 0;
   for (const Point& p : points_) {
     const Point px = project(lens, {at.x + p.x, at.y + p.y});
     if (!(px.x > -image_.cols && px.x < 2 * image_.cols && px.y > -image_.rows &&
           px.y < 2 * image_.rows)) {
       return std::nullopt;
     }
-    values(i) = weights_(i) * bilinear(px);
+    values[i] = weights_[i] * bilinear(px);
     ++i;
   }
-  return cv::Mat1d(solver_ * values);
+  return solver_ * values;
 }
 
 /// Beyond the frame its edge goes on, so that a pin at the edge is not cut off.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
@@ -29,14 +30,15 @@ class PinFit {
                                          double reach_mm) const;
 
  private:
-  [[nodiscard]] std::optional<cv::Mat1d> fit_at(const recon::Lens& lens, recon::Point at) const;
+  [[nodiscard]] std::optional<Eigen::VectorXd> fit_at(const recon::Lens& lens,
+                                                      recon::Point at) const;
   [[nodiscard]] double bilinear(recon::Point px) const;
 
   const cv::Mat1f& image_;
   double sigma_;
   std::vector<recon::Point> points_;
-  cv::Mat1d weights_;
-  cv::Mat1d solver_;
+  Eigen::VectorXd weights_;
+  Eigen::MatrixXd solver_;
 };
 
 }  // namespace dtact::ctl

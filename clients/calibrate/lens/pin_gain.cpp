@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -37,21 +38,22 @@ struct Surface {
 
 /// Least squares over all pins but `out`.
 Surface fit(const std::vector<Pin>& pins, bool quadratic, std::size_t out) {
-  const int terms = quadratic ? 6 : 3;
-  cv::Mat1d a(0, terms);
-  cv::Mat1d b(0, 1);
+  const Eigen::Index terms = quadratic ? 6 : 3;
+  const auto count = static_cast<Eigen::Index>(pins.size() - (out < pins.size() ? 1 : 0));
+  Eigen::MatrixXd a(count, terms);
+  Eigen::VectorXd b(count);
+  Eigen::Index row = 0;
   for (std::size_t i = 0; i < pins.size(); ++i) {
     if (i == out) continue;
     const Pin& p = pins[i];
-    const double row[] = {
-        1, p.x, p.y, -p.levels * p.x * p.x, -p.levels * p.x * p.y, -p.levels * p.y * p.y};
-    a.push_back(cv::Mat1d(1, terms, const_cast<double*>(row)).clone());
-    b.push_back(p.levels);
+    Eigen::RowVectorXd all(6);
+    all << 1, p.x, p.y, -p.levels * p.x * p.x, -p.levels * p.x * p.y, -p.levels * p.y * p.y;
+    a.row(row) = all.head(terms);
+    b[row++] = p.levels;
   }
-  cv::Mat1d x;
-  cv::solve(a, b, x, cv::DECOMP_SVD);
-  Surface surface{{x(0), x(1), x(2)}, {}};
-  if (quadratic) surface.q = {x(3), x(4), x(5)};
+  const Eigen::VectorXd x = a.completeOrthogonalDecomposition().solve(b);
+  Surface surface{{x[0], x[1], x[2]}, {}};
+  if (quadratic) surface.q = {x[3], x[4], x[5]};
   return surface;
 }
 

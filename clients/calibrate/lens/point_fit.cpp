@@ -4,10 +4,10 @@
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <opencv2/core.hpp>
 #include <stdexcept>
 #include <string>
 
@@ -60,15 +60,18 @@ Units units_of(std::span<const Mark> marks) {
 /// Parameters in `units`: eight of the homography, two of the centre, the radial ones.
 using Parameters = std::vector<double>;
 
+Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>> homography_of(Lens& lens) {
+  return Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(lens.homography.data());
+}
+
 Lens lens_of(const Parameters& p, const Units& u) {
-  const cv::Matx33d inner(p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], 1);
-  const cv::Matx33d to_px(u.px_size, 0, u.px.x, 0, u.px_size, u.px.y, 0, 0, 1);
-  const cv::Matx33d from_mm(1 / u.mm_size, 0, -u.mm.x / u.mm_size, 0, 1 / u.mm_size,
-                            -u.mm.y / u.mm_size, 0, 0, 1);
-  cv::Matx33d h = to_px * inner * from_mm;
-  h = h * (1 / h(2, 2));
+  const Eigen::Matrix3d inner{{p[0], p[1], p[2]}, {p[3], p[4], p[5]}, {p[6], p[7], 1}};
+  const Eigen::Matrix3d to_px{{u.px_size, 0, u.px.x}, {0, u.px_size, u.px.y}, {0, 0, 1}};
+  const Eigen::Matrix3d from_mm{
+      {1 / u.mm_size, 0, -u.mm.x / u.mm_size}, {0, 1 / u.mm_size, -u.mm.y / u.mm_size}, {0, 0, 1}};
+  const Eigen::Matrix3d h = to_px * inner * from_mm;
   Lens lens;
-  std::copy(std::begin(h.val), std::end(h.val), lens.homography.begin());
+  homography_of(lens) = h / h(2, 2);
   lens.centre_col = u.px.x + p[8] * u.px_size;
   lens.centre_row = u.px.y + p[9] * u.px_size;
   lens.radius_px = u.px_size;
@@ -107,9 +110,10 @@ class MarkCost {
 };
 
 Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t terms) {
-  cv::Mat1d a(static_cast<int>(marks.size()), 3);
-  cv::Mat1d b(static_cast<int>(marks.size()), 2);
-  int i = 0;
+  const auto count = static_cast<Eigen::Index>(marks.size());
+  Eigen::MatrixX3d a(count, 3);
+  Eigen::MatrixX2d b(count, 2);
+  Eigen::Index i = 0;
   for (const Mark& mark : marks) {
     a(i, 0) = (mark.mm.x - u.mm.x) / u.mm_size;
     a(i, 1) = (mark.mm.y - u.mm.y) / u.mm_size;
@@ -121,12 +125,11 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
   // Places on a line leave one direction of the plane open. The places are in units of their own
   // extent, so that noise alone stays far below a thousandth.
   constexpr double kLine = 1e-3;
-  const cv::SVD svd(a);
-  cv::Mat1d x;
-  svd.backSubst(b, x);
-  if (svd.w.at<double>(2) < kLine * svd.w.at<double>(0)) {
+  const Eigen::BDCSVD<Eigen::MatrixX3d> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  if (svd.singularValues()[2] < kLine * svd.singularValues()[0]) {
     throw std::runtime_error("lens: the points lie on a line; use a board with several rows");
   }
+  const Eigen::MatrixX2d x = svd.solve(b);
   Parameters p(kHomography + 2 + terms, 0.0);
   for (int c = 0; c < 3; ++c) {
     p[static_cast<std::size_t>(c)] = x(c, 0);
@@ -193,9 +196,10 @@ std::vector<Point> residuals_mm(const Lens& lens, std::span<const Mark> marks) {
     const Point at = project(lens, mark.mm);
     const Point right = project(lens, {mark.mm.x + kStep, mark.mm.y});
     const Point below = project(lens, {mark.mm.x, mark.mm.y + kStep});
-    const cv::Matx22d jacobian((right.x - at.x) / kStep, (below.x - at.x) / kStep,
-                               (right.y - at.y) / kStep, (below.y - at.y) / kStep);
-    const cv::Vec2d mm = jacobian.inv() * cv::Vec2d(mark.px.x - at.x, mark.px.y - at.y);
+    const Eigen::Matrix2d jacobian{{(right.x - at.x) / kStep, (below.x - at.x) / kStep},
+                                   {(right.y - at.y) / kStep, (below.y - at.y) / kStep}};
+    const Eigen::Vector2d mm =
+        jacobian.inverse() * Eigen::Vector2d(mark.px.x - at.x, mark.px.y - at.y);
     residuals.push_back({mm[0], mm[1]});
   }
   return residuals;
@@ -273,12 +277,11 @@ void level(Lens& lens, std::span<Mark> marks) {
   // J = R·S with S symmetric: the rotation's angle is that of (J + cofactor(J)).
   const double angle =
       std::atan2((right.y - at.y) - (below.x - at.x), (right.x - at.x) + (below.y - at.y));
-  const cv::Matx33d turn(std::cos(angle), std::sin(angle), 0, -std::sin(angle), std::cos(angle), 0,
-                         0, 0, 1);
-  const cv::Matx33d h = cv::Matx33d(lens.homography.data()) * turn;
-  std::copy(std::begin(h.val), std::end(h.val), lens.homography.begin());
+  const Eigen::Matrix3d turn{
+      {std::cos(angle), std::sin(angle), 0}, {-std::sin(angle), std::cos(angle), 0}, {0, 0, 1}};
+  homography_of(lens) *= turn;
   for (Mark& mark : marks) {
-    const cv::Vec3d mm = turn.t() * cv::Vec3d(mark.mm.x, mark.mm.y, 1);
+    const Eigen::Vector3d mm = turn.transpose() * Eigen::Vector3d(mark.mm.x, mark.mm.y, 1);
     mark.mm = {mm[0], mm[1]};
   }
 }

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/difference.hpp"
-#include "clients/calibrate/offline/colour_map.hpp"
+#include "clients/calibrate/offline/drawing.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "hal/base/atomic_file.hpp"
@@ -22,7 +22,7 @@ struct Options {
 };
 
 void run(const Options& options) {
-  const cli::DepthEncoder encode = cli::encoder_for(options.output, encode_colour_png);
+  const cli::DepthEncoder encode = cli::encoder_for(options.output, encode_legend_png);
   const calibration::Calibration calibration = calibration::load(options.calibration);
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet frame = load_images({options.frame}, "--frame");

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/calibrate/fit/plausibility.hpp"
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/offline/depth_build.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 

@@ -9,10 +9,9 @@
 #include "clients/calibrate/lens/chessboard.hpp"
 #include "clients/calibrate/lens/pin_gain.hpp"
 #include "clients/calibrate/lens/pins.hpp"
-#include "clients/calibrate/offline/board_images.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
-#include "daemon/calibration/lens_file.hpp"
+#include "daemon/calibration/sensor_files.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::ctl {

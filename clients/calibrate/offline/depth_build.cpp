@@ -7,11 +7,10 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/fit/model/layered_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
-#include "clients/calibrate/fit/plausibility.hpp"
-#include "daemon/calibration/lens_file.hpp"
-#include "daemon/calibration/sensor_file.hpp"
+#include "daemon/calibration/sensor_files.hpp"
 
 namespace dtact::ctl {
 namespace {

@@ -3,6 +3,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "clients/common/depth_file.hpp"
 #include "hal/image/png.hpp"
 
 namespace dtact::ctl {
@@ -19,5 +20,8 @@ void draw_text(Picture& picture, cv::Point corner, const std::string& text,
                const cv::Scalar& colour);
 
 [[nodiscard]] image::Rgb8 to_image(const Picture& picture);
+
+/// PNG: the map in colours beside a legend in millimetres, a bar of the scale below.
+[[nodiscard]] std::string encode_legend_png(const cli::DepthImage& depth);
 
 }  // namespace dtact::ctl

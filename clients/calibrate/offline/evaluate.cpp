@@ -2,12 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
-#include <stdexcept>
 
-#include "clients/calibrate/fit/plausibility.hpp"
-#include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
 #include "clients/common/json.hpp"
@@ -21,9 +17,6 @@ struct EvaluationOptions {
   std::vector<std::string> reference;
   std::vector<std::string> ball;
   double radius_mm = 0;
-  std::string folder;
-  Board board;
-  std::string page;
 };
 
 cli::BallReport report_of(const calibration::Evaluation& e) {
@@ -47,49 +40,6 @@ cli::BallReport report_of(const calibration::Evaluation& e) {
   }
   for (const std::string& doubt : calibration::doubts_about(e)) report.add_doubts(doubt);
   return report;
-}
-
-cli::LensReport report_of(const PinPress& pins) {
-  cli::LensReport report;
-  report.set_pins(pins.marks.size());
-  for (const std::string& missing : pins.missing) report.add_missing(missing);
-  report.set_rows(pins.rows);
-  report.set_cols(pins.cols);
-  report.set_rms_mm(rms(pins.lens.in_sample));
-  report.set_left_out_rms_mm(rms(pins.lens.left_out));
-  report.set_parameters(parameters(pins.lens.model));
-  report.set_mm_per_px(recon::central_mm_per_px(pins.lens.lens));
-  return report;
-}
-
-cli::PinDepthsReport report_of(const PinDepths& depths) {
-  cli::PinDepthsReport report;
-  report.set_pins(depths.mm.size());
-  report.set_mean_mm(depths.mean_mm);
-  report.set_spread(depths.spread);
-  report.set_tilt_x_um_per_mm(depths.tilt_x_um_per_mm);
-  report.set_tilt_y_um_per_mm(depths.tilt_y_um_per_mm);
-  return report;
-}
-
-cli::FolderReport report_of(const FolderEvaluation& e) {
-  cli::FolderReport report;
-  report.set_lens_skipped(e.no_pins);
-  if (e.pins) *report.mutable_lens() = report_of(*e.pins);
-  report.set_ball_skipped(e.no_ball);
-  if (e.ball && e.calibration) {  // which made it
-    *report.mutable_ball() = report_of(*e.ball);
-    for (const std::string& doubt : calibration::doubts_about(e.calibration->model->list)) {
-      report.mutable_ball()->add_doubts(doubt);
-    }
-  }
-  report.set_pin_depths_skipped(e.no_pin_depths);
-  if (e.pin_depths) *report.mutable_pin_depths() = report_of(*e.pin_depths);
-  return report;
-}
-
-void print_json(const google::protobuf::Message& report) {
-  fmt::print("{}", cli::json_line(report));
 }
 
 void print_text(const calibration::Evaluation& e) {
@@ -117,32 +67,18 @@ void print_text(const calibration::Evaluation& e) {
   for (const std::string& doubt : calibration::doubts_about(e)) fmt::print("doubtful: {}\n", doubt);
 }
 
-void run_folder(const EvaluationOptions& options, bool json) {
-  constexpr double kUsualRadius = 4.0;  // mm, of the ball that this kind of sensor comes with
-  const std::filesystem::path folder = std::filesystem::weakly_canonical(options.folder);
-  const FolderEvaluation e = evaluate_folder(
-      folder, options.board, options.radius_mm > 0 ? options.radius_mm : kUsualRadius);
-  if (!options.page.empty()) write_page(e, folder.filename().string(), options.page);
-  if (json) return print_json(report_of(e));
-  for (const std::string& line : lines_of(e)) fmt::print("{}\n", line);
-  if (options.page.empty()) return;
-  fmt::print("page: {}\n", (std::filesystem::path(options.page) / "index.html").string());
-}
-
 void run(const EvaluationOptions& options, bool json) {
-  if (!options.folder.empty()) return run_folder(options, json);
-  if (options.calibration.empty() || options.reference.empty() || options.ball.empty() ||
-      options.radius_mm == 0) {
-    throw std::runtime_error(
-        "give --folder, or --calibration, --reference, --ball and --radius-mm");
-  }
   const calibration::Calibration calibration = calibration::load(options.calibration);
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet ball = load_images(options.ball, "--ball");
   require_same_size(reference, "--reference", ball, "--ball");
   const calibration::Evaluation evaluation = calibration::evaluate(
       calibration, reference.mean_q8().pixels, ball.frames(), options.radius_mm);
-  json ? print_json(report_of(evaluation)) : print_text(evaluation);
+  if (json) {
+    fmt::print("{}", cli::json_line(report_of(evaluation)));
+  } else {
+    print_text(evaluation);
+  }
 }
 
 }  // namespace
@@ -152,42 +88,21 @@ void add_evaluate(CLI::App& app, const bool& json) {
       app.add_subcommand("evaluate", "Compare a calibration with the press of a ball");
   const auto options = std::make_shared<EvaluationOptions>();
   evaluate->add_option("--calibration", options->calibration, "Calibration folder")
-      ->type_name("FOLDER");
+      ->type_name("FOLDER")
+      ->required();
   evaluate
       ->add_option("--reference", options->reference,
                    "Untouched surface: PNG files, or a folder of them (averaged)")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->required();
   evaluate
       ->add_option("--ball", options->ball,
                    "The ball pressed in: PNG files, or a folder of them (averaged)")
-      ->type_name("FILE");
-  evaluate
-      ->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm (with --folder: 4)")
+      ->type_name("FILE")
+      ->required();
+  evaluate->add_option("--radius-mm", options->radius_mm, "Radius of the ball, mm")
+      ->required()
       ->check(CLI::Range(0.1, 100.0));
-  CLI::Option* folder =
-      evaluate
-          ->add_option("--folder", options->folder,
-                       "Folder with board_reference.png, board.png, ball_reference.png, ball.png: "
-                       "measures the lens and makes and judges a calibration through it")
-          ->type_name("FOLDER")
-          ->excludes("--calibration")
-          ->excludes("--reference")
-          ->excludes("--ball");
-  evaluate->add_option("--pin-rows", options->board.rows, "Rows of the board's pins")
-      ->capture_default_str()
-      ->check(CLI::Range(2, 100))
-      ->needs(folder);
-  evaluate->add_option("--pin-cols", options->board.cols, "Columns of the board's pins")
-      ->capture_default_str()
-      ->check(CLI::Range(2, 100))
-      ->needs(folder);
-  evaluate->add_option("--pitch-mm", options->board.pitch_mm, "Distance of neighbouring pins, mm")
-      ->capture_default_str()
-      ->check(CLI::Range(0.1, 100.0))
-      ->needs(folder);
-  evaluate->add_option("-o,--output", options->page, "Folder for a page of pictures")
-      ->type_name("FOLDER")
-      ->needs(folder);
   evaluate->callback([options, &json] { run(*options, json); });
 }
 

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "daemon/calibration/sha256.hpp"
+#include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
 
 namespace dtact::ctl {
@@ -80,6 +80,23 @@ void require_same_size(const ImageSet& a, const std::string& a_option, const Ima
   throw std::runtime_error(
       fmt::format("{} is {}x{} but {} is {}x{}; both must come from one camera mode", a_option,
                   a.width(), a.height(), b_option, b.width(), b.height()));
+}
+
+cv::Mat1f mean_levels(const ImageSet& set) {
+  const image::Grey16 mean = set.mean_q8();
+  cv::Mat1f levels(mean.height, mean.width);
+  std::ranges::transform(mean.pixels, levels.begin(),
+                         [](std::uint16_t q8) { return static_cast<float>(q8) / 256; });
+  return levels;
+}
+
+std::vector<cv::Mat1b> grey_images(const ImageSet& set) {
+  std::vector<cv::Mat1b> images;
+  for (const image::Grey8& frame : set.frames()) {
+    images.emplace_back(frame.height, frame.width);
+    std::ranges::copy(frame.pixels, images.back().begin());
+  }
+  return images;
 }
 
 }  // namespace dtact::ctl

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
+#include "clients/calibrate/offline/images.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/image/png.hpp"
 
@@ -29,5 +31,11 @@ struct ImageSet {
 /// Throws std::runtime_error when two sets are not of one size.
 void require_same_size(const ImageSet& a, const std::string& a_option, const ImageSet& b,
                        const std::string& b_option);
+
+/// The mean of a set, grey levels.
+[[nodiscard]] cv::Mat1f mean_levels(const ImageSet& set);
+
+/// Each image of a set as OpenCV's.
+[[nodiscard]] std::vector<cv::Mat1b> grey_images(const ImageSet& set);
 
 }  // namespace dtact::ctl

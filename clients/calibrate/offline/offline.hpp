@@ -13,7 +13,7 @@ void add_calibrate(CLI::App& app);
 void add_calibrate_lens(CLI::App& app);
 /// apply --calibration cal/ --reference R.png --frame F.png -o depth.{npy,png,ply}
 void add_apply(CLI::App& app);
-/// evaluate --calibration cal/ --reference R.png --ball B.png --radius-mm 4.0, or --folder DIR.
+/// evaluate --calibration cal/ --reference R.png --ball B.png --radius-mm 4.0.
 /// `json`: read when the command runs; one JSON object instead of sentences.
 void add_evaluate(CLI::App& app, const bool& json);
 

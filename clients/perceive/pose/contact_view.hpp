@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/geometry/point_cloud.hpp"
 
 namespace dtact::perceive {
 

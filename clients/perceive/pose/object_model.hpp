@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/perceive/geometry/mesh_file.hpp"
+#include "clients/geometry/mesh_file.hpp"
 #include "clients/perceive/pose/contact_view.hpp"
 
 namespace dtact::perceive {

@@ -40,7 +40,7 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   out.decimation = shape.decimation;
   out.made_decimation = resolution.decimation();
   out.sharpen_steps = resolution.steps();
-  out.surface = model.surface;  // Pipeline::free_retired() has another reference to the heights
+  out.surface = model.surface;
   // Within the capacity reserved at start, so this allocates nothing.
   out.depth_um.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
   // What another calibration or rung drew in this buffer says nothing about this one's map.

@@ -18,9 +18,9 @@
 #include <vector>
 
 #include "clients/calibrate/fit/build.hpp"
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "clients/calibrate/fit/model/layered_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
-#include "clients/calibrate/fit/plausibility.hpp"
 #include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/depth/uncertainty.hpp"

@@ -8,7 +8,7 @@
 #include <numeric>
 #include <span>
 
-#include "clients/calibrate/fit/depth_reader.hpp"
+#include "clients/calibrate/fit/difference.hpp"
 #include "clients/calibrate/fit/model/model_fit.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/accuracy/table/another_law.hpp"

@@ -14,12 +14,12 @@
 #include <utility>
 #include <vector>
 
-#include "clients/calibrate/fit/list_shape.hpp"
-#include "clients/calibrate/fit/model/depth_spread.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
+#include "clients/calibrate/fit/model/layered_build.hpp"
 #include "clients/calibrate/fit/model/model_list.hpp"
 #include "clients/calibrate/fit/model/radial_transform.hpp"
-#include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "tests/accuracy/model/study.hpp"
+#include "tests/accuracy/real/folder_evaluation.hpp"
 #include "tests/accuracy/table/methods.hpp"
 #include "tests/accuracy/table/sensor.hpp"
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "clients/calibrate/fit/depth_reader.hpp"
+#include "clients/calibrate/fit/difference.hpp"
 #include "clients/calibrate/fit/model/layered_build.hpp"
 #include "tests/accuracy/table/another_law.hpp"
 #include "tests/accuracy/table/judge.hpp"

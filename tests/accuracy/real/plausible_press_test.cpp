@@ -9,9 +9,9 @@
 #include <cmath>
 #include <string>
 
-#include "clients/calibrate/fit/plausibility.hpp"
-#include "clients/calibrate/offline/folder_evaluation.hpp"
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "tests/accuracy/real/ball_press.hpp"
+#include "tests/accuracy/real/folder_evaluation.hpp"
 
 namespace dtact::ctl {
 namespace {

@@ -1,4 +1,4 @@
-// dtactctl evaluate --folder on real images changed as other sensors of the family would change
+// A folder's evaluation on real images changed as other sensors of the family would change
 // them: what the ball and the pins read must not hang on how the camera is turned or where the
 // light is weak.
 #include <fmt/format.h>
@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <string>
 
-#include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
+#include "tests/accuracy/real/folder_evaluation.hpp"
 #include "tests/accuracy/real/press_images.hpp"
 #include "tests/unit/calibration/sample.hpp"
 

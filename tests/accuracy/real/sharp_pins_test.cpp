@@ -14,7 +14,7 @@
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/difference.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
-#include "clients/calibrate/offline/folder_evaluation.hpp"
+#include "tests/accuracy/real/folder_evaluation.hpp"
 #include "tests/accuracy/real/press_images.hpp"
 
 namespace dtact::ctl {

@@ -13,7 +13,6 @@
 #include "clients/calibrate/guided/console.hpp"
 #include "clients/calibrate/guided/coverage.hpp"
 #include "clients/calibrate/guided/fitness.hpp"
-#include "clients/calibrate/guided/json_console.hpp"
 #include "clients/calibrate/guided/preview.hpp"
 #include "clients/common/guided.pb.h"
 

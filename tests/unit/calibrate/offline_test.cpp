@@ -11,9 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/calibrate/offline/colour_map.hpp"
 #include "clients/calibrate/offline/depth_build.hpp"
-#include "clients/calibrate/offline/folder_evaluation.hpp"
+#include "clients/calibrate/offline/drawing.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/image/png.hpp"
@@ -176,14 +175,6 @@ TEST_F(Offline, EvaluatesInSentencesAndJson) {
   EXPECT_THAT(run(with(evaluate, "--json")), Not(HasSubstr("half_mae_mm")));
 }
 
-TEST_F(Offline, SaysWhyItSkipsWhatAFolderLacks) {
-  const std::string reason = "board_reference.png is not there";
-  const std::string folder = std::filesystem::path(at("ball.png")).parent_path().string();
-  EXPECT_THAT(run({"evaluate", "--folder", folder}), HasSubstr("lens: skipped: " + reason));
-  EXPECT_THAT(run({"evaluate", "--folder", folder, "--json"}),
-              HasSubstr("{\"lens_skipped\":\"" + reason + "\""));
-}
-
 TEST_F(Offline, ReconstructsToNpy) {
   run(calibrate());
   EXPECT_THAT(run(apply("depth.npy")), HasSubstr("260x240, deepest 1."));
@@ -233,21 +224,6 @@ TEST_F(Offline, NamesWhatIsWrong) {
   EXPECT_THAT([&] { run(inside_out); }, ThrowsMessage<CLI::ParseError>(HasSubstr("--radius-mm")));
 }
 
-// What is judged is not what dtact-calibrate depth makes unless it is asked to.
-TEST(FolderEvaluation, NamesTheMethodThatItJudges) {
-  calibration::BallPress press{.reference_q8 = Ball{}.untouched_q8(),
-                               .frames = {Ball{}.frame()},
-                               .ball_radius_mm = 4,
-                               .mm_per_px = 0.005,
-                               .lens = {},
-                               .crop = {}};
-  FolderEvaluation e;
-  e.calibration = calibration::build(press);
-  e.ball = calibration::evaluate(*e.calibration, press.reference_q8.pixels, press.frames, 4);
-  EXPECT_THAT(lines_of(e), AllOf(testing::Contains(HasSubstr("sphere alone (--method list)")),
-                                 testing::Contains(HasSubstr("refused: a grey level is 0.3 um"))));
-}
-
 // Presses are told apart by their names, and one that counts twice chains with itself.
 TEST_F(Offline, RefusesAPressThatIsGivenTwice) {
   MapOptions map;
@@ -284,7 +260,7 @@ TEST(DepthFile, PointsLeaveUntrustedOutAndPressDown) {
 
 TEST(DepthFile, APictureOfNothingStillHasItsLegend) {
   const std::vector<float> mm(4, std::numeric_limits<float>::quiet_NaN());
-  EXPECT_GT(encode_colour_png({2, 2, 0.1, mm}).size(), 100U);
+  EXPECT_GT(encode_legend_png({2, 2, 0.1, mm}).size(), 100U);
 }
 
 }  // namespace

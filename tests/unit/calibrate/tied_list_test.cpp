@@ -1,12 +1,11 @@
 // A list of one press at the zero of another list.
-#include "clients/calibrate/fit/model/tied_list.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
 
-#include "clients/calibrate/fit/list_shape.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
+#include "clients/calibrate/fit/model/layered_build.hpp"
 
 namespace dtact::calibration {
 namespace {

@@ -1,5 +1,3 @@
-#include "clients/calibrate/fit/depth_reader.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>

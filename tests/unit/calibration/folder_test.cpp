@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "daemon/calibration/calibration.hpp"
-#include "daemon/calibration/sha256.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/calibration/sample.hpp"
 

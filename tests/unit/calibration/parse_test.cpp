@@ -1,11 +1,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <stdexcept>
 #include <string>
 
-#include "daemon/calibration/sha256.hpp"
+#include "daemon/calibration/calibration.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/image/png.hpp"
 #include "tests/unit/calibration/sample.hpp"
@@ -176,75 +175,6 @@ TEST(ParseCalibration, ASurfaceIsCheckedAndMayBeAbsent) {
   };
   refused("[surface]\nshape = \"cube\"\n", "surface.shape");
   refused("[surface]\nshape = \"sphere\"\nradius_mm = 0\n", "surface.radius_mm");
-}
-
-/// A [surface] table of heights with one place changed, in the sample's place of it.
-std::string heights_with(const std::string& from, const std::string& to) {
-  std::string table =
-      "[surface]\nshape = \"heights\"\nspacing_mm = 0.5\nheights_mm = [\n"
-      "  [-0.2, -0.1, -0.1, -0.2, -0.5],\n  [-0.1, 0, 0.01, -0.1, -0.4],\n"
-      "  [-0.1, 0.01, 0.012, -0.1, -0.4],\n  [-0.2, -0.1, -0.1, -0.2, -0.5],\n]\n"
-      "air_mm = 20\ngel_mm = 8\nrefraction = 1.41\n";
-  const auto at = table.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  table.replace(at, from.size(), to);
-  std::string toml = format(sample()).toml;
-  const auto begin = toml.find("[surface]");
-  return toml.replace(begin, toml.find('\n', begin) + 1 - begin, table);
-}
-
-TEST(ParseCalibration, ASurfaceOfHeightsIsReadBack) {
-  const std::string png = format(sample()).reference_png;
-  const Calibration parsed = parse(heights_with("", ""), png, "upload");
-  const recon::Surface& surface = parsed.model->surface;
-  EXPECT_EQ(surface.kind, recon::Surface::Kind::height_map);
-  EXPECT_EQ(surface.gel_mm, 8);
-  ASSERT_TRUE(surface.heights);
-  EXPECT_EQ(surface.heights->width, 5);
-  EXPECT_EQ(surface.heights->height, 4);
-  EXPECT_EQ(surface.heights->spacing_mm, 0.5);
-  EXPECT_EQ(surface.heights->z_um[7], 10);
-  EXPECT_EQ(surface.heights->z_um[12], 12);
-  EXPECT_EQ(surface.heights->z_um[19], -500);
-  const Files files = format(parsed);
-  EXPECT_EQ(parse(files.toml, files.reference_png, "upload").model->surface, surface);
-  // Not the same object, and not the same heights.
-  recon::SurfaceHeights other = *surface.heights;
-  other.z_um[3] += 1;
-  recon::Surface changed = surface;
-  changed.heights = std::make_shared<const recon::SurfaceHeights>(other);
-  EXPECT_NE(changed, surface);
-}
-
-TEST(ParseCalibration, HeightsThatCannotBeAreRefused) {
-  const auto refused = [](const std::string& from, const std::string& to, const std::string& key,
-                          const std::string& what) {
-    expect_refused(heights_with(from, to), "surface." + key, what);
-  };
-  refused("\"heights\"", "\"height\"", "shape", "\"heights\"");
-  refused("spacing_mm = 0.5\n", "", "spacing_mm", "missing");
-  refused("spacing_mm = 0.5", "spacing_mm = 0", "spacing_mm", "from 0.05 to 20");
-  refused("[-0.1, 0, 0.01, -0.1, -0.4]", "[-0.1, 0, 0.01, -0.1]", "heights_mm",
-          "row 2 has 4 numbers where the first has 5");
-  refused("[-0.1, 0, 0.01, -0.1, -0.4]", "0.4", "heights_mm", "row 2 is no row of numbers");
-  refused("[-0.1, 0, 0.01,", "[-0.1, 0, nan,", "heights_mm", "row 2, entry 3 is not allowed");
-  refused("[-0.1, 0, 0.01,", "[-0.1, 0, \"a\",", "heights_mm", "row 2, entry 3 is not allowed");
-  refused("[-0.1, 0, 0.01,", "[-0.1, 0, 100.5,", "heights_mm", "from -100 to 100");
-  refused("  [-0.2, -0.1, -0.1, -0.2, -0.5],\n", "", "heights_mm",
-          "3 rows of 5 are not allowed; expected 4 to 64 of each");
-  refused("[-0.1, 0, 0.01, -0.1, -0.4]", "[-0.1, 0, 0.01, -0.1, -1.7]", "heights_mm",
-          "row 2, entry 5 is -1.7 mm, too steep beside the -0.1 mm to the left");
-  refused("[-0.2, -0.1, -0.1, -0.2, -0.5]", "[1.5, 0.1, -0.1, -0.2, -0.5]", "heights_mm",
-          "row 2, entry 1 is -0.1 mm, too steep beside the 1.5 mm above");
-  refused("gel_mm = 8", "gel_mm = 0.3", "heights_mm",
-          "row 1, entry 5 is -0.5 mm, behind the gel's flat back; expected more than -0.3");
-  refused("0.012", "0.3", "heights_mm", "take this off all of them");
-  refused("spacing_mm = 0.5", "spacing_mm = 0.5\nradius_mm = 9", "radius_mm", "unknown key");
-  // The line of the row itself.
-  const std::string toml = heights_with("0.01, -0.1, -0.4]", "0.01, -0.1, nan]");
-  const auto line =
-      std::count(toml.begin(), toml.begin() + std::ptrdiff_t(toml.find("nan]")), '\n');
-  expect_refused(toml, "upload:" + std::to_string(line + 1) + ": surface.heights_mm", "entry 5");
 }
 
 TEST(ParseCalibration, GainAndUncertaintyAreCheckedAndMayBeAbsent) {

@@ -1,5 +1,3 @@
-#include "clients/calibrate/fit/plausibility.hpp"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "clients/calibrate/fit/evaluate.hpp"
 #include "tests/unit/calibration/ball.hpp"
 
 namespace dtact::calibration {

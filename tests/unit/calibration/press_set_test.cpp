@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "clients/calibrate/fit/chain_fit.hpp"
-#include "clients/calibrate/fit/press_chain.hpp"
 #include "tests/unit/calibration/ball.hpp"
 #include "tests/unit/calibration/list_reading.hpp"
 

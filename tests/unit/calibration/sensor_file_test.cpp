@@ -1,10 +1,9 @@
-#include "daemon/calibration/sensor_file.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
+#include "daemon/calibration/sensor_files.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/calibration/sample.hpp"
 

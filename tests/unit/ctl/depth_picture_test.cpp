@@ -59,20 +59,21 @@ double lightness(Colour c) { return 0.30 * c.r + 0.59 * c.g + 0.11 * c.b; }
 
 TEST(ColourOf, GrowsLighterAllTheWay) {
   for (int i = 1; i <= 100; ++i) {
-    EXPECT_GT(lightness(colour_of(i / 100.0)), lightness(colour_of((i - 1) / 100.0))) << i;
+    EXPECT_GT(lightness(cli::colour_of(i / 100.0)), lightness(cli::colour_of((i - 1) / 100.0)))
+        << i;
   }
-  EXPECT_LT(lightness(colour_of(0)), 40);
-  EXPECT_GT(lightness(colour_of(1)), 220);
-  EXPECT_EQ(colour_of(-3), colour_of(0));
-  EXPECT_EQ(colour_of(3), colour_of(1));
+  EXPECT_LT(lightness(cli::colour_of(0)), 40);
+  EXPECT_GT(lightness(cli::colour_of(1)), 220);
+  EXPECT_EQ(cli::colour_of(-3), cli::colour_of(0));
+  EXPECT_EQ(cli::colour_of(3), cli::colour_of(1));
 }
 
 TEST(FullScale, IsARoundNumber) {
-  EXPECT_DOUBLE_EQ(full_scale_mm(-1), 0.2);
-  EXPECT_DOUBLE_EQ(full_scale_mm(0.2), 0.2);
-  EXPECT_DOUBLE_EQ(full_scale_mm(0.21), 0.5);
-  EXPECT_DOUBLE_EQ(full_scale_mm(0.51), 1);
-  EXPECT_DOUBLE_EQ(full_scale_mm(1.4), 2);
+  EXPECT_DOUBLE_EQ(cli::full_scale_mm(-1), 0.2);
+  EXPECT_DOUBLE_EQ(cli::full_scale_mm(0.2), 0.2);
+  EXPECT_DOUBLE_EQ(cli::full_scale_mm(0.21), 0.5);
+  EXPECT_DOUBLE_EQ(cli::full_scale_mm(0.51), 1);
+  EXPECT_DOUBLE_EQ(cli::full_scale_mm(1.4), 2);
 }
 
 TEST(Picture, FitsTheTerminal) {
@@ -95,8 +96,8 @@ TEST(Picture, ShowsDepthByColour) {
   const v1::Frame half = frame(40, 40, [](int x, int) { return x < 20 ? 0.0 : 0.5; });
   const auto lines = picture_of(half, 0.5, {60, 22, Palette::rgb});
   ASSERT_EQ(lines.size(), 21U);
-  const Colour low = colour_of(0);
-  const Colour high = colour_of(1);
+  const Colour low = cli::colour_of(0);
+  const Colour high = cli::colour_of(1);
   const auto escapes = [](Colour c) {
     const std::string rgb =
         std::to_string(c.r) + ";" + std::to_string(c.g) + ";" + std::to_string(c.b) + "m";

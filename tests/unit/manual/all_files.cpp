@@ -32,8 +32,7 @@ Command dtactd() {
 Command dtactctl() {
   cli::Context context{{}, false, std::cout};
   CLI::App app;
-  const std::vector<std::string> none;
-  ctl::set_up(app, context, none);
+  ctl::set_up(app, context);
   return describe(app);
 }
 
@@ -89,16 +88,6 @@ std::vector<File> all_files(const std::filesystem::path& root) {
   const PageNotes of_perceive{1, kUserCommands, {}, {kDtactd, kCtl, kWeb}};
   const PageNotes of_web{1, kUserCommands, {}, {kDtactd, kCtl, kPerceive}};
 
-  // As clients/ctl/hand_over.cpp has it.
-  const std::string as_is = "words=(dtact-calibrate $words); (( CURRENT++ )); _dtact-calibrate";
-  const std::string guided = R"(
-          if (( CURRENT > 2 )) && [[ $words[2] == (depth|lens|force) ]]; then
-            words[1]=dtact-calibrate
-          else
-            (( CURRENT == 2 )) && compadd depth lens force
-            words=(dtact-calibrate guided $words[2,-1]); (( CURRENT++ ))
-          fi
-          _dtact-calibrate)";
   return {
       {"daemon/dtactd.8", program_page(daemon, of_daemon)},
       {"clients/ctl/dtactctl.1", program_page(ctl, of_ctl)},
@@ -106,14 +95,11 @@ std::vector<File> all_files(const std::filesystem::path& root) {
       {"clients/perceive/dtact-perceive.1", program_page(perceive, of_perceive)},
       {"clients/web/dtact-web.1", program_page(web, of_web)},
       {"config/dtactd.toml.5", config_page(base::read_file(root / "config/dtactd.toml"))},
-      {"daemon/dtactd.zsh-completion", zsh_completion(daemon, {})},
-      {"clients/ctl/dtactctl.zsh-completion",
-       zsh_completion(
-           ctl,
-           {{"calibrate", guided}, {"reprocess", as_is}, {"apply", as_is}, {"evaluate", as_is}})},
-      {"clients/calibrate/dtact-calibrate.zsh-completion", zsh_completion(calibrate, {})},
-      {"clients/perceive/dtact-perceive.zsh-completion", zsh_completion(perceive, {})},
-      {"clients/web/dtact-web.zsh-completion", zsh_completion(web, {})},
+      {"daemon/dtactd.zsh-completion", zsh_completion(daemon)},
+      {"clients/ctl/dtactctl.zsh-completion", zsh_completion(ctl)},
+      {"clients/calibrate/dtact-calibrate.zsh-completion", zsh_completion(calibrate)},
+      {"clients/perceive/dtact-perceive.zsh-completion", zsh_completion(perceive)},
+      {"clients/web/dtact-web.zsh-completion", zsh_completion(web)},
   };
 }
 

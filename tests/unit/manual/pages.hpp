@@ -28,10 +28,8 @@ struct PageNotes {
 /// that the daemon has and the file has not, or the other way round.
 [[nodiscard]] std::string config_page(const std::string& toml);
 
-/// A file for zsh's fpath that completes `program`. `hand_over`: for each command that another
-/// program runs, what stands in its place: {"calibrate", "dtact-calibrate guided"}.
-[[nodiscard]] std::string zsh_completion(
-    const Command& program, const std::vector<std::pair<std::string, std::string>>& hand_over);
+/// A file for zsh's fpath that completes `program`.
+[[nodiscard]] std::string zsh_completion(const Command& program);
 
 /// The programs as they are built.
 [[nodiscard]] Command dtactd();

@@ -70,24 +70,18 @@ std::string specs(const Command& command) {
   return words;
 }
 
-using HandOver = std::vector<std::pair<std::string, std::string>>;
-
 /// The function for a program or command with commands below it, those below first. `locals`: lines
 /// that it begins with, which those below see.
-std::string function(const std::string& name, const Command& command, const HandOver& hand_over,
-                     const std::string& locals) {
+std::string function(const std::string& name, const Command& command, const std::string& locals) {
   std::string before;
   std::string list;
   std::string cases;
   for (const Command& below : command.commands) {
     list += "\n        " + in_quotes(below.name + ":" + below.text);
-    const auto given = std::ranges::find(hand_over, below.name, &HandOver::value_type::first);
     std::string what = "_arguments -s $everywhere" + specs(below);
-    if (given != hand_over.end()) {
-      what = given->second;
-    } else if (!below.commands.empty()) {
+    if (!below.commands.empty()) {
       what = name + "_" + below.name;
-      before += function(what, below, {}, "") + "\n";
+      before += function(what, below, "") + "\n";
     }
     cases += fmt::format("        {}) {} ;;\n", below.name, what);
   }
@@ -111,15 +105,15 @@ std::string function(const std::string& name, const Command& command, const Hand
 
 }  // namespace
 
-std::string zsh_completion(const Command& program, const HandOver& hand_over) {
+std::string zsh_completion(const Command& program) {
   const std::string name = "_" + program.name;
   std::string text = "#compdef " + program.name +
                      "\n# Made by ./dev man from the program's --help; change it there.\n\n";
   if (program.commands.empty()) {
     text += fmt::format("{}() {{\n  _arguments -s{}\n}}\n", name, specs(program));
   } else {
-    text += function(name, program, hand_over,
-                     fmt::format("  local -a everywhere=({}\n  )\n", specs(program)));
+    text +=
+        function(name, program, fmt::format("  local -a everywhere=({}\n  )\n", specs(program)));
   }
   return text + "\n" + name + " \"$@\"\n";
 }

@@ -89,23 +89,9 @@ TEST_F(Zsh, OffersEveryCommandAndOption) {
   }
   std::vector<std::string> lines;
   for (const auto& [line, words] : expected) lines.push_back(line);
-  // dtactctl, its 18 commands, 5 of calibration; dtact-calibrate and its 7; dtact-perceive and its
+  // dtactctl, its 14 commands, 5 of calibration; dtact-calibrate and its 7; dtact-perceive and its
   // 2; dtactd.
-  EXPECT_EQ(lines.size(), 1U + 18 + 5 + 2 + 1 + 7 + 1 + 1 + 2 + 1 + 1 + 1 + 1 + 1);
-  for (const auto& [line, words] : offers(lines)) {
-    EXPECT_THAT(expected.at(line), IsSubsetOf(words)) << line;
-  }
-}
-
-TEST_F(Zsh, OffersWhatDtactCalibrateDoesToDtactctl) {
-  std::map<std::string, Words> expected{{"dtactctl calibrate ", {"depth", "force", "lens"}}};
-  std::vector<std::string> lines{"dtactctl calibrate "};
-  for (const Command& command : dtact_calibrate().commands) {
-    const bool verb = command.name == "depth" || command.name == "lens" || command.name == "force";
-    const std::string name = command.name == "guided" ? "calibrate" : command.name;
-    lines.push_back(fmt::format("dtactctl {}{} --", verb ? "calibrate " : "", name));
-    expected[lines.back()] = long_names(command.options);
-  }
+  EXPECT_EQ(lines.size(), 1U + 14 + 5 + 2 + 1 + 7 + 1 + 1 + 2 + 1 + 1 + 1 + 1 + 1);
   for (const auto& [line, words] : offers(lines)) {
     EXPECT_THAT(expected.at(line), IsSubsetOf(words)) << line;
   }

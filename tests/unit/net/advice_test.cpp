@@ -21,7 +21,7 @@ TEST(Advice, IsEmptyWhenAllIsWell) {
 TEST(Advice, SaysHowToCalibrate) {
   pipeline::Status status;
   status.health.set(Health::uncalibrated);
-  EXPECT_THAT(advice(status), HasSubstr("dtactctl calibrate depth"));
+  EXPECT_THAT(advice(status), HasSubstr("dtact-calibrate depth"));
   EXPECT_THAT(advice(status), HasSubstr("dtactctl calibration upload"));
 }
 

@@ -127,27 +127,6 @@ TEST(FrameEncoder, SaysTheSurfaceOfASensorThatIsNotFlat) {
   EXPECT_EQ(message.surface().refraction(), 1.41);
 }
 
-TEST(FrameEncoder, SaysTheHeightsOfASurfaceThatHasNoName) {
-  FrameEncoder encoder("f");
-  auto frame = make_frame(3);
-  frame.surface = {
-      .kind = recon::Surface::Kind::height_map, .air_mm = 20, .gel_mm = 8, .refraction = 1.41};
-  recon::SurfaceHeights heights{.width = 5, .height = 4, .spacing_mm = 0.5, .z_um = {}};
-  for (int i = 0; i < 20; ++i) heights.z_um.push_back(10 * i - 100);
-  frame.surface.heights = std::make_shared<const recon::SurfaceHeights>(heights);
-  encoder.begin(frame);
-  v1::Frame message;
-  ASSERT_TRUE(message.ParseFromString(encoder.encode(kind(0, 0))->body));
-  EXPECT_EQ(message.surface().shape(), v1::Surface::HEIGHT_MAP);
-  EXPECT_EQ(message.surface().gel_mm(), 8);
-  EXPECT_EQ(message.surface().heights().width(), 5U);
-  EXPECT_EQ(message.surface().heights().height(), 4U);
-  EXPECT_EQ(message.surface().heights().spacing_mm(), 0.5);
-  ASSERT_EQ(message.surface().heights().z_um_size(), 20);
-  EXPECT_EQ(message.surface().heights().z_um(0), -100);
-  EXPECT_EQ(message.surface().heights().z_um(19), 90);
-}
-
 TEST(FrameEncoder, RefusesWhatExceedsTheWire) {
   FrameEncoder encoder("f");
   const auto frame = make_frame(1, 4096, 4096);  // 32 MiB of depth, 16 MiB of luma

@@ -1,4 +1,4 @@
-#include "clients/perceive/geometry/cloud_file.hpp"
+#include "clients/geometry/cloud_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,17 +1,16 @@
 // What CloudMaker leaves as it is, and what each instruction set makes, against points made anew.
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <random>
 #include <vector>
 
-#include "clients/perceive/geometry/point_cloud.hpp"
-#include "clients/perceive/geometry/rows.hpp"
-#include "tests/unit/perceive/sampled.hpp"
+#include "clients/geometry/point_cloud.hpp"
+#include "clients/geometry/rows.hpp"
 
 namespace dtact::perceive {
 namespace {
@@ -21,8 +20,7 @@ using Kind = recon::Surface::Kind;
 std::vector<recon::Surface> surfaces() {
   return {{},
           {Kind::sphere, 4, 0, 20, 8, 1.41},  // rays at the map's corners miss it
-          {Kind::cylinder, 12, 30, 20, 8, 1.41},
-          test::sampled({Kind::sphere, 12, 0, 20, 8, 1.41}, 12, 0.5)};
+          {Kind::cylinder, 12, 30, 20, 8, 1.41}};
 }
 
 constexpr int kWidth = 150;  // four tiles and a part of one
@@ -165,26 +163,21 @@ TEST(CloudMaker, WhereZeroIsNoDepthNothingIsUntouched) {
   EXPECT_FALSE(cloud.has(0));
 }
 
-TEST(CloudMaker, EveryInstructionSetMakesTheSameBits) {
-  for (const recon::Surface& surface : surfaces()) {
-    std::vector<PointCloud> made;
-    std::vector<std::vector<std::int16_t>> units;
-    std::vector<float> largest_of;
-    for (const std::int64_t target : hwy::SupportedAndGeneratedTargets()) {
-      hwy::SetSupportedTargetsForTest(target);
-      const auto map = map_of(3);
-      const PointCloud& cloud = made.emplace_back();
-      CloudMaker(surface).make(grid_of(map), 1, made.back());
-      auto& quantised = units.emplace_back(cloud.values.size());
-      quantise(cloud.values.data(), quantised.size(), 1e6F, quantised.data());
-      largest_of.push_back(largest(cloud.values.data(), cloud.size()));
-    }
-    hwy::SetSupportedTargetsForTest(0);
-    ASSERT_FALSE(made.empty());
-    for (const PointCloud& cloud : made) expect_same(cloud, made.front(), "a target");
-    for (const auto& one : units) EXPECT_EQ(one, units.front());
-    for (const float one : largest_of) EXPECT_EQ(one, largest_of.front());
-  }
+// Halves go to the even neighbour.
+TEST(Rows, QuantiseRoundsBoundsAndKeepsHoles) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const std::vector<float> values{0.5F, 1.5F, -1.5F, -0.75F, nan, 1e9F, -1e9F, 32766.4F, 3, nan};
+  std::vector<std::int16_t> units(values.size());
+  quantise(values.data(), values.size(), 1, units.data());
+  EXPECT_EQ(units,
+            (std::vector<std::int16_t>{0, 2, -2, -1, -32768, 32767, -32767, 32766, 3, -32768}));
+}
+
+TEST(Rows, LargestIsTheFarthestFromZero) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(largest(std::vector<float>{1, -7.25F, nan, 3, -nan}.data(), 5), 7.25F);
+  EXPECT_EQ(largest(&nan, 1), 0);
+  EXPECT_EQ(count_holes(std::vector<float>{1, nan, 2, nan, -nan}.data(), 5), 3);
 }
 
 }  // namespace

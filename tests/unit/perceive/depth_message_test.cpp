@@ -28,19 +28,6 @@ v1::Surface sphere() {
   return surface;
 }
 
-/// 4 × 5 nodes 3 mm apart, all at −1 mm.
-v1::Surface heights() {
-  v1::Surface surface = sphere();
-  surface.set_shape(v1::Surface::HEIGHT_MAP);
-  surface.clear_radius_mm();
-  v1::HeightMap& map = *surface.mutable_heights();
-  map.set_width(4);
-  map.set_height(5);
-  map.set_spacing_mm(3);
-  for (int i = 0; i < 20; ++i) map.add_z_um(-1000);
-  return surface;
-}
-
 void expect_refused(const v1::Surface& surface, const std::string& what) {
   EXPECT_THAT([&] { (void)surface_of(surface); },
               ThrowsMessage<client::ProtocolError>(HasSubstr(what)));
@@ -53,14 +40,6 @@ TEST(SurfaceOf, ReadsEachShape) {
   cylinder.set_shape(v1::Surface::CYLINDER);
   cylinder.set_axis_deg(-30);
   EXPECT_EQ(surface_of(cylinder), (recon::Surface{Kind::cylinder, 10, -30, 20, 5, 1.41}));
-  const recon::Surface found = surface_of(heights());
-  EXPECT_EQ(found.kind, Kind::height_map);
-  EXPECT_EQ(found.gel_mm, 5);
-  ASSERT_TRUE(found.heights);
-  EXPECT_EQ(found.heights->width, 4);
-  EXPECT_EQ(found.heights->height, 5);
-  EXPECT_EQ(found.heights->spacing_mm, 3);
-  EXPECT_EQ(found.heights->z_um, std::vector<std::int32_t>(20, -1000));
 }
 
 TEST(SurfaceOf, RefusesWhatContradictsItself) {
@@ -73,22 +52,7 @@ TEST(SurfaceOf, RefusesWhatContradictsItself) {
   surface = sphere();
   surface.set_gel_mm(std::numeric_limits<double>::quiet_NaN());
   expect_refused(surface, "nan mm of gel");
-  surface = heights();
-  surface.mutable_heights()->add_z_um(0);
-  expect_refused(surface, "21 heights on 4x5 nodes");
-  surface = heights();
-  surface.mutable_heights()->set_width(1U << 31U);
-  expect_refused(surface, "20 heights on 2147483648x5");
-  surface = heights();
-  surface.mutable_heights()->set_spacing_mm(0);
-  expect_refused(surface, "0 mm apart");
-  surface = heights();
-  surface.mutable_heights()->set_z_um(7, std::numeric_limits<std::int32_t>::min());
-  expect_refused(surface, "contradicts itself");
-  surface = heights();
-  surface.clear_heights();
-  expect_refused(surface, "0 heights");
-  surface = heights();
+  surface = sphere();
   surface.set_refraction(0.9);
   expect_refused(surface, "index 0.9");
 }
@@ -123,7 +87,6 @@ TEST(DepthImage, ItsPointsLieOnTheSurfaceWhereTheMapIs) {
   EXPECT_FLOAT_EQ(flat[1], 0.5e-3F);
   EXPECT_EQ(flat[2], 0);
   EXPECT_NEAR(first_point(sphere())[2], -0.0626e-3, 0.002e-3) << "1.12² / (2 · 10) mm";
-  EXPECT_NEAR(first_point(heights())[2], -1e-3, 1e-9);
 }
 
 TEST(DepthImage, RefusesAMapBesideItsWhole) {

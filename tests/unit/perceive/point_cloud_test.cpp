@@ -1,4 +1,4 @@
-#include "clients/perceive/geometry/point_cloud.hpp"
+#include "clients/geometry/point_cloud.hpp"
 
 #include <gtest/gtest.h>
 

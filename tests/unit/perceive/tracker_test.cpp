@@ -5,7 +5,6 @@
 #include <array>
 
 #include "tests/unit/perceive/balls.hpp"
-#include "tests/unit/perceive/sampled.hpp"
 
 namespace dtact::perceive {
 namespace {
@@ -58,30 +57,6 @@ TEST(Tracker, RollsAndPressesDeeper) {
   const Error error = follow(tracker, {0, 0, -0.2}, Vector3d::UnitX(), 8, 30, 5);
   EXPECT_LT(error.um, 30);
   EXPECT_LT(error.degrees, 0.8);
-}
-
-// The sphere as 36 × 36 heights half a millimetre apart, in whole micrometres, in its place.
-TEST(Tracker, HeightsOfASphereSayTheMotionThatTheSphereSays) {
-  const recon::Surface sphere = curved().front();
-  CloudMaker of_heights(sampled(sphere, 36, 0.5));
-  Tracker by_sphere;
-  Tracker by_heights;
-  PointCloud cloud;
-  constexpr int kFrames = 20;
-  for (int i = 0; i <= kFrames; ++i) {
-    const double part = static_cast<double>(i) / kFrames;
-    const Motion truth = round_the_centre(sphere.radius_mm, Vector3d::UnitX(),
-                                          part * 2 / sphere.radius_mm, part * 10);
-    const Frame frame(bumps(), truth, 5, static_cast<unsigned>(i), sphere);
-    (void)by_sphere.follow(frame.view(), 100 + static_cast<unsigned>(i));
-    of_heights.make(frame.grid, 1, cloud);
-    const auto& pose = by_heights.follow(ContactView(frame.grid, cloud, of_heights.table(), 10),
-                                         100 + static_cast<unsigned>(i));
-    EXPECT_EQ(pose.state, i == 0 ? State::started : State::tracked) << i;
-    const Error apart = error_of(pose.alignment, by_sphere.pose().alignment.motion);
-    EXPECT_LT(apart.um, 2) << i;
-    EXPECT_LT(apart.degrees, 0.1) << i;
-  }
 }
 
 // Round the finger, so that it stays as deep: three millimetres and a twist.

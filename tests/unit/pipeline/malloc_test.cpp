@@ -38,18 +38,6 @@ std::vector<std::vector<std::uint8_t>> payloads(int count) {
   return made;
 }
 
-/// The toy's calibration with a surface of heights of its own: the last that lets go of them frees.
-std::shared_ptr<const calibration::Calibration> calibration_with_heights() {
-  auto made = fakes::scattering_toy_calibration(15);
-  recon::Model model = *made->model;
-  model.surface = {
-      .kind = recon::Surface::Kind::height_map, .air_mm = 20, .gel_mm = 8, .refraction = 1.41};
-  model.surface.heights = std::make_shared<const recon::SurfaceHeights>(recon::SurfaceHeights{
-      .width = 4, .height = 4, .spacing_mm = 1, .z_um = std::vector<std::int32_t>(16)});
-  made->model = std::make_shared<const recon::Model>(std::move(model));
-  return made;
-}
-
 /// Page faults of the calling thread so far.
 std::array<long, 2> faults() {
   rusage usage{};
@@ -80,7 +68,7 @@ class CaptureThread : public ::testing::Test {
     config.reconstruction = rules;
     fakes::FakeRing::Handle ring;
     Pipeline pipeline(std::move(camera), std::make_unique<fakes::FakeRing>(ring),
-                      calibration_with_heights(), config);
+                      fakes::scattering_toy_calibration(15), config);
     pipeline.want({.contact = true, .depth = true, .luma = true, .jpeg = true});
     pipeline.start();
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
@@ -117,7 +105,7 @@ class CaptureThread : public ::testing::Test {
       case 2:
         return {commands_, CopyReference{}};
       default:
-        return {commands_, UseCalibration{calibration_with_heights()}};
+        return {commands_, UseCalibration{fakes::scattering_toy_calibration(15)}};
     }
   }
 
@@ -135,7 +123,7 @@ std::function<void(std::uint64_t)> counting(std::uint64_t frames) {
   };
 }
 
-// Two calibrations long, with heights each.
+// Two calibrations long.
 TEST_F(CaptureThread, AllocatesAndFreesNothingAfterItsFirstHundredFrames) {
   if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer brings its own malloc";
   run(1400, counting(1400));

@@ -325,7 +325,7 @@ TEST_F(PipelineTest, WithoutCalibrationThereIsLuma) {
   EXPECT_EQ(pipeline->status().calibration, nullptr);
   const CommandDone refused = ask(Rezero{});
   EXPECT_EQ(refused.outcome, Outcome::uncalibrated);
-  EXPECT_NE(refused.message.find("dtactctl calibrate"), std::string::npos);
+  EXPECT_NE(refused.message.find("dtact-calibrate"), std::string::npos);
 }
 
 TEST_F(PipelineTest, ACalibrationCanComeLaterAndBeReplaced) {

@@ -63,19 +63,6 @@ class Surface(unittest.TestCase):
         m.surface.air_mm, m.surface.gel_mm, m.surface.refraction = 20, 8, 1.41
         self.assertEqual(dtact.Frame(m).surface, dtact.Surface("cylinder", 12.5, 90, 20, 8, 1.41))
 
-    def test_heights(self):
-        m = message()
-        m.surface.shape = 3
-        heights = m.surface.heights
-        heights.width, heights.height, heights.spacing_mm = 5, 4, 0.5
-        heights.z_um.extend(range(-10, 10))
-        surface = dtact.Frame(m).surface
-        self.assertEqual((surface.shape, surface.spacing_mm), ("height_map", 0.5))
-        np.testing.assert_array_equal(surface.heights_um[:, 0], [-10, -5, 0, 5])
-        del heights.z_um[0]
-        with self.assertRaises(dtact.ProtocolError):
-            _ = dtact.Frame(m).surface
-
 
 class Pose(unittest.TestCase):
     def test_matrix_and_names(self):

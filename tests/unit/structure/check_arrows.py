@@ -43,9 +43,9 @@ ROOMS = {
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
     # Of the reconstruction the surface's shape alone.
-    "clients/perceive/geometry": ["daemon/recon"],
-    "clients/perceive/pose": ["clients/perceive/geometry"],
-    "clients/common": ["daemon/serve", "hal/base", "hal/image", "proto", "daemon/recon", "clients/cpp", "clients/perceive/geometry"],
+    "clients/geometry": ["daemon/recon"],
+    "clients/perceive/pose": ["clients/geometry"],
+    "clients/common": ["daemon/serve", "hal/base", "hal/image", "proto", "daemon/recon", "clients/cpp", "clients/geometry"],
     "clients/recording": ["hal/mcap", "proto", "clients/cpp"],
     "clients/calibrate/fit": ["hal/image", "daemon/recon", "daemon/calibration"],
     "clients/calibrate/fit/model": ["daemon/recon", "daemon/calibration", "clients/calibrate/fit"],
@@ -58,7 +58,7 @@ ROOMS = {
     "clients/calibrate/force": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/offline", "clients/recording"],
     "clients/calibrate": ["clients/common", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
     # A client and a server: what serves the wire is the daemon's own.
-    "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/perceive/geometry", "clients/perceive/pose"],
+    "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/geometry", "clients/perceive/pose"],
     # The same for browsers.
     "clients/web/foxglove": ["proto", "daemon/serve", "clients/cpp", "clients/common", "clients/recording", "clients/web"],
     "clients/web": ["hal/base", "proto", "daemon/serve", "clients/common", "clients/cpp", "clients/web/foxglove"],

@@ -189,13 +189,6 @@ TEST(Golden11, Surface) {
       "00 00 00 00 08 40 29 00 00 00 00 00 00 10 40 31 00 00 00 00 00 00 14 40");
 }
 
-TEST(Golden11, HeightMap) {
-  expect_golden<ServerMessage>(
-      R"(frame { surface { shape: HEIGHT_MAP heights { width: 4 height: 5 spacing_mm: 1 )"
-      R"(z_um: 1 z_um: -1 z_um: 300 } } })",
-      "12 1a a2 01 17 08 03 3a 13 08 04 10 05 19 00 00 00 00 00 00 f0 3f 22 04 02 01 d8 04");
-}
-
 TEST(Golden11, Cloud) {
   expect_golden<ServerMessage>(
       R"(frame { cloud { encoding: CLOUD_INT16 width: 2 height: 1 metres_per_unit: 0.5 data: )"

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "clients/calibrate/fit/model/gauss_legendre.hpp"
+#include "clients/calibrate/fit/model/radial_transform.hpp"
 
 namespace dtact::calibration {
 namespace {

@@ -3,17 +3,119 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <memory>
+#include <span>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
-#include "clients/calibrate/fit/list_shape.hpp"
-#include "clients/calibrate/fit/model/depth_spread.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
-#include "clients/calibrate/fit/model/tied_list.hpp"
 
 namespace dtact::calibration {
+namespace {
+
+double sure_mm(const LevelledPress& press) { return kSureOfContact * press.contact.radius_mm; }
+
+/// Mean of `value(level)` over the sure part of a press's contact.
+template <typename Value>
+double mean_of_sure(const LevelledPress& press, const Value& value) {
+  double sum = 0;
+  double pixels = 0;
+  for (int y = 0; y < press.map.height; ++y) {
+    for (int x = 0; x < press.map.width; ++x) {
+      const double level = press.map.at(x, y);
+      const bool sure = distance_mm(press.map, press.contact, x, y) < sure_mm(press);
+      if (!sure || std::isnan(level)) continue;
+      sum += value(level);
+      pixels += 1;
+    }
+  }
+  return sum / pixels;
+}
+
+}  // namespace
+
+double LayerList::read_mm(double level) const {
+  return look_up_mm(*list, levels_per_level * level);
+}
+
+double mean_level(const LevelledPress& press) {
+  return mean_of_sure(press, [](double level) { return level; });
+}
+
+TiedList tie(const recon::DepthList& list, const LayerList& layer, const LevelledPress& press) {
+  TiedList tied{list, mean_of_sure(press, [&](double level) {
+                  return layer.read_mm(level) - look_up_mm(list, level);
+                })};
+  const RadialProfile profile = radial_profile(press.map, press.contact, 2 * sure_mm(press));
+  const double sure_level = std::max(1.0, profile.at(sure_mm(press)));
+  const double last_level = static_cast<double>(list.covered_to_q6) / recon::kEntriesPerLevel;
+  const auto apart_mm = [&](double level) {
+    return look_up_mm(list, level) + tied.moved_mm - layer.read_mm(level);
+  };
+  double deepest_mm = -INFINITY;
+  for (std::size_t i = 0; i < list.um.size(); ++i) {
+    const double level = static_cast<double>(list.first_q6 + static_cast<int>(i)) /
+                         static_cast<double>(recon::kEntriesPerLevel);
+    const double share = std::clamp(level / sure_level, 0.0, 1.0);
+    const double depth_mm =
+        layer.read_mm(level) + share * apart_mm(std::clamp(level, sure_level, last_level));
+    deepest_mm = std::max(deepest_mm, depth_mm);
+    tied.list.um[i] = static_cast<std::int16_t>(std::lround(1000 * deepest_mm));
+  }
+  return tied;
+}
+
+namespace {
+
+/// Of the ball's radius: the profile goes to 2.25 (kFarField).
+constexpr std::array<double, 2> kReaches = {1.5, 1.75};
+/// Right, down, left, up.
+constexpr std::array<std::pair<int, int>, 4> kSides = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
+
+std::vector<PixelFilter> parts_of(const LevelledPress& press) {
+  const Contact& contact = press.contact;
+  std::vector<PixelFilter> parts;
+  parts.reserve(kSides.size() + kReaches.size());
+  for (const auto& [right, down] : kSides) {
+    parts.emplace_back([&contact, right, down](int x, int y) {
+      return right * (x - contact.col) + down * (y - contact.row) > 0;
+    });
+  }
+  for (const double reach : kReaches) {
+    parts.emplace_back([&press, within_mm = reach * contact.ball_radius_mm](int x, int y) {
+      return distance_mm(press.map, press.contact, x, y) < within_mm;
+    });
+  }
+  return parts;
+}
+
+}  // namespace
+
+double depth_spread_mm(const LevelledPress& press, const MapOptics& optics, const ModelFit& fit) {
+  const double level = mean_level(press);
+  const auto depth_mm = [&](const PixelFilter& use) {
+    const PressProfile profile = profile_of(press, optics.light_levels, optics.smoothing_mm, use);
+    const ModelFit part = fit_model(std::span(&profile, 1), fit);
+    return look_up_mm(lists_of(part.layer, optics, part.deepest_mm()).front(), level);
+  };
+  try {
+    const double all_mm = depth_mm({});
+    double most_mm = 0;
+    for (const PixelFilter& part : parts_of(press)) {
+      most_mm = std::max(most_mm, std::abs(depth_mm(part) - all_mm));
+    }
+    return most_mm;
+  } catch (const ModelRefused&) {
+    return std::numeric_limits<double>::infinity();
+  }
+}
+
 namespace {
 
 /// What depth_spread_mm() may be for a layer's depth to be taken from it, millimetres: simulated

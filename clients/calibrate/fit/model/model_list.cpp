@@ -10,7 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/calibrate/fit/list_shape.hpp"
+#include "clients/calibrate/fit/least_squares.hpp"
+#include "clients/calibrate/fit/list_fit.hpp"
 #include "clients/calibrate/fit/list_worth.hpp"
 #include "clients/calibrate/fit/model/radial_transform.hpp"
 
@@ -92,11 +93,7 @@ struct Knots {
   Eigen::VectorXd depth_mm;
 
   [[nodiscard]] double at(double level) const {
-    const double place = level / kKnotLevels - first;
-    const auto last = depth_mm.size() - 1;
-    const auto i =
-        std::clamp(static_cast<Eigen::Index>(std::floor(place)), Eigen::Index{0}, last - 1);
-    return depth_mm[i] + (place - static_cast<double>(i)) * (depth_mm[i + 1] - depth_mm[i]);
+    return value_at(depth_mm, level / kKnotLevels - first);
   }
 };
 
@@ -116,35 +113,19 @@ Knots fit_knots(const std::vector<Shown>& balls, std::size_t list) {
   const int last = std::max(2, static_cast<int>(std::ceil(high / kKnotLevels)));
   const Eigen::Index count = last - knots.first + 1;
   const Eigen::Index zero = -knots.first;
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(count, count);
-  Eigen::VectorXd right = Eigen::VectorXd::Zero(count);
+  LeastSquares squares(count);
   for (const Shown& ball : balls) {
     for_places(ball, list, [&](double level, double depth, double weight) {
-      const double place = level / kKnotLevels - knots.first;
-      const Eigen::Index i =
-          std::clamp(static_cast<Eigen::Index>(place), Eigen::Index{0}, count - 2);
-      const double part = place - static_cast<double>(i);
-      normal(i, i) += weight * (1 - part) * (1 - part);
-      normal(i, i + 1) += weight * part * (1 - part);
-      normal(i + 1, i) += weight * part * (1 - part);
-      normal(i + 1, i + 1) += weight * part * part;
-      right[i] += weight * (1 - part) * depth;
-      right[i + 1] += weight * part * depth;
+      const auto [below, part] = between_knots(level / kKnotLevels - knots.first, count);
+      squares.add({{below, 1 - part}, {below + 1, part}}, depth, weight);
     });
   }
-  const double stiff = 0.02 * normal.trace() / static_cast<double>(count);
-  for (Eigen::Index i = 1; i + 1 < count; ++i) {
-    if (i == zero) continue;  // the layer answers otherwise on either side
-    const std::array<double, 3> second = {1, -2, 1};
-    for (Eigen::Index j = 0; j < 3; ++j) {
-      for (Eigen::Index k = 0; k < 3; ++k) {
-        normal(i - 1 + j, i - 1 + k) +=
-            stiff * second[static_cast<std::size_t>(j)] * second[static_cast<std::size_t>(k)];
-      }
-    }
-  }
-  normal(zero, zero) += 1e6 * normal.trace();  // depth 0
-  knots.depth_mm = normal.ldlt().solve(right);
+  // The layer answers otherwise on either side of zero.
+  const double stiff = 0.02 * squares.trace() / static_cast<double>(count);
+  squares.straighten(0, zero + 1, stiff);
+  squares.straighten(zero, count - zero, stiff);
+  squares.add({{zero, 1}}, 0, 1e6 * squares.trace());  // depth 0
+  knots.depth_mm = squares.solve();
   knots.depth_mm[zero] = 0;
   for (Eigen::Index i = zero + 1; i < count; ++i) {
     knots.depth_mm[i] = std::max(knots.depth_mm[i], knots.depth_mm[i - 1]);

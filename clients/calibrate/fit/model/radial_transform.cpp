@@ -4,8 +4,6 @@
 
 #include <vector>
 
-#include "clients/calibrate/fit/model/gauss_legendre.hpp"
-
 namespace dtact::calibration {
 namespace {
 

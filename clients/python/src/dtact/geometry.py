@@ -20,30 +20,20 @@ class Surface:
     the origin. The camera looks along z through air and through the flat back of the gel, where rays
     are refracted."""
 
-    shape: str  #: "plane", "sphere", "cylinder" or "height_map"
+    shape: str  #: "plane", "sphere" or "cylinder"
     radius_mm: float = 0.0  #: of a sphere, its centre at (0, 0, −radius_mm), or a cylinder
     axis_deg: float = 0.0  #: of a cylinder, from x towards y
     air_mm: float = 0.0  #: from the camera's pinhole to the gel
     gel_mm: float = 0.0  #: from there to the surface's origin
     refraction: float = 1.0  #: of the gel
-    #: Of a height map: (H, W) micrometres towards the object, `spacing_mm` from node to node both
-    #: ways, its middle the origin; None of any other.
-    heights_um: NDArray[np.int32] | None = None
-    spacing_mm: float = 0.0
 
     @classmethod
     def of(cls, m: Message) -> Surface:
-        """ProtocolError where there are not as many heights as the sizes say."""
         shape = name_of("Surface.Shape", m.shape, "")
         if shape == "plane":
             return cls(shape)
-        heights = None
-        if shape == "height_map":
-            if len(m.heights.z_um) != m.heights.width * m.heights.height:
-                raise ProtocolError("a surface's heights are damaged: install the same release on both sides")
-            heights = np.array(m.heights.z_um, np.int32).reshape(m.heights.height, m.heights.width)
         return cls(shape, float(m.radius_mm), float(m.axis_deg), float(m.air_mm), float(m.gel_mm),
-                   float(m.refraction), heights, float(m.heights.spacing_mm))
+                   float(m.refraction))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace dtact::perceive {
+
+// Plain loops over a row's pixels that -O3 turns into vector code. Nothing is contracted, so that
+// they give the same bits on every processor.
+
+/// Bit k: whether a value of [k · tile, (k + 1) · tile) is not 0. A tile is a multiple of
+/// kTilePixels; there are at most 64.
+inline constexpr int kTilePixels = 32;
+[[nodiscard]] std::uint64_t touched_tiles(const std::int16_t* values, int width, int tile) noexcept;
+
+/// How many of them are NaN.
+[[nodiscard]] int count_holes(const float* values, int count) noexcept;
+
+/// Depth in values: metres are value · metres; `untrusted` is none.
+struct DepthUnit {
+  float metres = 0;
+  int untrusted = 0;
+};
+
+/// The largest size of all that are not NaN; 0 when there is none.
+[[nodiscard]] float largest(const float* values, std::size_t count) noexcept;
+
+/// The nearest whole number to value · per_unit, within ±32767; −32768 for NaN.
+void quantise(const float* values, std::size_t count, float per_unit, std::int16_t* out) noexcept;
+
+/// point − depth · normal of one axis; NaN where untrusted.
+void press(const float* point, const float* normal, const std::int16_t* depth, DepthUnit unit,
+           int count, float* out) noexcept;
+
+/// A row and the pixels of it that are to be made. Neighbours lie `reach` pixels away along it, or
+/// at its ends; the one above and the one below so many values away.
+struct RowPart {
+  int width = 0;
+  int reach = 0;
+  std::ptrdiff_t above = 0;
+  std::ptrdiff_t below = 0;
+  int begin = 0;
+  int end = 0;
+};
+
+// Outward unit normals by the differences of the neighbours. NaN where the pixel or a neighbour is
+// none, and where there is no neighbour to either side.
+
+/// Of a flat surface: z = −depth, and the normal (d depth/dx, d depth/dy, 1), normalised. All
+/// pointers are to the row's begin.
+void flat_points(const std::int16_t* depth, DepthUnit unit, float px_metres, const RowPart& part,
+                 float* z, float* nx, float* ny, float* nz) noexcept;
+
+/// Of points anywhere, whose y lie `apart` values after their x, and z after y. NaN too where the
+/// neighbours' differences are parallel.
+void curved_normals(const float* x, std::size_t apart, const RowPart& part, float* nx, float* ny,
+                    float* nz) noexcept;
+
+}  // namespace dtact::perceive

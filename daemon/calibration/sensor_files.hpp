@@ -1,0 +1,57 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "daemon/calibration/calibration.hpp"
+#include "daemon/recon/lens.hpp"
+#include "daemon/recon/spatial_gain.hpp"
+#include "hal/toml/key_reader.hpp"
+
+namespace dtact::calibration {
+
+/// Lies in a folder of images and says under which camera and light they were taken, so that a
+/// calibration made from them records both.
+inline constexpr const char* kSensorName = "sensor.toml";
+
+/// Camera, controls and light as the tables [camera], [camera.controls] and [light].
+[[nodiscard]] std::string format_camera_and_light(const Origin& origin);
+/// Takes those tables. Throws as KeyReader.
+void read_camera_and_light(tomlfile::KeyReader& top, Origin& origin);
+
+/// The text of a sensor file.
+[[nodiscard]] std::string format_sensor(const Origin& origin);
+/// Camera, controls and light of a sensor file; the rest is empty. Throws std::runtime_error with
+/// file, line, key and remedy.
+[[nodiscard]] Origin load_sensor(const std::filesystem::path& path);
+
+/// A lens and the camera frame it was measured in, and what the same images told of the gain: what
+/// `dtact-calibrate lens` writes.
+struct LensFile {
+  int frame_width = 0;
+  int frame_height = 0;
+  recon::Lens lens;
+  recon::SpatialGain gain;         ///< Places in millimetres of the lens's surface.
+  std::vector<std::string> notes;  ///< Comment lines: how it was measured and how well it fits.
+  bool gain_told = false;          ///< A board said so, also where `gain` is none.
+};
+
+/// The keys of a `[lens]` table, one a line, without the header. Numbers are read back exactly.
+[[nodiscard]] std::string format_lens(const recon::Lens& lens);
+
+/// Takes a `[lens]` table's keys; an empty table is no lens. Throws as KeyReader.
+[[nodiscard]] std::optional<recon::Lens> read_lens(tomlfile::KeyReader reader, int frame_width,
+                                                   int frame_height);
+
+/// The text of a lens file.
+[[nodiscard]] std::string format(const LensFile& file);
+
+/// Reads a lens file, or the lens of a calibration folder (without its gain, which belongs to its
+/// list). Throws std::runtime_error with file,
+/// line, key and remedy.
+[[nodiscard]] LensFile load_lens(const std::filesystem::path& path);
+
+}  // namespace dtact::calibration
