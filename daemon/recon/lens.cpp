@@ -40,6 +40,31 @@ Place split(double at, int size) {
   return {static_cast<int>(whole), static_cast<int>(fine - whole * kWeights)};
 }
 
+/// A lower bound of the slope of ρ(1 + k₁ρ² + …) where ρ² is between two values.
+double lowest_slope(const std::vector<double>& radial, double from_r2, double to_r2) {
+  double slope = 1;
+  double low = from_r2;
+  double high = to_r2;
+  double factor = 3;
+  for (const double k : radial) {
+    slope += factor * k * (k < 0 ? high : low);
+    low *= from_r2;
+    high *= to_r2;
+    factor += 2;
+  }
+  return slope;
+}
+
+/// The bound is closer in parts of the way. True: the slope is positive everywhere from the centre
+/// to `r2`. False: it may not be.
+bool rises_in_parts(const std::vector<double>& radial, double r2) {
+  constexpr int kParts = 8;
+  for (int i = 0; i < kParts; ++i) {
+    if (!(lowest_slope(radial, r2 * i / kParts, r2 * (i + 1) / kParts) > 0)) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 Point project(const Lens& lens, Point mm) {
@@ -52,18 +77,15 @@ Point project(const Lens& lens, Point mm) {
   const double r2 = (x * x + y * y) / (lens.radius_px * lens.radius_px);
   double stretch = 1;
   double power = r2;
-  double factor = 3;
-  double lowest_slope = 1;  // nowhere on the way from the centre is it lower
   for (const double k : lens.radial) {
     stretch += k * power;
-    lowest_slope += std::min(0.0, factor * k * power);
     power *= r2;
-    factor += 2;
   }
   // What lies beyond a fold is not seen where the polynomial says; where there may be one, the
   // slope of ρ(1 + k₁ρ² + …) is looked at on the whole way from the centre.
   constexpr int kSteps = 32;
-  for (int i = 1; i <= kSteps && !(lowest_slope > 0); ++i) {
+  const bool may_fold = !(lowest_slope(lens.radial, 0, r2) > 0) && !rises_in_parts(lens.radial, r2);
+  for (int i = 1; i <= kSteps && may_fold; ++i) {
     const double s2 = r2 * i * i / (kSteps * kSteps);
     double slope = 1;
     double s_power = s2;

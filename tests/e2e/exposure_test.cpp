@@ -1,4 +1,5 @@
 // A camera whose exposure is automatic, and how long a light change takes.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -22,15 +23,21 @@ std::filesystem::path write_scene(const TempFolder& folder, const std::string& t
   return file;
 }
 
-// Something covers a part of the picture from the fifth second on, with sanitizers later: the
-// daemon has to have seen it without.
+/// An exposure that follows the picture, and something that covers a part of the picture for five
+/// seconds of every ten, with sanitizers longer. The daemon must see the picture uncovered first,
+/// however late it starts.
+std::string covered_again_and_again() {
+  std::string text = "[[fault]]\nkind = \"auto_exposure\"\nframe = 0\nframes = 100000\n";
+  constexpr int kFrames = 300 * kSlower;
+  for (int frame = kFrames; frame < 100000; frame += 2 * kFrames) {
+    text += fmt::format("[[fault]]\nkind = \"covered\"\nframe = {}\nframes = {}\n", frame, kFrames);
+  }
+  return text;
+}
+
 TEST(Exposure, ThatFollowsThePictureIsNamedThoughTheCameraCallsItLocked) {
   const TempFolder folder;
-  const Sensor sensor(write_scene(
-      folder, "[[fault]]\nkind = \"covered\"\nframe = " + std::to_string(300 * kSlower) +
-                  "\nframes = 100000\n"
-                  "[[fault]]\nkind = \"auto_exposure\"\nframe = 0\n"
-                  "frames = 100000\n"));
+  const Sensor sensor(write_scene(folder, covered_again_and_again()));
   client::Client client = sensor.connect();
   v1::Subscribe summary;
   summary.set_summary(true);

@@ -1,73 +1,100 @@
 #!/usr/bin/env python3
-"""Puts one plausible bug after another into the code and asks whether a test notices.
+"""Draws small bugs at random, puts one after another into the code and asks whether a test fails.
 
-Each *.toml beside this file is an area and lists its bugs: a file, a text that stands in it exactly
-once, what stands there instead, what a user would suffer, and the tests that are built and run. All
-of it happens in a copy of the tree under --work with a build folder of its own, so that neither an
-interrupt nor a killed run leaves a bug behind.
+A mutant is one edit of one line of the C++ sources in daemon, hal and clients: a flipped comparison, a
+number or an offset off by one, a dropped negation, a dropped statement, or a constant swapped for its
+counterpart. The seed and the sources determine the draw. All of it happens in a copy of the tree under
+--work, so that neither an interrupt nor a killed run leaves a bug behind.
 
-Prints one line a bug and the share of each area. Exit code: 0 every bug was caught, 1 some were not,
-or the list or the tree is not in order.
+Prints one line a mutant and the share caught. Exit code: 0 every mutant was caught, 1 some were not, or
+the tree does not build or pass without a mutant, or the command line is wrong.
 """
 import argparse
 import collections
-import itertools
+import json
 import os
 import pathlib
+import random
 import re
 import signal
 import subprocess
 import sys
 import time
-import tomllib
 
-HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parent.parent
-KEYS = {"name", "file", "line", "instead", "harm", "tests"}
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+AREAS = ("daemon", "hal", "clients")
 CAUGHT, SURVIVED, UNBUILT = "caught", "SURVIVED", "does not build"
 
-Mutant = collections.namedtuple("Mutant", "area name file line instead harm tests")
+FLIPPED = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "=="}
+COUNTERPARTS = [("true", "false"), ("min", "max"), ("width", "height"), ("row", "col"), ("rows", "cols"),
+                ("&&", "||"), ("first", "last"), ("begin", "end"), ("front", "back"), ("floor", "ceil")]
+SWAPPED = {**dict(COUNTERPARTS), **{b: a for a, b in COUNTERPARTS}}
+
+Mutant = collections.namedtuple("Mutant", "kind file number before after")
 
 
 class Trouble(Exception):
-    """The list or the tree is not in order; the text says where and what to do."""
+    """The tree or the command line is not in order; the text says what to do."""
 
 
-def load():
-    """All mutants, by area and file, so that neighbours share most of what is built."""
-    mutants = []
-    for path in sorted(HERE.glob("*.toml")):
-        document = tomllib.loads(path.read_text())
-        for entry in document["mutant"]:
-            entry = {"tests": document.get("tests"), **entry}
-            if set(entry) != KEYS or not entry["tests"]:
-                raise Trouble(f"{path.name}: {entry.get('name', '?')}: needs the keys "
-                              f"{', '.join(sorted(KEYS))} and no other")
-            mutants.append(Mutant(path.stem, **entry))
-    names = collections.Counter(m.name for m in mutants)
-    twice = [name for name, count in names.items() if count > 1]
-    if twice:
-        raise Trouble(f"names must differ: {', '.join(twice)}")
-    return sorted(mutants, key=lambda m: (m.area, m.file))
+def blanked(text):
+    """The text with comments, literals of text and preprocessor lines blanked, at the same offsets."""
+    pattern = re.compile(r"""//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:\\.|[^"\\\n])*"|(?<!\w)'(?:\\.|[^'\\\n])*'"""
+                         r"""|^[ \t]*\#(?:\\\n|[^\n])*|static_assert[^;]*;""", re.DOTALL | re.MULTILINE)
+    return pattern.sub(lambda found: re.sub(r"[^\n]", "\0", found.group()), text)
 
 
-def chosen(mutants, names):
-    unknown = set(names) - {m.name for m in mutants} - {m.area for m in mutants}
-    if unknown:
-        raise Trouble(f"no mutant or area is named {', '.join(sorted(unknown))}; --list names them")
-    return [m for m in mutants if not names or m.name in names or m.area in names]
+def line_edits(code):
+    """(kind, begin, end, replacement) of each edit that a line of code without comments allows."""
+    for found in re.finditer(r"(?<= )(<=|>=|==|!=|<|>)(?= )", code):
+        yield "comparison", *found.span(), FLIPPED[found.group()]
+    for found in re.finditer(r"(?<![\w.'])\d{1,6}(?=U?L?L?(?![\w.']))", code):
+        for step in (1, -1):
+            if int(found.group()) + step >= 0:
+                yield "off by one", *found.span(), str(int(found.group()) + step)
+    for found in re.finditer(r"(?<=[\w)\]] )[+-](?= )", code):
+        yield "off by one", *found.span(), "-" if found.group() == "+" else "+"
+    for found in re.finditer(r"!(?=[\w(:*])", code):
+        yield "negation", *found.span(), ""
+    # A call, an assignment or a step, whole on its line; no declaration and nothing that ends the block.
+    found = re.fullmatch(r"(\s+)((?:\+\+|--)?[A-Za-z_*][\w.:>\[\]-]*"
+                         r"(?:\(.*\)| (?:[-+*/|&^]|<<|>>)?= .*)?(?:\+\+|--)?;)\s*", code)
+    if found and not re.match(r"(return|break|continue|goto|using|public|throw|else|default|co_)\b", found.group(2)):
+        yield "statement", *found.span(2), "{}"
+    for found in re.finditer(r"\w+|&&|\|\|", code):
+        if found.group() in SWAPPED:
+            yield "constant", *found.span(), SWAPPED[found.group()]
 
 
-def check(mutants):
-    """Every text stands where it is looked for."""
-    wrong = []
-    for m in mutants:
-        path = ROOT / m.file
-        found = path.read_text().count(m.line) if path.is_file() else 0
-        if found != 1 or m.line == m.instead:
-            wrong.append(f"  {m.area}.toml: {m.name}: its line stands {found} times in {m.file}")
-    if wrong:
-        raise Trouble("the code has changed; bring these up to date:\n" + "\n".join(wrong))
+def all_mutants(folders):
+    """Every possible mutant of the folders, by kind."""
+    listed = subprocess.run(["git", "ls-files", "--", *folders], cwd=ROOT, check=True, capture_output=True,
+                            text=True).stdout.split()
+    mutants = collections.defaultdict(list)
+    for name in sorted(listed):
+        if not name.endswith((".cpp", ".hpp")) or not name.startswith(AREAS):
+            continue
+        text = (ROOT / name).read_text()
+        lines = zip(text.split("\n"), blanked(text).split("\n"), strict=True)
+        for number, (line, code) in enumerate(lines):
+            for kind, begin, end, instead in line_edits(code):
+                mutants[kind].append(Mutant(kind, name, number, line, line[:begin] + instead + line[end:]))
+    return mutants
+
+
+def drawn(folders, seed):
+    """Mutants without end, each kind as often as any other."""
+    mutants = all_mutants(folders)
+    if not mutants:
+        raise Trouble(f"no C++ source to change is under {' '.join(folders)}; name folders of {', '.join(AREAS)}")
+    generator = random.Random(seed)
+    kinds = sorted(mutants)
+    seen = set()
+    while len(seen) < sum(map(len, mutants.values())):
+        mutant = generator.choice(mutants[generator.choice(kinds)])
+        if mutant not in seen:
+            seen.add(mutant)
+            yield mutant
 
 
 def end(process):
@@ -80,13 +107,14 @@ def end(process):
 
 
 class Tree:
-    """A copy of the sources with a build folder, kept from run to run."""
+    """A copy of the sources, built as the dev preset says; kept from run to run."""
 
     def __init__(self, work):
         self.source = work / "tree"
-        self.build = work / "build"
+        self.build = self.source / "build" / "dev"
         self.copy()
         self.configure()
+        self.read_targets()
 
     def copy(self):
         """Writes what differs, with the present time: only so does the build see a reverted bug."""
@@ -101,21 +129,65 @@ class Tree:
             there.parent.mkdir(parents=True, exist_ok=True)
             there.write_bytes(content)
             there.chmod(here.stat().st_mode)
-        for path in self.source.rglob("*"):
-            if path.is_file() and str(path.relative_to(self.source)) not in wanted:
-                path.unlink()
+        for folder in self.source.iterdir():
+            for path in [folder] if folder.is_file() else folder.rglob("*"):
+                name = str(path.relative_to(self.source))
+                if path.is_file() and not name.startswith("build/") and name not in wanted:
+                    path.unlink()
 
     def configure(self):
-        done = self.run(["cmake", "--preset", "mutants", "-B", self.build], 600)
+        query = self.build / ".cmake/api/v1/query"
+        query.mkdir(parents=True, exist_ok=True)
+        (query / "codemodel-v2").touch()
+        done = self.run(["cmake", "--preset", "dev"], 600)
         if done.returncode != 0:
             raise Trouble(f"cmake failed:\n{done.stdout}")
 
+    def read_targets(self):
+        """Which targets a source is part of, what depends on a target, and which targets are tests."""
+        reply = self.build / ".cmake/api/v1/reply"
+        model = json.loads(next(reply.glob("codemodel-v2-*.json")).read_text())
+        targets = {t["id"]: json.loads((reply / t["jsonFile"]).read_text())
+                   for t in model["configurations"][0]["targets"]}
+        self.names = {t: targets[t]["name"] for t in targets}
+        self.owners = collections.defaultdict(set)
+        self.below = {}
+        for t, target in targets.items():
+            self.below[t] = {d["id"] for d in target.get("dependencies", [])}
+            for source in target.get("sources", []):
+                self.owners[source["path"]].add(t)
+                if target["type"] != "EXECUTABLE" or not source["path"].startswith("tests/"):
+                    self.owners[str(pathlib.PurePath(source["path"]).parent)].add(t)
+        shown = self.run(["ctest", "--test-dir", self.build, "--show-only=json-v1"], 60).stdout
+        labels = {}
+        for test in json.loads(shown[shown.index("{"):])["tests"]:
+            for entry in test["properties"]:
+                if entry["name"] == "LABELS":
+                    labels[test["name"]] = set(entry["value"])
+        self.labels = {t: labels[name] for t, name in self.names.items() if name in labels}
+
+    def all_below(self, target):
+        reached, todo = set(), [target]
+        while todo:
+            for dependency in self.below[todo.pop()] - reached:
+                reached.add(dependency)
+                todo.append(dependency)
+        return reached
+
+    def tests_of(self, file, label):
+        """The test programs with the label that contain the file, those of the fewest parts first. A header
+        belongs to the targets of its folder."""
+        owners = self.owners.get(file) or self.owners.get(str(pathlib.PurePath(file).parent), set())
+        below = {t: self.all_below(t) for t, labels in self.labels.items() if label in labels}
+        return [self.names[t] for t in sorted(below, key=lambda t: (len(below[t]), self.names[t]))
+                if owners & (below[t] | {t})]
+
     def run(self, command, seconds, **environment):
         """A process group of its own, so that nothing of a hanging test outlives its time."""
-        with subprocess.Popen(command, cwd=self.source, stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, text=True, errors="replace",
-                              start_new_session=True,
-                              env={**os.environ, **environment}) as process:
+        # With its own tree as base a compiler cache finds what another copy has compiled.
+        environment = {"CCACHE_BASEDIR": str(self.source), "CCACHE_NOHASHDIR": "1", **os.environ, **environment}
+        with subprocess.Popen(command, cwd=self.source, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                              text=True, errors="replace", start_new_session=True, env=environment) as process:
             try:
                 output, _ = process.communicate(timeout=seconds)
             except subprocess.TimeoutExpired:
@@ -130,83 +202,103 @@ class Tree:
         return self.run(["cmake", "--build", self.build, "--target", *targets], 3600)
 
     def test(self, targets):
-        """The first failure ends it. A test may hang with a bug: 120 s are its limit."""
-        return self.run(["ctest", "--test-dir", self.build, "--output-on-failure",
-                         "--stop-on-failure", "--timeout", "120",
-                         "-R", f"^({'|'.join(targets)})$"], 900,
+        """The first failure ends it. A test may hang with a bug: 300 s are its limit."""
+        return self.run(["ctest", "--test-dir", self.build, "--output-on-failure", "--stop-on-failure",
+                         "--timeout", "300", "-R", f"^({'|'.join(targets)})$"], 3600,
                         GTEST_BRIEF="1", GTEST_FAIL_FAST="1")
 
 
-def verdict(tree, mutant):
-    """What becomes of the bug, and by which test."""
-    path = tree.source / mutant.file
-    whole = path.read_text()
-    try:
-        path.write_text(whole.replace(mutant.line, mutant.instead))
-        made = tree.make(mutant.tests)
-        if made.returncode != 0:
-            error = re.search(r"error: (.*)", made.stdout)
-            return UNBUILT, error.group(1) if error else ""
-        tested = tree.test(mutant.tests)
-        if tested.returncode == 0:
-            return SURVIVED, mutant.harm
-        failed = re.search(r"\[  FAILED  \] (\S+?)[ ,]", tested.stdout)
-        how = re.search(r"\*\*\*(\w+)", tested.stdout)
-        return CAUGHT, failed.group(1) if failed else (how.group(1) if how else "")
-    finally:
-        path.write_text(whole)
+def stages(tree, mutant, labels):
+    """Tests to build and run, one stage after another until one fails."""
+    for label in labels:
+        tests = tree.tests_of(mutant.file, label)
+        yield from (stage for stage in (tests[:3], tests[3:]) if stage)
 
 
-def expect_well(tree, mutants):
-    """Without a bug all of the tests pass; else nothing that follows would mean anything."""
-    targets = sorted({test for m in mutants for test in m.tests})
-    made = tree.make(targets)
+def require_clean(tree, tests, clean):
+    """Without a mutant the tests pass; else nothing that follows would mean anything."""
+    tests = [test for test in tests if test not in clean]
+    if not tests:
+        return
+    made = tree.make(tests)
     if made.returncode != 0:
         raise Trouble(f"the tree does not build:\n{made.stdout}")
-    tested = tree.test(targets)
+    tested = tree.test(tests)
     if tested.returncode != 0:
-        raise Trouble(f"the tests fail without any bug:\n{tested.stdout}")
+        raise Trouble(f"tests fail without a mutant:\n{tested.stdout}")
+    clean.update(tests)
 
 
-def print_share(name, verdicts):
-    built = len(verdicts) - verdicts.count(UNBUILT)
-    caught = verdicts.count(CAUGHT)
-    rest = f", {verdicts.count(UNBUILT)} do not build" if built < len(verdicts) else ""
-    print(f"{name:12} {caught} of {built} caught ({100 * caught / max(1, built):.0f} %){rest}")
+def outcome(tree, tests):
+    """Of the tests with the mutant in the tree; None when they all pass."""
+    made = tree.make(tests)
+    if made.returncode != 0:
+        error = re.search(r"error: (.*)", made.stdout)
+        return UNBUILT, error.group(1) if error else ""
+    tested = tree.test(tests)
+    if tested.returncode == 0:
+        return None
+    failed = re.search(r"\[  FAILED  \] (\S+?)[ ,]", tested.stdout)
+    how = re.search(r"\d+ - (\S+ \(\w+\))", tested.stdout)
+    return CAUGHT, failed.group(1) if failed else (how.group(1) if how else "")
 
 
-def summary(results):
-    for area in sorted({m.area for m, _ in results}):
-        of_area = [what for m, what in results if m.area == area]
-        print_share(area, of_area)
-    print_share("all", [what for _, what in results])
+def verdict(tree, mutant, labels, clean):
+    """What becomes of the mutant, and by which test."""
+    path = tree.source / mutant.file
+    whole = path.read_text()
+    lines = whole.split("\n")
+    lines[mutant.number] = mutant.after
+    for tests in stages(tree, mutant, labels):
+        require_clean(tree, tests, clean)
+        try:
+            path.write_text("\n".join(lines))
+            found = outcome(tree, tests)
+        finally:
+            path.write_text(whole)
+        if found:
+            return found
+    return SURVIVED, ""
+
+
+def show(mutant):
+    print(f"{mutant.file}:{mutant.number + 1}: {mutant.kind}\n  - {mutant.before.strip()}\n"
+          f"  + {mutant.after.strip()}", flush=True)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("names", nargs="*", help="areas or mutants; all when left out")
-    parser.add_argument("--list", action="store_true", help="name them and run nothing")
+    parser.add_argument("folders", nargs="*", help="folders or files to draw from; all of daemon, hal and clients when "
+                                                   "left out")
+    parser.add_argument("--count", type=int, default=60, help="mutants that build (60)")
+    parser.add_argument("--seed", type=int, default=1, help="another seed draws others (1)")
+    parser.add_argument("--unit", action="store_true", help="ask the unit tests alone, not those end to end")
+    parser.add_argument("--list", action="store_true", help="show the first of the draw and run nothing")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "build" / "mutants")
     options = parser.parse_args()
-    mutants = chosen(load(), options.names)
-    check(mutants)
+    if options.count < 1:
+        parser.error("--count needs a number above 0")
+    draw = drawn(options.folders or AREAS, options.seed)
     if options.list:
-        for m in mutants:
-            print(f"{m.area:12} {m.name:34} {m.file}: {m.harm}")
+        for mutant, _ in zip(draw, range(options.count)):
+            show(mutant)
         return 0
     tree = Tree(options.work.resolve())
-    results = []
-    for _, of_area in itertools.groupby(mutants, key=lambda m: m.area):
-        of_area = list(of_area)
-        expect_well(tree, of_area)
-        for mutant in of_area:
-            begin = time.monotonic()
-            what, by = verdict(tree, mutant)
-            results.append((mutant, what))
-            seconds = time.monotonic() - begin
-            print(f"{mutant.area:12} {mutant.name:34} {what} ({seconds:.0f} s)  {by}", flush=True)
-    summary(results)
-    return 0 if all(what == CAUGHT for _, what in results) else 1
+    labels = ["unit"] if options.unit else ["unit", "e2e"]
+    verdicts = collections.Counter()
+    clean = set()
+    for mutant in draw:
+        show(mutant)
+        began = time.monotonic()
+        what, by = verdict(tree, mutant, labels, clean)
+        verdicts[what] += 1
+        print(f"  {what} ({time.monotonic() - began:.0f} s)  {by}", flush=True)
+        if verdicts[CAUGHT] + verdicts[SURVIVED] == options.count:
+            break
+    built = verdicts[CAUGHT] + verdicts[SURVIVED]
+    print(f"seed {options.seed}: {verdicts[CAUGHT]} of {built} caught "
+          f"({100 * verdicts[CAUGHT] / max(1, built):.0f} %), {verdicts[UNBUILT]} more do not build")
+    return 0 if verdicts[SURVIVED] == 0 else 1
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ import { fileURLToPath } from "node:url";
 import { open, until } from "./browser.mjs";
 import { startDaemon, startGateway, status, stopAll, tokenFile, work } from "./programs.mjs";
 
-const scenes = path.resolve(path.dirname(fileURLToPath(import.meta.url)), "../../config/scenes");
+const here = path.dirname(fileURLToPath(import.meta.url));
 const folder = path.join(work, "sessions");
 const START = { radius_mm: 4, mm_per_px: 0.0413793, crop: [560, 520] };
 
@@ -18,7 +18,7 @@ let pane;
 
 before(async () => {
   left = await startDaemon("left", 0, [
-    `camera.sim.scene=${path.join(scenes, "calibration_presses.toml")}`,
+    `camera.sim.scene=${path.join(here, "guide_presses.toml")}`,
     "camera.fps=60",
   ]);
   view = await open(await startGateway({ left: left.port }, ["--work-folder", folder]));
@@ -58,7 +58,7 @@ test("presses become a calibration that the daemon uses", async () => {
   const said = guide.getByLabel("Said", { exact: true });
   const done = /the daemon uses calibration left-\d{8}-\d{6} from now on/;
   let refused;
-  // Some come out too light, or their like have been taken.
+  // It asks again where a press was taken already.
   const end = Date.now() + 300_000;
   while (Date.now() < end && !done.test(await said.textContent())) {
     const answer = guide.getByRole("button", { name: /^(take|yes)$/ });

@@ -32,15 +32,24 @@ inline v1::LumaMap picture(const Scene& scene, double depth_mm, std::uint32_t se
   map.set_encoding(v1::LUMA_GREY8);
   map.set_width(kWidth);
   map.set_height(kHeight);
+  std::string& pixels = *map.mutable_data();
+  pixels.resize(std::size_t{kWidth} * kHeight);
   std::uint32_t noise = seed * 2654435761U + 1;
+  std::size_t i = 0;
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 0; x < kWidth; ++x) {
-      const double r = 0.05 * std::hypot(x - scene.x_px, y - scene.y_px);
-      const double sag = 4 - std::sqrt(std::max(0.0, 16 - r * r));
-      const double dark = 30 * std::max(0.0, depth_mm - sag);
+      long dark = 0;
+      const double dx = 0.05 * (x - scene.x_px);
+      const double dy = 0.05 * (y - scene.y_px);
+      const double r2 = dx * dx + dy * dy;
+      // Where the ball is below the surface.
+      if (r2 < 2 * 4 * depth_mm) {
+        const double sag = 4 - std::sqrt(std::max(0.0, 16 - r2));
+        dark = std::lround(30 * std::max(0.0, depth_mm - sag));
+      }
       noise = noise * 1664525U + 1013904223U;
       const int grain = static_cast<int>(noise >> 30U) - 1;  // −1 … 2
-      map.mutable_data()->push_back(static_cast<char>(std::lround(200 - dark) + grain));
+      pixels[i++] = static_cast<char>(200 - dark + grain);
     }
   }
   return map;

@@ -36,7 +36,9 @@ class GuidedSession : public testing::Test {
     plan_.presses = 4;
     plan_.reference_frames = 8;
     plan_.press_frames = 4;
-    plan_.patience_s = 20;
+    plan_.patience_s = 8;
+    // The fits of the other methods take seconds each.
+    plan_.method = ListMethod::alone;
     plan_.again = "dtact-calibrate guided --folder X";
   }
   ~GuidedSession() override { fs::remove_all(plan_.folder.parent_path()); }
@@ -103,7 +105,7 @@ TEST_F(GuidedSession, TheBatchCommandReadsTheWorkFolder) {
     add_press(images, (plan_.folder / name).string());
   }
   calibration::PressReport report;
-  const calibration::Calibration batch = build_list(images, ListMethod::automatic, &report);
+  const calibration::Calibration batch = build_list(images, plan_.method, &report);
   const calibration::Calibration guided = calibration::load(plan_.folder / "calibration");
   EXPECT_EQ(batch.model->list.um, guided.model->list.um);
   EXPECT_EQ(batch.origin.leds, guided.origin.leds);
@@ -264,6 +266,7 @@ v1::LumaMap layer_picture(const Scene& scene) {
 TEST_F(GuidedSession, EndsWhereTheLayerMakesUpForAPress) {
   plan_.map.mm_per_px = calibration::ImaginedView::kMmPerPx;
   plan_.presses = 6;
+  plan_.method = ListMethod::automatic;
   FakeSensor sensor(presses({{.depth_mm = 2.8}, {.depth_mm = 2.5, .x_px = 150, .y_px = 158}}));
   sensor.paint = layer_picture;
   FakeConsole console({"", "", "", "s", ""});

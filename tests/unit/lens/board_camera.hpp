@@ -1,9 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <functional>
 #include <numbers>
 #include <opencv2/core.hpp>
+#include <vector>
 
 namespace dtact::ctl {
 
@@ -38,6 +41,7 @@ struct BoardCamera {
   [[nodiscard]] cv::Mat1f photograph(const std::function<double(cv::Point2d mm)>& pattern,
                                      int samples, double noise) const {
     const cv::Matx33d to_camera = axes();
+    const std::vector<double> factors = factors_seen();
     cv::Mat1f image(height, width);
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) {
@@ -46,7 +50,7 @@ struct BoardCamera {
           const int column = s % samples;
           const int row = s / samples;
           const cv::Point2d inside((column + 0.5) / samples - 0.5, (row + 0.5) / samples - 0.5);
-          sum += pattern(surface(to_camera, cv::Point2d(x, y) + inside));
+          sum += pattern(surface(to_camera, factors, cv::Point2d(x, y) + inside));
         }
         image(y, x) = static_cast<float>(sum / (samples * samples));
       }
@@ -59,17 +63,41 @@ struct BoardCamera {
   }
 
  private:
+  static constexpr double kFactorsPerSlope = 8192;
+
+  /// factor() of the rays by the slope at which they are seen, up to beyond the image's corners, in
+  /// steps of 1 / kFactorsPerSlope.
+  [[nodiscard]] std::vector<double> factors_seen() const {
+    const double corner = std::hypot(std::max(centre.x, width - centre.x) + 1,
+                                     std::max(centre.y, height - centre.y) + 1);
+    std::vector<double> factors;
+    while (static_cast<double>(factors.size()) < corner / focal * kFactorsPerSlope + 2) {
+      const double seen = static_cast<double>(factors.size()) / kFactorsPerSlope;
+      double slope = seen;
+      for (int i = 0; i < 12; ++i) slope = seen / factor(slope * slope);
+      factors.push_back(factor(slope * slope));
+    }
+    return factors;
+  }
   /// The plane's point that a pixel shows.
-  [[nodiscard]] cv::Point2d surface(const cv::Matx33d& a, cv::Point2d px) const {
+  [[nodiscard]] cv::Point2d surface(const cv::Matx33d& a, const std::vector<double>& factors,
+                                    cv::Point2d px) const {
     const cv::Point2d seen = (px - centre) / focal;
-    cv::Point2d ray = seen;
-    for (int i = 0; i < 12; ++i) ray = seen / factor(ray.dot(ray));
+    const double place_in_table = std::hypot(seen.x, seen.y) * kFactorsPerSlope;
+    const auto below = static_cast<std::size_t>(place_in_table);
+    const double part = place_in_table - static_cast<double>(below);
+    const cv::Point2d ray = seen / ((1 - part) * factors[below] + part * factors[below + 1]);
     // a · (X, Y, 0) + place is along the ray: two equations for X and Y.
     const cv::Vec3d t = place();
-    const cv::Matx22d left(a(0, 0) - ray.x * a(2, 0), a(0, 1) - ray.x * a(2, 1),
-                           a(1, 0) - ray.y * a(2, 0), a(1, 1) - ray.y * a(2, 1));
-    const cv::Vec2d mm = left.inv() * cv::Vec2d(ray.x * t[2] - t[0], ray.y * t[2] - t[1]);
-    return {mm[0], mm[1]};
+    const double xx = a(0, 0) - ray.x * a(2, 0);
+    const double xy = a(0, 1) - ray.x * a(2, 1);
+    const double yx = a(1, 0) - ray.y * a(2, 0);
+    const double yy = a(1, 1) - ray.y * a(2, 1);
+    const double right_x = ray.x * t[2] - t[0];
+    const double right_y = ray.y * t[2] - t[1];
+    const double determinant = xx * yy - xy * yx;
+    return {(right_x * yy - xy * right_y) / determinant,
+            (xx * right_y - yx * right_x) / determinant};
   }
   [[nodiscard]] double factor(double r2) const { return 1 + r2 * (k1 + r2 * (k2 + r2 * k3)); }
   [[nodiscard]] cv::Vec3d place() const { return {shift_mm.x, shift_mm.y, distance_mm}; }

@@ -90,9 +90,6 @@ std::uint64_t encoded(RawClient& asking) {
 // NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send for constants
 // To the kernel a program that was stopped is one that does not read.
 TEST(StoppedReader, IsKeptAndToldWhatItMissed) {
-#ifdef DTACT_EMULATED
-  GTEST_SKIP() << "the emulator does not pass on what TCP knows of a connection";
-#endif
   NetConfig config;
   config.dead_after = kDeadAfter;
   Rig rig(config);
@@ -220,9 +217,6 @@ TEST_F(DeadPeer, IsLetGoInTheMiddleOfFrames) {
 }
 
 TEST_F(DeadPeer, IsLetGoAfterItStoppedReading) {
-#ifdef DTACT_EMULATED
-  GTEST_SKIP() << "the emulator does not pass on what TCP knows of a connection";
-#endif
   Rig rig(config_);
   RawClient client(rig.tcp_port(), kSmallBuffer);
   client.hello();

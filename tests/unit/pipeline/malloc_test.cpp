@@ -139,9 +139,6 @@ TEST_F(CaptureThread, AllocatesAndFreesNothingWhileItSharpensMoreAndLess) {
 
 TEST_F(CaptureThread, TouchesNoNewPageOnceItHasDoneEverything) {
   if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer's shadow pages would count";
-#ifdef DTACT_EMULATED
-  GTEST_SKIP() << "the emulator's own pages would count";
-#endif
   // Code is mapped at its first execution: the first round of commands belongs to the warm-up.
   void* const fresh =
       ::mmap(nullptr, 1, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);

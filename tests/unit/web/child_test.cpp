@@ -106,9 +106,6 @@ TEST(Child, KeepsTheEndOfALongComplaint) {
 }
 
 TEST(Child, SaysThatAProgramIsNotThere) {
-#ifdef DTACT_EMULATED
-  GTEST_SKIP() << "the emulator forks where the C library lets the child tell of its failure";
-#endif
   boost::asio::io_context io;
   const auto child = std::make_shared<Child>(io.get_executor());
   EXPECT_THROW(child->start({"/nowhere/dtact"}, "", {}), std::system_error);
