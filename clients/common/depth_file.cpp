@@ -11,7 +11,7 @@
 
 #include "clients/common/exit_codes.hpp"
 #include "clients/perceive/geometry/cloud_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::cli {
 namespace {

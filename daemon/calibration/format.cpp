@@ -15,8 +15,8 @@
 #include "daemon/calibration/sha256.hpp"
 #include "daemon/calibration/surface_table.hpp"
 #include "daemon/calibration/text.hpp"
-#include "hal/image/png.hpp"
-#include "hal/toml/key_reader.hpp"
+#include "hal/files/key_reader.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 namespace {

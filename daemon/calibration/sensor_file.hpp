@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "daemon/calibration/calibration.hpp"
-#include "hal/toml/key_reader.hpp"
+#include "hal/files/key_reader.hpp"
 
 namespace dtact::calibration {
 

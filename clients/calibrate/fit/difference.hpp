@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "daemon/recon/model.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 

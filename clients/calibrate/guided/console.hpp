@@ -7,7 +7,7 @@
 
 #include "clients/calibrate/guided/line_input.hpp"
 #include "clients/calibrate/guided/taken_press.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl::guided {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "clients/calibrate/guided/cells.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl::guided {
 

@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl {
 

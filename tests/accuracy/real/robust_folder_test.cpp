@@ -9,7 +9,7 @@
 
 #include "clients/calibrate/offline/folder_evaluation.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/accuracy/real/press_images.hpp"
 #include "tests/unit/calibration/sample.hpp"
 

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
-#include "hal/mcap/writer.hpp"
+#include "hal/files/mcap_writer.hpp"
+#include "hal/files/png.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "tests/fakes/fake_clock.hpp"
 #include "tests/fakes/jpeg_maker.hpp"
