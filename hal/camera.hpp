@@ -40,6 +40,11 @@ struct CameraInfo {
   std::vector<CameraControl> controls;
 };
 
+/// A camera that has sent nothing for longer than this has stalled. Nanoseconds.
+[[nodiscard]] constexpr std::int64_t stall_ns(std::int64_t frame_period_ns) noexcept {
+  return 3 * frame_period_ns;
+}
+
 enum class CameraState : std::uint8_t { streaming, stalled, unplugged, busy, denied, ended };
 
 /// Why payloads were damaged.
@@ -53,10 +58,13 @@ struct DamageCounts {
 /// Run-time condition of a camera. Any thread may ask.
 struct CameraReport {
   CameraState state = CameraState::streaming;
-  std::string remedy;             ///< A sentence saying what to do; empty while streaming.
-  std::uint64_t delivered = 0;    ///< Frames handed out.
-  std::uint64_t lost = 0;         ///< Gaps in the sequence.
-  std::uint64_t skipped = 0;      ///< Whole frames passed over for a newer one.
+  std::string remedy;           ///< A sentence saying what to do; empty while streaming.
+  std::uint64_t delivered = 0;  ///< Frames handed out.
+  /// Every gap in the sequence is counted in exactly one of the two. `lost`: the camera or its
+  /// driver lost the frame. `skipped`: this process came late. It passed the frame over for a newer
+  /// one, or had not returned a buffer that the driver could have filled.
+  std::uint64_t lost = 0;
+  std::uint64_t skipped = 0;
   std::uint64_t damaged = 0;      ///< Truncated or undecodable payloads.
   DamageCounts damage;            ///< The same by cause.
   std::uint64_t disconnects = 0;  ///< Times the device went away.

@@ -42,7 +42,8 @@ enum class TimestampMeaning : std::uint8_t {
 /// What is odd about a frame that is still whole enough to use. A bit set.
 enum FrameFlag : std::uint32_t {
   kFrameNormal = 0,
-  kFrameAfterGap = 1U << 0U,  ///< Frames between this one and the one before were lost.
+  /// The camera lost frames between this one and the one before (CameraReport::lost).
+  kFrameAfterGap = 1U << 0U,
   /// A locked control of the camera has moved by itself: the brightness may have, too.
   kFrameControlsMoved = 1U << 1U,
   /// The device was opened and its controls were set anew since the frame before: the brightness
@@ -51,7 +52,7 @@ enum FrameFlag : std::uint32_t {
 };
 
 struct FrameInfo {
-  /// The camera's own counter. A gap means frames that the camera or driver lost.
+  /// The camera's own counter. CameraReport says whether frames in a gap were lost or skipped.
   std::uint64_t sequence = 0;
   /// CLOCK_MONOTONIC, nanoseconds; `meaning` says which moment.
   std::int64_t timestamp_ns = 0;

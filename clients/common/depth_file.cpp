@@ -12,7 +12,7 @@
 #include "clients/common/colours.hpp"
 #include "clients/common/exit_codes.hpp"
 #include "clients/geometry/cloud_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::cli {
 namespace {

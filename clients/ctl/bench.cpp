@@ -89,6 +89,7 @@ class Bench {
       return report;
     }
     (void)stream(kWarmUpSeconds);
+    const v1::CameraStatus camera_before = ask_camera();
     const bool pings = !client_.same_machine() && client_.has_feature("ping");
     const ClockOffset before = pings ? ask_clock() : ClockOffset{};
     const BenchMeter meter = stream(options_.seconds);
@@ -99,6 +100,9 @@ class Bench {
     }
     cli::BenchReport report = meter.report(offset);
     report.set_encoding(encoding);
+    const v1::CameraStatus camera = ask_camera();
+    report.set_lost(camera.lost() - camera_before.lost());
+    report.set_skipped(camera.skipped() - camera_before.skipped());
     if (pings) {
       report.set_clock_offset_ms(static_cast<double>(after.offset_ns) * 1e-6);
       report.set_clock_uncertainty_ms(
@@ -114,10 +118,20 @@ class Bench {
       const std::int64_t theirs_ns = client_.ping().monotonic_ns();
       pings.push_back({sent_ns, now(), theirs_ns});
     }
-    // What came meanwhile waited for this and says nothing of the connection.
+    discard_waiting();
+    return shortest_round_trip(pings);
+  }
+
+  v1::CameraStatus ask_camera() {
+    v1::CameraStatus camera = client_.status().camera();
+    discard_waiting();
+    return camera;
+  }
+
+  /// What came during a request waited for it and says nothing of the connection.
+  void discard_waiting() {
     while (client_.next(std::chrono::milliseconds(0)).has_value()) {
     }
-    return shortest_round_trip(pings);
   }
 
   BenchMeter stream(double seconds) {
@@ -142,7 +156,8 @@ void add_bench(CLI::App& app, Context& context) {
   auto* command = app.add_subcommand(
       "bench",
       "Measure the connection: rate, latency since the frame's timestamp (between machines by an "
-      "estimate of their clocks' offset), jitter, what was missed here and lost before, bytes");
+      "estimate of their clocks' offset), jitter, bytes, frames missed here, skipped by the daemon "
+      "and lost by the camera");
   const auto options = std::make_shared<BenchOptions>();
   command->add_option("--seconds", options->seconds, "For so long each")
       ->check(CLI::PositiveNumber)

@@ -21,7 +21,6 @@ std::uint64_t size_on_wire(const v1::Frame& frame) {
 
 v1::Frame without_maps(const v1::Frame& frame) {
   v1::Frame head;
-  head.set_sequence(frame.sequence());
   head.set_dropped(frame.dropped());
   head.set_meaning(frame.meaning());
   return head;
@@ -81,19 +80,16 @@ cli::BenchReport BenchMeter::report(
     report.set_fps(static_cast<double>(arrivals_.size() - 1) / seconds);
     report.set_bytes_per_second(static_cast<double>(bytes_) / seconds);
   }
-  const std::uint64_t missed = last_.dropped() - first_.dropped();
-  const std::uint64_t passed = last_.sequence() - first_.sequence() + 1;
-  report.set_missed(missed);
-  report.set_lost(passed - std::min<std::uint64_t>(passed, arrivals_.size() + missed));
+  report.set_missed(last_.dropped() - first_.dropped());
   return report;
 }
 
 std::string bench_head() {
   return fmt::format(
-      "{:<14} {:>6} {:>9} {:>8}   {:>20}   {:>20} {:>7} {:>6}\n{:<14} {:>6} {:>9} "
-      "{:>8}   {:>6} {:>6} {:>6}   {:>6} {:>6} {:>6} {:>7} {:>6}\n",
-      "", "", "bytes", "", "latency, ms", "jitter, ms", "", "", "encoding", "fps", "a frame",
-      "Mbit/s", "p50", "p99", "max", "p50", "p99", "max", "missed", "lost");
+      "{:<14} {:>6} {:>9} {:>8}   {:>20}   {:>20}\n{:<14} {:>6} {:>9} "
+      "{:>8}   {:>6} {:>6} {:>6}   {:>6} {:>6} {:>6} {:>7} {:>7} {:>6}\n",
+      "", "", "bytes", "", "latency, ms", "jitter, ms", "encoding", "fps", "a frame", "Mbit/s",
+      "p50", "p99", "max", "p50", "p99", "max", "missed", "skipped", "lost");
 }
 
 std::string bench_line(const cli::BenchReport& report) {
@@ -105,11 +101,12 @@ std::string bench_line(const cli::BenchReport& report) {
     return report.has_latency_p50_ms() ? fmt::format("{:6.2f}", ms) : "     -";
   };
   return fmt::format(
-      "{:<14} {:6.1f} {:9.0f} {:8.2f}   {} {} {}   {:6.2f} {:6.2f} {:6.2f} {:7} {:6}\n", name,
+      "{:<14} {:6.1f} {:9.0f} {:8.2f}   {} {} {}   {:6.2f} {:6.2f} {:6.2f} {:7} {:7} {:6}\n", name,
       report.fps(), report.fps() > 0 ? report.bytes_per_second() / report.fps() : 0.0,
       report.bytes_per_second() * 8e-6, latency(report.latency_p50_ms()),
       latency(report.latency_p99_ms()), latency(report.latency_max_ms()), report.jitter_p50_ms(),
-      report.jitter_p99_ms(), report.jitter_max_ms(), report.missed(), report.lost());
+      report.jitter_p99_ms(), report.jitter_max_ms(), report.missed(), report.skipped(),
+      report.lost());
 }
 
 }  // namespace dtact::ctl

@@ -9,7 +9,8 @@
 
 namespace dtact::ctl {
 
-/// What `bench` saw of a stream: every frame's times and size.
+/// What `bench` saw of a stream: every frame's times and size. What the camera lost and what the
+/// daemon skipped is the daemon's to count (Status.camera).
 class BenchMeter {
  public:
   /// `now_ns`: CLOCK_MONOTONIC when the client had the frame.

@@ -13,7 +13,7 @@
 #include "clients/cpp/names.hpp"
 #include "clients/ctl/online.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl {
 namespace {

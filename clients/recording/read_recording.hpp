@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "hal/mcap/reader.hpp"
+#include "hal/files/mcap_reader.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::recording {

@@ -11,7 +11,7 @@
 #include <variant>
 
 #include "clients/recording/recording_writer.hpp"
-#include "hal/mcap/writer.hpp"
+#include "hal/files/mcap_writer.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::recording {

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "hal/mcap/writer.hpp"
+#include "hal/files/mcap_writer.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::recording {

@@ -8,8 +8,8 @@
 
 #include "daemon/app/key_kinds.hpp"
 #include "daemon/net/light_schemes.hpp"
+#include "hal/files/key_reader.hpp"
 #include "hal/registry.hpp"
-#include "hal/toml/key_reader.hpp"
 
 namespace dtact::app {
 namespace {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "hal/toml/key_reader.hpp"
+#include "hal/files/key_reader.hpp"
 
 namespace dtact::app {
 

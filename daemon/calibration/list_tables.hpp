@@ -3,7 +3,7 @@
 #include <string>
 
 #include "daemon/recon/model.hpp"
-#include "hal/toml/key_reader.hpp"
+#include "hal/files/key_reader.hpp"
 
 namespace dtact::calibration {
 

@@ -9,7 +9,7 @@
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/recon/lens.hpp"
 #include "daemon/recon/spatial_gain.hpp"
-#include "hal/toml/key_reader.hpp"
+#include "hal/files/key_reader.hpp"
 
 namespace dtact::calibration {
 

@@ -10,7 +10,7 @@
 #include "daemon/recon/force.hpp"
 #include "daemon/recon/spatial_gain.hpp"
 #include "daemon/recon/surface.hpp"
-#include "hal/toml/key_reader.hpp"
+#include "hal/files/key_reader.hpp"
 
 namespace dtact::calibration {
 

@@ -11,8 +11,8 @@
 #include "daemon/calibration/sensor_files.hpp"
 #include "daemon/calibration/tables.hpp"
 #include "daemon/recon/rectify.hpp"
-#include "hal/image/png.hpp"
-#include "hal/toml/key_reader.hpp"
+#include "hal/files/key_reader.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 namespace {

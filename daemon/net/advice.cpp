@@ -77,7 +77,7 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
      "(automatic priority) to 0, make the exposure shorter than a frame, or give the camera more "
      "USB bandwidth (a port without a hub, MJPEG)."},
     {Health::frames_lost,
-     "The camera loses frames: look at the USB cable, hub and processor load."},
+     "The camera loses frames on their way to this machine: look at the USB cable and hub."},
     {Health::not_realtime,
      "The capture thread runs without real-time scheduling: start dtactd from its systemd unit or "
      "grant it LimitRTPRIO and LimitMEMLOCK."},

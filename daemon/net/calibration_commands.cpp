@@ -11,7 +11,7 @@
 #include "daemon/net/hub.hpp"
 #include "daemon/net/messages.hpp"
 #include "hal/base/utf8.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {

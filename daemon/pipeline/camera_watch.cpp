@@ -7,7 +7,6 @@ namespace dtact::pipeline {
 bool CameraWatch::arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexcept {
   const bool was_away = std::exchange(away_, false);
   const bool returned = was_away || (info.flags & hal::kFrameReopened) != 0;
-  // The sequence alone would count as lost what was passed over for a newer frame.
   if ((info.flags & hal::kFrameAfterGap) != 0) lose(now_ns);
   if (returned) rate_.forget();
   rate_.add(info);
@@ -31,7 +30,7 @@ void CameraWatch::missed(hal::GrabStatus status, std::int64_t now_ns) noexcept {
     case hal::GrabStatus::ok:
       break;
   }
-  stalled_ = now_ns - last_ns_ > 3 * period_ns_;
+  stalled_ = now_ns - last_ns_ > hal::stall_ns(period_ns_);
 }
 
 void CameraWatch::lose(std::int64_t now_ns) noexcept {

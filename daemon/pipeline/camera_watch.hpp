@@ -22,7 +22,7 @@ class CameraWatch {
 
   /// Unplugged or ended: no frame comes unless the device returns.
   [[nodiscard]] bool away() const noexcept { return away_; }
-  /// Away, or without a usable frame for more than three frame periods.
+  /// Away, or without a usable frame for longer than hal::stall_ns().
   [[nodiscard]] bool trouble() const noexcept { return away_ || stalled_; }
   /// What came last was a damaged frame.
   [[nodiscard]] bool damaged() const noexcept { return damaged_; }

@@ -22,8 +22,8 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       exchange_(parts.exchange),
       clock_(parts.clock),
       period_ns_(std::llround(1e9 / camera_.info().fps)),
-      timeout_(std::min<std::chrono::nanoseconds>(std::chrono::nanoseconds(3 * period_ns_),
-                                                  kLongestGrab)),
+      timeout_(std::min<std::chrono::nanoseconds>(
+          std::chrono::nanoseconds(hal::stall_ns(period_ns_)), kLongestGrab)),
       untouched_(camera_.info().width, camera_.info().height, config.light, config),
       depth_(config, clock_),
       watch_(period_ns_),

@@ -210,6 +210,7 @@ void Session::start(const PhotometricLock& lock) {
     if (const int e = camera_->queueRequest(slot.request.get()); e != 0) {
       fail(e, "queue requests of", camera_->id());
     }
+    ++queued_;
   }
 }
 
@@ -273,6 +274,7 @@ live::DequeueStatus Session::dequeue(live::Filled& out) noexcept {
     std::shift_left(completed_.begin(), completed_.begin() + completed_count_, 1);
     --completed_count_;
   }
+  --queued_;
 
   const Slot& slot = slots_[static_cast<std::size_t>(out.index)];
   const bool readable = sync_for_reading(slot.fd, true);
@@ -316,7 +318,9 @@ bool Session::enqueue(int index) noexcept {
   const Slot& slot = slots_[static_cast<std::size_t>(index)];
   (void)sync_for_reading(slot.fd, false);
   slot.request->reuse(lc::Request::ReuseBuffers);
-  return camera_->queueRequest(slot.request.get()) == 0;
+  const bool taken = camera_->queueRequest(slot.request.get()) == 0;
+  if (taken) ++queued_;
+  return taken;
 }
 
 std::string Session::check_controls(std::vector<CameraControl>& controls) {

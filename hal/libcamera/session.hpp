@@ -4,6 +4,7 @@
 #include <libcamera/framebuffer_allocator.h>
 
 #include <array>
+#include <atomic>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -37,6 +38,7 @@ class Session final : public live::Source {
   [[nodiscard]] live::Format format() const noexcept override { return format_; }
   void wait(std::int64_t deadline_ns) noexcept override;
   [[nodiscard]] live::DequeueStatus dequeue(live::Filled& out) noexcept override;
+  [[nodiscard]] int queued() const noexcept override { return queued_; }
   [[nodiscard]] bool enqueue(int index) noexcept override;
   void stop() noexcept override;
   [[nodiscard]] std::string check_controls(std::vector<CameraControl>& controls) override;
@@ -73,6 +75,7 @@ class Session final : public live::Source {
   std::vector<CameraControl> controls_;
   std::vector<std::unique_ptr<libcamera::FrameBuffer>> own_buffers_;  // those from the heap
   std::vector<Slot> slots_;
+  std::atomic<int> queued_{0};  // a frame may be released on another thread
   bool acquired_ = false;
 
   // Shared with libcamera's thread; held for copies that do not allocate.

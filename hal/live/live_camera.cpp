@@ -18,8 +18,6 @@ namespace {
 constexpr std::int64_t kMillisecond = 1'000'000;
 /// Between two attempts to open a camera that is away.
 constexpr std::int64_t kRetry = 100 * kMillisecond;
-/// Silence that counts as a stall, in frame times.
-constexpr int kStallFrames = 3;
 /// From the start of the stream to its first frame cameras take up to this long; it isn't a stall.
 constexpr std::int64_t kFirstFrame = 1000 * kMillisecond;
 /// A stalled camera is closed and opened anew after this long: many come back by it.
@@ -106,6 +104,9 @@ void LiveCamera::connect() {
   opened_ns_ = now_ns();
   last_buffer_ns_ = 0;
   last_counted_.reset();
+  buffers_free_ = opened.source->queued();
+  taken_in_a_row_ = 0;
+  driver_was_full_ = false;
   after_gap_ = get(counters_.delivered) > 0;
   reopened_ = after_gap_;
   const std::lock_guard guard(mutex_);
@@ -208,11 +209,9 @@ LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
   bool damaged = false;
   for (unsigned taken = 0; taken < kMaxTaken; ++taken) {
     Filled filled;
-    const DequeueStatus status = source.dequeue(filled);
-    if (status == DequeueStatus::none) break;
-    if (status == DequeueStatus::failed) return Collected::lost;
-    last_buffer_ns_ = base::system_clock().monotonic_ns();
-    count_gap(filled.sequence);
+    const Collected got = take(filled);
+    if (got == Collected::nothing) break;
+    if (got == Collected::lost) return Collected::lost;
     const PayloadStatus payload = connection_->decoder.inspect(filled);
     int home = filled.index;
     if (payload != PayloadStatus::ok) {
@@ -253,6 +252,24 @@ LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
   return damaged ? Collected::damaged : Collected::nothing;
 }
 
+LiveCamera::Collected LiveCamera::take(Filled& out) noexcept {
+  switch (connection_->source->dequeue(out)) {
+    case DequeueStatus::failed:
+      return Collected::lost;
+    case DequeueStatus::none:
+      buffers_free_ = connection_->source->queued();
+      taken_in_a_row_ = 0;
+      return Collected::nothing;
+    case DequeueStatus::filled:
+      break;
+  }
+  last_buffer_ns_ = now_ns();
+  count_gap(out.sequence);
+  // A single waiting buffer is the ordinary case, even if the driver has no other.
+  driver_was_full_ = ++taken_in_a_row_ >= std::max(2, buffers_free_);
+  return Collected::frame;
+}
+
 FrameInfo LiveCamera::facts_of(const Filled& filled, std::uint64_t sequence) const noexcept {
   FrameInfo frame;
   frame.sequence = sequence;
@@ -282,7 +299,9 @@ void LiveCamera::count_gap(std::uint32_t counted) noexcept {
   if (step == 0 || step > kPlausibleGap) step = 1;
   last_counted_ = counted;
   sequence_ += step;
-  if (step > 1) {
+  if (step > 1 && driver_was_full_) {
+    add(counters_.skipped, step - 1);
+  } else if (step > 1) {
     add(counters_.lost, step - 1);
     after_gap_ = true;
   }
@@ -308,8 +327,7 @@ std::int64_t LiveCamera::silence_ns(std::int64_t now) const noexcept {
 }
 
 std::int64_t LiveCamera::tolerated_silence_ns() const noexcept {
-  const std::int64_t stall = kStallFrames * period_ns_;
-  return last_buffer_ns_ == 0 ? std::max(kFirstFrame, stall) : stall;
+  return last_buffer_ns_ == 0 ? std::max(kFirstFrame, stall_ns(period_ns_)) : stall_ns(period_ns_);
 }
 
 void LiveCamera::note_silence(std::int64_t now) noexcept {

@@ -65,6 +65,7 @@ class LiveCamera : public Camera {
   [[nodiscard]] Collected collect(Frame& out) noexcept;
   [[nodiscard]] FrameInfo facts_of(const Filled& filled, std::uint64_t sequence) const noexcept;
   void note_delivery() noexcept;
+  [[nodiscard]] Collected take(Filled& out) noexcept;
   void count_gap(std::uint32_t sequence) noexcept;
   void count_damage(PayloadStatus status) noexcept;
   void watch_controls() noexcept;
@@ -81,6 +82,9 @@ class LiveCamera : public Camera {
   std::int64_t opened_ns_ = 0;
   std::uint64_t sequence_ = 0;                 // of the last buffer, never going back
   std::optional<std::uint32_t> last_counted_;  // the driver's count of the last buffer
+  int buffers_free_ = 0;          // with the driver when its queue was last found empty
+  int taken_in_a_row_ = 0;        // buffers since then
+  bool driver_was_full_ = false;  // no buffer was left to fill after the newest one taken
   bool after_gap_ = false;
   bool reopened_ = false;
 

@@ -52,6 +52,8 @@ class Source {
   virtual void wait(std::int64_t deadline_ns) noexcept = 0;
   /// The oldest filled buffer, if any. `failed`: the stream is of no more use.
   [[nodiscard]] virtual DequeueStatus dequeue(Filled& out) noexcept = 0;
+  /// Number of buffers that the driver holds, filled or empty.
+  [[nodiscard]] virtual int queued() const noexcept = 0;
   /// Hands a buffer back to the driver. False: the stream is of no more use.
   [[nodiscard]] virtual bool enqueue(int index) noexcept = 0;
   /// Lets go of the device, so that it can be opened anew while this object still exists.

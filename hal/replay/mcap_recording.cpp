@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "hal/mcap/reader.hpp"
+#include "hal/files/mcap_reader.hpp"
 #include "hal/replay/recording.hpp"
 
 namespace dtact::hal::replay {

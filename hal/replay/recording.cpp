@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 
 namespace dtact::hal::replay {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <span>
 #include <stdexcept>
-#include <utility>
 
 namespace dtact::hal::replay {
 
@@ -101,7 +100,6 @@ GrabStatus ReplayCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noex
     if (const std::uint64_t newest = newest_due(now_ns); newest > next_) {
       skipped_ += newest - next_;
       next_ = newest;
-      after_gap_ = true;
     }
   }
   FrameInfo info;
@@ -110,7 +108,6 @@ GrabStatus ReplayCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noex
   info.ready_ns = config_.replay.paced ? due_ns(info.sequence) : now_ns;
   info.timestamp_ns = info.ready_ns;
   info.meaning = TimestampMeaning::arrival;
-  info.flags = std::exchange(after_gap_, false) ? kFrameAfterGap : kFrameNormal;
   return lend(out, info);
 }
 

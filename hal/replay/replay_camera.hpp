@@ -50,7 +50,6 @@ class ReplayCamera final : public Camera, private FrameOwner {
 
   std::int64_t began_ns_ = 0;
   std::uint64_t next_ = 0;  ///< Sequence of the next frame.
-  bool after_gap_ = false;
   std::atomic<std::uint64_t> delivered_{0};
   std::atomic<std::uint64_t> skipped_{0};
   std::atomic<std::uint64_t> damaged_{0};

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/toml/key_reader.hpp"
+#include "hal/files/key_reader.hpp"
 
 namespace dtact::hal::sim {
 namespace {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <utility>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::hal::sim {
 namespace {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/sim/light_field.hpp"
 #include "hal/sim/noise.hpp"
 #include "hal/sim/optics.hpp"

@@ -9,9 +9,9 @@
 #include <stdexcept>
 
 #include "hal/base/atomic_file.hpp"
+#include "hal/files/key_reader.hpp"
 #include "hal/sim/calibrated.hpp"
 #include "hal/sim/default_scene.hpp"
-#include "hal/toml/key_reader.hpp"
 
 namespace dtact::hal::sim {
 namespace {

@@ -187,6 +187,7 @@ void Stream::start() {
       throw error_of(e, "queue buffers of", node_);
     }
   }
+  queued_ = static_cast<int>(buffers_.size());
   std::uint32_t type = kType;
   if (const int e = call(fd_.get(), VIDIOC_STREAMON, type); e != 0) {
     throw error_of(e, "start the stream of", node_);
@@ -221,6 +222,7 @@ DequeueStatus Stream::dequeue(Filled& out) noexcept {
   if (error == EAGAIN) return DequeueStatus::none;
   // After an unplug drivers answer with ENODEV, EIO or, the queue being gone, EINVAL.
   if (error != 0 || buffer.index >= buffers_.size()) return DequeueStatus::failed;
+  --queued_;
   const auto memory = buffers_[buffer.index];
   out.index = static_cast<int>(buffer.index);
   out.payload = memory.first(std::min<std::size_t>(buffer.bytesused, memory.size()));
@@ -232,7 +234,9 @@ DequeueStatus Stream::dequeue(Filled& out) noexcept {
 
 bool Stream::enqueue(int index) noexcept {
   v4l2_buffer buffer = buffer_request(static_cast<std::uint32_t>(index));
-  return call(fd_.get(), VIDIOC_QBUF, buffer) == 0;
+  const bool taken = call(fd_.get(), VIDIOC_QBUF, buffer) == 0;
+  if (taken) ++queued_;
+  return taken;
 }
 
 void Stream::lock_controls() { controls_ = lock_.apply(fd_.get(), usb_device_of(node_)); }

@@ -2,6 +2,7 @@
 
 #include <linux/videodev2.h>
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -37,6 +38,7 @@ class Stream final : public live::Source {
   [[nodiscard]] live::Format format() const noexcept override { return format_; }
   void wait(std::int64_t deadline_ns) noexcept override;
   [[nodiscard]] live::DequeueStatus dequeue(live::Filled& out) noexcept override;
+  [[nodiscard]] int queued() const noexcept override { return queued_; }
   [[nodiscard]] bool enqueue(int index) noexcept override;
   void stop() noexcept override;
   [[nodiscard]] std::string check_controls(std::vector<CameraControl>& controls) override;
@@ -56,6 +58,7 @@ class Stream final : public live::Source {
   live::Format format_;
   bool uvcvideo_ = false;  // the driver
   std::vector<std::span<std::uint8_t>> buffers_;
+  std::atomic<int> queued_{0};  // a frame may be released on another thread
 };
 
 }  // namespace dtact::hal::v4l2

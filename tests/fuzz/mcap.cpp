@@ -1,5 +1,5 @@
 // An MCAP file: opened and read to its end. Only mcap::Error may come out of it.
-#include "hal/mcap/reader.hpp"
+#include "hal/files/mcap_reader.hpp"
 #include "tests/fuzz/fuzz.hpp"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

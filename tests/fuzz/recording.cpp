@@ -6,7 +6,7 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "hal/mcap/format.hpp"
+#include "hal/files/mcap_format.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "tests/fakes/fake_clock.hpp"
 #include "tests/fuzz/fuzz.hpp"

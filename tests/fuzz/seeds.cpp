@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "daemon/calibration/text.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "proto/depth_encoding.hpp"
 #include "proto/dtact.pb.h"
 #include "proto/framing.hpp"

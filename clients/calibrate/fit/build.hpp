@@ -9,7 +9,7 @@
 #include "clients/calibrate/fit/contact.hpp"
 #include "clients/calibrate/fit/press_gain.hpp"
 #include "daemon/calibration/calibration.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 

@@ -9,7 +9,7 @@
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/upsampler.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 

@@ -11,7 +11,7 @@
 #include "clients/calibrate/fit/press_gain.hpp"
 #include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/calibration/calibration.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 

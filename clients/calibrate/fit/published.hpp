@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "daemon/recon/list.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 

@@ -8,7 +8,7 @@
 
 #include "clients/calibrate/force/force_fit.hpp"
 #include "daemon/calibration/calibration.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::force {
 

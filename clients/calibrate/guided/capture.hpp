@@ -8,7 +8,7 @@
 #include "clients/calibrate/guided/cells.hpp"
 #include "clients/calibrate/guided/console.hpp"
 #include "clients/calibrate/guided/sensor.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl::guided {
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl::guided {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "clients/calibrate/fit/contact.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl::guided {
 

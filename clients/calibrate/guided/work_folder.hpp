@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "daemon/calibration/calibration.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl::guided {
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "clients/common/depth_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl {
 

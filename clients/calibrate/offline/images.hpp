@@ -6,7 +6,7 @@
 
 #include "clients/calibrate/offline/images.hpp"
 #include "daemon/calibration/calibration.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl {
 

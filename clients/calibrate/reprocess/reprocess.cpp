@@ -18,7 +18,7 @@
 #include "clients/recording/read_recording.hpp"
 #include "clients/recording/recording_writer.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/luma/luma_buffer.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::pipeline {
 namespace {

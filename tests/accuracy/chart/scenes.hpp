@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/sim/renderer.hpp"
 
 /// What the chart measures on: the built-in simulated sensor (hal/sim), its truth never shown to

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "daemon/recon/model.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::chart {
 

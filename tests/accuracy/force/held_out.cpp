@@ -13,7 +13,7 @@
 
 #include "clients/calibrate/calibrate.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/sim/objects.hpp"
 #include "tests/accuracy/table/configuration.hpp"
 #include "tests/accuracy/table/sensor.hpp"

@@ -7,7 +7,7 @@
 #include "clients/calibrate/lens/pin_gain.hpp"
 #include "clients/calibrate/lens/pins.hpp"
 #include "daemon/calibration/calibration.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::ctl {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact {
 namespace {

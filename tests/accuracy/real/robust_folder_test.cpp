@@ -8,7 +8,7 @@
 #include <string>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/accuracy/real/folder_evaluation.hpp"
 #include "tests/accuracy/real/press_images.hpp"
 #include "tests/unit/calibration/sample.hpp"

@@ -12,7 +12,7 @@
 
 #include "clients/calibrate/fit/build.hpp"
 #include "daemon/recon/reconstructor.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/accuracy/recon/double_pipeline.hpp"
 
 namespace dtact::recon {

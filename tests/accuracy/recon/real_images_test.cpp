@@ -8,7 +8,7 @@
 
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/evaluate.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 namespace {

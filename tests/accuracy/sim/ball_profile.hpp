@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/sim/scene.hpp"
 
 namespace dtact::accuracy {

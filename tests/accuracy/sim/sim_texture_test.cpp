@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/sim/renderer.hpp"
 #include "tests/accuracy/sim/ball_profile.hpp"
 

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/sim/objects.hpp"
 #include "hal/sim/truth.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/recon/model.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/accuracy/table/sensor.hpp"
 #include "tests/accuracy/table/trial.hpp"
 

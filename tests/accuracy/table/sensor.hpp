@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/luma/luma_buffer.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "hal/sim/payload.hpp"

@@ -9,7 +9,7 @@
 #include "daemon/pipeline/untouched/cells.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "hal/luma/luma_buffer.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "hal/sim/payload.hpp"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "hal/files/png.hpp"
 #include "hal/frame.hpp"
-#include "hal/image/png.hpp"
 
 namespace dtact::kernel_test {
 

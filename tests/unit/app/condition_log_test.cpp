@@ -61,12 +61,12 @@ TEST_F(Conditions, OneThatComesAndGoesIsToldOnceAMinuteWithItsCount) {
   }
   EXPECT_THAT(after(38s, with({})), IsEmpty());
   EXPECT_THAT(after(1s, with({})),
-              ElementsAre("frames_lost: The camera loses frames: look at the USB cable, hub and "
-                          "processor load. (came 10 times since it was last told)"));
+              ElementsAre("frames_lost: The camera loses frames on their way to this machine: look "
+                          "at the USB cable and hub. (came 10 times since it was last told)"));
   EXPECT_THAT(after(100s, with({})), IsEmpty());
   EXPECT_THAT(after(1s, with({Health::frames_lost})),
-              ElementsAre("frames_lost: The camera loses frames: look at the USB cable, hub and "
-                          "processor load."));
+              ElementsAre("frames_lost: The camera loses frames on their way to this machine: look "
+                          "at the USB cable and hub."));
 }
 
 TEST_F(Conditions, OneStillThereAfterTheMinuteIsTold) {

@@ -1,4 +1,4 @@
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 #include <gtest/gtest.h>
 

@@ -17,8 +17,8 @@
 #include "clients/recording/recording_writer.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
-#include "hal/mcap/file_sink.hpp"
+#include "hal/files/mcap_file_sink.hpp"
+#include "hal/files/png.hpp"
 #include "tests/unit/calibration/ball.hpp"
 #include "tests/unit/calibration/sample.hpp"
 

@@ -6,7 +6,7 @@
 
 #include "clients/calibrate/fit/model/layer_model.hpp"
 #include "clients/calibrate/fit/model/radial_transform.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 

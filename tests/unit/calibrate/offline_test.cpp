@@ -15,7 +15,7 @@
 #include "clients/calibrate/offline/drawing.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/unit/calibration/ball.hpp"
 #include "tests/unit/calibration/sample.hpp"
 

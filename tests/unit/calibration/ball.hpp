@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "clients/calibrate/fit/difference.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 
 namespace dtact::calibration {
 

@@ -6,7 +6,7 @@
 
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/calibration/text.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/unit/calibration/sample.hpp"
 
 namespace dtact::calibration {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/unit/ctl/run_ctl.hpp"
 #include "tests/unit/net/rig.hpp"
 

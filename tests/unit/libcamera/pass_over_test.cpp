@@ -24,6 +24,7 @@ class Script final : public live::Source {
     out.index = static_cast<int>(next_);
     return statuses_[next_++];
   }
+  [[nodiscard]] int queued() const noexcept override { return 4; }
   [[nodiscard]] bool enqueue(int index) noexcept override {
     home.push_back(index);
     return true;

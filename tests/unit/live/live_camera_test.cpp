@@ -46,10 +46,14 @@ class LendingSource final : public Source {
     if (filled.empty()) return DequeueStatus::none;
     out.index = filled.front();
     filled.pop_front();
+    ++taken;
     out.payload = std::span(memory[static_cast<std::size_t>(out.index)]).first(bytes);
     out.sequence = sequence++;
     out.timestamp_ns = base::system_clock().monotonic_ns();
     return DequeueStatus::filled;
+  }
+  int queued() const noexcept override {
+    return static_cast<int>(memory.size() + home.size()) - taken;
   }
   bool enqueue(int index) noexcept override {
     home.push_back(index);
@@ -83,6 +87,7 @@ class LendingSource final : public Source {
   std::deque<int> filled;
   std::vector<int> home;  // what came back
   std::uint32_t sequence = 0;
+  int taken = 0;
 };
 
 CameraConfig small() {
@@ -258,6 +263,46 @@ TEST(LiveCamera, ANewSourcesCountIsNoGap) {
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
   EXPECT_EQ(frame.info().sequence, 2U);
   EXPECT_EQ(rig.camera.report().lost, 0U);
+}
+
+TEST(LiveCamera, AGapWithBuffersToFillIsTheCamerasLoss) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  rig.source->fill(0, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  rig.source->sequence += 4;
+  rig.source->fill(1, 60);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().flags, kFrameAfterGap);
+  EXPECT_EQ(frame.info().sequence, 6U);
+  EXPECT_EQ(rig.camera.report().lost, 4U);
+  EXPECT_EQ(rig.camera.report().skipped, 0U);
+}
+
+// The driver had no buffer to put the frames into, since this process held or had not looked at
+// any of them: no cable and no hub is to blame.
+TEST(LiveCamera, AGapWithoutABufferToFillIsSkippedNotLost) {
+  Rig rig;
+  rig.camera.start();
+  Frame frame;
+  for (const int index : {0, 1, 2}) rig.source->fill(index, 50);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(rig.camera.report().skipped, 2U);
+  rig.source->sequence += 4;
+  rig.source->fill(0, 60);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().flags, kFrameNormal);
+  EXPECT_EQ(frame.info().sequence, 8U);
+  EXPECT_EQ(rig.camera.report().lost, 0U);
+  EXPECT_EQ(rig.camera.report().skipped, 6U);
+  // From here on it has buffers again.
+  rig.source->sequence += 1;
+  rig.source->fill(1, 70);
+  ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
+  EXPECT_EQ(frame.info().flags, kFrameAfterGap);
+  EXPECT_EQ(rig.camera.report().lost, 1U);
+  EXPECT_EQ(rig.camera.report().skipped, 6U);
 }
 
 TEST(LiveCamera, AMovedControlIsTheFramesFlagUntilItStays) {

@@ -5,8 +5,8 @@
 #include <set>
 #include <string>
 
-#include "hal/mcap/reader.hpp"
-#include "hal/mcap/writer.hpp"
+#include "hal/files/mcap_reader.hpp"
+#include "hal/files/mcap_writer.hpp"
 
 namespace dtact::mcap {
 namespace {

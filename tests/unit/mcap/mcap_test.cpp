@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/mcap/reader.hpp"
-#include "hal/mcap/writer.hpp"
+#include "hal/files/mcap_reader.hpp"
+#include "hal/files/mcap_writer.hpp"
 #include "tests/fakes/own_path.hpp"
 
 namespace dtact::mcap {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "hal/base/clock.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/requests.hpp"
 #include "tests/unit/net/rig.hpp"

@@ -8,7 +8,7 @@
 #include "clients/ctl/ctl.hpp"
 #include "clients/recording/recording_writer.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/fakes/own_path.hpp"
 #include "tests/unit/recording/sample.hpp"
 

@@ -7,7 +7,7 @@
 #include <system_error>
 #include <vector>
 
-#include "hal/mcap/file_sink.hpp"
+#include "hal/files/mcap_file_sink.hpp"
 #include "proto/depth_encoding.hpp"
 #include "proto/dtact.pb.h"
 

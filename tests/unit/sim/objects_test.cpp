@@ -7,7 +7,7 @@
 #include <string>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/image/png.hpp"
+#include "hal/files/png.hpp"
 #include "tests/fakes/own_path.hpp"
 
 namespace dtact::hal::sim {

@@ -10,15 +10,13 @@ import sys
 
 ROOMS = {
     "hal/base": [],
-    "hal/image": ["hal/base"],
-    "hal/toml": [],
+    # File formats: neither devices nor tactile sensing.
+    "hal/files": ["hal/base"],
     "hal/luma": ["hal"],
     "hal/mjpeg": ["hal"],
     "hal/null": ["hal", "hal/base"],
-    # A container for recordings: neither devices nor tactile sensing.
-    "hal/mcap": ["hal/base"],
-    "hal/replay": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mcap", "hal/mjpeg"],
-    "hal/sim": ["hal", "hal/base", "hal/image", "hal/toml", "hal/luma", "hal/mjpeg"],
+    "hal/replay": ["hal", "hal/base", "hal/files", "hal/luma", "hal/mjpeg"],
+    "hal/sim": ["hal", "hal/base", "hal/files", "hal/luma", "hal/mjpeg"],
     "hal/live": ["hal", "hal/base", "hal/luma", "hal/mjpeg"],
     "hal/v4l2": ["hal", "hal/base", "hal/live"],
     "hal/libcamera": ["hal", "hal/base", "hal/live"],
@@ -27,35 +25,35 @@ ROOMS = {
     # The registry is the only file that names backends.
     "hal": ["hal/null", "hal/replay", "hal/sim", "hal/v4l2", "hal/libcamera", "hal/ws2812"],
     "daemon/recon": [],
-    "daemon/calibration": ["hal/base", "hal/image", "hal/toml", "daemon/recon"],
+    "daemon/calibration": ["hal/base", "hal/files", "daemon/recon"],
     # The two rooms inside know of the pipeline its settings, conditions and the frame it fills.
-    "daemon/pipeline/untouched": ["hal", "hal/base", "hal/image", "daemon/recon", "daemon/calibration", "daemon/pipeline"],
+    "daemon/pipeline/untouched": ["hal", "hal/base", "hal/files", "daemon/recon", "daemon/calibration", "daemon/pipeline"],
     "daemon/pipeline/depth": ["hal", "hal/base", "daemon/recon", "daemon/pipeline", "daemon/pipeline/untouched"],
     "daemon/pipeline": ["hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth"],
     "daemon/serve": ["hal/base", "proto"],
-    "daemon/net": ["daemon/serve", "hal", "hal/base", "hal/image", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
+    "daemon/net": ["daemon/serve", "hal", "hal/base", "hal/files", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
     # The text alone is made of what the network part gives; nothing includes it but the assembly.
     "daemon/metrics": ["daemon/net"],
     "daemon/announce": ["hal/base", "proto"],
     "daemon/app/doctor": ["hal", "hal/base", "hal/gpiod", "hal/v4l2", "hal/ws2812"],
-    "daemon/app": ["hal", "hal/base", "hal/toml", "daemon/calibration", "daemon/pipeline", "daemon/serve", "daemon/net", "daemon/metrics", "daemon/announce"],
+    "daemon/app": ["hal", "hal/base", "hal/files", "daemon/calibration", "daemon/pipeline", "daemon/serve", "daemon/net", "daemon/metrics", "daemon/announce"],
     "daemon": ["daemon/app", "daemon/app/doctor"],
     "proto": [],
     "clients/cpp": ["hal/base", "proto"],
     # Of the reconstruction the surface's shape alone.
     "clients/geometry": ["daemon/recon"],
     "clients/perceive/pose": ["clients/geometry"],
-    "clients/common": ["daemon/serve", "hal/base", "hal/image", "proto", "daemon/recon", "clients/cpp", "clients/geometry"],
-    "clients/recording": ["hal/mcap", "proto", "clients/cpp"],
-    "clients/calibrate/fit": ["hal/image", "daemon/recon", "daemon/calibration"],
+    "clients/common": ["daemon/serve", "hal/base", "hal/files", "proto", "daemon/recon", "clients/cpp", "clients/geometry"],
+    "clients/recording": ["hal/files", "proto", "clients/cpp"],
+    "clients/calibrate/fit": ["hal/files", "daemon/recon", "daemon/calibration"],
     "clients/calibrate/fit/model": ["daemon/recon", "daemon/calibration", "clients/calibrate/fit"],
     "clients/calibrate/lens": ["daemon/recon"],
-    "clients/calibrate/offline": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/fit/model", "clients/calibrate/lens"],
-    "clients/calibrate/guided": ["hal/base", "hal/image", "hal/toml", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
+    "clients/calibrate/offline": ["hal/base", "hal/files", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/fit/model", "clients/calibrate/lens"],
+    "clients/calibrate/guided": ["hal/base", "hal/files", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
     # Depth of a recording, made by what makes it in the daemon.
-    "clients/calibrate/reprocess": ["hal", "hal/base", "hal/image", "hal/luma", "hal/mjpeg", "proto", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/recording"],
+    "clients/calibrate/reprocess": ["hal", "hal/base", "hal/files", "hal/luma", "hal/mjpeg", "proto", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/recording"],
     # Contacts of pictures and of recordings.
-    "clients/calibrate/force": ["hal/base", "hal/image", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/offline", "clients/recording"],
+    "clients/calibrate/force": ["hal/base", "hal/files", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/offline", "clients/recording"],
     "clients/calibrate": ["clients/common", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],
     # A client and a server: what serves the wire is the daemon's own.
     "clients/perceive": ["hal/base", "proto", "daemon/recon", "daemon/serve", "clients/common", "clients/cpp", "clients/geometry", "clients/perceive/pose"],
@@ -63,7 +61,7 @@ ROOMS = {
     "clients/web/foxglove": ["proto", "daemon/serve", "clients/cpp", "clients/common", "clients/recording", "clients/web"],
     "clients/web": ["hal/base", "proto", "daemon/serve", "clients/common", "clients/cpp", "clients/web/foxglove"],
     # A daemon's administration: neither a fit nor OpenCV.
-    "clients/ctl": ["hal/base", "hal/image", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
+    "clients/ctl": ["hal/base", "hal/files", "hal/v4l2", "proto", "clients/common", "clients/cpp", "clients/recording"],
 }
 # Only standard headers and Highway may stand in angle brackets here.
 STANDARD_ONLY = {"daemon/recon": re.compile(r"^(hwy/.*|[a-z_]+)$")}

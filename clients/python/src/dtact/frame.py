@@ -199,7 +199,7 @@ class Frame:
 
     @property
     def sequence(self) -> int:
-        """The camera's number of the frame; a gap is a lost frame."""
+        """The camera's number of the frame; a gap is frames lost, skipped or not asked for."""
         return int(self.message.sequence)
 
     @property

@@ -1,4 +1,4 @@
-#include "hal/mcap/writer.hpp"
+#include "hal/files/mcap_writer.hpp"
 
 #include <zstd.h>
 
@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "hal/mcap/bytes.hpp"
+#include "hal/files/mcap_bytes.hpp"
 
 namespace dtact::mcap {
 namespace {

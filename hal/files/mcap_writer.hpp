@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "hal/mcap/file_sink.hpp"
-#include "hal/mcap/format.hpp"
+#include "hal/files/mcap_file_sink.hpp"
+#include "hal/files/mcap_format.hpp"
 
 namespace dtact::mcap {
 

@@ -1,4 +1,4 @@
-#include "hal/mcap/bytes.hpp"
+#include "hal/files/mcap_bytes.hpp"
 
 #include <fmt/format.h>
 #include <zlib.h>

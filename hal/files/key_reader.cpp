@@ -1,4 +1,4 @@
-#include "hal/toml/key_reader.hpp"
+#include "hal/files/key_reader.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

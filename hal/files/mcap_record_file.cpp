@@ -1,4 +1,4 @@
-#include "hal/mcap/record_file.hpp"
+#include "hal/files/mcap_record_file.hpp"
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "hal/mcap/format.hpp"
+#include "hal/files/mcap_format.hpp"
 
 namespace dtact::mcap {
 

@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "hal/base/unique_fd.hpp"
-#include "hal/mcap/bytes.hpp"
-#include "hal/mcap/format.hpp"
+#include "hal/files/mcap_bytes.hpp"
+#include "hal/files/mcap_format.hpp"
 
 namespace dtact::mcap {
 

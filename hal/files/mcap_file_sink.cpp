@@ -1,4 +1,4 @@
-#include "hal/mcap/file_sink.hpp"
+#include "hal/files/mcap_file_sink.hpp"
 
 #include <fcntl.h>
 #include <unistd.h>

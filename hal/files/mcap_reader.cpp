@@ -1,11 +1,11 @@
-#include "hal/mcap/reader.hpp"
+#include "hal/files/mcap_reader.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "hal/mcap/record_file.hpp"
+#include "hal/files/mcap_record_file.hpp"
 
 namespace dtact::mcap {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "hal/mcap/bytes.hpp"
-#include "hal/mcap/format.hpp"
+#include "hal/files/mcap_bytes.hpp"
+#include "hal/files/mcap_format.hpp"
 
 namespace dtact::mcap {
 
