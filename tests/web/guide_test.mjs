@@ -19,7 +19,7 @@ let pane;
 before(async () => {
   left = await startDaemon("left", 0, [
     `camera.sim.scene=${path.join(here, "guide_presses.toml")}`,
-    "camera.fps=60",
+    "camera.fps=15",
   ]);
   view = await open(await startGateway({ left: left.port }, ["--work-folder", folder]));
   pane = view.page.locator('[data-sensor="left"]');
