@@ -33,10 +33,10 @@ inline DepthError depth_error(const v1::Frame& frame, const hal::sim::Truth& tru
   double inside = 0;
   double outside = 0;
   int outside_pixels = 0;
-  for (std::size_t y = 0; y < kCropSide; ++y) {
-    for (std::size_t x = 0; x < kCropSide; ++x) {
+  for (std::size_t y = 0; y < kCropHeight; ++y) {
+    for (std::size_t x = 0; x < kCropWidth; ++x) {
       const std::size_t at = (y + kCropRow) * width + x + kCropColumn;
-      const float depth = mm[y * kCropSide + x];
+      const float depth = mm[y * kCropWidth + x];
       const bool touched = contact[at] != 0;
       if (touched) ++error.inside_pixels;
       if (std::isnan(depth)) {

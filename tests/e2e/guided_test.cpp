@@ -46,7 +46,7 @@ int guide(const Sensor& sensor, const std::string& typed, std::string* output,
                                         "--centre",
                                         "400,300",
                                         "--crop",
-                                        "580,580",
+                                        kCrop,
                                         "--folder",
                                         (sensor.folder.path() / "ball").string()};
   arguments.insert(arguments.end(), more.begin(), more.end());

@@ -54,8 +54,8 @@ void PrintTo(const Finger& finger, std::ostream* out) { *out << finger.name; }
 
 /// The part of the map that holds the contact wherever the ball is held: where threads are watched,
 /// a whole map's points take many seconds.
-constexpr std::size_t kBoxColumn = 205;
-constexpr std::size_t kBoxRow = 180;
+constexpr std::size_t kBoxColumn = 165;
+constexpr std::size_t kBoxRow = 90;
 constexpr std::size_t kBoxSide = 195;
 
 class PointsOfABall : public testing::TestWithParam<Finger> {};

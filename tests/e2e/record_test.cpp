@@ -87,7 +87,7 @@ TEST_F(Record, SigtermFinishesTheFile) {
       std::ranges::find_if(frames, [](const auto& entry) { return entry.second.has_depth(); });
   ASSERT_NE(with_depth, frames.end());
   const v1::Frame& frame = with_depth->second;
-  EXPECT_EQ(client::values_of(frame.depth()).size(), 580U * 580U);
+  EXPECT_EQ(client::values_of(frame.depth()).size(), std::size_t{kCropWidth} * kCropHeight);
   // The simulated camera delivers JPEG.
   EXPECT_EQ(frame.jpeg().data().substr(0, 2), "\xff\xd8");
   const auto attached = [&](const char* name) {

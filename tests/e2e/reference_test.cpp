@@ -64,10 +64,10 @@ Pressed next_press(client::Client& client, const hal::sim::Truth& truth) {
     truth.indentation_mm(frame->sequence(), indentation);
     truth.contact(frame->sequence(), contact);
     int n = 0;
-    for (std::size_t y = 0; y < kCropSide; ++y) {
-      for (std::size_t x = 0; x < kCropSide; ++x) {
+    for (std::size_t y = 0; y < kCropHeight; ++y) {
+      for (std::size_t x = 0; x < kCropWidth; ++x) {
         const std::size_t at = (y + kCropRow) * 800 + x + kCropColumn;
-        const float depth = mm[y * kCropSide + x];
+        const float depth = mm[y * kCropWidth + x];
         if (contact[at] == 0 || std::isnan(depth)) continue;
         pressed.depth_mm += static_cast<double>(depth);
         pressed.truth_mm += static_cast<double>(indentation[at]);

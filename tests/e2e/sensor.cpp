@@ -24,7 +24,7 @@ void calibrate(const fs::path& folder, const fs::path& calibration) {
   run_or_throw({SIM_RENDER_PROGRAM, "--scene", scene, "--frames", "0:32", "-o", reference});
   run_or_throw({SIM_RENDER_PROGRAM, "--scene", scene, "--frames", "200:232", "-o", ball});
   run_or_throw({CALIBRATE_PROGRAM, "depth", "--reference", reference, "--ball", ball, "--radius-mm",
-                "4.0", "--mm-per-px", "0.0413793", "--centre", "400,300", "--crop", "580,580", "-o",
+                "4.0", "--mm-per-px", "0.0413793", "--centre", "400,300", "--crop", kCrop, "-o",
                 calibration.string()});
 }
 

@@ -12,10 +12,14 @@
 
 namespace dtact::e2e {
 
-/// The rectangle of the simulated 800×600 image that the depth map shows.
-inline constexpr int kCropColumn = 110;
-inline constexpr int kCropRow = 10;
-inline constexpr int kCropSide = 580;
+/// The rectangle of the simulated 800×600 image that the depth map shows: wider than high, so that
+/// an order which is confused shows.
+inline constexpr int kCropWidth = 500;
+inline constexpr int kCropHeight = 400;
+inline constexpr int kCropColumn = (800 - kCropWidth) / 2;
+inline constexpr int kCropRow = (600 - kCropHeight) / 2;
+/// The same for dtact-calibrate.
+inline constexpr const char* kCrop = "500,400";
 
 /// A calibration folder of the simulated sensor, made once in a test program the way a user makes
 /// it: images of the scene calibrate_ball.toml and `dtact-calibrate depth`. The simulator's

@@ -136,7 +136,8 @@ TEST(Stream, SendsWhatASubscriptionOfVersion11AsksFor) {
       EXPECT_EQ(depth.um_per_unit(), 5.0);
       EXPECT_EQ(depth.x(), 50U);
       EXPECT_EQ(depth.y(), 30U);
-      EXPECT_EQ(depth.full_width(), kCropSide / 2);
+      EXPECT_EQ(depth.full_width(), kCropWidth / 2);
+      EXPECT_EQ(depth.full_height(), kCropHeight / 2);
       EXPECT_EQ(client::values_of(depth).size(), 100U * 150U);
       depth_ns.push_back(frame->monotonic_ns());
     }

@@ -79,7 +79,7 @@ test("depth is made as the panel says, and its worth and time are on the chart",
   );
   await until(
     () => fact(pane, "map").textContent(),
-    (text) => text === "145 × 145, quarter",
+    (text) => text === "125 × 100, quarter",
   );
   await until(told, (text) => text.startsWith("quarter: "));
   // Which way is the faster here is the machine's to say; the chart orders them by what it tells.

@@ -50,7 +50,8 @@ test("presses become a calibration that the daemon uses", async () => {
   const guide = view.page.getByRole("dialog", { name: "Guided calibration" });
   // As the calibration in use has them.
   assert.equal(await guide.getByLabel("Millimetres a pixel").inputValue(), "0.0413793");
-  assert.equal(await guide.getByLabel("Map's width, pixels").inputValue(), "580");
+  assert.equal(await guide.getByLabel("Map's width, pixels").inputValue(), "500");
+  assert.equal(await guide.getByLabel("Map's height, pixels").inputValue(), "400");
   // Wider than high, so that an order which is confused shows.
   await guide.getByLabel("Map's width, pixels").fill("560");
   await guide.getByLabel("Map's height, pixels").fill("520");

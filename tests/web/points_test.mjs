@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import path from "node:path";
 import { after, before, test } from "node:test";
 import { fact, numberOf, open, until } from "./browser.mjs";
-import { startDaemon, startGateway, startPerceive, stopAll, work } from "./programs.mjs";
+import { MAP, startDaemon, startGateway, startPerceive, stopAll, work } from "./programs.mjs";
 
 let daemon;
 let port;
@@ -74,7 +74,7 @@ test("points are drawn while something touches, and none else", async () => {
     () => numberOf(pane, "points"),
     (points) => points > 500,
   );
-  assert.ok(told < 580 * 580);
+  assert.ok(told < MAP.width * MAP.height);
   const lit = await until(drawn, ({ pixels }) => pixels > 500);
   assert.ok(lit.colours > 20, `${lit.colours} shades of a ball`);
   await view.page.screenshot({ path: path.join(work, "points.png") });

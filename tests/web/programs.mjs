@@ -12,6 +12,8 @@ const { DTACTD, DTACTCTL, DTACT_WEB, DTACT_PERCEIVE, CALIBRATE, SIM_RENDER, FOLD
 const FPS = process.env.WEB_FPS ?? "20";
 
 const scene = path.join(here, "presses.toml");
+/** The depth map, wider than high, so that an order which is confused shows. */
+export const MAP = { width: 500, height: 400 };
 /** A ball pressed deeper than the calibration covers, and held. */
 export const beyond = path.join(here, "beyond.toml");
 export const work = mkdtempSync(
@@ -36,7 +38,7 @@ export function calibration(method = "auto") {
   }
   const depth = ["depth", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre", "400,300"];
   const from = ["--reference", path.join(folder, "reference"), "--ball", path.join(folder, "ball")];
-  const how = ["--crop", "580,580", "--method", method];
+  const how = ["--crop", `${MAP.width},${MAP.height}`, "--method", method];
   execFileSync(CALIBRATE, [...depth, ...from, ...how, "-o", made]);
   return made;
 }

@@ -20,7 +20,7 @@ def calibrate(folder):
                        check=True, capture_output=True)
     subprocess.run([os.environ["CALIBRATE"], "depth", "--reference", folder / "reference", "--ball",
                     folder / "ball", "--radius-mm", "4.0", "--mm-per-px", "0.0413793", "--centre",
-                    "400,300", "--crop", "580,580", "-o", folder / "calibration"],
+                    "400,300", "--crop", "500,400", "-o", folder / "calibration"],
                    check=True, capture_output=True)
     return folder / "calibration"
 

@@ -72,7 +72,7 @@ class Depth(unittest.TestCase):
                     self.fail(f"{encoding}: no frame was seen by both")
                 saved = np.load(file)
                 np.testing.assert_array_equal(f.depth_mm, saved)
-                self.assertEqual((f.depth_mm.dtype, f.depth_mm.shape), (np.float32, (580, 580)))
+                self.assertEqual((f.depth_mm.dtype, f.depth_mm.shape), (np.float32, (400, 500)))
                 self.assertEqual(f.message.depth.encoding,
                                  1 + ["int16", "delta_zstd", "rvl", "predict_zstd"].index(encoding))
 
@@ -98,15 +98,15 @@ class Depth(unittest.TestCase):
                 self.skipTest("this daemon speaks version 1.0")
             s.subscribe(dtact.Subscription(decimation=4, um_per_unit=5))
             f = pressed(s)
-            self.assertEqual((f.depth_mm.shape, f.decimation, f.um_per_unit), ((145, 145), 4, 5.0))
+            self.assertEqual((f.depth_mm.shape, f.decimation, f.um_per_unit), ((100, 125), 4, 5.0))
             self.assertAlmostEqual(float(np.nanmax(f.depth_mm)), f.contact.deepest_mm, delta=0.2)
             s.subscribe(dtact.Subscription(region=(100, 200, 60, 40)))
             f = next(f for f in s.frames() if f.has_depth)
             self.assertEqual((f.depth_mm.shape, f.origin_px, f.full_shape),
-                             ((40, 60), (100, 200), (580, 580)))
+                             ((40, 60), (100, 200), (400, 500)))
             s.subscribe(dtact.Subscription(region="contact"))
             f = pressed(s)
-            self.assertLess(f.depth_mm.size, 580 * 580 / 2)
+            self.assertLess(f.depth_mm.size, 500 * 400 / 2)
             self.assertGreater(float(np.nanmax(f.depth_mm)), 0.3)
             s.subscribe(dtact.Subscription(depth=None, jpeg=True))
             f = next(f for f in s.frames() if f.has_jpeg)
@@ -159,7 +159,7 @@ class Commands(unittest.TestCase):
                 how = s.set_reconstruction(resolution="quarter")
                 self.assertEqual((how.resolution, how.sharpen), ("quarter", before.sharpen))
                 f = next(f for f in s.frames() if f.has_depth and f.message.depth.decimation == 4)
-                self.assertEqual(f.depth_mm.shape, (145, 145))
+                self.assertEqual(f.depth_mm.shape, (100, 125))
                 with self.assertRaisesRegex(dtact.Invalid, "max_error_um: 0; allowed are 1 to 10000"):
                     s.set_reconstruction(max_error_um=0)
             finally:
@@ -209,16 +209,16 @@ class Connections(unittest.TestCase):
                 async for f in s.frames():
                     if f.contact and f.contact.touching:
                         return f.depth_mm.shape, (await s.status()).state
-        self.assertEqual(asyncio.run(main()), ((580, 580), "serving"))
+        self.assertEqual(asyncio.run(main()), ((400, 500), "serving"))
 
     def test_camera(self):
         with dtact.Camera(daemon.address, fps=30) as camera:
-            self.assertEqual((camera.width, camera.height), (580, 580))
+            self.assertEqual((camera.width, camera.height), (500, 400))
             until = time.monotonic() + 60
             while (deepest := float(camera.read_depth().max())) < 0.0003:
                 self.assertLess(time.monotonic(), until)
             self.assertLess(deepest, 0.002)
-            self.assertEqual(camera.read_latest(5000).shape, (580, 580, 3))
+            self.assertEqual(camera.read_latest(5000).shape, (400, 500, 3))
             self.assertGreater(int(camera.async_read(5000).max()), 20)
 
 
@@ -242,7 +242,7 @@ class Documents(unittest.TestCase):
         for block in blocks:
             out = self.run_code([block])
             if "deepest_mm" in block:
-                self.assertRegex(out, r"^\(580, 580\), \d\.\d\d mm deep, ±0\.\d{3} mm\n$")
+                self.assertRegex(out, r"^\(400, 500\), \d\.\d\d mm deep, ±0\.\d{3} mm\n$")
 
     def test_notebook(self):
         notebook = json.loads((SOURCE / "clients/python/docs/press.ipynb").read_text())
