@@ -24,6 +24,36 @@ void append_float(std::string& out, float value) {
   }
 }
 
+perceive::PointCloud points_of(const DepthImage& depth) {
+  // Micrometres, as they came.
+  std::vector<std::int16_t> values;
+  values.reserve(depth.mm.size());
+  perceive::DepthGrid grid{.x = depth.x,
+                           .y = depth.y,
+                           .width = depth.width,
+                           .height = depth.height,
+                           .full_width = std::max(depth.full_width, depth.width),
+                           .full_height = std::max(depth.full_height, depth.height),
+                           .mm_per_px = depth.mm_per_px,
+                           .values = {}};
+  for (const float mm : depth.mm) {
+    values.push_back(static_cast<std::int16_t>(
+        std::isnan(mm) ? grid.untrusted : std::clamp(std::lround(1000 * mm), -32767L, 32767L)));
+  }
+  grid.values = values;
+  perceive::PointCloud cloud;
+  perceive::CloudMaker(depth.surface).make(grid, 1, cloud);
+  return cloud;
+}
+
+std::string encode_points_ply(const DepthImage& depth) {
+  return perceive::encode_ply(points_of(depth));
+}
+
+std::string encode_points_pcd(const DepthImage& depth) {
+  return perceive::encode_pcd(points_of(depth));
+}
+
 }  // namespace
 
 std::string npy_head(const std::string& shape) {
@@ -77,40 +107,6 @@ std::string encode_colour_png(const DepthImage& depth) {
   }
   return image::encode_png(picture);
 }
-
-namespace {
-
-perceive::PointCloud points_of(const DepthImage& depth) {
-  // Micrometres, as they came.
-  std::vector<std::int16_t> values;
-  values.reserve(depth.mm.size());
-  perceive::DepthGrid grid{.x = depth.x,
-                           .y = depth.y,
-                           .width = depth.width,
-                           .height = depth.height,
-                           .full_width = std::max(depth.full_width, depth.width),
-                           .full_height = std::max(depth.full_height, depth.height),
-                           .mm_per_px = depth.mm_per_px,
-                           .values = {}};
-  for (const float mm : depth.mm) {
-    values.push_back(static_cast<std::int16_t>(
-        std::isnan(mm) ? grid.untrusted : std::clamp(std::lround(1000 * mm), -32767L, 32767L)));
-  }
-  grid.values = values;
-  perceive::PointCloud cloud;
-  perceive::CloudMaker(depth.surface).make(grid, 1, cloud);
-  return cloud;
-}
-
-std::string encode_points_ply(const DepthImage& depth) {
-  return perceive::encode_ply(points_of(depth));
-}
-
-std::string encode_points_pcd(const DepthImage& depth) {
-  return perceive::encode_pcd(points_of(depth));
-}
-
-}  // namespace
 
 DepthEncoder encoder_for(const std::string& path, DepthEncoder png) {
   const std::string ending = std::filesystem::path(path).extension().string();

@@ -33,6 +33,8 @@ void read_light(tomlfile::KeyReader light, Origin& origin) {
   light.finish();
 }
 
+constexpr double kReach = 1e6;  // of any number in the table, pixels or pixels per millimetre
+
 }  // namespace
 
 std::string format_camera_and_light(const Origin& origin) {
@@ -72,12 +74,6 @@ Origin load_sensor(const std::filesystem::path& path) {
   top.finish();
   return origin;
 }
-
-namespace {
-
-constexpr double kReach = 1e6;  // of any number in the table, pixels or pixels per millimetre
-
-}  // namespace
 
 std::string format_lens(const recon::Lens& lens) {
   return fmt::format(

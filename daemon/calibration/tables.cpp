@@ -12,6 +12,60 @@
 #include "daemon/recon/surface_limits.hpp"
 
 namespace dtact::calibration {
+namespace {
+
+std::string shape_text(const recon::SpatialGain& gain) {
+  switch (gain.shape) {
+    case recon::GainShape::none:
+      break;
+    case recon::GainShape::uniform:
+      return "[gain]  # darkening counts as a share of the light at its place\nshape = "
+             "\"uniform\"\n";
+    case recon::GainShape::radial:
+      return fmt::format(
+          "[gain]  # darkening is multiplied by 1 + per_mm * distance from the centre\n"
+          "shape = \"radial\"\ncentre_x_mm = {}\ncentre_y_mm = {}\nper_mm = {}\n",
+          gain.centre_x_mm, gain.centre_y_mm, gain.per_mm);
+  }
+  return "[gain]  # the same at every place\nshape = \"none\"\n";
+}
+
+using tomlfile::KeyReader;
+
+constexpr double kMost = 1e6;  // of anything here: only not finite numbers are impossible
+
+std::string estimate_text(const char* key, const Layer::Estimate& estimate) {
+  return fmt::format("{} = [{}, {}]\n", key, estimate.value, estimate.error);
+}
+
+Layer::Estimate read_estimate(KeyReader& reader, const char* key) {
+  const std::vector<double> pair = reader.numbers(key, 0, kMost);
+  if (pair.size() != 2) reader.fail(key, "expected a number and its standard error");
+  return {pair[0], pair[1]};
+}
+
+std::vector<double> read_five(KeyReader& reader, const char* key, double least) {
+  std::vector<double> five = reader.numbers(key, least, kMost);
+  if (five.size() != std::tuple_size_v<decltype(Layer::slope)>) {
+    reader.fail(key, "expected five numbers");
+  }
+  return five;
+}
+
+using Kind = recon::Surface::Kind;
+using Limits = recon::SurfaceLimits;
+
+std::string format_shape(const recon::Surface& surface) {
+  if (surface.kind == Kind::sphere) {
+    return fmt::format("shape = \"sphere\"\nradius_mm = {}\n", surface.radius_mm);
+  }
+  return fmt::format(
+      "shape = \"cylinder\"\nradius_mm = {}\n"
+      "axis_deg = {}  # from the map's x towards its y\n",
+      surface.radius_mm, surface.axis_deg);
+}
+
+}  // namespace
 
 std::string format_force(const recon::ForceModel& force) {
   return fmt::format(
@@ -36,26 +90,6 @@ recon::ForceModel read_force(tomlfile::KeyReader reader) {
   reader.finish();
   return force;
 }
-
-namespace {
-
-std::string shape_text(const recon::SpatialGain& gain) {
-  switch (gain.shape) {
-    case recon::GainShape::none:
-      break;
-    case recon::GainShape::uniform:
-      return "[gain]  # darkening counts as a share of the light at its place\nshape = "
-             "\"uniform\"\n";
-    case recon::GainShape::radial:
-      return fmt::format(
-          "[gain]  # darkening is multiplied by 1 + per_mm * distance from the centre\n"
-          "shape = \"radial\"\ncentre_x_mm = {}\ncentre_y_mm = {}\nper_mm = {}\n",
-          gain.centre_x_mm, gain.centre_y_mm, gain.per_mm);
-  }
-  return "[gain]  # the same at every place\nshape = \"none\"\n";
-}
-
-}  // namespace
 
 std::string format_gain(const recon::SpatialGain& gain) {
   std::string text = shape_text(gain);
@@ -92,32 +126,6 @@ recon::SpatialGain read_gain(tomlfile::KeyReader reader) {
   reader.finish();
   return gain;
 }
-
-namespace {
-
-using tomlfile::KeyReader;
-
-constexpr double kMost = 1e6;  // of anything here: only not finite numbers are impossible
-
-std::string estimate_text(const char* key, const Layer::Estimate& estimate) {
-  return fmt::format("{} = [{}, {}]\n", key, estimate.value, estimate.error);
-}
-
-Layer::Estimate read_estimate(KeyReader& reader, const char* key) {
-  const std::vector<double> pair = reader.numbers(key, 0, kMost);
-  if (pair.size() != 2) reader.fail(key, "expected a number and its standard error");
-  return {pair[0], pair[1]};
-}
-
-std::vector<double> read_five(KeyReader& reader, const char* key, double least) {
-  std::vector<double> five = reader.numbers(key, least, kMost);
-  if (five.size() != std::tuple_size_v<decltype(Layer::slope)>) {
-    reader.fail(key, "expected five numbers");
-  }
-  return five;
-}
-
-}  // namespace
 
 std::string format_layer(const Layer& layer) {
   std::array<double, 5> slopes{};
@@ -159,23 +167,6 @@ Layer read_layer(KeyReader reader) {
   reader.finish();
   return layer;
 }
-
-namespace {
-
-using Kind = recon::Surface::Kind;
-using Limits = recon::SurfaceLimits;
-
-std::string format_shape(const recon::Surface& surface) {
-  if (surface.kind == Kind::sphere) {
-    return fmt::format("shape = \"sphere\"\nradius_mm = {}\n", surface.radius_mm);
-  }
-  return fmt::format(
-      "shape = \"cylinder\"\nradius_mm = {}\n"
-      "axis_deg = {}  # from the map's x towards its y\n",
-      surface.radius_mm, surface.axis_deg);
-}
-
-}  // namespace
 
 std::string format_surface(const recon::Surface& surface) {
   if (surface.kind == Kind::plane) return {};

@@ -127,26 +127,6 @@ ChainFit solve_once(const std::vector<SagProfile>& presses, const std::vector<do
   return fit;
 }
 
-}  // namespace
-
-double gain_at(const std::vector<double>& gain, const std::vector<double>& place) {
-  constexpr double kLeast = 0.1;
-  return std::max(kLeast, std::inner_product(gain.begin(), gain.end(), place.begin(), 1.0));
-}
-
-ChainFit fit_chain(const std::vector<SagProfile>& presses) {
-  const std::size_t terms = presses.empty() ? 0 : presses.front().place.size();
-  ChainFit fit = solve_once(presses, std::vector<double>(terms), nullptr);
-  for (int round = 0; terms > 0 && round < kGainRounds; ++round) {
-    fit = solve_once(presses, fit.gain, &fit);
-    fit = solve_once(presses, fit.gain, nullptr);
-  }
-  fit.gaps = gaps_of(presses, fit);
-  return fit;
-}
-
-namespace {
-
 constexpr double kSureOfSeen = 0.6;
 constexpr int kChainRounds = 4;  // until the contacts' radii have followed the depths
 
@@ -166,6 +146,22 @@ SagProfile within(const PressRings& press, double reach) {
 }
 
 }  // namespace
+
+double gain_at(const std::vector<double>& gain, const std::vector<double>& place) {
+  constexpr double kLeast = 0.1;
+  return std::max(kLeast, std::inner_product(gain.begin(), gain.end(), place.begin(), 1.0));
+}
+
+ChainFit fit_chain(const std::vector<SagProfile>& presses) {
+  const std::size_t terms = presses.empty() ? 0 : presses.front().place.size();
+  ChainFit fit = solve_once(presses, std::vector<double>(terms), nullptr);
+  for (int round = 0; terms > 0 && round < kGainRounds; ++round) {
+    fit = solve_once(presses, fit.gain, &fit);
+    fit = solve_once(presses, fit.gain, nullptr);
+  }
+  fit.gaps = gaps_of(presses, fit);
+  return fit;
+}
 
 std::vector<double> gain_terms(const SettledPress& press, int terms) {
   const double x = (press.contact.col - 0.5 * (press.map.width - 1)) * press.map.mm_per_px;

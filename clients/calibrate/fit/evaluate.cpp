@@ -153,25 +153,6 @@ Evaluation read(const recon::Model& model, const SettledPress& press,
   return result;
 }
 
-}  // namespace
-
-Evaluation read_ball(const Calibration& calibration, std::span<const std::uint16_t> reference_q8,
-                     std::span<const image::Grey8> frames, double ball_radius_mm) {
-  const recon::Model& model = *calibration.model;
-  return read(model, settle(model, reference_q8, frames, ball_radius_mm), frames);
-}
-
-Evaluation evaluate(const Calibration& calibration, std::span<const std::uint16_t> reference_q8,
-                    std::span<const image::Grey8> frames, double ball_radius_mm) {
-  const recon::Model& model = *calibration.model;
-  const SettledPress press = settle(model, reference_q8, frames, ball_radius_mm);
-  Evaluation result = read(model, press, frames);
-  if (model.method == recon::Method::list) leave_out(press, result);
-  return result;
-}
-
-namespace {
-
 constexpr int kLevels = 20;  // of a light press, about 0.6 mm: over these the slope is taken
 
 double depth_um(const recon::DepthList& list, int q6) {
@@ -210,6 +191,21 @@ std::vector<LitContact> lit_contacts(const recon::Model& model, const BallPresse
 }
 
 }  // namespace
+
+Evaluation read_ball(const Calibration& calibration, std::span<const std::uint16_t> reference_q8,
+                     std::span<const image::Grey8> frames, double ball_radius_mm) {
+  const recon::Model& model = *calibration.model;
+  return read(model, settle(model, reference_q8, frames, ball_radius_mm), frames);
+}
+
+Evaluation evaluate(const Calibration& calibration, std::span<const std::uint16_t> reference_q8,
+                    std::span<const image::Grey8> frames, double ball_radius_mm) {
+  const recon::Model& model = *calibration.model;
+  const SettledPress press = settle(model, reference_q8, frames, ball_radius_mm);
+  Evaluation result = read(model, press, frames);
+  if (model.method == recon::Method::list) leave_out(press, result);
+  return result;
+}
 
 std::string dim_part_of(const Calibration& made, const BallPresses& set) {
   constexpr double kLeastPart = 0.005;  // of the map

@@ -37,56 +37,6 @@ double bulge_limit(const RadialProfile& profile, const std::vector<Knot>& knots,
   return low;
 }
 
-}  // namespace
-
-double interpolate(const std::vector<Knot>& knots, double level) {
-  const auto above = std::ranges::lower_bound(knots, level, {}, &Knot::level);
-  if (above == knots.end()) return knots.back().depth_mm;
-  const Knot below = above == knots.begin() ? Knot{} : *(above - 1);
-  return std::lerp(below.depth_mm, above->depth_mm,
-                   (level - below.level) / (above->level - below.level));
-}
-
-recon::DepthList make_list(const std::vector<Knot>& knots, double slope_at_zero,
-                           double slope_beyond, const RadialProfile& profile) {
-  const double c = bulge_limit(profile, knots, slope_at_zero);
-  const Knot deepest = knots.back();
-  const double faintest = std::ranges::min(
-      profile.levels, {}, [](double level) { return std::isnan(level) ? 0 : level; });
-
-  recon::DepthList list;
-  constexpr int kStep = recon::kEntriesPerLevel;
-  list.first_q6 = kListFirstLevel * kStep;
-  for (int q6 = kListFirstLevel * kStep; q6 <= kListLastLevel * kStep; ++q6) {
-    const double level = static_cast<double>(q6) / kStep;
-    double mm = 0;
-    if (level <= 0) {
-      mm = bulge_mm(level, slope_at_zero, c);
-    } else if (level <= deepest.level) {
-      mm = interpolate(knots, level);
-    } else {
-      mm = deepest.depth_mm + slope_beyond * (level - deepest.level);
-    }
-    list.um.push_back(
-        static_cast<std::int16_t>(std::clamp(std::lround(1000 * mm), -16383L, 16383L)));
-  }
-  const auto covered = [](double level) {
-    return static_cast<int>(
-        std::lround(kStep * std::clamp<double>(level, kListFirstLevel, kListLastLevel)));
-  };
-  list.covered_from_q6 = covered(std::min(faintest, 0.0));
-  list.covered_to_q6 = covered(deepest.level + kVouched);
-  return list;
-}
-
-double look_up_mm(const recon::DepthList& list, double level) {
-  const long entry = std::lround(level * recon::kEntriesPerLevel) - list.first_q6;
-  const long last = static_cast<long>(list.um.size()) - 1;
-  return 0.001 * list.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))];
-}
-
-namespace {
-
 constexpr double kBinsPerLevel = 2;  // of the monotone fit
 constexpr int kFewest = 4;           // pixels that make a grey level's vote
 constexpr std::size_t kRange = 256;  // grey levels
@@ -175,6 +125,52 @@ double hand_over(std::vector<Knot>& knots, double sure_level, double line_slope)
 }
 
 }  // namespace
+
+double interpolate(const std::vector<Knot>& knots, double level) {
+  const auto above = std::ranges::lower_bound(knots, level, {}, &Knot::level);
+  if (above == knots.end()) return knots.back().depth_mm;
+  const Knot below = above == knots.begin() ? Knot{} : *(above - 1);
+  return std::lerp(below.depth_mm, above->depth_mm,
+                   (level - below.level) / (above->level - below.level));
+}
+
+recon::DepthList make_list(const std::vector<Knot>& knots, double slope_at_zero,
+                           double slope_beyond, const RadialProfile& profile) {
+  const double c = bulge_limit(profile, knots, slope_at_zero);
+  const Knot deepest = knots.back();
+  const double faintest = std::ranges::min(
+      profile.levels, {}, [](double level) { return std::isnan(level) ? 0 : level; });
+
+  recon::DepthList list;
+  constexpr int kStep = recon::kEntriesPerLevel;
+  list.first_q6 = kListFirstLevel * kStep;
+  for (int q6 = kListFirstLevel * kStep; q6 <= kListLastLevel * kStep; ++q6) {
+    const double level = static_cast<double>(q6) / kStep;
+    double mm = 0;
+    if (level <= 0) {
+      mm = bulge_mm(level, slope_at_zero, c);
+    } else if (level <= deepest.level) {
+      mm = interpolate(knots, level);
+    } else {
+      mm = deepest.depth_mm + slope_beyond * (level - deepest.level);
+    }
+    list.um.push_back(
+        static_cast<std::int16_t>(std::clamp(std::lround(1000 * mm), -16383L, 16383L)));
+  }
+  const auto covered = [](double level) {
+    return static_cast<int>(
+        std::lround(kStep * std::clamp<double>(level, kListFirstLevel, kListLastLevel)));
+  };
+  list.covered_from_q6 = covered(std::min(faintest, 0.0));
+  list.covered_to_q6 = covered(deepest.level + kVouched);
+  return list;
+}
+
+double look_up_mm(const recon::DepthList& list, double level) {
+  const long entry = std::lround(level * recon::kEntriesPerLevel) - list.first_q6;
+  const long last = static_cast<long>(list.um.size()) - 1;
+  return 0.001 * list.um[static_cast<std::size_t>(std::clamp(entry, 0L, last))];
+}
 
 SagLine fit_sag_line(const DifferenceMap& map, const Contact& contact, const PixelFilter& use) {
   return fit_line(sag_by_level(map, contact, use, kSureOfContact * contact.radius_mm, 1));

@@ -26,6 +26,9 @@ std::string trimmed(const std::string& text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
+/// Of a picture in the terminal.
+constexpr int kColumns = 44;
+
 }  // namespace
 
 std::size_t LineInput::fetch() {
@@ -54,13 +57,6 @@ Typed LineInput::take() {
   if (!buffer_.empty()) return {Typed::Kind::line, trimmed(std::exchange(buffer_, {}))};
   return {Typed::Kind::end, {}};
 }
-
-namespace {
-
-/// Of a picture in the terminal.
-constexpr int kColumns = 44;
-
-}  // namespace
 
 std::string text_of(const Prompt& prompt) {
   std::string text = prompt.text;

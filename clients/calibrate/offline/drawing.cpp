@@ -20,31 +20,6 @@ constexpr int kBarWidth = 22;
 constexpr int kLegendWidth = 120;
 constexpr int kFooter = 46;
 
-}  // namespace
-
-int text_width(const std::string& text) {
-  int below = 0;
-  return cv::getTextSize(text, kFont, kScale, 1, &below).width;
-}
-
-void draw_text(Picture& picture, cv::Point corner, const std::string& text,
-               const cv::Scalar& colour) {
-  // OpenCV wants the left end of the line that letters stand on.
-  cv::putText(picture, text, corner + cv::Point(0, kTextHeight - 2), kFont, kScale, colour, 1,
-              cv::LINE_AA);
-}
-
-image::Rgb8 to_image(const Picture& picture) {
-  image::Rgb8 image{picture.cols, picture.rows, {}};
-  image.pixels.reserve(3 * picture.total());
-  for (const cv::Vec3b& pixel : picture) {
-    image.pixels.insert(image.pixels.end(), {pixel[0], pixel[1], pixel[2]});
-  }
-  return image;
-}
-
-namespace {
-
 Picture::value_type pixel_of(cli::Colour colour) { return {colour.r, colour.g, colour.b}; }
 
 void draw_map(Picture picture, const cli::DepthImage& depth, double full_mm) {
@@ -79,6 +54,27 @@ void draw_scale(Picture& picture, const cli::DepthImage& depth, int left, int to
 }
 
 }  // namespace
+
+int text_width(const std::string& text) {
+  int below = 0;
+  return cv::getTextSize(text, kFont, kScale, 1, &below).width;
+}
+
+void draw_text(Picture& picture, cv::Point corner, const std::string& text,
+               const cv::Scalar& colour) {
+  // OpenCV wants the left end of the line that letters stand on.
+  cv::putText(picture, text, corner + cv::Point(0, kTextHeight - 2), kFont, kScale, colour, 1,
+              cv::LINE_AA);
+}
+
+image::Rgb8 to_image(const Picture& picture) {
+  image::Rgb8 image{picture.cols, picture.rows, {}};
+  image.pixels.reserve(3 * picture.total());
+  for (const cv::Vec3b& pixel : picture) {
+    image.pixels.insert(image.pixels.end(), {pixel[0], pixel[1], pixel[2]});
+  }
+  return image;
+}
 
 std::string encode_legend_png(const cli::DepthImage& depth) {
   const double full_mm = cli::full_scale_mm(cli::deepest_mm(depth.mm));

@@ -33,17 +33,6 @@ std::string list(const std::vector<Argument>& arguments) {
   return text;
 }
 
-/// Names of other programs in brackets, as places to look.
-std::string with_references(std::string page, const std::vector<PageName>& others) {
-  for (const auto& [name, section] : others) {
-    const std::string mention = "(" + escaped(name) + ")";
-    for (auto at = page.find(mention); at != std::string::npos; at = page.find(mention, at + 1)) {
-      page.replace(at, mention.size(), "(see " + reference(name, section) + ")");
-    }
-  }
-  return page;
-}
-
 std::string positional(const Argument& argument) {
   const std::string name = italic(argument.names.at(0)) + (argument.several ? " …" : "");
   return argument.required ? name : "[" + name + "]";
@@ -146,7 +135,7 @@ std::string program_page(const Command& program, const PageNotes& notes) {
   std::vector<std::string> others;
   for (const auto& [name, section] : notes.see_also) others.push_back(reference(name, section));
   page += filled(fmt::format("{}", fmt::join(others, ", ")));
-  return with_references(std::move(page), notes.see_also);
+  return page;
 }
 
 }  // namespace dtact::manual

@@ -38,41 +38,6 @@ double mean_of_sure(const LevelledPress& press, const Value& value) {
   return sum / pixels;
 }
 
-}  // namespace
-
-double LayerList::read_mm(double level) const {
-  return look_up_mm(*list, levels_per_level * level);
-}
-
-double mean_level(const LevelledPress& press) {
-  return mean_of_sure(press, [](double level) { return level; });
-}
-
-TiedList tie(const recon::DepthList& list, const LayerList& layer, const LevelledPress& press) {
-  TiedList tied{list, mean_of_sure(press, [&](double level) {
-                  return layer.read_mm(level) - look_up_mm(list, level);
-                })};
-  const RadialProfile profile = radial_profile(press.map, press.contact, 2 * sure_mm(press));
-  const double sure_level = std::max(1.0, profile.at(sure_mm(press)));
-  const double last_level = static_cast<double>(list.covered_to_q6) / recon::kEntriesPerLevel;
-  const auto apart_mm = [&](double level) {
-    return look_up_mm(list, level) + tied.moved_mm - layer.read_mm(level);
-  };
-  double deepest_mm = -INFINITY;
-  for (std::size_t i = 0; i < list.um.size(); ++i) {
-    const double level = static_cast<double>(list.first_q6 + static_cast<int>(i)) /
-                         static_cast<double>(recon::kEntriesPerLevel);
-    const double share = std::clamp(level / sure_level, 0.0, 1.0);
-    const double depth_mm =
-        layer.read_mm(level) + share * apart_mm(std::clamp(level, sure_level, last_level));
-    deepest_mm = std::max(deepest_mm, depth_mm);
-    tied.list.um[i] = static_cast<std::int16_t>(std::lround(1000 * deepest_mm));
-  }
-  return tied;
-}
-
-namespace {
-
 /// Of the ball's radius: the profile goes to 2.25 (kFarField).
 constexpr std::array<double, 2> kReaches = {1.5, 1.75};
 /// Right, down, left, up.
@@ -94,29 +59,6 @@ std::vector<PixelFilter> parts_of(const LevelledPress& press) {
   }
   return parts;
 }
-
-}  // namespace
-
-double depth_spread_mm(const LevelledPress& press, const MapOptics& optics, const ModelFit& fit) {
-  const double level = mean_level(press);
-  const auto depth_mm = [&](const PixelFilter& use) {
-    const PressProfile profile = profile_of(press, optics.light_levels, optics.smoothing_mm, use);
-    const ModelFit part = fit_model(std::span(&profile, 1), fit);
-    return look_up_mm(lists_of(part.layer, optics, part.deepest_mm()).front(), level);
-  };
-  try {
-    const double all_mm = depth_mm({});
-    double most_mm = 0;
-    for (const PixelFilter& part : parts_of(press)) {
-      most_mm = std::max(most_mm, std::abs(depth_mm(part) - all_mm));
-    }
-    return most_mm;
-  } catch (const ModelRefused&) {
-    return std::numeric_limits<double>::infinity();
-  }
-}
-
-namespace {
 
 /// What depth_spread_mm() may be for a layer's depth to be taken from it, millimetres: simulated
 /// sensors have 0.024 at most, one of another law 0.010; the two real presses 0.07 and 0.24.
@@ -228,6 +170,56 @@ Calibration chained_at(const FittedCalibration& fitted, const BallPresses& set,
 }
 
 }  // namespace
+
+double LayerList::read_mm(double level) const {
+  return look_up_mm(*list, levels_per_level * level);
+}
+
+double mean_level(const LevelledPress& press) {
+  return mean_of_sure(press, [](double level) { return level; });
+}
+
+TiedList tie(const recon::DepthList& list, const LayerList& layer, const LevelledPress& press) {
+  TiedList tied{list, mean_of_sure(press, [&](double level) {
+                  return layer.read_mm(level) - look_up_mm(list, level);
+                })};
+  const RadialProfile profile = radial_profile(press.map, press.contact, 2 * sure_mm(press));
+  const double sure_level = std::max(1.0, profile.at(sure_mm(press)));
+  const double last_level = static_cast<double>(list.covered_to_q6) / recon::kEntriesPerLevel;
+  const auto apart_mm = [&](double level) {
+    return look_up_mm(list, level) + tied.moved_mm - layer.read_mm(level);
+  };
+  double deepest_mm = -INFINITY;
+  for (std::size_t i = 0; i < list.um.size(); ++i) {
+    const double level = static_cast<double>(list.first_q6 + static_cast<int>(i)) /
+                         static_cast<double>(recon::kEntriesPerLevel);
+    const double share = std::clamp(level / sure_level, 0.0, 1.0);
+    const double depth_mm =
+        layer.read_mm(level) + share * apart_mm(std::clamp(level, sure_level, last_level));
+    deepest_mm = std::max(deepest_mm, depth_mm);
+    tied.list.um[i] = static_cast<std::int16_t>(std::lround(1000 * deepest_mm));
+  }
+  return tied;
+}
+
+double depth_spread_mm(const LevelledPress& press, const MapOptics& optics, const ModelFit& fit) {
+  const double level = mean_level(press);
+  const auto depth_mm = [&](const PixelFilter& use) {
+    const PressProfile profile = profile_of(press, optics.light_levels, optics.smoothing_mm, use);
+    const ModelFit part = fit_model(std::span(&profile, 1), fit);
+    return look_up_mm(lists_of(part.layer, optics, part.deepest_mm()).front(), level);
+  };
+  try {
+    const double all_mm = depth_mm({});
+    double most_mm = 0;
+    for (const PixelFilter& part : parts_of(press)) {
+      most_mm = std::max(most_mm, std::abs(depth_mm(part) - all_mm));
+    }
+    return most_mm;
+  } catch (const ModelRefused&) {
+    return std::numeric_limits<double>::infinity();
+  }
+}
 
 Calibration build_alone(const BallPresses& set, const recon::SpatialGain& gain,
                         PressReport& report) {
