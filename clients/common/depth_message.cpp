@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "clients/cpp/errors.hpp"
-#include "daemon/recon/surface_limits.hpp"
+#include "daemon/recon/surface.hpp"
 
 namespace dtact::cli {
 namespace {

@@ -4,7 +4,6 @@
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/base/atomic_folder.hpp"
 
 namespace dtact::calibration {
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/recon/surface_limits.hpp"
+#include "daemon/recon/surface.hpp"
 
 namespace dtact::calibration {
 namespace {

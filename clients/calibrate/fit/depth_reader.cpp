@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "daemon/recon/decimate.hpp"
+#include "daemon/recon/model.hpp"
 
 namespace dtact::calibration {
 namespace {

@@ -10,7 +10,7 @@
 #include "clients/calibrate/offline/colour_map.hpp"
 #include "clients/calibrate/offline/drawing.hpp"
 #include "clients/calibrate/offline/folder_evaluation.hpp"
-#include "hal/base/atomic_folder.hpp"
+#include "hal/base/atomic_file.hpp"
 
 namespace dtact::ctl {
 namespace {
