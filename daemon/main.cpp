@@ -7,9 +7,8 @@
 #include "daemon/app/config.hpp"
 #include "daemon/app/daemon.hpp"
 #include "daemon/app/doctor/doctor.hpp"
-#include "daemon/app/input_files.hpp"
+#include "daemon/app/files.hpp"
 #include "daemon/app/journal.hpp"
-#include "daemon/app/net_files.hpp"
 #include "daemon/app/options.hpp"
 #include "daemon/app/service.hpp"
 

@@ -6,8 +6,7 @@
 #include <stdexcept>
 
 #include "hal/libcamera/libcamera_camera.hpp"
-#include "hal/null/null_camera.hpp"
-#include "hal/null/null_ring.hpp"
+#include "hal/null/null.hpp"
 #include "hal/replay/replay_camera.hpp"
 #include "hal/sim/sim_camera.hpp"
 #include "hal/sim/sim_ring.hpp"

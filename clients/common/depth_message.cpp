@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "clients/cpp/errors.hpp"
-#include "daemon/recon/surface_limits.hpp"
+#include "daemon/recon/surface.hpp"
 
 namespace dtact::cli {
 namespace {

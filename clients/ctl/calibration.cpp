@@ -14,7 +14,6 @@
 #include "clients/ctl/calibration_text.hpp"
 #include "clients/ctl/online.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/base/atomic_folder.hpp"
 
 namespace dtact::ctl {
 namespace {

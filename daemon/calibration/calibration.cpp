@@ -9,7 +9,6 @@
 
 #include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/base/atomic_folder.hpp"
 
 namespace dtact::calibration {
 

@@ -9,7 +9,7 @@
 #include <tuple>
 #include <vector>
 
-#include "daemon/recon/surface_limits.hpp"
+#include "daemon/recon/surface.hpp"
 
 namespace dtact::calibration {
 namespace {

@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/metrics/heap.hpp"
-#include "daemon/metrics/temperatures.hpp"
+#include "daemon/metrics/machine.hpp"
 #include "daemon/net/overview.hpp"
 
 namespace dtact::metrics {

@@ -11,6 +11,13 @@
 
 namespace dtact::net {
 
+/// Pixels of the calibration's resolution that are sent around a contact.
+inline constexpr int kContactMargin = 16;
+
+/// The box around what is pressed deeper than the contact threshold, kContactMargin larger on each
+/// side and not cut at the map's far borders. Nothing while nothing touches.
+[[nodiscard]] std::optional<DepthRegion> contact_box(const pipeline::DepthFrame& frame);
+
 /// The depth maps of one frame as clients asked for them: each view is made once, whatever
 /// encodings it is sent in, and each of its encodings once. Buffers are used again with the next
 /// frame.

@@ -1,8 +1,44 @@
 #include "daemon/pipeline/camera_watch.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace dtact::pipeline {
+
+void RateWatch::add(const hal::FrameInfo& info) noexcept {
+  const std::int64_t passed_ns = info.timestamp_ns - timestamp_ns_;
+  // A number or a stamp that does not go on says nothing of the rate.
+  const bool goes_on = have_before_ && info.sequence > sequence_ && passed_ns > 0;
+  const auto frames = static_cast<std::int64_t>(info.sequence - sequence_);
+  have_before_ = true;
+  sequence_ = info.sequence;
+  timestamp_ns_ = info.timestamp_ns;
+  if (!goes_on) return;
+  intervals_[count_++] = passed_ns / frames;
+  span_ns_ += passed_ns;
+  if (count_ < kMost && (count_ < kLeast || span_ns_ < kWindowNs)) return;
+  const auto middle = intervals_.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
+  std::nth_element(intervals_.begin(), middle,
+                   intervals_.begin() + static_cast<std::ptrdiff_t>(count_));
+  median_ns_ = *middle;
+  count_ = 0;
+  span_ns_ = 0;
+}
+
+void RateWatch::forget() noexcept {
+  median_ns_ = 0;
+  count_ = 0;
+  span_ns_ = 0;
+  have_before_ = false;
+}
+
+double RateWatch::fps() const noexcept {
+  return median_ns_ == 0 ? 0 : 1e9 / static_cast<double>(median_ns_);
+}
+
+bool RateWatch::slow() const noexcept {
+  return kSlow * static_cast<double>(median_ns_) > static_cast<double>(promised_ns_);
+}
 
 bool CameraWatch::arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexcept {
   const bool was_away = std::exchange(away_, false);

@@ -8,11 +8,34 @@
 #include "daemon/recon/force.hpp"
 #include "daemon/recon/list.hpp"
 #include "daemon/recon/rectify.hpp"
-#include "daemon/recon/scattering.hpp"
 #include "daemon/recon/spatial_gain.hpp"
 #include "daemon/recon/surface.hpp"
 
 namespace dtact::recon {
+
+/// Light that is scattered sideways in the layer: a point's loss of light appears as the sum of two
+/// Gaussians round it.
+struct Scattering {
+  double narrow_mm = 0;      ///< Standard deviation, 0.01 … 5 mm.
+  double wide_mm = 0;        ///< Standard deviation, above narrow_mm, at most 20 mm.
+  double narrow_weight = 0;  ///< Share of the light in the narrow one, 0 … 1; the rest is wide.
+
+  bool operator==(const Scattering&) const = default;
+};
+
+inline constexpr double kNarrowestMm = 0.01;
+inline constexpr double kWidestNarrowMm = 5;
+inline constexpr double kWidestMm = 20;
+
+/// Greatest number of Van Cittert's steps (sharpener.hpp): a third sharpens more and costs noise.
+inline constexpr int kMostSharpeningSteps = 2;
+
+/// Levels are sharpened at 1/kSharpenedAt of the calibration's resolution in each direction, which
+/// the layer's own blur leaves enough of.
+inline constexpr int kSharpenedAt = 4;
+
+/// Throws std::invalid_argument, naming the key as in calibration.toml, outside those ranges.
+void check(const Scattering& scattering);
 
 /// Depth value of a pixel that must not be believed. 0 is a valid depth (untouched).
 inline constexpr std::int16_t kUntrusted = INT16_MIN;
@@ -64,5 +87,13 @@ struct Model {
 
 /// Throws std::invalid_argument, naming the part, where the parts do not fit each other.
 void check(const Model& model);
+
+/// The model of a map of 1/`factor` the resolution (1, 2 or 4), for hosts that cannot afford the
+/// whole: its pixels are means over factor × factor of the model's, taken before smoothing, the
+/// smoothing keeps its width in millimetres, and a pixel that covers an untrusted one is untrusted.
+/// Columns and rows that fill no pixel are left out on both sides alike, so that the centre stays
+/// within half a pixel of `model`. Throws
+/// std::invalid_argument for another factor, a map smaller than one pixel or a decimated model.
+[[nodiscard]] Model decimate(const Model& model, int factor);
 
 }  // namespace dtact::recon

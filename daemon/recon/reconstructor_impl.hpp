@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/recon/depth_sums.hpp"
 #include "daemon/recon/list_table.hpp"
 #include "daemon/recon/lit_reference.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/sharpener.hpp"
 #include "daemon/recon/smoother.hpp"
-#include "daemon/recon/strip_sums.hpp"
 #include "daemon/recon/tiles.hpp"
 #include "daemon/recon/vector_kernels.hpp"
 

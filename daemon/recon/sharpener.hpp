@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "daemon/recon/scattering.hpp"
+#include "daemon/recon/model.hpp"
 #include "daemon/recon/sharpen_kernels.hpp"
 #include "daemon/recon/smoother.hpp"
 

@@ -10,7 +10,7 @@
 namespace dtact::recon {
 
 /// Reads a coarse depth map bilinearly at the pixels of a finer one of the same calibration
-/// (decimate.hpp: both leave out what fills no pixel on both sides alike). A pixel is as trusted as
+/// (decimate(): both leave out what fills no pixel on both sides alike). A pixel is as trusted as
 /// the coarse one that it lies in; untrusted neighbours are not read. Allocates in the constructor
 /// only.
 class Upsampler {

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace dtact::base {
 
@@ -19,5 +21,14 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
 
 /// Makes a rename in `folder` last through a power cut. Throws std::system_error.
 void sync_folder(const std::filesystem::path& folder);
+
+/// File names, without folder, and contents.
+using FolderFiles = std::vector<std::pair<std::string, std::string>>;
+
+/// Writes a folder of files so that at any moment it is either absent, the old one or the new one.
+/// An old one is replaced only when it holds nothing but files named in `known`; `what` says in the
+/// error what the folder should be ("a calibration"). Throws std::runtime_error.
+void write_folder_atomically(const std::filesystem::path& folder, const FolderFiles& files,
+                             const std::vector<std::string>& known, const std::string& what);
 
 }  // namespace dtact::base

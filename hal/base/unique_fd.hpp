@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <cerrno>
 #include <utility>
 
 namespace dtact::base {
@@ -23,7 +24,14 @@ class UniqueFd {
   [[nodiscard]] int get() const noexcept { return fd_; }
   [[nodiscard]] explicit operator bool() const noexcept { return fd_ >= 0; }
   [[nodiscard]] int release() noexcept { return std::exchange(fd_, -1); }
-  void reset(int fd = -1) noexcept;
+  void reset(int fd = -1) noexcept {
+    const int old = std::exchange(fd_, fd);
+    if (old < 0 || old == fd) return;
+    // Linux closes the descriptor even when close() reports EINTR, so it is never tried again.
+    const int saved = errno;
+    ::close(old);
+    errno = saved;
+  }
 
  private:
   int fd_ = -1;

@@ -8,7 +8,7 @@
 #include <array>
 #include <stdexcept>
 
-#include "hal/live/device_error.hpp"
+#include "hal/live/source.hpp"
 
 namespace dtact::hal::libcamera_backend {
 namespace {

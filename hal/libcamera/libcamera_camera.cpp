@@ -14,9 +14,9 @@
 #include "hal/libcamera/manager.hpp"
 #include "hal/libcamera/photometry.hpp"
 #include "hal/libcamera/session.hpp"
-#include "hal/live/device_error.hpp"
 #include "hal/live/live_camera.hpp"
 #include "hal/live/search_pace.hpp"
+#include "hal/live/source.hpp"
 
 namespace dtact::hal::libcamera_backend {
 namespace {

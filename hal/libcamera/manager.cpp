@@ -6,7 +6,7 @@
 #include <memory>
 #include <mutex>
 
-#include "hal/live/device_error.hpp"
+#include "hal/live/source.hpp"
 
 namespace dtact::hal::libcamera_backend {
 namespace {

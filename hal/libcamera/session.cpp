@@ -16,7 +16,7 @@
 #include "hal/base/clock.hpp"
 #include "hal/libcamera/pass_over.hpp"
 #include "hal/libcamera/sensor_mode.hpp"
-#include "hal/live/device_error.hpp"
+#include "hal/live/source.hpp"
 
 namespace dtact::hal::libcamera_backend {
 namespace {

@@ -8,7 +8,7 @@
 #include "hal/camera.hpp"
 #include "hal/live/payload.hpp"
 #include "hal/live/source.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 
 namespace dtact::hal::live {
 

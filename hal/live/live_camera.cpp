@@ -10,7 +10,7 @@
 
 #include "hal/base/clock.hpp"
 #include "hal/base/rt_thread.hpp"
-#include "hal/live/device_error.hpp"
+#include "hal/live/source.hpp"
 
 namespace dtact::hal::live {
 namespace {

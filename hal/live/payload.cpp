@@ -1,6 +1,6 @@
 #include "hal/live/payload.hpp"
 
-#include "hal/luma/extract.hpp"
+#include "hal/luma/luma.hpp"
 
 namespace dtact::hal::live {
 namespace {

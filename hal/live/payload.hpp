@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "hal/live/source.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 
 namespace dtact::hal::live {

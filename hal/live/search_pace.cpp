@@ -6,7 +6,7 @@
 #include <system_error>
 #include <utility>
 
-#include "hal/live/device_error.hpp"
+#include "hal/live/source.hpp"
 
 namespace dtact::hal::live {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 
 namespace dtact::hal::replay {

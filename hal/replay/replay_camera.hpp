@@ -7,7 +7,7 @@
 #include "hal/base/clock.hpp"
 #include "hal/camera.hpp"
 #include "hal/config.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "hal/replay/recording.hpp"
 

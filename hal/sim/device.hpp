@@ -11,10 +11,10 @@
 #include "hal/base/rt_thread.hpp"
 #include "hal/base/unique_fd.hpp"
 #include "hal/camera.hpp"
-#include "hal/luma/luma_buffer.hpp"
-#include "hal/sim/light_link.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/sim/payload.hpp"
 #include "hal/sim/renderer.hpp"
+#include "hal/sim/sim_ring.hpp"
 
 namespace dtact::hal::sim {
 

@@ -6,9 +6,26 @@
 #include <vector>
 
 #include "hal/light_ring.hpp"
+#include "hal/sim/grid.hpp"
 #include "hal/sim/scene.hpp"
 
 namespace dtact::hal::sim {
+
+/// What a real layer shows untouched beside smooth light: bubbles, dust under the paint, old dents.
+/// Random numbers on a lattice, joined by cubic B-splines; always the same ones, for they belong to
+/// the sensor. Immutable.
+class Texture {
+ public:
+  /// `rms`: share of the light; `size_mm`: the lattice's pitch, about the width of a mark.
+  Texture(double rms, double size_mm) noexcept;
+
+  /// Share of the light by which this place is brighter (or, negative, darker).
+  [[nodiscard]] double at(const Place& place) const noexcept;
+
+ private:
+  double scale_;
+  double size_mm_;
+};
 
 /// How bright each LED is: luma of its colour times brightness, 0 … 65025.
 using LedLevels = std::array<std::uint16_t, kLedCount>;

@@ -11,8 +11,7 @@
 #include <optional>
 #include <utility>
 
-#include "hal/luma/extract.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "hal/sim/device.hpp"
 

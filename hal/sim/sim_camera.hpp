@@ -5,7 +5,7 @@
 #include "hal/base/clock.hpp"
 #include "hal/camera.hpp"
 #include "hal/config.hpp"
-#include "hal/sim/light_link.hpp"
+#include "hal/sim/sim_ring.hpp"
 
 namespace dtact::hal::sim {
 

@@ -8,8 +8,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "hal/v4l2/error_of.hpp"
-#include "hal/v4l2/ioctl.hpp"
+#include "hal/v4l2/node.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {

@@ -12,8 +12,7 @@
 #include <stdexcept>
 
 #include "hal/live/exposure.hpp"
-#include "hal/v4l2/ioctl.hpp"
-#include "hal/v4l2/usb_device.hpp"
+#include "hal/v4l2/node.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {

@@ -13,10 +13,8 @@
 #include <utility>
 
 #include "hal/base/clock.hpp"
-#include "hal/v4l2/error_of.hpp"
-#include "hal/v4l2/ioctl.hpp"
 #include "hal/v4l2/modes.hpp"
-#include "hal/v4l2/usb_device.hpp"
+#include "hal/v4l2/node.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {

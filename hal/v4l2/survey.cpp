@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "hal/v4l2/error_of.hpp"
+#include "hal/v4l2/node.hpp"
 
 namespace dtact::hal::v4l2 {
 

@@ -19,7 +19,7 @@
 #include "hal/base/clock.hpp"
 #include "hal/libcamera/dma_buffer.hpp"
 #include "hal/libcamera/formats.hpp"
-#include "hal/luma/extract.hpp"
+#include "hal/luma/luma.hpp"
 
 namespace {
 

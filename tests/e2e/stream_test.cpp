@@ -5,7 +5,7 @@
 #include <csignal>
 #include <cstdio>
 
-#include "hal/null/null_camera.hpp"
+#include "hal/null/null.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/e2e/depth_error.hpp"
 #include "tests/e2e/sensor.hpp"

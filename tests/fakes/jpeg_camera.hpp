@@ -8,7 +8,7 @@
 
 #include "hal/base/clock.hpp"
 #include "hal/camera.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 
 namespace dtact::fakes {

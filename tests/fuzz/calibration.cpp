@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "daemon/calibration/text.hpp"
-#include "daemon/recon/decimate.hpp"
+#include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
 #include "tests/fuzz/fuzz.hpp"

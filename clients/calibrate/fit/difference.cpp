@@ -5,7 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "daemon/recon/decimate.hpp"
+#include "daemon/recon/model.hpp"
 
 namespace dtact::calibration {
 

@@ -8,7 +8,6 @@
 
 #include "daemon/calibration/sensor_files.hpp"
 #include "hal/base/atomic_file.hpp"
-#include "hal/base/atomic_folder.hpp"
 #include "hal/files/key_reader.hpp"
 
 namespace dtact::ctl::guided {

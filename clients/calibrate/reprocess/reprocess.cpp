@@ -19,7 +19,7 @@
 #include "clients/recording/recording_writer.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "hal/files/png.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 
 namespace dtact::reprocess {

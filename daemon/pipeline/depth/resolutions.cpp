@@ -8,9 +8,8 @@
 #include <utility>
 
 #include "daemon/pipeline/depth/uncertainty.hpp"
-#include "daemon/recon/decimate.hpp"
 #include "daemon/recon/kernels.hpp"
-#include "daemon/recon/scattering.hpp"
+#include "daemon/recon/model.hpp"
 
 namespace dtact::pipeline {
 namespace {

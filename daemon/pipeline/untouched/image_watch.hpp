@@ -6,12 +6,56 @@
 
 #include "daemon/pipeline/health.hpp"
 #include "daemon/pipeline/untouched/cells.hpp"
-#include "daemon/pipeline/untouched/exposure_watch.hpp"
 #include "daemon/pipeline/untouched/luma_grid.hpp"
 #include "daemon/pipeline/untouched/touch_check.hpp"
 #include "hal/frame.hpp"
 
 namespace dtact::pipeline {
+
+/// A frame beside its reference, once one smooth light is taken out of what differs.
+struct LightCompared {
+  double brighter = 0;  ///< That light is brighter than the followed one, by this share of it.
+  double lost = 0;      ///< What covers takes this share of the whole picture's light.
+};
+
+/// Tells exposure or gain that runs automatically, whatever the camera says of its controls, by
+/// what nothing else does: something covers a part of the picture, and at once the rest brightens
+/// by about as much as keeps the mean. A press is no such thing: the layer does not compress, so
+/// that the bulge round it gives back the light that it takes. Nor does light that changes by
+/// itself, or by command, change as something begins to cover. One thread; does not allocate.
+class ExposureWatch {
+ public:
+  /// There is a new reference: whatever exposure it was taken with, it begins with that.
+  void restart() noexcept { *this = {}; }
+  /// No depth is measured at present.
+  void forget() noexcept;
+  /// The next frame against a reference that was taken with nothing touching. `compared`: where it
+  /// was.
+  void look(const LightSeen& light, const std::optional<LightCompared>& compared,
+            std::int64_t timestamp_ns) noexcept;
+
+  /// It was seen since restart().
+  [[nodiscard]] bool follows() const noexcept { return follows_; }
+
+  /// The least share of the light that is lost, and that the rest brightens by. No press of the
+  /// atlas takes more than 0.1 % of the whole, nor does any light that it has look as more than
+  /// 0.9 %.
+  static constexpr double kLost = 0.02;
+  static constexpr double kBrighter = 0.01;
+  /// Between these, as a multiple of what would keep the mean: cameras weigh the middle of the
+  /// picture more than its edges, or the reverse, and see more of it than is calibrated.
+  static constexpr double kLeastShare = 0.4;
+  static constexpr double kMostShare = 4;
+  /// It begins so soon after nothing was there, and lasts so long.
+  static constexpr std::int64_t kSoonNs = 5'000'000'000;
+  static constexpr std::int64_t kLastsNs = 1'000'000'000;
+
+ private:
+  double untouched_ = 0;  // brighter than the followed light by this share when nothing touched
+  std::optional<std::int64_t> untouched_ns_;  // when nothing touched last
+  std::optional<std::int64_t> since_ns_;      // it is being seen
+  bool follows_ = false;
+};
 
 /// What the picture itself tells about how far depth can be believed, from the statistics that the
 /// look for activity gathers. What each limit is worth in millimetres, and what no limit can tell,

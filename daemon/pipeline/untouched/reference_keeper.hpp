@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -9,10 +11,28 @@
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/pipeline/untouched/luma_grid.hpp"
 #include "daemon/pipeline/untouched/reference_average.hpp"
-#include "daemon/pipeline/untouched/settle.hpp"
 #include "daemon/pipeline/untouched/touch_check.hpp"
 
 namespace dtact::pipeline {
+
+/// Says when the mean grey has stopped moving: over the last `settle_frames` frames it stayed
+/// within `settle_grey` grey levels.
+class SettleDetector {
+ public:
+  /// Throws std::invalid_argument when settle_frames is not 2 … 64.
+  explicit SettleDetector(const ReferenceRules& rules);
+
+  void reset() noexcept { count_ = 0; }
+  /// Takes the next frame's mean; true once settled.
+  [[nodiscard]] bool add(float mean_grey) noexcept;
+
+ private:
+  static constexpr std::size_t kMost = 64;
+  std::size_t frames_;
+  double grey_;
+  std::array<float, kMost> means_{};
+  std::size_t count_ = 0;
+};
 
 /// What the reference in use stands on.
 enum class Footing : std::uint8_t {

@@ -9,7 +9,6 @@
 #include "daemon/pipeline/health.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/pipeline/untouched/calibrated_image.hpp"
-#include "daemon/pipeline/untouched/exposure_watch.hpp"
 #include "daemon/pipeline/untouched/image_watch.hpp"
 #include "daemon/pipeline/untouched/light_follower.hpp"
 #include "daemon/pipeline/untouched/place_watch.hpp"

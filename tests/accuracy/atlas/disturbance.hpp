@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "hal/light_ring.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "hal/sim/noise.hpp"
 #include "hal/sim/payload.hpp"

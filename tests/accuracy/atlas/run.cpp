@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "daemon/pipeline/capture_loop.hpp"
-#include "hal/null/null_ring.hpp"
+#include "hal/null/null.hpp"
 #include "proto/dtact.pb.h"
 #include "tests/accuracy/table/configuration.hpp"
 #include "tests/accuracy/table/judge.hpp"

@@ -9,7 +9,7 @@
 
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/model/layered_build.hpp"
-#include "daemon/recon/decimate.hpp"
+#include "daemon/recon/model.hpp"
 #include "tests/accuracy/chart/virtual_balls.hpp"
 
 namespace dtact::chart {

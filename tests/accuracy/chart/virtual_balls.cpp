@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include "daemon/recon/decimate.hpp"
+#include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/accuracy/chart/scenes.hpp"

@@ -8,7 +8,7 @@
 
 #include "clients/calibrate/offline/drawing.hpp"
 #include "clients/calibrate/offline/images.hpp"
-#include "hal/base/atomic_folder.hpp"
+#include "hal/base/atomic_file.hpp"
 #include "tests/accuracy/real/folder_evaluation.hpp"
 
 namespace dtact::ctl {

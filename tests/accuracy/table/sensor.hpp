@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "hal/files/png.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "hal/sim/payload.hpp"
 #include "hal/sim/renderer.hpp"

@@ -10,7 +10,7 @@
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
 #include "hal/files/png.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "hal/sim/payload.hpp"
 #include "hal/sim/renderer.hpp"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "hal/base/atomic_file.hpp"
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/sim/payload.hpp"
 #include "hal/sim/renderer.hpp"
 #include "hal/sim/scene.hpp"

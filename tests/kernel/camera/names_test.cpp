@@ -9,8 +9,8 @@
 #include <string>
 
 #include "hal/base/unique_fd.hpp"
-#include "hal/v4l2/ioctl.hpp"
 #include "hal/v4l2/modes.hpp"
+#include "hal/v4l2/node.hpp"
 #include "tests/kernel/camera/guest_camera.hpp"
 
 namespace dtact::kernel_test {

@@ -3,7 +3,7 @@
 #include <linux/videodev2.h>
 
 #include "hal/base/unique_fd.hpp"
-#include "hal/v4l2/ioctl.hpp"
+#include "hal/v4l2/node.hpp"
 #include "tests/kernel/camera/guest_camera.hpp"
 
 namespace dtact::kernel_test {

@@ -1,11 +1,11 @@
-#include "daemon/app/input_files.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 #include <functional>
 #include <stdexcept>
+
+#include "daemon/app/files.hpp"
 
 namespace dtact::app {
 namespace {

@@ -1,3 +1,5 @@
+#include "hal/luma/luma.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -5,8 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "hal/luma/extract.hpp"
-#include "hal/luma/luma_buffer.hpp"
 #include "tests/fakes/counted_loads.hpp"
 
 namespace dtact::hal::luma {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "hal/luma/luma_buffer.hpp"
+#include "hal/luma/luma.hpp"
 #include "hal/mjpeg/grey_decoder.hpp"
 #include "tests/fakes/jpeg_maker.hpp"
 #include "tests/fakes/malloc_counter.hpp"

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <libcamera/property_ids.h>
 
-#include "hal/live/device_error.hpp"
+#include "hal/live/source.hpp"
 #include "tests/unit/libcamera/pi_camera.hpp"
 
 namespace dtact::hal::libcamera_backend {

@@ -16,8 +16,8 @@
 #include <new>
 
 #include "hal/libcamera/session.hpp"
-#include "hal/live/device_error.hpp"
 #include "hal/live/live_camera.hpp"
+#include "hal/live/source.hpp"
 #include "tests/unit/libcamera/kernel_double.hpp"
 
 // libcamera 0.4.0's virtual camera leaves a frame's metadata as the memory was (virtual.cpp:

@@ -13,7 +13,7 @@
 
 #include "hal/base/clock.hpp"
 #include "hal/base/rt_thread.hpp"
-#include "hal/live/device_error.hpp"
+#include "hal/live/source.hpp"
 #include "tests/fakes/jpeg_maker.hpp"
 
 namespace dtact::hal::live {

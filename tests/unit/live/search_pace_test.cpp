@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "hal/live/device_error.hpp"
+#include "hal/live/source.hpp"
 #include "tests/fakes/own_path.hpp"
 
 namespace dtact::hal::live {

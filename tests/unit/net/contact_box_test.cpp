@@ -1,6 +1,6 @@
-#include "daemon/net/contact_box.hpp"
-
 #include <gtest/gtest.h>
+
+#include "daemon/net/depth_maps.hpp"
 
 namespace dtact::net {
 namespace {

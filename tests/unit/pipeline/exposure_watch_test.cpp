@@ -1,9 +1,8 @@
-#include "daemon/pipeline/untouched/exposure_watch.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "daemon/pipeline/untouched/image_watch.hpp"
 #include "tests/fakes/stepped_loop.hpp"
 
 namespace dtact::pipeline {

@@ -17,7 +17,6 @@
 
 #include "daemon/pipeline/pipeline.hpp"
 #include "hal/base/clock.hpp"
-#include "hal/live/device_error.hpp"
 #include "hal/live/live_camera.hpp"
 #include "hal/live/source.hpp"
 #include "tests/fakes/fake_ring.hpp"

@@ -7,7 +7,7 @@
 
 #include "daemon/pipeline/untouched/luma_grid.hpp"
 #include "daemon/pipeline/untouched/reference_average.hpp"
-#include "daemon/pipeline/untouched/settle.hpp"
+#include "daemon/pipeline/untouched/reference_keeper.hpp"
 #include "daemon/pipeline/untouched/touch_check.hpp"
 #include "hal/files/png.hpp"
 #include "tests/fakes/toy_sensor.hpp"

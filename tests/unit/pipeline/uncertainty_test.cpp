@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "daemon/pipeline/active_calibration.hpp"
+#include "daemon/recon/depth_sums.hpp"
 #include "daemon/recon/model.hpp"
-#include "daemon/recon/strip_sums.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
 namespace dtact::pipeline {

@@ -8,7 +8,6 @@
 #include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/camera_watch.hpp"
 #include "daemon/pipeline/light_timeline.hpp"
-#include "daemon/pipeline/rate_watch.hpp"
 #include "daemon/pipeline/statistics.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 

@@ -1,5 +1,3 @@
-#include "daemon/recon/decimate.hpp"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -8,6 +6,7 @@
 #include <vector>
 
 #include "daemon/recon/kernels.hpp"
+#include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
 
 namespace dtact::recon {

@@ -13,7 +13,6 @@
 
 #include "daemon/recon/kernels.hpp"
 #include "daemon/recon/reconstructor.hpp"
-#include "daemon/recon/strip_sums.hpp"
 #include "daemon/recon/vector_kernels.hpp"
 #include "tests/unit/recon/every_target.hpp"
 

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "daemon/recon/decimate.hpp"
+#include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "tests/unit/recon/every_target.hpp"
 #include "tests/unit/recon/specification.hpp"

@@ -1,8 +1,8 @@
-#include "hal/sim/texture.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
+
+#include "hal/sim/light_field.hpp"
 
 namespace dtact::hal::sim {
 namespace {

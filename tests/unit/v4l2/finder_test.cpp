@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "hal/v4l2/error_of.hpp"
 #include "hal/v4l2/modes.hpp"
+#include "hal/v4l2/node.hpp"
 #include "tests/unit/v4l2/emulated_camera.hpp"
 #include "tests/unit/v4l2/emulated_nodes.hpp"
 

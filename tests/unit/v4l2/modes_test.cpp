@@ -4,7 +4,7 @@
 #include <linux/videodev2.h>
 
 #include "hal/live/payload.hpp"
-#include "hal/v4l2/error_of.hpp"
+#include "hal/v4l2/node.hpp"
 
 namespace dtact::hal::v4l2 {
 namespace {

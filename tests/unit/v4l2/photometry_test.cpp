@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "hal/base/unique_fd.hpp"
-#include "hal/v4l2/ioctl.hpp"
+#include "hal/v4l2/node.hpp"
 #include "tests/unit/v4l2/emulated_camera.hpp"
 
 namespace dtact::hal::v4l2 {

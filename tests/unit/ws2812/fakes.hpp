@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "hal/base/clock.hpp"
-#include "hal/ws2812/spi_port.hpp"
+#include "hal/ws2812/spi_wire.hpp"
 
 namespace dtact::hal::ws2812::test {
 

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "clients/calibrate/fit/model/ball_contact.hpp"
-#include "daemon/recon/scattering.hpp"
+#include "daemon/recon/model.hpp"
 
 namespace dtact::calibration {
 

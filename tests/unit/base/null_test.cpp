@@ -1,4 +1,4 @@
-#include "hal/null/null_camera.hpp"
+#include "hal/null/null.hpp"
 
 #include <gtest/gtest.h>
 

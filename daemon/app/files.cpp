@@ -1,6 +1,12 @@
-#include "daemon/app/net_files.hpp"
+#include "daemon/app/files.hpp"
 
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
+#include <stdexcept>
 
 #include "daemon/app/config.hpp"
 #include "daemon/app/service.hpp"
@@ -9,6 +15,23 @@
 #include "daemon/serve/tls.hpp"
 
 namespace dtact::app {
+
+void check_readable(const std::string& key, const std::filesystem::path& path) {
+  std::error_code ignored;
+  const int rights = std::filesystem::is_directory(path, ignored) ? R_OK | X_OK : R_OK;
+  if (path.empty() || ::access(path.c_str(), rights) == 0) return;
+  const int error = errno;
+  throw std::runtime_error(fmt::format(
+      "{} = \"{}\": {}{}", key, path.string(), std::strerror(error),
+      under_systemd() ? "; the service sees nothing in /home, /root and /tmp: put it into "
+                        "/etc/dtactd, readable to the user dtactd"
+                      : ""));
+}
+
+void check_camera_files(const hal::CameraConfig& camera) {
+  if (camera.backend == "sim") check_readable("camera.sim.scene", camera.sim.scene);
+  if (camera.backend == "replay") check_readable("camera.replay.folder", camera.replay.folder);
+}
 
 void resolve_credentials(net::NetConfig& config) {
   config.tls_certificate = resolve_credential("net.tls_certificate", config.tls_certificate);

@@ -1,4 +1,4 @@
-#include "daemon/recon/strip_sums.hpp"
+#include "daemon/recon/depth_sums.hpp"
 
 #include <algorithm>
 #include <cstddef>

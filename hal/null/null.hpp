@@ -7,6 +7,7 @@
 #include "hal/base/clock.hpp"
 #include "hal/camera.hpp"
 #include "hal/config.hpp"
+#include "hal/light_ring.hpp"
 
 namespace dtact::hal::null {
 
@@ -31,6 +32,13 @@ class NullCamera final : public Camera, private FrameOwner {
   std::int64_t period_ns_;
   std::int64_t next_ns_ = 0;
   std::atomic<std::uint64_t> delivered_{0};  // any thread reads it
+};
+
+/// The ring that does nothing, for sensors whose light no computer commands.
+class NullRing final : public LightRing {
+ public:
+  [[nodiscard]] RingInfo info() const override { return {"null", "null"}; }
+  [[nodiscard]] ShowResult show(const Light& /*light*/) override { return {}; }
 };
 
 }  // namespace dtact::hal::null

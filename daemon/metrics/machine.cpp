@@ -1,10 +1,17 @@
-#include "daemon/metrics/temperatures.hpp"
+#include "daemon/metrics/machine.hpp"
+
+#include <malloc.h>
 
 #include <algorithm>
 #include <fstream>
 #include <system_error>
 
 namespace dtact::metrics {
+
+Heap heap() noexcept {
+  const auto info = ::mallinfo2();
+  return {.used = info.uordblks + info.hblkhd, .free = info.fordblks, .mapped = info.hblkhd};
+}
 
 namespace fs = std::filesystem;
 

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
 
 namespace dtact::metrics {
 
@@ -15,5 +18,17 @@ struct Heap {
 /// By mallinfo2(3). Holds each arena's lock while its free blocks are counted. Under sanitizers,
 /// which bring an allocator of their own, it says nothing of the program.
 [[nodiscard]] Heap heap() noexcept;
+
+/// One of the board's own thermometers.
+struct Temperature {
+  std::string zone;  ///< "thermal_zone0"
+  std::string type;  ///< "cpu-thermal", as the kernel's driver calls it
+  double celsius = 0;
+};
+
+/// What the kernel's thermal zones read now, in the order of their names; those that do not answer
+/// are left out. `folder`: as in the kernel's Documentation/ABI/testing/sysfs-class-thermal.
+[[nodiscard]] std::vector<Temperature> temperatures(
+    const std::filesystem::path& folder = "/sys/class/thermal");
 
 }  // namespace dtact::metrics
