@@ -22,9 +22,7 @@ void require_feature(const v1::HelloReply& daemon, const std::string& feature) {
 }
 
 void require_features(const v1::HelloReply& daemon, const v1::Subscribe& s) {
-  const std::array<std::pair<const char*, bool>, 10> needs{{
-      {"rvl", s.depth() == v1::DEPTH_RVL},
-      {"predict_zstd", s.depth() == v1::DEPTH_PREDICT_ZSTD},
+  const std::array<std::pair<const char*, bool>, 8> needs{{
       {"jpeg", s.jpeg()},
       {"rates", s.depth_hz() != 0 || s.luma_hz() != 0 || s.jpeg_hz() != 0 || s.summary_hz() != 0 ||
                     s.cloud_hz() != 0 || s.pose_hz() != 0},

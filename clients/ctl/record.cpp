@@ -33,8 +33,7 @@ struct RecordOptions {
 
 v1::Subscribe subscription_for(const client::Client& client, const RecordOptions& options) {
   v1::Subscribe subscription;
-  subscription.set_depth(client.has_feature("predict_zstd") ? v1::DEPTH_PREDICT_ZSTD
-                                                            : v1::DEPTH_DELTA_ZSTD);
+  subscription.set_depth(v1::DEPTH_PREDICT_ZSTD);
   subscription.set_summary(true);
   subscription.set_jpeg(!options.no_jpeg && client.has_feature("jpeg"));
   return subscription;

@@ -16,9 +16,7 @@ struct Part {
 };
 
 std::vector<Part> parts() {
-  return {{"rvl", [](v1::Subscribe& s) { s.set_depth(v1::DEPTH_RVL); }},
-          {"predict_zstd", [](v1::Subscribe& s) { s.set_depth(v1::DEPTH_PREDICT_ZSTD); }},
-          {"jpeg", [](v1::Subscribe& s) { s.set_jpeg(true); }},
+  return {{"jpeg", [](v1::Subscribe& s) { s.set_jpeg(true); }},
           {"rates", [](v1::Subscribe& s) { s.set_depth_hz(1); }},
           {"rates", [](v1::Subscribe& s) { s.set_luma_hz(1); }},
           {"rates", [](v1::Subscribe& s) { s.set_jpeg_hz(1); }},
@@ -109,7 +107,7 @@ TEST(Features, PingAndReference) {
   }});
   Client client(daemon.options);
   EXPECT_TRUE(client.has_feature("ping"));
-  EXPECT_FALSE(client.has_feature("rvl"));
+  EXPECT_FALSE(client.has_feature("jpeg"));
   EXPECT_EQ(client.ping().monotonic_ns(), 5);
   EXPECT_EQ(client.reference().png(), "png");
   try {

@@ -54,7 +54,7 @@ TEST(Stream, OneThatNeverReadsDelaysNobody) {
   for (int i = 0; i < 15; ++i) {
     clients.push_back(std::make_unique<RawClient>(rig.tcp_port()));
     clients.back()->hello();
-    clients.back()->subscribe(i % 2 == 0 ? v1::DEPTH_INT16 : v1::DEPTH_DELTA_ZSTD);
+    clients.back()->subscribe(i % 2 == 0 ? v1::DEPTH_INT16 : v1::DEPTH_PREDICT_ZSTD);
   }
   constexpr std::uint64_t kFrames = 30;
   for (std::uint64_t sequence = 1; sequence <= kFrames; ++sequence) {

@@ -148,7 +148,7 @@ TEST(Subscription, AnOldClientsSummaryIsInsteadOfTheMaps) {
 
 TEST(Subscription, KindsHoldWhatIsDueOnly) {
   v1::Subscribe request;
-  request.set_depth(v1::DEPTH_DELTA_ZSTD);
+  request.set_depth(v1::DEPTH_PREDICT_ZSTD);
   request.set_luma(v1::LUMA_GREY8);
   request.set_decimation(2);
   request.set_um_per_unit(5);

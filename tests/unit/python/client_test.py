@@ -235,16 +235,15 @@ class Requests(unittest.TestCase):
     def test_what_an_older_daemon_does_not_know_is_not_sent(self):
         with FakeDaemon(minor=0) as daemon, dtact.connect(daemon.address) as s:
             for ask in (s.ping, s.reference,
-                        lambda: s.subscribe(dtact.Subscription(decimation=2)),
-                        lambda: s.subscribe(dtact.Subscription(depth="rvl"))):
+                        lambda: s.subscribe(dtact.Subscription(decimation=2))):
                 self.assertRaises(dtact.Unsupported, ask)
             self.assertEqual(len(daemon.requests), 1)
-            s.subscribe(dtact.Subscription(depth="delta_zstd", luma=True, every=3))
+            s.subscribe(dtact.Subscription(depth="predict_zstd", luma=True, every=3))
             sent = daemon.requests[-1].subscribe
             self.assertEqual((sent.depth, sent.luma, sent.every), (2, 1, 3))
 
     def test_every_part_of_a_subscription_is_sent(self):
-        names = ["rvl", "predict_zstd", "jpeg", "rates", "decimation", "units", "region", "events"]
+        names = ["jpeg", "rates", "decimation", "units", "region", "events"]
         with FakeDaemon(features=names) as daemon, dtact.connect(daemon.address) as s:
             s.subscribe(dtact.Subscription(
                 depth="predict_zstd", jpeg=True, summary=True, depth_hz=30, luma_hz=1, jpeg_hz=2,
@@ -252,7 +251,7 @@ class Requests(unittest.TestCase):
             m = daemon.requests[-1].subscribe
             self.assertEqual((m.depth, m.jpeg, m.summary, m.depth_hz, m.luma_hz, m.jpeg_hz,
                               m.summary_hz, m.decimation, m.um_per_unit, m.events),
-                             (4, True, True, 30, 1, 2, 60, 4, 5, False))
+                             (2, True, True, 30, 1, 2, 60, 4, 5, False))
             self.assertEqual((m.box.x, m.box.y, m.box.width, m.box.height), (1, 2, 3, 4))
             self.assertTrue(m.HasField("events"))
             s.subscribe(dtact.Subscription(region="contact"))

@@ -102,10 +102,10 @@ class Asking(unittest.TestCase):
     def test_needs_perceive(self):
         wanted = dtact.Subscription(depth=None, cloud="int16", pose=True, cloud_hz=10)
         self.assertEqual(wanted.needs(), {"cloud", "pose", "rates"})
-        request = wanted.message(frozenset(), True)
+        request = wanted.message(True)
         self.assertEqual((request.depth, request.cloud, request.pose, request.cloud_hz), (0, 2, True, 10))
         with self.assertRaises(ValueError):
-            dtact.Subscription(cloud="int8").message(frozenset(), True)  # type: ignore[arg-type]
+            dtact.Subscription(cloud="int8").message(True)  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":

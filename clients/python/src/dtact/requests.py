@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import AbstractSet, Callable, Generic, Sequence, TypeVar
+from typing import Callable, Generic, Sequence, TypeVar
 
 from .errors import Invalid
 from .messages import ClientMessage, Message
@@ -57,10 +57,9 @@ def hello(program: str, token: str | None) -> Request[Server]:
     return Request(message, lambda reply: Server.of(reply.hello))
 
 
-def subscribe(subscription: Subscription, features: AbstractSet[str],
-              same_machine: bool) -> Request[None]:
+def subscribe(subscription: Subscription, same_machine: bool) -> Request[None]:
     message = ClientMessage()
-    message.subscribe.CopyFrom(subscription.message(features, same_machine))
+    message.subscribe.CopyFrom(subscription.message(same_machine))
     return Request(message, _nothing, needs=subscription.needs())
 
 

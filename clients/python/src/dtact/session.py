@@ -200,7 +200,7 @@ class Session:
     def _subscribe_request(self, subscription: Subscription | None) -> Request[None]:
         if subscription is None:
             return requests.unsubscribe()
-        return requests.subscribe(subscription, self.server.features, self._local)
+        return requests.subscribe(subscription, self._local)
 
     def _no_frame(self, seconds: float, status: Status) -> str:
         advice = status.advice or "Has what was subscribed a frame at all?"
