@@ -194,7 +194,6 @@ TEST(Stream, ANewerFrameHoldsWhatWasDueOfTheOneItReplaces) {
   RawClient slow(rig.tcp_port(), kSmallBuffer);
   v1::ClientMessage hello;
   hello.mutable_hello()->set_major(1);
-  hello.mutable_hello()->set_minor(1);
   ASSERT_TRUE(slow.request(hello).has_hello());
   auto message = subscribe();
   message.mutable_subscribe()->set_summary(true);

@@ -11,11 +11,7 @@ Encoding = Literal["auto", "int16", "predict_zstd"]
 
 @dataclass(frozen=True)
 class Subscription:
-    """What is to be sent from now on. What is left out is not sent; a limit of 0 Hz is none.
-
-    All but `depth`, `luma`, `every` and `summary` need a daemon of version 1.1; an older one is
-    not asked for them and Unsupported is raised.
-    """
+    """What is to be sent from now on. What is left out is not sent; a limit of 0 Hz is none."""
 
     #: How depth travels; both encodings give the same depth. "auto": int16 on the daemon's own
     #: machine, where bytes cost least; predict_zstd elsewhere. None: no depth.
@@ -40,21 +36,6 @@ class Subscription:
     cloud_hz: float = 0.0
     pose: bool = False  #: how the touched object moves, of dtact-perceive
     pose_hz: float = 0.0
-
-    def needs(self) -> frozenset[str]:
-        """The features that a daemon has to have for it."""
-        asked = {
-            "jpeg": self.jpeg,
-            "rates": any((self.depth_hz, self.luma_hz, self.jpeg_hz, self.summary_hz,
-                          self.cloud_hz, self.pose_hz)),
-            "cloud": self.cloud is not None,
-            "pose": self.pose,
-            "decimation": self.decimation not in (0, 1),
-            "units": self.um_per_unit not in (0, 1),
-            "region": self.region is not None,
-            "events": not self.events,
-        }
-        return frozenset(name for name, wanted in asked.items() if wanted)
 
     def message(self, same_machine: bool) -> Message:
         """The request. ValueError for an encoding that is no Encoding."""

@@ -116,7 +116,6 @@ class Session {
   }
 
   private ping(): void {
-    if (!this.features.includes("ping")) return;
     const sent = nowMs();
     void this.ask({ case: "ping", value: create(PingSchema) }).then((reply) => {
       if (reply?.result.case === "pong") {
