@@ -16,10 +16,6 @@ void DepthEncoder::encode(v1::DepthEncoding encoding, std::span<const std::int16
   switch (encoding) {
     case v1::DEPTH_INT16:
       return encode_int16(depth, out);
-    case v1::DEPTH_DELTA_ZSTD:
-      return delta_zstd_.encode(depth, width, out);
-    case v1::DEPTH_RVL:
-      return rvl_.encode(depth, out);
     case v1::DEPTH_PREDICT_ZSTD:
       return predict_zstd_.encode(depth, width, out);
     default:
@@ -32,10 +28,6 @@ bool decode_depth(v1::DepthEncoding encoding, std::string_view bytes, std::size_
   switch (encoding) {
     case v1::DEPTH_INT16:
       return decode_int16(bytes, width, height, depth);
-    case v1::DEPTH_DELTA_ZSTD:
-      return decode_delta_zstd(bytes, width, height, depth);
-    case v1::DEPTH_RVL:
-      return decode_rvl(bytes, width, height, depth);
     case v1::DEPTH_PREDICT_ZSTD:
       return decode_predict_zstd(bytes, width, height, depth);
     default:

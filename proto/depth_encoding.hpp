@@ -8,10 +8,8 @@
 #include <vector>
 
 #include "proto/dtact.pb.h"
-#include "proto/encodings/delta_zstd.hpp"
 #include "proto/encodings/int16.hpp"
 #include "proto/encodings/predict_zstd.hpp"
-#include "proto/encodings/rvl.hpp"
 
 namespace dtact::wire {
 
@@ -28,8 +26,6 @@ class DepthEncoder {
               std::string& out);
 
  private:
-  DeltaZstdEncoder delta_zstd_;
-  RvlEncoder rvl_;
   PredictZstdEncoder predict_zstd_;
 };
 

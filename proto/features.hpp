@@ -4,16 +4,8 @@
 
 namespace dtact::wire {
 
-/// What a daemon can do beyond version 1.0, as HelloReply.features lists it; proto/README.md says
-/// what each stands for. A client asks for what is listed and does not compare versions.
-inline constexpr std::array kFeatures = {
-    "contact_absence", "decimation",     "events",    "force",  "jpeg", "ping",   "predict_zstd",
-    "rates",           "reconstruction", "reference", "region", "rvl",  "stamps", "units",
-};
-
-/// The same of dtact-perceive.
-inline constexpr std::array kPerceiveFeatures = {
-    "cloud", "decimation", "events", "ping", "pose", "rates", "region",
-};
+/// HelloReply.features of dtactd and of dtact-perceive; proto/README.md says what each stands for.
+inline constexpr std::array kFeatures = {"jpeg", "reconstruction", "reference"};
+inline constexpr std::array kPerceiveFeatures = {"cloud", "pose"};
 
 }  // namespace dtact::wire

@@ -61,9 +61,8 @@ recon::Surface surface_of(const v1::Surface& surface) {
 
 DepthImage depth_image(const v1::Frame& frame, std::span<const float> mm) {
   const v1::DepthMap& map = frame.depth();
-  // A daemon of 1.0 says neither.
-  const std::uint64_t full_width = std::max(map.full_width(), map.width());
-  const std::uint64_t full_height = std::max(map.full_height(), map.height());
+  const std::uint64_t full_width = map.full_width();
+  const std::uint64_t full_height = map.full_height();
   constexpr std::uint64_t kMostSide = 1U << 20U;
   if (std::uint64_t{map.x()} + map.width() > full_width ||
       std::uint64_t{map.y()} + map.height() > full_height || full_width > kMostSide ||

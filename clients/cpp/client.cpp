@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "clients/cpp/features.hpp"
 #include "clients/cpp/session.hpp"
 #include "hal/base/unique_fd.hpp"
 
@@ -44,7 +43,8 @@ Client& Client::operator=(Client&&) noexcept = default;
 
 const v1::HelloReply& Client::server() const noexcept { return session_->server(); }
 bool Client::has_feature(const std::string& name) const {
-  return lists_feature(session_->server(), name);
+  const auto& features = session_->server().features();
+  return std::ranges::find(features, name) != features.end();
 }
 bool Client::same_machine() const noexcept { return session_->local(); }
 int Client::native_handle() const noexcept { return session_->native_handle(); }
@@ -67,7 +67,6 @@ void Client::rezero(bool force) {
 }
 
 v1::Reconstruction Client::set_reconstruction(const v1::SetReconstruction& change) {
-  require_feature(server(), "reconstruction");
   v1::ClientMessage message;
   *message.mutable_set_reconstruction() = change;
   return session_->request(message, session_->options().timeout).reconstruction();
@@ -80,14 +79,12 @@ v1::Status Client::status() {
 }
 
 v1::ReferenceImage Client::reference() {
-  require_feature(server(), "reference");
   v1::ClientMessage message;
   message.mutable_get_reference();
   return std::move(*session_->request(message, session_->options().timeout).mutable_reference());
 }
 
 v1::Pong Client::ping() {
-  require_feature(server(), "ping");
   v1::ClientMessage message;
   message.mutable_ping();
   return session_->request(message, session_->options().timeout).pong();
@@ -97,13 +94,7 @@ v1::CalibrationFiles Client::calibration(std::optional<std::uint64_t> number) {
   v1::ClientMessage message;
   auto& request = *message.mutable_get_calibration();
   if (number.has_value()) request.set_number(*number);
-  v1::Reply reply = session_->request(message, session_->options().timeout);
-  v1::CalibrationFiles& files = *reply.mutable_calibration();
-  if (number.has_value() && (!files.has_number() || files.number() != *number)) {
-    throw Refused(v1::ERROR_UNSUPPORTED,
-                  "this daemon is older and knows only its current calibration: update dtactd");
-  }
-  return std::move(files);
+  return std::move(*session_->request(message, session_->options().timeout).mutable_calibration());
 }
 
 std::vector<v1::StoredCalibration> Client::calibrations() {
@@ -111,18 +102,13 @@ std::vector<v1::StoredCalibration> Client::calibrations() {
   message.mutable_list_calibrations();
   v1::Reply reply = session_->request(message, parse_timeout(session_->options()));
   auto& calibrations = *reply.mutable_calibrations()->mutable_calibrations();
-  for (v1::StoredCalibration& stored : calibrations) {
-    if (!stored.has_in_use()) stored.set_in_use(stored.current());
-  }
   return {calibrations.begin(), calibrations.end()};
 }
 
-std::optional<std::uint64_t> Client::upload_calibration(const v1::UploadCalibration& files) {
+std::uint64_t Client::upload_calibration(const v1::UploadCalibration& files) {
   v1::ClientMessage message;
   *message.mutable_upload_calibration() = files;
-  const auto reply = session_->request(message, parse_timeout(session_->options()));
-  if (!reply.done().has_calibration()) return std::nullopt;
-  return reply.done().calibration();
+  return session_->request(message, parse_timeout(session_->options())).done().calibration();
 }
 
 void Client::activate_calibration(std::uint64_t number) {

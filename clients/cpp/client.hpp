@@ -61,16 +61,16 @@ class DTACT_EXPORT Client {
 
   /// Who answered. Renewed by a reconnection.
   [[nodiscard]] const v1::HelloReply& server() const noexcept;
-  /// What the daemon can do beyond version 1.0, by the names in proto/README.md: "ping", "rates".
+  /// HelloReply.features lists `name`; proto/README.md has the names: "reference", "cloud".
   [[nodiscard]] bool has_feature(const std::string& name) const;
   /// The daemon runs on this machine, so that its CLOCK_MONOTONIC is ours.
   [[nodiscard]] bool same_machine() const noexcept;
 
-  // Requests. Each throws Refused with the daemon's sentence or, for what this daemon is too old
-  // for, the library's own; TimeoutError; or a ConnectionError, after which it is not known whether
-  // the daemon has done it. None is sent twice. While a lost connection is to be made again, a
-  // request tries that once when the next attempt is due, and throws at once before. Frames and
-  // events that arrive meanwhile are kept for next(): every event, and the newest few frames.
+  // Requests. Each throws Refused with the daemon's sentence, TimeoutError, or a ConnectionError,
+  // after which it is not known whether the daemon has done it. None is sent twice. While a lost
+  // connection is to be made again, a request tries that once when the next attempt is due, and
+  // throws at once before. Frames and events that arrive meanwhile are kept for next(): every
+  // event, and the newest few frames.
 
   /// Replaces the subscription, also for connections to come.
   void subscribe(const v1::Subscribe& subscription = depth_stream());
@@ -91,12 +91,10 @@ class DTACT_EXPORT Client {
   [[nodiscard]] v1::CalibrationFiles calibration(
       std::optional<std::uint64_t> number = std::nullopt);
   /// All that the daemon has: the configured one, then the uploaded ones, oldest first. The
-  /// daemon reads and checks those that it does not know yet; may take a few seconds. Of an older
-  /// daemon, which does not say what is in use, the current one is taken to be.
+  /// daemon reads and checks those that it does not know yet; may take a few seconds.
   [[nodiscard]] std::vector<v1::StoredCalibration> calibrations();
-  /// Returns once the daemon uses and has stored it, with its number; nothing from a daemon that is
-  /// too old to say it. May take a few seconds.
-  std::optional<std::uint64_t> upload_calibration(const v1::UploadCalibration& files);
+  /// Returns once the daemon uses and has stored it, with its number. May take a few seconds.
+  std::uint64_t upload_calibration(const v1::UploadCalibration& files);
   /// Makes one of calibrations() current. Returns once the daemon uses it and will start with it.
   void activate_calibration(std::uint64_t number);
 

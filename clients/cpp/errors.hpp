@@ -60,7 +60,7 @@ class DTACT_EXPORT Refused : public Error {
   [[nodiscard]] v1::ErrorCode code() const noexcept { return code_; }
   /// The token is missing, wrong, or its rights do not reach.
   [[nodiscard]] bool denied() const noexcept { return code_ == v1::ERROR_DENIED; }
-  /// This daemon is too old for it; also found by the library itself, before anything is sent.
+  /// This program does not know the request, or a value in it.
   [[nodiscard]] bool unsupported() const noexcept { return code_ == v1::ERROR_UNSUPPORTED; }
   /// The same request may be granted later without any change.
   [[nodiscard]] bool worth_repeating() const noexcept {

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "clients/cpp/errors.hpp"
-#include "clients/cpp/features.hpp"
 #include "proto/framing.hpp"
 
 namespace dtact::client {
@@ -80,7 +79,6 @@ void Session::reopen(int wake) {
   try {
     open(limit);
     if (subscription_) {
-      require_features(server_, *subscription_);
       v1::ClientMessage message;
       *message.mutable_subscribe() = *subscription_;
       (void)exchange(message, limit);
@@ -179,7 +177,6 @@ v1::Reply Session::request(v1::ClientMessage& message, std::chrono::milliseconds
 }
 
 void Session::subscribe(const v1::Subscribe& subscription) {
-  require_features(server_, subscription);
   v1::ClientMessage message;
   *message.mutable_subscribe() = subscription;
   (void)request(message, options_.timeout);

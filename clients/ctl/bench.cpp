@@ -64,13 +64,11 @@ class Bench {
   static std::int64_t now() { return base::system_clock().monotonic_ns(); }
 
   [[nodiscard]] std::string head(const cli::BenchReport& report) const {
-    std::string clock = "not known: the daemon is elsewhere and older than 1.1";
-    if (client_.same_machine()) {
-      clock = "the same";
-    } else if (report.has_clock_offset_ms()) {
-      clock = fmt::format("{:.3f} ms ahead of this machine's, +- {:.3f}", report.clock_offset_ms(),
+    const std::string clock =
+        client_.same_machine()
+            ? "the same"
+            : fmt::format("{:.3f} ms ahead of this machine's, +- {:.3f}", report.clock_offset_ms(),
                           report.clock_uncertainty_ms());
-    }
     return fmt::format("latency since {}; the daemon's clock: {}\n",
                        client::name_of(report.since()), clock) +
            bench_head();
@@ -90,15 +88,12 @@ class Bench {
     }
     (void)stream(kWarmUpSeconds);
     const v1::CameraStatus camera_before = ask_camera();
-    const bool pings = !client_.same_machine() && client_.has_feature("ping");
+    const bool pings = !client_.same_machine();
     const ClockOffset before = pings ? ask_clock() : ClockOffset{};
     const BenchMeter meter = stream(options_.seconds);
     const ClockOffset after = pings ? ask_clock() : ClockOffset{};
-    std::function<std::int64_t(std::int64_t)> offset;
-    if (pings || client_.same_machine()) {
-      offset = [&](std::int64_t at_ns) { return offset_at(before, after, at_ns); };
-    }
-    cli::BenchReport report = meter.report(offset);
+    cli::BenchReport report =
+        meter.report([&](std::int64_t at_ns) { return offset_at(before, after, at_ns); });
     report.set_encoding(encoding);
     const v1::CameraStatus camera = ask_camera();
     report.set_lost(camera.lost() - camera_before.lost());

@@ -31,12 +31,11 @@ struct RecordOptions {
   bool progress = false;
 };
 
-v1::Subscribe subscription_for(const client::Client& client, const RecordOptions& options) {
+v1::Subscribe subscription_for(const RecordOptions& options) {
   v1::Subscribe subscription;
-  subscription.set_depth(client.has_feature("predict_zstd") ? v1::DEPTH_PREDICT_ZSTD
-                                                            : v1::DEPTH_DELTA_ZSTD);
+  subscription.set_depth(v1::DEPTH_PREDICT_ZSTD);
   subscription.set_summary(true);
-  subscription.set_jpeg(!options.no_jpeg && client.has_feature("jpeg"));
+  subscription.set_jpeg(!options.no_jpeg);
   return subscription;
 }
 
@@ -55,7 +54,7 @@ class Recording {
     // Before frames come: while an answer is waited for only the newest few are kept.
     const v1::Status status = client_.status();
     fetch_files();
-    client_.subscribe(subscription_for(client_, options_));
+    client_.subscribe(subscription_for(options_));
     const auto end = options_.seconds > 0
                          ? began_ + milliseconds(static_cast<std::int64_t>(options_.seconds * 1e3))
                          : Clock::time_point::max();
@@ -115,7 +114,6 @@ class Recording {
     } catch (const client::Refused&) {  // NOLINT(bugprone-empty-catch)
       // Uncalibrated, or busy with another one, which an event will tell.
     }
-    if (!client_.has_feature("reference")) return;
     try {
       put(recording::kUntouchedPng, "image/png", client_.reference().png());
     } catch (const client::Refused&) {  // NOLINT(bugprone-empty-catch)

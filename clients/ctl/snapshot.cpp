@@ -27,7 +27,7 @@ struct SnapshotOptions {
 /// The next frame that holds what is asked for.
 v1::Frame fetch(client::Client& client, const SnapshotOptions& options) {
   v1::Subscribe subscription;
-  subscription.set_depth(options.luma ? v1::DEPTH_NONE : v1::DEPTH_DELTA_ZSTD);
+  subscription.set_depth(options.luma ? v1::DEPTH_NONE : v1::DEPTH_PREDICT_ZSTD);
   subscription.set_luma(options.luma ? v1::LUMA_GREY8 : v1::LUMA_NONE);
   client.subscribe(subscription);
   const auto end = std::chrono::steady_clock::now() +

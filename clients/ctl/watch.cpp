@@ -39,10 +39,10 @@ constexpr double kDrawnFps = 20;
 v1::Subscribe drawn_stream(client::Client& client) {
   const double every = std::ceil(client.status().camera().fps() / kDrawnFps);
   v1::Subscribe subscription;
-  subscription.set_depth(v1::DEPTH_DELTA_ZSTD);
+  subscription.set_depth(v1::DEPTH_PREDICT_ZSTD);
   subscription.set_every(static_cast<std::uint32_t>(std::max(1.0, every)));
-  if (client.has_feature("decimation")) subscription.set_decimation(4);
-  if (client.has_feature("units")) subscription.set_um_per_unit(5);
+  subscription.set_decimation(4);
+  subscription.set_um_per_unit(5);
   return subscription;
 }
 

@@ -17,8 +17,8 @@ namespace {
 /// As client::values_of(), which looks at no more than the values; throws client::ProtocolError
 /// also where the map contradicts itself.
 std::vector<std::int16_t> values_of(const v1::DepthMap& map) {
-  const std::uint64_t full_width = std::max(map.full_width(), map.width());
-  const std::uint64_t full_height = std::max(map.full_height(), map.height());
+  const std::uint64_t full_width = map.full_width();
+  const std::uint64_t full_height = map.full_height();
   const bool inside = std::uint64_t{map.x()} + map.width() <= full_width &&
                       std::uint64_t{map.y()} + map.height() <= full_height;
   const bool scaled = map.mm_per_px() > 0 && std::isfinite(map.mm_per_px()) &&
@@ -41,9 +41,8 @@ DepthPart::DepthPart(const v1::DepthMap& map)
              .y = static_cast<int>(map.y()),
              .width = static_cast<int>(map.width()),
              .height = static_cast<int>(map.height()),
-             // A daemon of 1.0 says neither.
-             .full_width = static_cast<int>(std::max(map.full_width(), map.width())),
-             .full_height = static_cast<int>(std::max(map.full_height(), map.height())),
+             .full_width = static_cast<int>(map.full_width()),
+             .full_height = static_cast<int>(map.full_height()),
              .mm_per_px = map.mm_per_px(),
              .um_per_unit = map.um_per_unit(),
              .untrusted = map.untrusted_value(),

@@ -84,8 +84,7 @@ void Server::update_want() {
 
 void Server::subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
                        const v1::Subscribe& request) {
-  const auto made =
-      Subscription::from(request, session->minor_version(), {}, net::Serves::geometry);
+  const auto made = Subscription::from(request, {}, net::Serves::geometry);
   if (const auto* refusal = std::get_if<net::Refusal>(&made)) {
     return session->reply_error(id, refusal->code, refusal->sentence);
   }

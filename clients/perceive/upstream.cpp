@@ -3,8 +3,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/cpp/features.hpp"
-
 namespace dtact::perceive {
 namespace {
 
@@ -43,7 +41,7 @@ void Upstream::on_up(const v1::HelloReply& daemon, bool same_machine) {
     serial_ = daemon.serial();
     newest_.part();
     // Raw values cost least where they need not travel.
-    compressed_ = !same_machine && client::lists_feature(daemon, "predict_zstd");
+    compressed_ = !same_machine;
     subscribe();
   }
   handlers_.notice("connected to " + daemon.program() + " at " + host_);

@@ -86,12 +86,7 @@ void RecordingWriter::add_light(const v1::LightState& light) {
 }
 
 void RecordingWriter::add(const v1::Event& event) {
-  if (event.monotonic_ns() != 0) {
-    now_ = moment_of(event.sequence(), event.monotonic_ns(), event.wall_ns());
-  } else if (!epoch_ns_) {
-    // A daemon before 1.1 does not say when; later ones are as of the last frame.
-    return;
-  }
+  now_ = moment_of(event.sequence(), event.monotonic_ns(), event.wall_ns());
   add_message(event_, event);
 }
 

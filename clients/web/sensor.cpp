@@ -25,14 +25,14 @@ void send(net::Session& session, std::uint64_t id, v1::Reply reply) {
 }
 
 /// All that the daemon lets through, since rates were its part.
-Subscription every_frame(v1::Subscribe request, std::uint32_t minor) {
+Subscription every_frame(v1::Subscribe request) {
   for (const auto clear :
        {&v1::Subscribe::clear_every, &v1::Subscribe::clear_depth_hz, &v1::Subscribe::clear_luma_hz,
         &v1::Subscribe::clear_jpeg_hz, &v1::Subscribe::clear_summary_hz,
         &v1::Subscribe::clear_cloud_hz, &v1::Subscribe::clear_pose_hz}) {
     (request.*clear)();
   }
-  auto made = Subscription::from(request, minor, {}, net::Serves::everything);
+  auto made = Subscription::from(request, {}, net::Serves::everything);
   // The daemon has agreed to it; one that knows more than this release sends more.
   const auto* subscription = std::get_if<Subscription>(&made);
   return subscription != nullptr ? *subscription : Subscription();
@@ -118,7 +118,7 @@ void Sensor::subscribe(const std::shared_ptr<net::Session>& session, std::uint64
   const auto answered = [weak = std::weak_ptr(session), id, request](v1::Reply reply) {
     const auto viewer = weak.lock();
     if (viewer == nullptr) return;
-    if (!reply.has_error()) viewer->subscribe(every_frame(request, viewer->minor_version()));
+    if (!reply.has_error()) viewer->subscribe(every_frame(request));
     send(*viewer, id, std::move(reply));
   };
   source_->subscribe(

@@ -125,7 +125,7 @@ void Commands::subscribe(const Who& who, const v1::Subscribe& request) {
     const CalibrationSummary summary = summarise(*calibration);
     map = {static_cast<std::uint32_t>(summary.width), static_cast<std::uint32_t>(summary.height)};
   }
-  const auto made = Subscription::from(request, session->minor_version(), map);
+  const auto made = Subscription::from(request, map);
   if (const auto* refusal = std::get_if<Refusal>(&made)) {
     return session->reply_error(id, refusal->code, refusal->sentence);
   }

@@ -202,7 +202,6 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   state_ = State::greeted;
   decoder_.set_cap(wire::kMaxMessage);
   program_ = printable(hello.program());
-  minor_ = hello.minor();
   config_.log({LogLevel::info,
                fmt::format("client {} ({}) connected{}{}", peer().address, program_,
                            verdict.token_name.empty() ? "" : " as ", verdict.token_name),

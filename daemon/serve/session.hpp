@@ -83,7 +83,6 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
   [[nodiscard]] const std::string& program() const noexcept { return program_; }
   /// Of the version that the client speaks.
-  [[nodiscard]] std::uint32_t minor_version() const noexcept { return minor_; }
   [[nodiscard]] const Outbox& outbox() const noexcept { return outbox_; }
 
  private:
@@ -116,7 +115,6 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   Admission& admission_;
   std::weak_ptr<SessionHost> host_;
   std::string program_;
-  std::uint32_t minor_ = 0;
   State state_ = State::fresh;
   Subscription subscription_;
   Subscription::Parts waiting_ = 0;  ///< What the frame holds, or owes, that waits to be sent.

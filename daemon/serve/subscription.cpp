@@ -18,11 +18,10 @@ Refusal invalid(std::string sentence) { return {v1::ERROR_INVALID, std::move(sen
 
 std::optional<Refusal> check_encodings(const v1::Subscribe& request) {
   if (request.depth() != v1::DEPTH_NONE && !wire::is_depth_encoding(request.depth())) {
-    return Refusal{
-        v1::ERROR_UNSUPPORTED,
-        fmt::format("subscribe.depth: this daemon does not know encoding {}: ask for one "
-                    "that HelloReply.features lists, or update dtactd",
-                    static_cast<int>(request.depth()))};
+    return Refusal{v1::ERROR_UNSUPPORTED,
+                   fmt::format("subscribe.depth: this daemon does not know encoding {}: update "
+                               "dtactd",
+                               static_cast<int>(request.depth()))};
   }
   if (!v1::LumaEncoding_IsValid(request.luma())) {
     return Refusal{v1::ERROR_UNSUPPORTED,
@@ -116,8 +115,7 @@ bool RateLimit::admits(std::int64_t timestamp_ns, std::int64_t spacing_ns) noexc
   return true;
 }
 
-std::variant<Subscription, Refusal> Subscription::from(const v1::Subscribe& request,
-                                                       std::uint32_t minor, Map map,
+std::variant<Subscription, Refusal> Subscription::from(const v1::Subscribe& request, Map map,
                                                        Serves serves) {
   for (const auto& refusal : {check_parts(request, serves), check_encodings(request),
                               check_rates(request), check_map(request, map)}) {
@@ -136,16 +134,14 @@ std::variant<Subscription, Refusal> Subscription::from(const v1::Subscribe& requ
     const auto& box = request.box();
     made.kind_.spec.region = DepthRegion{box.x(), box.y(), box.width(), box.height()};
   }
-  // In version 1.0 a summary was instead of the maps.
-  const bool maps = !(minor == 0 && request.summary());
   const auto ask = [&made](bool wanted, Parts part, RateLimit& limit, double hz) {
     if (!wanted) return;
     made.parts_ |= part;
     limit = RateLimit(hz);
     made.unlimited_ = made.unlimited_ || !limit.limits();
   };
-  ask(maps && request.depth() != v1::DEPTH_NONE, kDepth, made.depth_, request.depth_hz());
-  ask(maps && request.luma() != v1::LUMA_NONE, kLuma, made.luma_, request.luma_hz());
+  ask(request.depth() != v1::DEPTH_NONE, kDepth, made.depth_, request.depth_hz());
+  ask(request.luma() != v1::LUMA_NONE, kLuma, made.luma_, request.luma_hz());
   ask(request.jpeg(), kJpeg, made.jpeg_, request.jpeg_hz());
   ask(request.cloud() != v1::CLOUD_NONE, kCloud, made.cloud_, request.cloud_hz());
   ask(request.pose(), kPose, made.pose_, request.pose_hz());

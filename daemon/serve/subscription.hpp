@@ -43,13 +43,13 @@ class Subscription {
   /// Nothing but events.
   Subscription() = default;
   /// The request, or why not. `map`: pixels of the calibration's depth map at full resolution; 0 =
-  /// not known. `minor`: of the version that the client speaks.
+  /// not known.
   struct Map {
     std::uint32_t width = 0;
     std::uint32_t height = 0;
   };
   [[nodiscard]] static std::variant<Subscription, Refusal> from(const v1::Subscribe& request,
-                                                                std::uint32_t minor, Map map,
+                                                                Map map,
                                                                 Serves serves = Serves::images);
 
   /// Parts of a frame message. A set of bits.

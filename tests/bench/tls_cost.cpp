@@ -182,7 +182,7 @@ void measure(int frames, int rounds) {
   v1::ClientMessage end;
   end.mutable_subscribe();
   for (auto& way : ways) way.stream.request(hello);
-  // The default scene's map at full resolution, and what delta + zstd makes of it.
+  // The default scene's map at full resolution, and what an encoding makes of it.
   for (const std::uint32_t side : {580U, 241U}) {
     std::map<std::string, std::vector<double>> times;
     for (int round = 0; round < rounds; ++round) {

@@ -85,7 +85,7 @@ TEST(Stream, CompressedDepthIsTheSameDepth) {
   client::Client packed = sensor.connect();
   plain.subscribe();
   v1::Subscribe subscription;
-  subscription.set_depth(v1::DEPTH_DELTA_ZSTD);
+  subscription.set_depth(v1::DEPTH_PREDICT_ZSTD);
   packed.subscribe(subscription);
   std::vector<v1::Frame> frames;
   ASSERT_TRUE(read_until(plain, [&](const Item& item) {

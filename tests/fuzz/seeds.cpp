@@ -58,7 +58,7 @@ void add_requests(const Corpus& corpus) {
          m.mutable_hello()->set_program("seed");
        })},
       {"subscribe", request([](M& m) {
-         m.mutable_subscribe()->set_depth(v1::DEPTH_DELTA_ZSTD);
+         m.mutable_subscribe()->set_depth(v1::DEPTH_INT16);
          m.mutable_subscribe()->set_luma(v1::LUMA_GREY8);
          m.mutable_subscribe()->set_every(2);
        })},
@@ -78,8 +78,8 @@ void add_requests(const Corpus& corpus) {
       {"list_calibrations", request([](M& m) { m.mutable_list_calibrations(); })},
       {"activate_calibration",
        request([](M& m) { m.mutable_activate_calibration()->set_number(0); })},
-      {"subscribe_1_1", request([](M& m) {
-         m.mutable_subscribe()->set_depth(v1::DEPTH_RVL);
+      {"subscribe_parts", request([](M& m) {
+         m.mutable_subscribe()->set_depth(v1::DEPTH_PREDICT_ZSTD);
          m.mutable_subscribe()->set_jpeg(true);
          m.mutable_subscribe()->set_depth_hz(30);
          m.mutable_subscribe()->set_decimation(2);
@@ -152,10 +152,8 @@ v1::ServerMessage points() {
 
 void add_answers(const Corpus& corpus) {
   corpus.add("answers", "frame_int16", frame(v1::DEPTH_INT16).SerializeAsString());
-  corpus.add("answers", "frame_delta_zstd", frame(v1::DEPTH_DELTA_ZSTD).SerializeAsString());
-  corpus.add("answers", "frame_rvl", frame(v1::DEPTH_RVL).SerializeAsString());
   corpus.add("answers", "frame_predict_zstd", frame(v1::DEPTH_PREDICT_ZSTD).SerializeAsString());
-  corpus.add("web", "depth", frame(v1::DEPTH_RVL).SerializeAsString());
+  corpus.add("web", "depth", frame(v1::DEPTH_PREDICT_ZSTD).SerializeAsString());
   corpus.add("web", "points", points().SerializeAsString());
   v1::ServerMessage message;
   message.mutable_reply()->set_id(3);
@@ -182,7 +180,7 @@ void add_answers(const Corpus& corpus) {
 }
 
 /// A map of a pressed slope with untouched and untrusted parts, as depth_maps.cpp and, in each
-/// encoding, as depth_decoders.cpp and python_rvl.cpp take it.
+/// encoding, as depth_decoders.cpp takes it.
 void add_depth(const Corpus& corpus, const std::string& name, std::size_t width,
                std::size_t height) {
   std::vector<std::int16_t> map;
@@ -194,13 +192,11 @@ void add_depth(const Corpus& corpus, const std::string& name, std::size_t width,
   }
   wire::DepthEncoder encoder;
   std::string bytes;
-  for (const auto encoding :
-       {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD, v1::DEPTH_RVL, v1::DEPTH_PREDICT_ZSTD}) {
+  for (const auto encoding : {v1::DEPTH_INT16, v1::DEPTH_PREDICT_ZSTD}) {
     encoder.encode(encoding, map, width, bytes);
     const std::string head{static_cast<char>(width), 0, static_cast<char>(height), 0,
                            static_cast<char>(encoding)};
     corpus.add("depth_decoders", name + '_' + std::to_string(encoding), head + bytes);
-    if (encoding == v1::DEPTH_RVL) corpus.add("python_rvl", name, head.substr(0, 4) + bytes);
   }
   encoder.encode(v1::DEPTH_INT16, map, width, bytes);
   corpus.add("depth_maps", name, static_cast<char>(width - 1) + bytes);

@@ -3,13 +3,13 @@
 # included, into the folder OUT, which is emptied. The work lies in the folder SOURCE (OUT-source when
 # left out), which stays the same from run to run so that ccache knows the files again.
 #
-# With DTACT_BUILT=FOLDER in the environment nothing is compiled but Python's small extension: the
-# programs are those that `cmake --preset dev` built in FOLDER. Seconds instead of tens of minutes.
+# With DTACT_BUILT=FOLDER in the environment nothing is compiled: the programs are those that
+# `cmake --preset dev` built in FOLDER. Seconds instead of tens of minutes.
 #
 # Exit code: 0 built; 77 Debian's packages are missing (they are named); else failed.
 set -euo pipefail
 missing=()
-for package in debhelper dh-python dpkg-dev libpython3-dev python3-dev python3-setuptools; do
+for package in debhelper dh-python dpkg-dev python3-setuptools; do
   dpkg-query -W -f='${Status}' "$package" 2> /dev/null | grep -q 'ok installed' || missing+=("$package")
 done
 if ((${#missing[@]})); then

@@ -155,7 +155,7 @@ def visit(address, rng, index, opened):
 def subscription(rng):
     box = (rng.randint(0, 400), rng.randint(0, 400), rng.randint(20, 180), rng.randint(20, 180))
     return dtact.Subscription(
-        depth=rng.choice([None, "int16", "delta_zstd", "predict_zstd"]), luma=rng.random() < 0.3,
+        depth=rng.choice([None, "int16", "predict_zstd"]), luma=rng.random() < 0.3,
         jpeg=rng.random() < 0.3, summary=rng.random() < 0.7, every=rng.choice([0, 1, 2, 7]),
         depth_hz=rng.choice([1, 2.5, 5]), luma_hz=rng.choice([1, 2]), jpeg_hz=rng.choice([1, 5]),
         summary_hz=rng.choice([0, 10, 30]), decimation=rng.choice([1, 2, 4]),

@@ -15,10 +15,9 @@ import numpy as np
 import zstandard
 
 import dtact
-from dtact.encodings import has_rvl
 from dtact.messages import message_class
 
-ENCODINGS = {"int16": 1, "delta_zstd": 2, "rvl": 3, "predict_zstd": 4}
+ENCODINGS = {"int16": 1, "predict_zstd": 2}
 SIDE = 580
 GOLDEN_MAKER = pathlib.Path(__file__).resolve().parents[3] / "tests/golden/depth/make.py"
 
@@ -49,8 +48,7 @@ def made() -> dict[str, dtact.Frame]:
         m.encoding, m.width, m.height, m.data = number, SIDE, SIDE, content
         m.um_per_unit, m.untrusted_value = 1, -32768
         frames[name] = dtact.Frame(message)
-        if name != "rvl" or has_rvl():
-            np.testing.assert_array_equal(frames[name].depth_values, depth)
+        np.testing.assert_array_equal(frames[name].depth_values, depth)
     return frames
 
 
@@ -58,8 +56,6 @@ def received(address: str) -> dict[str, dtact.Frame]:
     frames = {}
     with dtact.connect(address) as s:
         for name in ENCODINGS:
-            if name in ("rvl", "predict_zstd") and name not in s.server.features:
-                continue
             s.subscribe(dtact.Subscription(depth=name))
             frames[name] = next(f for f in s.frames() if f.contact and f.contact.touching)
     return frames
@@ -75,9 +71,6 @@ def main() -> None:
     print(f"{'encoding':14}{'bytes':>10}{'ms to int16':>14}{'ms to mm':>12}   (median of "
           f"{options.repeat})")
     for name, frame in frames.items():
-        if name == "rvl" and not has_rvl():
-            print(f"{name:14}   built without RVL")
-            continue
         times = []
         for _ in range(options.repeat):
             f = dtact.Frame(frame.message)

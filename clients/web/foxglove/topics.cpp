@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "clients/cpp/features.hpp"
 #include "clients/recording/channels.hpp"
 #include "clients/recording/pictures.hpp"
 
@@ -45,7 +44,7 @@ const std::array<TopicInfo, kTopics>& topics() {
 
 Topics served_by(const std::optional<v1::HelloReply>& daemon) {
   Topics served;
-  if (daemon && client::lists_feature(*daemon, "cloud")) {
+  if (daemon && std::ranges::count(daemon->features(), "cloud") > 0) {
     for (const Topic topic : {Topic::summary, Topic::contact, Topic::points}) {
       served.set(index(topic));
     }

@@ -43,8 +43,7 @@ const std::vector<Subscription> kSubscriptions = {
     {"5 µm", {.decimation = 1, .um_per_unit = 5}, 25},
     {"a quarter, 2 µm", {.decimation = 4, .um_per_unit = 2}, 4},
 };
-constexpr auto kEncodings = {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD, v1::DEPTH_RVL,
-                             v1::DEPTH_PREDICT_ZSTD};
+constexpr auto kEncodings = {v1::DEPTH_INT16, v1::DEPTH_PREDICT_ZSTD};
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;

@@ -1,6 +1,6 @@
 // What ./dev bench measures latency with: clients of dtactd that stamp each frame when its last
 // byte has come out of the socket. Nothing is decoded before the stamp.
-//   loop_client --port PORT [--clients N] [--seconds S] [--skip S] [--depth int16|delta_zstd]
+//   loop_client --port PORT [--clients N] [--seconds S] [--skip S] [--depth int16|predict_zstd]
 //               [--cpu CPU] [--fifo PRIORITY] -o FILE
 // FILE: one line a frame and client. Prints what of pinning and FIFO the system granted.
 #include <arpa/inet.h>
@@ -129,7 +129,7 @@ void measure(const Arguments& arguments, std::vector<Sample>& samples) {
   connection.request(hello);
   v1::ClientMessage subscribe;
   subscribe.mutable_subscribe()->set_depth(arguments.depth == "int16" ? v1::DEPTH_INT16
-                                                                      : v1::DEPTH_DELTA_ZSTD);
+                                                                      : v1::DEPTH_PREDICT_ZSTD);
   connection.request(subscribe);
 
   // Later memory would come from the kernel while frames do.
@@ -198,7 +198,7 @@ int main(int argc, char** argv) {
         ->check(CLI::Range(1, 1024));
     app.add_option("--seconds", arguments.seconds, "measured")->check(CLI::Range(0.1, 1e5));
     app.add_option("--skip", arguments.skip, "seconds before that")->check(CLI::Range(0.0, 1e3));
-    app.add_option("--depth", arguments.depth)->check(CLI::IsMember({"int16", "delta_zstd"}));
+    app.add_option("--depth", arguments.depth)->check(CLI::IsMember({"int16", "predict_zstd"}));
     app.add_option("--cpu", arguments.cpu, "to pin the threads to");
     app.add_option("--fifo", arguments.fifo, "SCHED_FIFO priority; 0: normal scheduling")
         ->check(CLI::Range(0, 99));

@@ -114,7 +114,7 @@ def main():
     from viewer import E
     requests = {"none, summaries": dict(summary=True),
                 "predict_zstd": dict(depth=E.DEPTH_PREDICT_ZSTD),
-                "rvl": dict(depth=E.DEPTH_RVL), "int16": dict(depth=E.DEPTH_INT16)}
+                "int16": dict(depth=E.DEPTH_INT16)}
     with tempfile.TemporaryDirectory(prefix="dtact_viewers_") as name:
         folder = pathlib.Path(name)
         daemon = Daemon(folder, "left", f"calibration={calibrate(folder)}")

@@ -71,7 +71,7 @@ class Frames(unittest.TestCase):
     def test_equal_subscriptions_are_one_client_of_the_daemon(self) -> None:
         with Viewer(gateway.port) as one, Viewer(gateway.port) as two, Viewer(gateway.port) as third:
             for viewer in (one, two):
-                viewer.call(subscribe=M.Subscribe(depth=E.DEPTH_RVL, depth_hz=20))
+                viewer.call(subscribe=M.Subscribe(depth=E.DEPTH_PREDICT_ZSTD, depth_hz=20))
             third.call(subscribe=M.Subscribe(summary=True))
             for viewer in (one, two, third):
                 viewer.frame()

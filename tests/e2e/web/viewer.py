@@ -1,15 +1,12 @@
 """What the page is to the gateway: a client of the daemon's wire over a WebSocket."""
 import collections
 import json
-import pathlib
 import struct
-import sys
 import time
 from typing import Any, Callable, Protocol
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "page_client"))
-from messages import E, M  # noqa: E402
-from web_socket import BINARY, PATIENCE, TEXT, WebSocket, connect  # noqa: E402
+from messages import E, M
+from web_socket import BINARY, PATIENCE, TEXT, WebSocket, connect
 
 __all__ = ["Client", "Conversation", "E", "M", "Viewer", "length"]
 

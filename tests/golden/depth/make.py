@@ -9,17 +9,13 @@ number or lower-case hexadecimal digits.
 
     width, height   pixels
     int16           the map: DEPTH_INT16
-    delta           DEPTH_DELTA_ZSTD before zstd
-    delta_zstd      the same as a zstd frame
-    rvl             DEPTH_RVL
     predict         DEPTH_PREDICT_ZSTD before zstd
     predict_zstd    the same as a zstd frame
 
-Every decoder must give the map for its bytes. An encoder must give these bytes; of the two with
+Every decoder must give the map for its bytes. An encoder must give these bytes; of the one with
 zstd, whose frames differ from one version to the next, those before it.
 
-Nothing of the project's is used: RVL is the listing of A. D. Wilson, "Fast Lossless Depth Image
-Compression" (ISS 2017), the others are written from proto/README.md.
+Nothing of the project's is used: it is written from proto/README.md.
 """
 import math
 import pathlib
@@ -44,56 +40,6 @@ def zigzag(value):
 
 def int16(width, values):
     return struct.pack(f"<{len(values)}h", *values)
-
-
-def delta(width, values):
-    left = [0 if i % width == 0 else values[i - 1] for i in range(len(values))]
-    return int16(width, [signed(value - before) for value, before in zip(values, left)])
-
-
-class Nibbles:
-    """EncodeVLE of the listing, and the words that it fills."""
-
-    def __init__(self):
-        self.words, self.word, self.written = [], 0, 0
-
-    def vle(self, value):
-        while True:
-            nibble = value & 7
-            value >>= 3
-            if value:
-                nibble |= 8
-            self.word = self.word << 4 | nibble
-            self.written += 1
-            if self.written == 8:
-                self.words.append(self.word)
-                self.word, self.written = 0, 0
-            if not value:
-                return
-
-    def finish(self):
-        if self.written:
-            self.words.append(self.word << 4 * (8 - self.written))
-        return struct.pack(f"<{len(self.words)}I", *self.words)
-
-
-def rvl(width, values):
-    """CompressRVL of the listing."""
-    out, at, end, previous = Nibbles(), 0, len(values), 0
-    while at != end:
-        zeros = nonzeros = 0
-        while at != end and values[at] == 0:
-            at += 1
-            zeros += 1
-        out.vle(zeros)
-        while at + nonzeros != end and values[at + nonzeros] != 0:
-            nonzeros += 1
-        out.vle(nonzeros)
-        for _ in range(nonzeros):
-            out.vle(zigzag(values[at] - previous))
-            previous = values[at]
-            at += 1
-    return out.finish()
 
 
 def predict(width, values):
@@ -160,12 +106,10 @@ def maps():
 def lines(width, values):
     yield "width", str(width)
     yield "height", str(len(values) // width)
-    for name, encode, compressed in (("int16", int16, None), ("delta", delta, "delta_zstd"),
-                                     ("rvl", rvl, None), ("predict", predict, "predict_zstd")):
-        content = encode(width, values)
-        yield name, content.hex()
-        if compressed:
-            yield compressed, content
+    content = predict(width, values)
+    yield "int16", int16(width, values).hex()
+    yield "predict", content.hex()
+    yield "predict_zstd", content
 
 
 def main():

@@ -147,6 +147,8 @@ class ForceOfARecording : public Force {
       map.set_encoding(v1::DEPTH_INT16);
       map.set_width(40);
       map.set_height(30);
+      map.set_full_width(40);
+      map.set_full_height(30);
       map.set_mm_per_px(0.65);
       map.set_um_per_unit(1);
       std::string bytes;

@@ -1,5 +1,4 @@
-// What daemons of version 1.1 can do, and that older ones are not asked for it.
-#include <gmock/gmock.h>
+// What daemons can do, and requests that take long.
 #include <gtest/gtest.h>
 
 #include "clients/cpp/client.hpp"
@@ -7,73 +6,6 @@
 
 namespace dtact::client::test {
 namespace {
-
-using testing::HasSubstr;
-
-struct Part {
-  std::string feature;
-  std::function<void(v1::Subscribe&)> ask;
-};
-
-std::vector<Part> parts() {
-  return {{"rvl", [](v1::Subscribe& s) { s.set_depth(v1::DEPTH_RVL); }},
-          {"predict_zstd", [](v1::Subscribe& s) { s.set_depth(v1::DEPTH_PREDICT_ZSTD); }},
-          {"jpeg", [](v1::Subscribe& s) { s.set_jpeg(true); }},
-          {"rates", [](v1::Subscribe& s) { s.set_depth_hz(1); }},
-          {"rates", [](v1::Subscribe& s) { s.set_luma_hz(1); }},
-          {"rates", [](v1::Subscribe& s) { s.set_jpeg_hz(1); }},
-          {"rates", [](v1::Subscribe& s) { s.set_summary_hz(1); }},
-          {"decimation", [](v1::Subscribe& s) { s.set_decimation(2); }},
-          {"units", [](v1::Subscribe& s) { s.set_um_per_unit(5); }},
-          {"region", [](v1::Subscribe& s) { s.mutable_box(); }},
-          {"region", [](v1::Subscribe& s) { s.set_contact_box(true); }},
-          {"events", [](v1::Subscribe& s) { s.set_events(false); }}};
-}
-
-TEST(Features, AnOlderDaemonIsNotAskedForWhatItDoesNotKnow) {
-  PlayedDaemon daemon({[](Peer& peer) {
-    peer.greet();
-    // The first that comes.
-    EXPECT_TRUE(peer.done().has_subscribe());
-  }});
-  Client client(daemon.options);
-  for (const Part& part : parts()) {
-    v1::Subscribe subscription;
-    part.ask(subscription);
-    try {
-      client.subscribe(subscription);
-      ADD_FAILURE() << part.feature;
-    } catch (const Refused& e) {
-      EXPECT_TRUE(e.unsupported());
-      EXPECT_THAT(e.what(), HasSubstr('"' + part.feature + '"'));
-      EXPECT_THAT(e.what(), HasSubstr("dtactd 9.8.7"));
-    }
-  }
-  EXPECT_THROW((void)client.ping(), Refused);
-  EXPECT_THROW((void)client.reference(), Refused);
-  // Fields at the values that 1.0 has anyway.
-  v1::Subscribe plain = depth_stream();
-  plain.set_decimation(1);
-  plain.set_um_per_unit(1);
-  plain.set_events(true);
-  client.subscribe(plain);
-}
-
-TEST(Features, ADaemonThatListsThemIsAsked) {
-  for (const Part& part : parts()) {
-    v1::Subscribe seen;
-    PlayedDaemon daemon({[&](Peer& peer) {
-      peer.greet({"other", part.feature});
-      seen = peer.done().subscribe();
-    }});
-    Client client(daemon.options);
-    v1::Subscribe subscription;
-    part.ask(subscription);
-    client.subscribe(subscription);
-    daemon.finish();
-    EXPECT_EQ(seen.SerializeAsString(), subscription.SerializeAsString());
-  }
-}
 
 // The daemon's refusal comes after patience_frames, which may be longer than any other answer
 // takes.
@@ -97,7 +29,7 @@ TEST(Rezero, WaitsAsLongAsTheDaemonSays) {
 
 TEST(Features, PingAndReference) {
   PlayedDaemon daemon({[](Peer& peer) {
-    peer.greet({"ping", "reference"});
+    peer.greet({"reference"});
     v1::Reply pong;
     pong.mutable_pong()->set_monotonic_ns(5);
     EXPECT_TRUE(peer.answer(pong).has_ping());
@@ -108,8 +40,8 @@ TEST(Features, PingAndReference) {
     peer.refuse(v1::ERROR_CONTACT, "something touches");
   }});
   Client client(daemon.options);
-  EXPECT_TRUE(client.has_feature("ping"));
-  EXPECT_FALSE(client.has_feature("rvl"));
+  EXPECT_TRUE(client.has_feature("reference"));
+  EXPECT_FALSE(client.has_feature("jpeg"));
   EXPECT_EQ(client.ping().monotonic_ns(), 5);
   EXPECT_EQ(client.reference().png(), "png");
   try {

@@ -48,7 +48,7 @@ TEST(Reconnecting, TheSubscriptionSurvivesADaemonThatGoesAndComesBack) {
   EXPECT_EQ(client.native_handle(), -1);
   v1::Subscribe seen;
   PlayedDaemon second({[&seen](Peer& peer) {
-                        peer.greet({"ping"});
+                        peer.greet({"jpeg"});
                         seen = peer.done().subscribe();
                         peer.frame(57);
                       }},
@@ -59,7 +59,7 @@ TEST(Reconnecting, TheSubscriptionSurvivesADaemonThatGoesAndComesBack) {
   EXPECT_GE(gap.away, milliseconds(50));
   EXPECT_EQ(next<v1::Frame>(client).sequence(), 57U);
   EXPECT_EQ(seen.SerializeAsString(), wanted.SerializeAsString());
-  EXPECT_TRUE(client.has_feature("ping"));
+  EXPECT_TRUE(client.has_feature("jpeg"));
 }
 
 TEST(Reconnecting, EachLossTellsItsOwnReason) {

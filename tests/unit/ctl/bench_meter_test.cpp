@@ -76,8 +76,8 @@ TEST(BenchMeter, SaysNoLatencyWithoutTheOtherClock) {
   meter.add(frame(1, 1000 * kMs), 5 * kMs);
   cli::BenchReport report = meter.report({});
   EXPECT_FALSE(report.has_latency_p50_ms());
-  report.set_encoding(v1::DEPTH_DELTA_ZSTD);
-  EXPECT_THAT(bench_line(report), HasSubstr("delta_zstd"));
+  report.set_encoding(v1::DEPTH_PREDICT_ZSTD);
+  EXPECT_THAT(bench_line(report), HasSubstr("predict_zstd"));
   EXPECT_THAT(bench_line(report), HasSubstr("     -      -      -"));
   report.set_latency_p50_ms(1.25);
   EXPECT_THAT(bench_line(report), HasSubstr("   1.25"));
@@ -85,9 +85,9 @@ TEST(BenchMeter, SaysNoLatencyWithoutTheOtherClock) {
 
 TEST(BenchMeter, SaysWhatWasRefused) {
   cli::BenchReport report;
-  report.set_encoding(v1::DEPTH_RVL);
+  report.set_encoding(v1::DEPTH_INT16);
   report.set_refused("update dtactd");
-  EXPECT_EQ(bench_line(report), "rvl            update dtactd\n");
+  EXPECT_EQ(bench_line(report), "int16          update dtactd\n");
   EXPECT_EQ(BenchMeter().report({}).frames(), 0U);
 }
 

@@ -283,7 +283,7 @@ TEST(FrameEncoder, OfTheContactsBoxSendsNoMapWhileNothingTouches) {
   FrameEncoder encoder("f");
   auto frame = make_frame(1, 100, 80);
   frame.contact_um = 100;
-  FrameKind asked = kind(v1::DEPTH_RVL, 0);
+  FrameKind asked = kind(v1::DEPTH_PREDICT_ZSTD, 0);
   asked.contact_box = true;
   encoder.begin(frame);
   v1::Frame message;
@@ -294,7 +294,7 @@ TEST(FrameEncoder, OfTheContactsBoxSendsNoMapWhileNothingTouches) {
   frame.depth_um[30 * 100 + 40] = 500;
   encoder.begin(frame);
   ASSERT_TRUE(message.ParseFromString(encoder.encode(asked)->body));
-  EXPECT_EQ(message.depth().encoding(), v1::DEPTH_RVL);
+  EXPECT_EQ(message.depth().encoding(), v1::DEPTH_PREDICT_ZSTD);
   EXPECT_EQ(message.depth().x(), 24U);
   EXPECT_EQ(message.depth().y(), 14U);
   EXPECT_EQ(message.depth().width(), 33U);

@@ -54,7 +54,7 @@ TEST(Stream, OneThatNeverReadsDelaysNobody) {
   for (int i = 0; i < 15; ++i) {
     clients.push_back(std::make_unique<RawClient>(rig.tcp_port()));
     clients.back()->hello();
-    clients.back()->subscribe(i % 2 == 0 ? v1::DEPTH_INT16 : v1::DEPTH_DELTA_ZSTD);
+    clients.back()->subscribe(i % 2 == 0 ? v1::DEPTH_INT16 : v1::DEPTH_PREDICT_ZSTD);
   }
   constexpr std::uint64_t kFrames = 30;
   for (std::uint64_t sequence = 1; sequence <= kFrames; ++sequence) {
@@ -194,7 +194,6 @@ TEST(Stream, ANewerFrameHoldsWhatWasDueOfTheOneItReplaces) {
   RawClient slow(rig.tcp_port(), kSmallBuffer);
   v1::ClientMessage hello;
   hello.mutable_hello()->set_major(1);
-  hello.mutable_hello()->set_minor(1);
   ASSERT_TRUE(slow.request(hello).has_hello());
   auto message = subscribe();
   message.mutable_subscribe()->set_summary(true);

@@ -46,9 +46,9 @@ TEST(Stream, EncodesWhatEachClientAskedFor) {
   small.hello();
   luma.hello();
   summary.hello();
-  small.subscribe(v1::DEPTH_DELTA_ZSTD);
+  small.subscribe(v1::DEPTH_PREDICT_ZSTD);
   luma.subscribe(v1::DEPTH_NONE, v1::LUMA_GREY8);
-  summary.subscribe(v1::DEPTH_INT16, v1::LUMA_GREY8, 1, true);
+  summary.subscribe(v1::DEPTH_NONE, v1::LUMA_NONE, 1, true);
   auto published = make_frame(7);
   published.contact.touching = true;
   published.contact.area_mm2 = 12.5;
@@ -56,7 +56,7 @@ TEST(Stream, EncodesWhatEachClientAskedFor) {
 
   auto frame = small.frame();
   std::vector<std::int16_t> depth;
-  ASSERT_TRUE(wire::decode_delta_zstd(frame.depth().data(), 8, 4, depth));
+  ASSERT_TRUE(wire::decode_predict_zstd(frame.depth().data(), 8, 4, depth));
   EXPECT_THAT(depth, Each(7));
   EXPECT_FALSE(frame.has_luma());
   frame = luma.frame();
@@ -77,7 +77,7 @@ TEST(Stream, EncodesOnceForSixtyFourClients) {
   for (int i = 0; i < 64; ++i) {
     clients.push_back(std::make_unique<RawClient>(rig.tcp_port()));
     clients.back()->hello();
-    clients.back()->subscribe(v1::DEPTH_DELTA_ZSTD);
+    clients.back()->subscribe(v1::DEPTH_PREDICT_ZSTD);
   }
   for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
     rig.port.publish(make_frame(sequence));
@@ -112,7 +112,7 @@ TEST(Stream, TellsThePipelineTheUnionOfWhatIsWanted) {
   depth->hello();
   EXPECT_TRUE(rig.port.wait_wanted({.contact = true}));
   luma.hello();
-  depth->subscribe(v1::DEPTH_DELTA_ZSTD);
+  depth->subscribe(v1::DEPTH_PREDICT_ZSTD);
   EXPECT_TRUE(rig.port.wait_wanted({.contact = true, .depth = true}));
   luma.subscribe(v1::DEPTH_NONE, v1::LUMA_GREY8);
   EXPECT_TRUE(rig.port.wait_wanted({.contact = true, .depth = true, .luma = true}));
@@ -238,7 +238,7 @@ TEST(Stream, EncodesOnceForEachDistinctChoice) {
     clients.push_back(std::make_unique<RawClient>(rig.tcp_port()));
     clients.back()->hello();
     auto message = subscribe();
-    message.mutable_subscribe()->set_depth(v1::DEPTH_RVL);
+    message.mutable_subscribe()->set_depth(v1::DEPTH_PREDICT_ZSTD);
     message.mutable_subscribe()->set_um_per_unit(i < 3 ? 1 : 5);
     message.mutable_subscribe()->set_contact_box(i == 5);
     ASSERT_TRUE(clients.back()->request(message).has_done());

@@ -72,8 +72,8 @@ TEST(RateLimit, APauseIsNotMadeUpFor) {
   EXPECT_TRUE(limit.admits(at(660), at(1) - at(0)));
 }
 
-Subscription made(const v1::Subscribe& request, std::uint32_t minor = 1) {
-  auto result = Subscription::from(request, minor, {});
+Subscription made(const v1::Subscribe& request) {
+  auto result = Subscription::from(request, {});
   return std::get<Subscription>(std::move(result));
 }
 
@@ -136,19 +136,17 @@ TEST(Subscription, OfNothingIsNeverDue) {
   EXPECT_TRUE(made(request).events());
 }
 
-// 1.0 said "without maps", 1.1 "also without maps".
-TEST(Subscription, AnOldClientsSummaryIsInsteadOfTheMaps) {
+TEST(Subscription, ASummaryComesBesideTheMaps) {
   v1::Subscribe request;
   request.set_depth(v1::DEPTH_INT16);
   request.set_luma(v1::LUMA_GREY8);
   request.set_summary(true);
-  EXPECT_EQ(parts_of(made(request, 0), 2), "s s");
-  EXPECT_EQ(parts_of(made(request, 1), 2), "dls dls");
+  EXPECT_EQ(parts_of(made(request), 2), "dls dls");
 }
 
 TEST(Subscription, KindsHoldWhatIsDueOnly) {
   v1::Subscribe request;
-  request.set_depth(v1::DEPTH_DELTA_ZSTD);
+  request.set_depth(v1::DEPTH_PREDICT_ZSTD);
   request.set_luma(v1::LUMA_GREY8);
   request.set_decimation(2);
   request.set_um_per_unit(5);
@@ -171,7 +169,7 @@ TEST(Subscription, KindsHoldWhatIsDueOnly) {
 }
 
 void expect_refused(const v1::Subscribe& request, v1::ErrorCode code, const std::string& part) {
-  const auto result = Subscription::from(request, 1, {.width = 580, .height = 580});
+  const auto result = Subscription::from(request, {.width = 580, .height = 580});
   const auto* refusal = std::get_if<Refusal>(&result);
   ASSERT_NE(refusal, nullptr) << part;
   EXPECT_EQ(refusal->code, code) << part;
@@ -197,7 +195,7 @@ TEST(Subscription, RefusesRatesOutOfRangeByName) {
   v1::Subscribe request;
   for (const double hz : {0.0, 0.01, 1000.0}) {
     request.set_depth_hz(hz);
-    EXPECT_EQ(Subscription::from(request, 1, {}).index(), 0U) << hz;
+    EXPECT_EQ(Subscription::from(request, {}).index(), 0U) << hz;
   }
 }
 
@@ -218,7 +216,7 @@ TEST(Subscription, RefusesOtherDecimationsUnitsAndBoxes) {
   request.mutable_box()->set_x(580);
   expect_refused(request, v1::ERROR_INVALID, "580x580");
   request.mutable_box()->set_x(579);
-  EXPECT_EQ(Subscription::from(request, 1, {.width = 580, .height = 580}).index(), 0U);
+  EXPECT_EQ(Subscription::from(request, {.width = 580, .height = 580}).index(), 0U);
 }
 
 TEST(Subscription, DoesNotSupportUnknownEncodings) {
@@ -238,7 +236,7 @@ TEST(Subscription, EachProgramServesItsOwnParts) {
   points.set_pose(true);
   points.set_contact_box(true);
   points.set_decimation(2);
-  const auto of_perceive = Subscription::from(points, 1, {}, Serves::geometry);
+  const auto of_perceive = Subscription::from(points, {}, Serves::geometry);
   ASSERT_TRUE(std::holds_alternative<Subscription>(of_perceive));
   const auto& made = std::get<Subscription>(of_perceive);
   EXPECT_EQ(made.parts(), Subscription::kCloud | Subscription::kPose);
@@ -250,7 +248,7 @@ TEST(Subscription, EachProgramServesItsOwnParts) {
   EXPECT_TRUE(made.kind(Subscription::kPose).pose);
   EXPECT_EQ(made.kind(Subscription::kPose).cloud, 0);
   const auto code_of = [](const v1::Subscribe& request, Serves serves) {
-    const auto from = Subscription::from(request, 1, {}, serves);
+    const auto from = Subscription::from(request, {}, serves);
     const auto* refusal = std::get_if<Refusal>(&from);
     return refusal == nullptr ? 0 : refusal->code;
   };

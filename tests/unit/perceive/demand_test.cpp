@@ -12,8 +12,7 @@ namespace dtact::perceive {
 namespace {
 
 net::Subscription of(const v1::Subscribe& request) {
-  return std::get<net::Subscription>(
-      net::Subscription::from(request, wire::kMinor, {}, net::Serves::geometry));
+  return std::get<net::Subscription>(net::Subscription::from(request, {}, net::Serves::geometry));
 }
 
 v1::Subscribe points(bool contact, std::uint32_t decimation = 1) {

@@ -24,7 +24,7 @@ class Aio(unittest.IsolatedAsyncioTestCase):
                 await asyncio.sleep(0.01)
 
     async def test_frames_events_and_requests(self):
-        with FakeDaemon(features=["ping"]) as daemon:
+        with FakeDaemon() as daemon:
             daemon.pushed = [frame(1), event(3), frame(2)]
             async with dtact.aio.connect(daemon.address, token="t") as s:
                 self.assertTrue(s.same_machine)
@@ -61,8 +61,6 @@ class Aio(unittest.IsolatedAsyncioTestCase):
                     await s.rezero()
                 with self.assertRaisesRegex(dtact.NoFrame, "serving"):
                     await self.first(s.frames(timeout=0.05))
-                with self.assertRaises(dtact.Unsupported):
-                    await s.subscribe(dtact.Subscription(decimation=2))
 
     async def test_timeouts(self):
         with FakeDaemon() as daemon:

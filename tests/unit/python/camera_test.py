@@ -57,7 +57,7 @@ class Shape(unittest.TestCase):
 
 class Reading(unittest.TestCase):
     def setUp(self):
-        self.daemon = self.enterContext(FakeDaemon(features=["decimation", "rates"]))
+        self.daemon = self.enterContext(FakeDaemon())
         self.daemon.pushed = [frame(1)]
 
     def camera(self, **settings):
@@ -97,15 +97,6 @@ class Reading(unittest.TestCase):
         self.assertEqual((sent.decimation, sent.depth_hz), (2, 20))
         with self.assertRaisesRegex(ValueError, "it gives 2 × 2, 1 × 1"):
             dtact.Camera(self.daemon.address, width=3, height=2).connect()
-
-    def test_rates_of_a_1_0_daemon(self):
-        self.daemon.features = ()
-        camera = self.camera(fps=20)
-        self.assertEqual(self.daemon.requests[-1].subscribe.every, 3)
-        camera.disconnect()
-        with self.assertRaisesRegex(ValueError, "no whole fraction of the camera's 60"):
-            dtact.Camera(self.daemon.address, fps=25).connect()
-        camera.connect()
 
     def test_async_read_gives_each_frame_once(self):
         camera = self.camera()

@@ -18,7 +18,7 @@ class Tls(unittest.TestCase):
         cls.context, cls.fingerprint = made
 
     def test_pinned(self):
-        with FakeDaemon(tls=self.context, features=["rvl"]) as daemon, \
+        with FakeDaemon(tls=self.context) as daemon, \
                 mock.patch("dtact.transport.is_local", return_value=False):
             daemon.pushed = [frame(1)]
             colons = ":".join(self.fingerprint[i : i + 2] for i in range(0, 64, 2)).upper()
@@ -26,7 +26,7 @@ class Tls(unittest.TestCase):
                 with dtact.connect(daemon.address, fingerprint=pin, token="secret") as s:
                     self.assertEqual(next(s.frames()).sequence, 1)
             self.assertEqual(daemon.requests[0].hello.token, "secret")
-            self.assertEqual(daemon.requests[-1].subscribe.depth, 3)
+            self.assertEqual(daemon.requests[-1].subscribe.depth, 2)
 
     def test_another_certificate_gets_nothing(self):
         with FakeDaemon(tls=self.context) as daemon:

@@ -15,6 +15,7 @@ def frame(sequence, values=(0, 1000, -32768, 25), width=2, um_per_unit=1.0):
     depth = m.depth
     depth.encoding = 1
     depth.width, depth.height = width, len(values) // width
+    depth.full_width, depth.full_height = depth.width, depth.height
     depth.mm_per_px = 0.5
     depth.um_per_unit = um_per_unit
     depth.untrusted_value = -32768
@@ -33,8 +34,8 @@ class FakeDaemon:
     """Accepts connections on a port of its own. `requests` are those that came; the messages in
     `pushed` are sent behind the answer to Subscribe."""
 
-    def __init__(self, features=(), minor=1, path=None, tls=None):
-        self.features, self.minor, self.tls = features, minor, tls
+    def __init__(self, features=(), path=None, tls=None):
+        self.features, self.tls = features, tls
         self.requests = []
         self.pushed = []
         self.answers = {}  # request kind → function (request, Reply message); False: no answer
@@ -108,7 +109,7 @@ class FakeDaemon:
                     continue
             elif kind == "hello":
                 hello = reply.hello
-                hello.major, hello.minor, hello.program = 1, self.minor, "fake"
+                hello.major, hello.minor, hello.program = 1, 1, "fake"
                 hello.features.extend(self.features)
             elif kind == "set_light":
                 reply.light.brightness = request.set_light.brightness

@@ -128,15 +128,6 @@ class Events(unittest.TestCase):
         event.contact.contact.touching = True
         self.assertTrue(event_of(event).contact.touching)
 
-    def test_of_a_1_0_daemon(self):
-        from dtact.event import event_of
-        event = ServerMessage().event
-        event.contact.sequence, event.contact.monotonic_ns = 12, 3_000_000_000
-        self.assertEqual((event_of(event).sequence, event_of(event).monotonic_s), (12, 3.0))
-        event.light.brightness = 9
-        made = event_of(event)
-        self.assertEqual((made.sequence, made.time, made.monotonic_s), (0, None, None))
-
 
 if __name__ == "__main__":
     unittest.main()

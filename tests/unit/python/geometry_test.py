@@ -86,13 +86,12 @@ class Pose(unittest.TestCase):
 
 
 class Asking(unittest.TestCase):
-    def test_needs_perceive(self):
+    def test_of_points_and_pose(self):
         wanted = dtact.Subscription(depth=None, cloud="int16", pose=True, cloud_hz=10)
-        self.assertEqual(wanted.needs(), {"cloud", "pose", "rates"})
-        request = wanted.message(frozenset(), True)
+        request = wanted.message(True)
         self.assertEqual((request.depth, request.cloud, request.pose, request.cloud_hz), (0, 2, True, 10))
         with self.assertRaises(ValueError):
-            dtact.Subscription(cloud="int8").message(frozenset(), True)  # type: ignore[arg-type]
+            dtact.Subscription(cloud="int8").message(True)  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ class Names(unittest.TestCase):
         self.assertEqual(messages.name_of("State", 3), "serving")
         self.assertEqual(messages.name_of("TimestampMeaning", 4, "TIMESTAMP_"), "first_packet")
         self.assertEqual(messages.name_of("Health", 103), "103")
-        self.assertEqual(messages.value_of("DEPTH_PREDICT_ZSTD"), 4)
+        self.assertEqual(messages.value_of("DEPTH_PREDICT_ZSTD"), 2)
         self.assertRaises(KeyError, messages.value_of, "DEPTH_OF_DESPAIR")
 
 

@@ -37,16 +37,14 @@ flock 9
 stamp=$(cd "$source" \
   && find . -type f -not -name '*.pyc' -print0 | sort -z | xargs -0 sha256sum | sha256sum)
 if [ "$(cat "$folder/stamp" 2> /dev/null)" != "$stamp" ]; then
-  rm -rf "$folder/venv" "$folder/without_rvl"
+  rm -rf "$folder/venv"
   $python -m venv --system-site-packages --without-pip "$folder/venv"
   install "$folder/venv"
-  # As on a machine without a compiler.
-  CC=/bin/false install "$folder/venv" --target "$folder/without_rvl"
   echo "$stamp" > "$folder/stamp"
 fi
 flock -u 9
 
-export WITHOUT_RVL=$folder/without_rvl MYPY_CACHE=$folder/mypy
+export MYPY_CACHE=$folder/mypy
 cd "$tests"
 # protobuf 3.21 itself warns of Python 3.14.
 exec "$folder/venv/bin/python" -B -W error -W default::DeprecationWarning \

@@ -30,6 +30,8 @@ inline v1::Frame sample_frame(std::uint64_t sequence) {
   map.set_encoding(v1::DEPTH_INT16);
   map.set_width(3);
   map.set_height(2);
+  map.set_full_width(3);
+  map.set_full_height(2);
   map.set_mm_per_px(0.5);
   map.set_um_per_unit(1);
   map.set_untrusted_value(INT16_MIN);

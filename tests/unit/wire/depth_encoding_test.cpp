@@ -16,8 +16,7 @@
 namespace dtact::wire {
 namespace {
 
-constexpr auto kEncodings = {v1::DEPTH_INT16, v1::DEPTH_DELTA_ZSTD, v1::DEPTH_RVL,
-                             v1::DEPTH_PREDICT_ZSTD};
+constexpr auto kEncodings = {v1::DEPTH_INT16, v1::DEPTH_PREDICT_ZSTD};
 
 std::string bytes_of(const std::string& hex) {
   std::string bytes;
@@ -29,7 +28,7 @@ std::string bytes_of(const std::string& hex) {
 
 /// What a frame holds; other encodings' bytes as they are.
 std::string content_of(v1::DepthEncoding encoding, const std::string& bytes) {
-  if (encoding != v1::DEPTH_DELTA_ZSTD && encoding != v1::DEPTH_PREDICT_ZSTD) return bytes;
+  if (encoding != v1::DEPTH_PREDICT_ZSTD) return bytes;
   std::string content(zstd_content_size(bytes).value_or(0), '?');
   EXPECT_TRUE(zstd_decompress(bytes, std::as_writable_bytes(std::span(content))));
   return content;
@@ -119,7 +118,7 @@ TEST(DepthEncoding, AllEncodingsAgreeOnArbitraryMaps) {
 TEST(DepthEncoding, KnowsWhichThereAre) {
   EXPECT_FALSE(is_depth_encoding(v1::DEPTH_NONE));
   for (const auto encoding : kEncodings) EXPECT_TRUE(is_depth_encoding(encoding));
-  EXPECT_FALSE(is_depth_encoding(static_cast<v1::DepthEncoding>(5)));
+  EXPECT_FALSE(is_depth_encoding(static_cast<v1::DepthEncoding>(3)));
 }
 
 TEST(DepthEncoding, RefusesOthersAndPartsOfRows) {
@@ -127,14 +126,14 @@ TEST(DepthEncoding, RefusesOthersAndPartsOfRows) {
   DepthEncoder encoder;
   std::string bytes;
   EXPECT_THROW(encoder.encode(v1::DEPTH_NONE, map, 3, bytes), std::invalid_argument);
-  EXPECT_THROW(encoder.encode(static_cast<v1::DepthEncoding>(5), map, 3, bytes),
+  EXPECT_THROW(encoder.encode(static_cast<v1::DepthEncoding>(3), map, 3, bytes),
                std::invalid_argument);
   for (const auto encoding : kEncodings) {
     EXPECT_THROW(encoder.encode(encoding, map, 4, bytes), std::invalid_argument);
   }
   std::vector<std::int16_t> back;
   EXPECT_FALSE(decode_depth(v1::DEPTH_NONE, "", 1, 1, back));
-  EXPECT_FALSE(decode_depth(static_cast<v1::DepthEncoding>(5), "\1", 1, 1, back));
+  EXPECT_FALSE(decode_depth(static_cast<v1::DepthEncoding>(3), "\1", 1, 1, back));
 }
 
 }  // namespace

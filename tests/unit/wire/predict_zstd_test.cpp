@@ -100,9 +100,9 @@ TEST(PredictZstd, AFlatMapIsSmall) {
   EXPECT_LT(bytes.size(), 100U);
 }
 
-TEST(PredictZstd, ANoisyBallIsFarBelowItsDifferences) {
+TEST(PredictZstd, ANoisyBallTakesLessThanHalfOfItsNibbles) {
   // A slope with noise as smooth as the reconstruction's filter leaves it: 14,211 bytes. Without
-  // its entropy code zstd would need half a byte a pixel, 32,768; delta + zstd takes 35,224.
+  // its entropy code zstd would need half a byte a pixel, 32,768.
   std::mt19937 random(3);
   constexpr std::size_t kSide = 256;
   constexpr std::size_t kStride = kSide + 16;

@@ -174,7 +174,7 @@ class Client(Session):
     async def calibrations(self) -> list[StoredCalibration]:
         return await self._ask(requests.calibrations())
 
-    async def upload_calibration(self, files: CalibrationFiles) -> int | None:
+    async def upload_calibration(self, files: CalibrationFiles) -> int:
         return await self._ask(requests.upload_calibration(files))
 
     async def activate_calibration(self, number: int) -> None:

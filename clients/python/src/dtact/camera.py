@@ -236,13 +236,7 @@ class Camera:
             self.fps = round(camera_fps)
         if self.fps >= round(camera_fps):
             return Subscription(decimation=decimation)
-        if "rates" in client.server.features:
-            return Subscription(decimation=decimation, depth_hz=self.fps)
-        every = camera_fps / self.fps
-        if abs(every - round(every)) > 0.01 * every:
-            raise ValueError(f"{self}: {self.fps} frames a second are no whole fraction of the "
-                             f"camera's {camera_fps:g}, and this daemon is too old for others")
-        return Subscription(decimation=decimation, every=round(every))
+        return Subscription(decimation=decimation, depth_hz=self.fps)
 
     def _read_loop(self, client: Client) -> None:
         error: Exception = ConnectionError(f"{self} was disconnected")

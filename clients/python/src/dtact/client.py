@@ -120,9 +120,9 @@ class Client(Session):
         take a few seconds."""
         return self._ask(requests.calibrations())
 
-    def upload_calibration(self, files: CalibrationFiles) -> int | None:
-        """Returns once the daemon uses and has stored it, with its number; None from a daemon too
-        old to say it. May take a few seconds."""
+    def upload_calibration(self, files: CalibrationFiles) -> int:
+        """Returns once the daemon uses and has stored it, with its number. May take a few
+        seconds."""
         return self._ask(requests.upload_calibration(files))
 
     def activate_calibration(self, number: int) -> None:

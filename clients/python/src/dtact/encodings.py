@@ -10,11 +10,6 @@ from numpy.typing import NDArray
 from .errors import ProtocolError
 from .messages import Message, value_of
 
-try:
-    from . import _rvl
-except ImportError:  # Installed without a compiler.
-    _rvl = None  # type: ignore[assignment]
-
 # The largest map of a daemon: what a message can hold as int16.
 _MOST_PIXELS = (16 << 20) // 2
 
@@ -31,33 +26,24 @@ def _int16(data: bytes, height: int, width: int) -> NDArray[np.int16]:
     return np.frombuffer(data, "<i2").reshape(height, width)
 
 
-def _delta_zstd(data: bytes, height: int, width: int) -> NDArray[np.int16]:
-    """Differences to the left neighbour within each row, modulo 2¹⁶."""
-    size = 2 * height * width
-    differences = np.frombuffer(_unpack(data, size, size), "<u2").reshape(height, width)
-    return np.cumsum(differences, axis=1, dtype=np.uint16).view(np.int16)
-
-
 def _long_residuals(second: NDArray[np.uint8]) -> NDArray[np.uint16]:
     """The residuals of 15 and more: a byte of residual − 15, or 255 and 16 bits."""
-    starts = np.ones(second.size, np.bool_)
-    long = []
-    behind = 0
-    # Few are so long. Between two of them each byte is a residual.
-    for at in np.flatnonzero(second == 255):
-        if at >= behind:
-            behind = at + 3
-            starts[at + 1 : behind] = False
-            long.append(at)
-    if behind > second.size:
+    # 255 is also found within the 16 bits of others: from each one that counts to the next.
+    marks = np.flatnonzero(second == 255)
+    following = np.searchsorted(marks, marks + 3).tolist()
+    counting = []
+    i = 0
+    while i < len(following):
+        counting.append(i)
+        i = following[i]
+    at = marks[counting]
+    if at.size and at[-1] + 3 > second.size:
         raise ValueError("the bytes end within a residual")
     values = second.astype(np.uint16) + np.uint16(15)
-    if long:
-        at = np.array(long)
-        values[at] = second[at + 1] | second[at + 2].astype(np.uint16) << 8
-        if (values[at] < 15 + 255).any():
-            raise ValueError("a residual is longer than it needs to be")
-    return values[starts]
+    values[at] = second[at + 1] | second[at + 2].astype(np.uint16) << 8
+    if (values[at] < 15 + 255).any():
+        raise ValueError("a residual is longer than it needs to be")
+    return np.delete(values, np.concatenate((at + 1, at + 2)))
 
 
 def _predict_zstd(data: bytes, height: int, width: int) -> NDArray[np.int16]:
@@ -82,23 +68,10 @@ def _predict_zstd(data: bytes, height: int, width: int) -> NDArray[np.int16]:
     return np.cumsum(sums, axis=0, dtype=np.uint16).view(np.int16)
 
 
-def _rvl_decode(data: bytes, height: int, width: int) -> NDArray[np.int16]:
-    if _rvl is None:
-        raise ValueError("it is RVL, which this installation was built without")
-    return np.frombuffer(_rvl.decode(data, height * width), np.int16).reshape(height, width)
-
-
 _DECODERS: dict[int, Callable[[bytes, int, int], NDArray[np.int16]]] = {
     value_of("DEPTH_INT16"): _int16,
-    value_of("DEPTH_DELTA_ZSTD"): _delta_zstd,
-    value_of("DEPTH_RVL"): _rvl_decode,
     value_of("DEPTH_PREDICT_ZSTD"): _predict_zstd,
 }
-
-
-def has_rvl() -> bool:
-    """Whether the C extension was built, without which RVL is not asked for."""
-    return _rvl is not None
 
 
 def depth_values(depth: Message) -> NDArray[np.int16]:

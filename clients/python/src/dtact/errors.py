@@ -82,7 +82,7 @@ class StorageFailed(Refused):
 
 
 class Unsupported(Refused):
-    """This daemon does not know the request, or a value in it: it is older than this package."""
+    """This program does not know the request, or a value in it: dtact-perceive, or an older dtactd."""
 
 
 class Denied(Refused):
@@ -101,7 +101,6 @@ _TYPES: dict[int, type[Refused]] = {
     10: Unsupported,
     11: Denied,
 }
-UNSUPPORTED = 10
 
 
 def refusal(code: int, sentence: str) -> Error:

@@ -12,10 +12,10 @@ from .values import Contact, Light, Reconstruction, condition_names, wall_time
 class Event:
     """What all events have."""
 
-    #: The last frame captured before it; 0: none yet, or a 1.0 daemon that does not say.
+    #: The last frame captured before it; 0: none yet.
     sequence: int
-    time: datetime | None  #: UTC, by the daemon's clock; None from a 1.0 daemon
-    monotonic_s: float | None  #: the daemon's CLOCK_MONOTONIC; None from a 1.0 daemon
+    time: datetime | None  #: UTC, by the daemon's clock; None of Reconnected
+    monotonic_s: float | None  #: the daemon's CLOCK_MONOTONIC; None of Reconnected
 
 
 @dataclass(frozen=True)
@@ -78,11 +78,8 @@ def event_of(message: Message) -> Event | None:
     if kind is None:
         return None
     m = getattr(message, kind)
-    # A 1.0 daemon has a contact's moment in the contact and the others' nowhere.
-    sequence = int(message.sequence or getattr(m, "sequence", 0))
-    time = wall_time(message.wall_ns) if message.wall_ns else None
-    monotonic_ns = message.monotonic_ns or getattr(m, "monotonic_ns", 0)
-    monotonic_s = monotonic_ns * 1e-9 if monotonic_ns else None
+    sequence, time = int(message.sequence), wall_time(message.wall_ns)
+    monotonic_s = message.monotonic_ns * 1e-9
     if kind == "contact":
         return ContactEvent(sequence, time, monotonic_s, Contact.of(m.contact))
     if kind == "light":

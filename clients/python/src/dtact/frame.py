@@ -94,7 +94,7 @@ class Frame:
     def full_shape(self) -> tuple[int, int]:
         """Height and width of the whole map, in the map's pixels."""
         depth = self._depth
-        return int(depth.full_height) or int(depth.height), int(depth.full_width) or int(depth.width)
+        return depth.full_height, depth.full_width
 
     @property
     def _depth(self) -> Message:
@@ -176,8 +176,7 @@ class Frame:
 
     @property
     def contact_absence(self) -> str:
-        """Why `contact` is None: "uncalibrated", "referencing", "unasked"; "none" when it is there
-        and from a 1.0 daemon."""
+        """Why `contact` is None: "uncalibrated", "referencing", "unasked"; "none" when it is there."""
         return name_of("ContactAbsence", self.message.contact_absence, "CONTACT_ABSENCE_")
 
     @cached_property

@@ -71,7 +71,7 @@ def name_of(enum: str, value: int, prefix: str | None = None) -> str:
 
 
 def value_of(constant: str) -> int:
-    """ "DEPTH_RVL" → 3. KeyError for a name that the schema does not have."""
+    """ "DEPTH_INT16" → 1. KeyError for a name that the schema does not have."""
     file = _pool.FindFileContainingSymbol("dtact.v1.ClientMessage")
     for enum in file.enum_types_by_name.values():
         if constant in enum.values_by_name:

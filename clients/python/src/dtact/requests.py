@@ -2,9 +2,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import AbstractSet, Callable, Generic, Sequence, TypeVar
+from typing import Callable, Generic, Sequence, TypeVar
 
-from .errors import Invalid
 from .messages import ClientMessage, Message
 from .subscription import Subscription
 from .values import (
@@ -23,7 +22,6 @@ T = TypeVar("T")
 
 MAJOR, MINOR = 1, 1  # kMajor and kMinor of proto/defaults.hpp
 MOST_PROGRAM_BYTES = 64
-_ERROR_INVALID = 4
 
 
 @dataclass(frozen=True)
@@ -32,8 +30,6 @@ class Request(Generic[T]):
 
     message: Message
     answer: Callable[[Message], T]
-    #: Features that the daemon has to have, or it would not understand.
-    needs: frozenset[str] = frozenset()
     #: Calibrations are parsed, and some written to a disk, before the request is answered.
     slow: bool = False
     #: Frames are averaged before the request is answered.
@@ -57,11 +53,10 @@ def hello(program: str, token: str | None) -> Request[Server]:
     return Request(message, lambda reply: Server.of(reply.hello))
 
 
-def subscribe(subscription: Subscription, features: AbstractSet[str],
-              same_machine: bool) -> Request[None]:
+def subscribe(subscription: Subscription, same_machine: bool) -> Request[None]:
     message = ClientMessage()
-    message.subscribe.CopyFrom(subscription.message(features, same_machine))
-    return Request(message, _nothing, needs=subscription.needs())
+    message.subscribe.CopyFrom(subscription.message(same_machine))
+    return Request(message, _nothing)
 
 
 def unsubscribe() -> Request[None]:
@@ -95,8 +90,7 @@ def set_reconstruction(resolution: str | None, sharpen: str | None,
         request.sharpen = sharpen
     if max_error_um is not None:
         request.max_error_um = max_error_um
-    return Request(message, lambda reply: Reconstruction.of(reply.reconstruction),
-                   needs=frozenset({"reconstruction"}))
+    return Request(message, lambda reply: Reconstruction.of(reply.reconstruction))
 
 
 def rezero(force: bool) -> Request[None]:
@@ -119,11 +113,8 @@ def calibration(number: int | None) -> Request[CalibrationFiles]:
 
     def answer(reply: Message) -> CalibrationFiles:
         m = reply.calibration
-        came = m.number if m.HasField("number") else None
-        if number is not None and came != number:
-            raise Invalid(_ERROR_INVALID, "this daemon is older and knows only its current "
-                          "calibration: update dtactd")
-        return CalibrationFiles(m.name, m.calibration_toml, m.reference_png, came)
+        return CalibrationFiles(m.name, m.calibration_toml, m.reference_png,
+                                m.number if m.HasField("number") else None)
 
     return Request(message, answer)
 
@@ -136,15 +127,13 @@ def calibrations() -> Request[list[StoredCalibration]]:
                    slow=True)
 
 
-def upload_calibration(files: CalibrationFiles) -> Request[int | None]:
+def upload_calibration(files: CalibrationFiles) -> Request[int]:
     message = ClientMessage()
     request = message.upload_calibration
     request.name = files.name
     request.calibration_toml = files.calibration_toml
     request.reference_png = files.reference_png
-    return Request(message,
-                   lambda reply: reply.done.calibration if reply.done.HasField("calibration") else None,
-                   slow=True)
+    return Request(message, lambda reply: int(reply.done.calibration), slow=True)
 
 
 def activate_calibration(number: int) -> Request[None]:
@@ -162,7 +151,7 @@ def reference() -> Request[ReferenceImage]:
         number = m.calibration if m.HasField("calibration") else None
         return ReferenceImage(m.png, Light.of(m.light), m.sequence, number)
 
-    return Request(message, answer, needs=frozenset({"reference"}))
+    return Request(message, answer)
 
 
 def ping(clock: Callable[[], float]) -> Request[Pong]:
@@ -174,4 +163,4 @@ def ping(clock: Callable[[], float]) -> Request[Pong]:
         m = reply.pong
         return Pong(m.monotonic_ns * 1e-9, wall_time(m.wall_ns), clock() - sent)
 
-    return Request(message, answer, needs=frozenset({"ping"}))
+    return Request(message, answer)

@@ -13,13 +13,11 @@ from pathlib import Path
 from . import requests
 from .address import DEFAULT_HOST, Address, parse
 from .errors import (
-    UNSUPPORTED,
     ConnectionError,
     Denied,
     Error,
     IdentityError,
     ProtocolError,
-    Unsupported,
     refusal,
 )
 from .event import Reconnected
@@ -154,12 +152,7 @@ class Session:
         return requests.hello(self._program, self._token)
 
     def _prepare(self, request: Request[T]) -> tuple[int, bytes]:
-        """The number and bytes of a request. Unsupported for one that the daemon is too old for."""
-        if self._server is not None:
-            missing = sorted(request.needs - self._server.features)
-            if missing:
-                raise Unsupported(UNSUPPORTED, f"{self._server.program} on {self._address} does not "
-                                  f"know {', '.join(missing)}: update dtactd")
+        """The number and bytes of a request."""
         return self._conversation.request(request.message)
 
     def _answer(self, reply: Message, request: Request[T]) -> T:
@@ -200,7 +193,7 @@ class Session:
     def _subscribe_request(self, subscription: Subscription | None) -> Request[None]:
         if subscription is None:
             return requests.unsubscribe()
-        return requests.subscribe(subscription, self.server.features, self._local)
+        return requests.subscribe(subscription, self._local)
 
     def _no_frame(self, seconds: float, status: Status) -> str:
         advice = status.advice or "Has what was subscribed a frame at all?"

@@ -2,27 +2,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import AbstractSet, Literal
+from typing import Literal
 
-from .encodings import has_rvl
 from .messages import Message, message_class, value_of
 
-Encoding = Literal["auto", "int16", "delta_zstd", "rvl", "predict_zstd"]
-
-# The names by which proto/README.md calls what came after version 1.0.
-_ENCODING_FEATURES = {"rvl": "rvl", "predict_zstd": "predict_zstd"}
+Encoding = Literal["auto", "int16", "predict_zstd"]
 
 
 @dataclass(frozen=True)
 class Subscription:
-    """What is to be sent from now on. What is left out is not sent; a limit of 0 Hz is none.
+    """What is to be sent from now on. What is left out is not sent; a limit of 0 Hz is none."""
 
-    All but `depth`, `luma`, `every` and `summary` need a daemon of version 1.1; an older one is
-    not asked for them and Unsupported is raised.
-    """
-
-    #: How depth travels; every encoding gives the same depth. "auto": int16 on the daemon's own
-    #: machine, where bytes cost least; elsewhere RVL where both sides can, else int16. None: no depth.
+    #: How depth travels; both encodings give the same depth. "auto": int16 on the daemon's own
+    #: machine, where bytes cost least; predict_zstd elsewhere. None: no depth.
     depth: Encoding | None = "auto"
     luma: bool = False  #: the camera's picture in grey
     jpeg: bool = False  #: the camera's own JPEG, if that is what it delivers
@@ -45,30 +37,11 @@ class Subscription:
     pose: bool = False  #: how the touched object moves, of dtact-perceive
     pose_hz: float = 0.0
 
-    def needs(self) -> frozenset[str]:
-        """The features that a daemon has to have for it."""
-        asked = {
-            "jpeg": self.jpeg,
-            "rates": any((self.depth_hz, self.luma_hz, self.jpeg_hz, self.summary_hz,
-                          self.cloud_hz, self.pose_hz)),
-            "cloud": self.cloud is not None,
-            "pose": self.pose,
-            "decimation": self.decimation not in (0, 1),
-            "units": self.um_per_unit not in (0, 1),
-            "region": self.region is not None,
-            "events": not self.events,
-        }
-        names = {name for name, wanted in asked.items() if wanted}
-        if self.depth in _ENCODING_FEATURES:
-            names.add(_ENCODING_FEATURES[self.depth])
-        return frozenset(names)
-
-    def message(self, features: AbstractSet[str], same_machine: bool) -> Message:
-        """The request for a daemon that has such features. ValueError for an encoding that is no
-        Encoding."""
+    def message(self, same_machine: bool) -> Message:
+        """The request. ValueError for an encoding that is no Encoding."""
         request = message_class("Subscribe")()
         if self.depth is not None:
-            request.depth = value_of(self._constant(features, same_machine))
+            request.depth = value_of(self._constant(same_machine))
         if self.luma:
             request.luma = value_of("LUMA_GREY8")
         request.every = self.every
@@ -96,14 +69,10 @@ class Subscription:
         request.pose_hz = self.pose_hz
         return request
 
-    def _constant(self, features: AbstractSet[str], same_machine: bool) -> str:
+    def _constant(self, same_machine: bool) -> str:
         if self.depth == "auto":
-            can = not same_machine and has_rvl() and _ENCODING_FEATURES["rvl"] in features
-            return "DEPTH_RVL" if can else "DEPTH_INT16"
-        if self.depth not in ("int16", "delta_zstd", "rvl", "predict_zstd"):
-            raise ValueError(f'"{self.depth}" is no encoding of depth: "auto", "int16", '
-                             '"delta_zstd", "rvl" or "predict_zstd"')
-        if self.depth == "rvl" and not has_rvl():
-            raise ValueError("this installation of dtact was built without RVL: install a C compiler "
-                             "and python3-dev, then dtact again, or choose another encoding")
+            return "DEPTH_INT16" if same_machine else "DEPTH_PREDICT_ZSTD"
+        if self.depth not in ("int16", "predict_zstd"):
+            raise ValueError(f'"{self.depth}" is no encoding of depth: "auto", "int16" or '
+                             '"predict_zstd"')
         return f"DEPTH_{self.depth.upper()}"

@@ -59,7 +59,7 @@ class Light:
     brightness: int  #: 0 … 255
     leds: tuple[tuple[int, int, int], ...]  #: eight colours (r, g, b) of 0 … 255
     #: The daemon's CLOCK_MONOTONIC in seconds from which on frames are exposed under it; None while
-    #: it is not known and from a 1.0 daemon.
+    #: it is not known.
     since_s: float | None
 
     @classmethod
@@ -117,9 +117,7 @@ class StoredCalibration:
     @classmethod
     def of(cls, m: Message) -> StoredCalibration:
         summary = CalibrationSummary.of(m.summary) if m.HasField("summary") else None
-        # An older daemon does not say which is in use: the current one is taken to be.
-        in_use = m.in_use if m.HasField("in_use") else m.current
-        return cls(m.number, m.name, m.uploaded, m.current, in_use, summary, m.damage)
+        return cls(m.number, m.name, m.uploaded, m.current, m.in_use, summary, m.damage)
 
 
 @dataclass(frozen=True)
@@ -194,8 +192,8 @@ class Server:
     program: str
     major: int
     minor: int
-    features: frozenset[str]  #: what it can do beyond version 1.0; proto/README.md lists the names
-    rights: str  #: "view", "control", or "unspecified" of a 1.0 daemon: everything
+    features: frozenset[str]  #: what it can do that others cannot; proto/README.md lists the names
+    rights: str  #: "view" or "control"
     name: str
     serial: str  #: the camera's, as far as it tells one
     frame_id: str  #: of the surface frame

@@ -94,8 +94,7 @@ export class Recording {
   }
 
   addEvent(event: Event): void {
-    if (event.monotonicNs === 0n && this.epochNs === undefined) return;
-    if (event.monotonicNs !== 0n) this.now = this.momentOf(event);
+    this.now = this.momentOf(event);
     this.add("/dtact/event", EventSchema, event);
   }
 

@@ -116,7 +116,6 @@ class Session {
   }
 
   private ping(): void {
-    if (!this.features.includes("ping")) return;
     const sent = nowMs();
     void this.ask({ case: "ping", value: create(PingSchema) }).then((reply) => {
       if (reply?.result.case === "pong") {
@@ -175,13 +174,6 @@ class Session {
     void this.subscribe();
   }
 
-  /** The cheapest encoding: of bytes from another machine, of work on the same. */
-  private encoding(): DepthEncoding {
-    if (this.nearby && this.features.includes("rvl")) return DepthEncoding.DEPTH_RVL;
-    if (this.features.includes("predict_zstd")) return DepthEncoding.DEPTH_PREDICT_ZSTD;
-    return DepthEncoding.DEPTH_DELTA_ZSTD;
-  }
-
   /** The answer to the newest: frames are those of an older one until that has come. */
   private subscribe(): Promise<Reply | undefined> {
     // dtact-perceive has points in place of maps.
@@ -198,7 +190,10 @@ class Session {
 
   private maps(): MessageInitShape<typeof SubscribeSchema> {
     return {
-      depth: this.wants.depth || this.recorder ? this.encoding() : DepthEncoding.DEPTH_NONE,
+      depth:
+        this.wants.depth || this.recorder
+          ? DepthEncoding.DEPTH_PREDICT_ZSTD
+          : DepthEncoding.DEPTH_NONE,
       luma: this.wants.luma ? LumaEncoding.LUMA_GREY8 : LumaEncoding.LUMA_NONE,
       lumaHz: this.nearby ? LUMA_HZ.nearby : LUMA_HZ.afar,
       summary: true,

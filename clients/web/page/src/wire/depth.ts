@@ -1,13 +1,10 @@
 // The depth encodings of proto/README.md. Each decoder fills `out`, width × height values, and throws
 // where the data are not exactly one such map.
-import { decodeRvl } from "./rvl";
 import { unzstd } from "./zstd";
 
 /** dtact.v1.DepthEncoding. */
 export const DEPTH_INT16 = 1;
-export const DEPTH_DELTA_ZSTD = 2;
-export const DEPTH_RVL = 3;
-export const DEPTH_PREDICT_ZSTD = 4;
+export const DEPTH_PREDICT_ZSTD = 2;
 
 /** So many values fit a message; a decoder allocates for no more. */
 export const MAX_VALUES = 8_388_608;
@@ -18,17 +15,6 @@ function decodeInt16(data: Uint8Array, out: Int16Array): void {
   }
   // As it stands: every machine with a browser is little-endian.
   new Uint8Array(out.buffer, out.byteOffset, out.byteLength).set(data);
-}
-
-function decodeDeltaZstd(data: Uint8Array, width: number, out: Int16Array): void {
-  decodeInt16(unzstd(data, 2 * out.length, 2 * out.length), out);
-  for (let row = 0; row < out.length; row += width) {
-    let value = 0;
-    for (let at = row; at < row + width; ++at) {
-      value += out[at] as number;
-      out[at] = value;
-    }
-  }
 }
 
 function decodePredictZstd(data: Uint8Array, width: number, out: Int16Array): void {
@@ -76,10 +62,6 @@ export function decodeDepth(
   switch (encoding) {
     case DEPTH_INT16:
       return decodeInt16(data, out);
-    case DEPTH_DELTA_ZSTD:
-      return decodeDeltaZstd(data, width, out);
-    case DEPTH_RVL:
-      return decodeRvl(data, out);
     case DEPTH_PREDICT_ZSTD:
       return decodePredictZstd(data, width, out);
     default:
