@@ -71,7 +71,8 @@ std::vector<std::string> words_for(const client::Options& daemon, const cli::Gui
   if (daemon.tls && !daemon.tls->ca_file.empty()) add("--ca-file", daemon.tls->ca_file.string());
   if (!daemon.token.empty()) add("--token-file", Child::kSecretFile);
   if (daemon.insecure) words.emplace_back("--insecure");
-  words.insert(words.end(), {"guided", "--json"});
+  words.emplace_back("guided");
+  words.emplace_back("--json");
   add("--radius-mm", fmt::to_string(start.radius_mm()));
   add("--mm-per-px", fmt::to_string(start.mm_per_px()));
   if (!start.crop().empty()) add("--crop", fmt::to_string(fmt::join(start.crop(), ",")));

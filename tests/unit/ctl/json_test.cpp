@@ -5,7 +5,6 @@
 
 #include <limits>
 
-#include "clients/common/guided.pb.h"
 #include "clients/common/reports.pb.h"
 #include "proto/dtact.pb.h"
 
