@@ -99,7 +99,7 @@ TEST_F(SpiRing, ACommandReachesTheWire) {
     forget();
     light.leds[0].r = static_cast<std::uint8_t>(i);
     const std::int64_t begin = base::system_clock().monotonic_ns();
-    ASSERT_TRUE(driver.submit(static_cast<std::uint64_t>(i), light));
+    ASSERT_TRUE(driver.submit({pipeline::SetLight{light}}));
     pipeline::Event event;
     ASSERT_TRUE(eventually([&] {
       pipeline::LightNote note;
