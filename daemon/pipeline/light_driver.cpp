@@ -1,13 +1,12 @@
 #include "daemon/pipeline/light_driver.hpp"
 
+#include <chrono>
 #include <utility>
 
 namespace dtact::pipeline {
 namespace {
 
 constexpr std::int64_t kRetryNs = 5'000'000;
-// A ring that writes by itself, to heal glitches, is asked so often how that goes.
-constexpr std::int64_t kLookNs = 250'000'000;
 
 }  // namespace
 
@@ -66,8 +65,9 @@ std::optional<std::int64_t> LightDriver::light_since_ns() const {
 }
 
 void LightDriver::run() {
+  std::chrono::nanoseconds due{};
   while (!stop_) {
-    if (!work_.wait_for(kLookNs)) look();
+    if (!work_.wait_for(due.count())) due = attend();
     Command command;
     while (!stop_ && commands_.pop(command)) serve(std::move(command));
   }
@@ -104,8 +104,8 @@ LightChanged LightDriver::changed() const {
           .since_ns = light_since_ns()};
 }
 
-void LightDriver::look() {
-  const hal::RingReport report = ring_->report();
+std::chrono::nanoseconds LightDriver::attend() {
+  const hal::RingReport report = ring_->attend();
   {
     const std::scoped_lock lock(mutex_);
     note_ = report.note;
@@ -114,13 +114,17 @@ void LightDriver::look() {
     away_ = true;
     const std::scoped_lock lock(mutex_);
     shown_ns_.reset();
-  } else {
-    if (away_) return come_back();
-    if (report.writes == 0 || report.ok != trouble_) return;
+  } else if (away_) {
+    come_back();
+    return report.due;
   }
-  trouble_ = !report.ok;
-  const std::scoped_lock lock(mutex_);
-  message_ = report.message;
+  // A ring that never re-sends knows nothing of how it is.
+  if (report.away || (report.writes > 0 && report.ok == trouble_)) {
+    trouble_ = !report.ok;
+    const std::scoped_lock lock(mutex_);
+    message_ = report.message;
+  }
+  return report.due;
 }
 
 void LightDriver::come_back() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -25,7 +26,8 @@ struct LightNote {
   bool failed = false;     ///< The write did not work.
 };
 
-/// Owns the ring and the thread that writes to it, since a write blocks for a millisecond and more.
+/// Owns the ring and the one thread that uses it: it writes, re-sends and answers commands, since a
+/// write blocks for a millisecond and more.
 /// Commands come from the network thread, events go back there, notes go to the capture thread;
 /// each way is a queue of its own and none ever drops (a full one makes this thread wait).
 ///
@@ -66,7 +68,7 @@ class LightDriver {
  private:
   void run();
   void serve(Command command);
-  void look();
+  std::chrono::nanoseconds attend();
   void come_back();
   hal::ShowResult write(const hal::Light& light);
   void note(const LightNote& note);
