@@ -55,10 +55,10 @@ class UntouchedImage {
 
   // Not on the capture thread.
 
-  /// Its threads run: one writes good references to the state folder, one compares places.
-  void start();
-  /// Ends them after what they have been given is done.
-  void stop() noexcept;
+  /// Its thread runs: it writes good references to the state folder and compares places.
+  void start() { side_.start(); }
+  /// Ends it after what it has been given is done.
+  void stop() noexcept { side_.stop(); }
   /// Waits until all that was given to the comparison of places has been judged. Any thread.
   void settle() const noexcept { place_.settle(); }
   /// How far the camera has moved since calibration; empty: not. Any thread.
@@ -128,6 +128,7 @@ class UntouchedImage {
   int width_;
   int height_;
   const std::filesystem::path folder_;
+  base::SideThread side_{"dtact-side"};  // before its jobs
   ReferenceWriter writer_;
   PlaceWatch place_;
   CalibratedImage* image_ = nullptr;
