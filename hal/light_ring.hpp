@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -57,10 +58,10 @@ struct ShowResult {
   bool ok = true;
   std::string message;   ///< When not ok: what failed and the remedy. When dimmed: why.
   double dimmed_to = 1;  ///< What a current limit left of the light asked for; 1 = all of it.
-  bool away = false;     ///< When not ok: there is no ring to write to now; report() tells when.
+  bool away = false;     ///< When not ok: there is no ring to write to now; attend() looks for it.
 };
 
-/// Run-time condition of a ring that writes by itself (a re-send can fail). Any thread may ask.
+/// Run-time condition of a ring.
 struct RingReport {
   bool ok = true;              ///< The ring is there and the last write worked.
   bool away = false;           ///< It is looked for; once it is there, show() it its light again.
@@ -68,10 +69,12 @@ struct RingReport {
   std::string note;            ///< Worth knowing, not wrong. Empty = nothing.
   std::uint64_t writes = 0;    ///< Tried, re-sends included.
   std::uint64_t failures = 0;  ///< Of these.
+  /// attend() is to be called again after at most this time.
+  std::chrono::nanoseconds due = std::chrono::milliseconds(250);
 };
 
-/// The LEDs that light the layer. show() may block for a millisecond and more, so it is called on
-/// the ring's own thread and never on the capture thread.
+/// The LEDs that light the gel. One thread uses a ring, and never the capture thread: show() and
+/// attend() may block for milliseconds, and for seconds while a device is opened.
 class LightRing {
  public:
   LightRing() = default;
@@ -81,7 +84,8 @@ class LightRing {
 
   [[nodiscard]] virtual RingInfo info() const = 0;
   [[nodiscard]] virtual ShowResult show(const Light& light) = 0;
-  [[nodiscard]] virtual RingReport report() const { return {}; }
+  /// Does what is due by time, a re-send or a look for a ring that is away, and reports.
+  [[nodiscard]] virtual RingReport attend() { return {}; }
 };
 
 }  // namespace dtact::hal

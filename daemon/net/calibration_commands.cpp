@@ -10,6 +10,7 @@
 
 #include "daemon/net/hub.hpp"
 #include "daemon/net/messages.hpp"
+#include "daemon/net/reconstruction_words.hpp"
 #include "hal/base/utf8.hpp"
 #include "hal/files/png.hpp"
 #include "proto/dtact.pb.h"
@@ -23,7 +24,7 @@ namespace asio = boost::asio;
 constexpr int kMaxReading = 16;
 
 constexpr const char* kChanging =
-    "another calibration is being uploaded or activated: ask again in a moment";
+    "another calibration or way to make depth is coming into use: ask again in a moment";
 
 bool valid_name(const std::string& name) {
   return !name.empty() && name.size() <= wire::kMaxCalibrationName &&
@@ -58,14 +59,13 @@ Outcome<Value> attempt(v1::ErrorCode failure, const Step& step) {
 
 CalibrationCommands::CalibrationCommands(asio::io_context& io, asio::thread_pool& worker,
                                          const NetConfig& config, Hub& hub, pipeline::Port& port,
-                                         CalibrationStore& store, Submit submit)
+                                         CalibrationStore& store)
     : io_(io),
       worker_(worker),
       config_(config),
       hub_(hub),
       port_(port),
       store_(store),
-      submit_(std::move(submit)),
       in_use_(store.current_number()) {
   if (in_use_) hub_.number_calibration(0, *in_use_);  // the pipeline's key of the first
 }
@@ -157,7 +157,7 @@ void CalibrationCommands::upload(const Who& who, const v1::UploadCalibration& re
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
   auto files = std::make_shared<const CalibrationFiles>(CalibrationFiles{
       .name = request.name(), .toml = request.calibration_toml(), .png = request.reference_png()});
-  change(who, {std::move(files), 0, {}, 0, {}});
+  change(who, {.upload = std::move(files)});
 }
 
 void CalibrationCommands::activate(const Who& who, const v1::ActivateCalibration& request) {
@@ -168,31 +168,37 @@ void CalibrationCommands::activate(const Who& who, const v1::ActivateCalibration
                                 "shows the numbers there are");
   }
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
-  change(who, {nullptr, request.number(), {}, 0, {}});
+  change(who, {.number = request.number()});
 }
 
 void CalibrationCommands::change(const Who& who, Change change) {
   changing_ = true;
-  using Loaded = std::shared_ptr<const calibration::Calibration>;
+  using Ready = pipeline::UseCalibration;
   on_worker(
-      [&store = store_, change] {
-        return attempt<Loaded>(v1::ERROR_INVALID, [&] {
-          return change.upload != nullptr ? store.check(*change.upload) : store.load(change.number);
+      [&store = store_, &port = port_, change, rules = port_.status().reconstruction] {
+        return attempt<Ready>(v1::ERROR_INVALID, [&] {
+          return port.prepare(
+              change.upload != nullptr ? store.check(*change.upload) : store.load(change.number),
+              rules);
         });
       },
-      [who, change](CalibrationCommands& self, Outcome<Loaded> loaded) mutable {
-        if (loaded.failed()) {
+      [who, change](CalibrationCommands& self, Outcome<Ready> ready) mutable {
+        if (ready.failed()) {
           self.changing_ = false;
-          return who.first->reply_error(who.second, loaded.code, loaded.error);
+          return who.first->reply_error(who.second, ready.code, ready.error);
         }
-        change.name = loaded.value->name;
-        self.changing_ =
-            self.submit_(who, pipeline::UseCalibration{std::move(loaded.value)}, std::move(change));
+        change.name = ready.value.calibration->name;
+        change.key = ready.value.key = ++self.last_key_;
+        self.changing_ = submit(self.port_, who, std::move(ready.value),
+                                [&self, who = WeakWho(who), change = std::move(change)](
+                                    const pipeline::CommandDone& done) mutable {
+                                  change.at = done.at;
+                                  self.keep(who, change);
+                                });
       });
 }
 
-void CalibrationCommands::keep(const std::weak_ptr<Session>& asking, std::uint64_t id,
-                               const Change& change) {
+void CalibrationCommands::keep(const WeakWho& who, const Change& change) {
   config_.log({LogLevel::info, fmt::format("calibration {} is in use", change.name)});
   in_use_.reset();
   if (change.upload == nullptr) {
@@ -209,7 +215,7 @@ void CalibrationCommands::keep(const std::weak_ptr<Session>& asking, std::uint64
           return change.number;
         });
       },
-      [weak = asking, id, change](CalibrationCommands& self, const Outcome<std::uint64_t>& kept) {
+      [who, change](CalibrationCommands& self, const Outcome<std::uint64_t>& kept) {
         self.changing_ = false;
         if (!kept.failed()) {
           self.in_use_ = kept.value;
@@ -223,6 +229,7 @@ void CalibrationCommands::keep(const std::weak_ptr<Session>& asking, std::uint64
                                         "the one before: {}",
                                         change.name, kept.error)});
         }
+        const auto& [weak, id] = who;
         const auto session = weak.lock();
         if (session == nullptr) return;
         if (kept.failed()) {
@@ -248,9 +255,50 @@ void CalibrationCommands::tell(const Change& change, std::optional<std::uint64_t
   hub_.broadcast(message);
 }
 
+void CalibrationCommands::set_reconstruction(const Who& who, const v1::SetReconstruction& request) {
+  const auto& [session, id] = who;
+  const pipeline::Status now = port_.status();
+  pipeline::ReconstructionRules rules = now.reconstruction;
+  const std::string wrong = net::change(request, rules);
+  if (!wrong.empty()) return session->reply_error(id, v1::ERROR_INVALID, wrong);
+  if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
+  changing_ = true;
+  using Ready = pipeline::SetReconstruction;
+  on_worker(
+      [&port = port_, in_use = now.calibration, rules] {
+        return attempt<Ready>(v1::ERROR_INVALID, [&] { return port.prepare_maps(in_use, rules); });
+      },
+      [who, rules](CalibrationCommands& self, Outcome<Ready> ready) {
+        if (ready.failed()) {
+          self.changing_ = false;
+          return who.first->reply_error(who.second, ready.code, ready.error);
+        }
+        self.changing_ = submit(
+            self.port_, who, std::move(ready.value),
+            [&self, who = WeakWho(who), rules](const pipeline::CommandDone& done) {
+              self.changing_ = false;
+              v1::ServerMessage message;
+              auto& event = *message.mutable_event();
+              fill(done.at, event);
+              fill(rules, *event.mutable_reconstruction());
+              self.hub_.broadcast(message);
+              reply(who, done, [&](v1::Reply& out) { fill(rules, *out.mutable_reconstruction()); });
+            });
+      });
+}
+
 void CalibrationCommands::get_reference(const Who& who) {
   if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
-  if (submit_(who, pipeline::CopyReference{}, ReferenceWanted{})) ++reading_;
+  const auto copied = [this, weak = WeakWho(who)](const pipeline::CommandDone& done) {
+    --reading_;
+    const auto session = weak.first.lock();
+    if (session != nullptr && done.outcome == pipeline::Outcome::done) {
+      return send_reference({session, weak.second},
+                            std::get<pipeline::CopyReference>(done.command.what).copy);
+    }
+    reply(weak, done, [](v1::Reply&) {});
+  };
+  if (submit(port_, who, pipeline::CopyReference{}, copied)) ++reading_;
 }
 
 void CalibrationCommands::send_reference(

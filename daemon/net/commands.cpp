@@ -2,13 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "daemon/net/hub.hpp"
 #include "daemon/net/light_schemes.hpp"
 #include "daemon/net/messages.hpp"
-#include "daemon/net/reconstruction_words.hpp"
 #include "daemon/serve/who.hpp"
 #include "hal/base/clock.hpp"
 #include "proto/dtact.pb.h"
@@ -17,26 +15,6 @@ namespace dtact::net {
 namespace {
 
 namespace asio = boost::asio;
-
-v1::ErrorCode code_of(pipeline::Outcome outcome) {
-  switch (outcome) {
-    case pipeline::Outcome::done:
-      return v1::ERROR_NONE;
-    case pipeline::Outcome::refused_contact:
-      return v1::ERROR_CONTACT;
-    case pipeline::Outcome::device_error:
-    case pipeline::Outcome::camera_away:
-    case pipeline::Outcome::ring_away:
-      return v1::ERROR_DEVICE;
-    case pipeline::Outcome::invalid:
-      return v1::ERROR_INVALID;
-    case pipeline::Outcome::uncalibrated:
-      return v1::ERROR_UNCALIBRATED;
-    case pipeline::Outcome::no_reference:
-      return v1::ERROR_BUSY;
-  }
-  return v1::ERROR_INVALID;
-}
 
 /// `light` changed as `request` says, or the sentence that says what is wrong with it.
 std::string change(const v1::SetLight& request, hal::Light& light) {
@@ -79,12 +57,7 @@ Commands::Commands(asio::io_context& io, asio::thread_pool& worker, const NetCon
     : config_(config),
       hub_(hub),
       port_(port),
-      calibrations_(std::make_shared<CalibrationCommands>(
-          io, worker, config, hub, port, store,
-          [this](const Who& who, decltype(pipeline::Command::what) command, auto what) {
-            return std::visit(
-                [&](auto& one) { return submit(who, std::move(command), std::move(one)); }, what);
-          })) {}
+      calibrations_(std::make_shared<CalibrationCommands>(io, worker, config, hub, port, store)) {}
 
 void Commands::on_request(const std::shared_ptr<Session>& session,
                           const v1::ClientMessage& message) {
@@ -111,7 +84,7 @@ void Commands::on_request(const std::shared_ptr<Session>& session,
     case v1::ClientMessage::kPing:
       return ping(who);
     case v1::ClientMessage::kSetReconstruction:
-      return set_reconstruction(who, message.set_reconstruction());
+      return calibrations_->set_reconstruction(who, message.set_reconstruction());
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::REQUEST_NOT_SET:
       return;  // The session's business.
@@ -136,94 +109,23 @@ void Commands::subscribe(const Who& who, const v1::Subscribe& request) {
   session->send(message);
 }
 
-bool Commands::submit(const Who& who, decltype(pipeline::Command::what) command,
-                      decltype(Pending::what) what) {
-  const std::uint64_t ticket = next_ticket_++;
-  if (auto* use = std::get_if<pipeline::UseCalibration>(&command)) use->key = ticket;
-  if (!port_.submit({ticket, std::move(command)})) {
-    who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
-    return false;
-  }
-  pending_.emplace(ticket, Pending{who.first, who.second, std::move(what)});
-  return true;
-}
-
 void Commands::set_light(const Who& who, const v1::SetLight& request) {
-  hal::Light light = light_.has_value() ? *light_ : port_.status().light;
+  hal::Light light = port_.status().light_requested;
   const std::string wrong = change(request, light);
   if (!wrong.empty()) return who.first->reply_error(who.second, v1::ERROR_INVALID, wrong);
-  if (!submit(who, pipeline::SetLight{light}, light)) return;
-  light_ = light;
-  ++lights_pending_;
-}
-
-void Commands::on_light(const hal::Light& light) {
-  if (lights_pending_ == 0) light_ = light;
+  (void)submit(port_, who, pipeline::SetLight{light},
+               [who = WeakWho(who), light](const pipeline::CommandDone& done) {
+                 reply(who, done, [&](v1::Reply& out) {
+                   fill(light, done.light_since_ns, *out.mutable_light());
+                 });
+               });
 }
 
 void Commands::rezero(const Who& who, bool force) {
-  (void)submit(who, pipeline::Rezero{force}, Pending::Rezero{});
-}
-
-void Commands::set_reconstruction(const Who& who, const v1::SetReconstruction& request) {
-  // One at a time: each makes the calibration ready anew.
-  const auto changes = [](const auto& entry) {
-    return std::holds_alternative<pipeline::ReconstructionRules>(entry.second.what);
-  };
-  if (std::ranges::any_of(pending_, changes)) {
-    return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
-  }
-  pipeline::ReconstructionRules rules = port_.status().reconstruction;
-  const std::string wrong = change(request, rules);
-  if (!wrong.empty()) return who.first->reply_error(who.second, v1::ERROR_INVALID, wrong);
-  (void)submit(who, pipeline::SetReconstruction{rules}, rules);
-}
-
-void Commands::tell_reconstruction(const pipeline::ReconstructionRules& rules,
-                                   const pipeline::Stamp& at) {
-  v1::ServerMessage message;
-  auto& event = *message.mutable_event();
-  fill(at, event);
-  fill(rules, *event.mutable_reconstruction());
-  hub_.broadcast(message);
-}
-
-void Commands::on_done(const pipeline::CommandDone& done) {
-  const auto entry = pending_.extract(done.ticket);
-  if (entry.empty()) return;
-  Pending& pending = entry.mapped();
-  const bool ok = done.outcome == pipeline::Outcome::done;
-  const auto* light = std::get_if<hal::Light>(&pending.what);
-  if (light != nullptr) {
-    --lights_pending_;
-    const bool kept = done.outcome == pipeline::Outcome::ring_away;
-    if (!ok && !kept && lights_pending_ == 0) light_.reset();
-  }
-  auto* const change = std::get_if<CalibrationCommands::Change>(&pending.what);
-  if (change != nullptr && ok) {
-    change->key = done.ticket;
-    change->at = done.at;
-    return calibrations_->keep(pending.session, pending.id, *change);
-  }
-  if (change != nullptr) calibrations_->refused();
-  const auto* rules = std::get_if<pipeline::ReconstructionRules>(&pending.what);
-  if (rules != nullptr && ok) tell_reconstruction(*rules, done.at);
-  const bool reference = std::holds_alternative<CalibrationCommands::ReferenceWanted>(pending.what);
-  if (reference) calibrations_->copied();
-
-  const auto session = pending.session.lock();
-  if (session == nullptr) return;
-  if (reference && ok) return calibrations_->send_reference({session, pending.id}, done.reference);
-  if (!ok) return session->reply_error(pending.id, code_of(done.outcome), done.message);
-  auto message = reply_to(pending.id);
-  if (light != nullptr) {
-    fill(*light, done.light_since_ns, *message.mutable_reply()->mutable_light());
-  } else if (rules != nullptr) {
-    fill(*rules, *message.mutable_reply()->mutable_reconstruction());
-  } else {
-    message.mutable_reply()->mutable_done();
-  }
-  session->send(message);
+  (void)submit(port_, who, pipeline::Rezero{force},
+               [who = WeakWho(who)](const pipeline::CommandDone& done) {
+                 reply(who, done, [](v1::Reply& out) { out.mutable_done(); });
+               });
 }
 
 void Commands::get_status(const Who& who) {

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <system_error>
 
+#include "daemon/net/commands.hpp"
 #include "daemon/net/messages.hpp"
 #include "daemon/pipeline/statistics.hpp"
 #include "hal/base/clock.hpp"
@@ -45,8 +46,8 @@ Hub::Hub(asio::io_context& io, const NetConfig& config, pipeline::Port& port)
   events_.native_non_blocking(true);
 }
 
-void Hub::start(Handlers handlers) {
-  handlers_ = std::move(handlers);
+void Hub::start(Commands& commands) {
+  commands_ = &commands;
   update_want();
   wait();
 }
@@ -86,9 +87,8 @@ void Hub::drain() {
 }
 
 void Hub::on_event(const pipeline::Event& event) {
-  if (const auto* done = std::get_if<pipeline::CommandDone>(&event)) return handlers_.done(*done);
-  if (const auto* light = std::get_if<pipeline::LightChanged>(&event)) {
-    handlers_.light(light->light);
+  if (const auto* done = std::get_if<pipeline::CommandDone>(&event)) {
+    return done->command.then(*done);
   }
   if (const auto* reference = std::get_if<pipeline::ReferenceTaken>(&event)) {
     reference_taken_ns_.reset();
@@ -170,7 +170,7 @@ void Hub::introduce(v1::HelloReply& reply) const {
 }
 
 void Hub::on_request(const std::shared_ptr<Session>& session, const v1::ClientMessage& message) {
-  handlers_.request(session, message);
+  commands_->on_request(session, message);
 }
 
 void Hub::on_closed(const Session& session) {

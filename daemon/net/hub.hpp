@@ -3,7 +3,6 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -19,22 +18,18 @@
 
 namespace dtact::net {
 
+class Commands;
+
 /// Where the pipeline meets the clients: fetches events and frames when the pipeline says that
 /// there are any, encodes each frame once for each kind some client is due, and hands every client
 /// the same buffer. Also keeps the list of clients. All on the network thread.
 class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
  public:
-  /// Whom the hub passes on to what it does not decide itself.
-  struct Handlers {
-    std::function<void(const std::shared_ptr<Session>&, const v1::ClientMessage&)> request;
-    std::function<void(const pipeline::CommandDone&)> done;
-    std::function<void(const hal::Light&)> light;
-  };
-
   /// Throws std::system_error when the pipeline's event descriptor cannot be watched.
   Hub(boost::asio::io_context& io, const NetConfig& config, pipeline::Port& port);
 
-  void start(Handlers handlers);
+  /// `commands` executes what clients request, until stop().
+  void start(Commands& commands);
   /// Ends every connection and stops watching the pipeline.
   void stop();
 
@@ -89,7 +84,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   boost::asio::posix::stream_descriptor events_;
   FrameEncoder encoder_;
   pipeline::Histogram handover_;  ///< From published until fetched here.
-  Handlers handlers_;
+  Commands* commands_ = nullptr;  // while started
   Guests guests_;
   std::vector<EndpointInfo> endpoints_;
   std::map<std::uint64_t, std::uint64_t> numbers_;  ///< By key, of those still in use.

@@ -29,13 +29,7 @@ struct Server::Impl {
 Server::Server(boost::asio::io_context& io, NetConfig config, pipeline::Port& port,
                CalibrationStore& store)
     : impl_(std::make_unique<Impl>(io, std::move(config), port, store)) {
-  auto& commands = *impl_->commands;
-  impl_->hub->start(
-      {[&commands](const std::shared_ptr<Session>& session, const v1::ClientMessage& message) {
-         commands.on_request(session, message);
-       },
-       [&commands](const pipeline::CommandDone& done) { commands.on_done(done); },
-       [&commands](const hal::Light& light) { commands.on_light(light); }});
+  impl_->hub->start(*impl_->commands);
   impl_->entrance.open(impl_->hub,
                        [&hub = *impl_->hub](const auto& session) { hub.admit(session); });
 }

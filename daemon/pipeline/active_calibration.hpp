@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <memory>
 
 #include "daemon/calibration/calibration.hpp"
@@ -11,14 +10,12 @@
 
 namespace dtact::pipeline {
 
-/// A calibration ready for the capture thread: all that takes memory or time is done. Made and
-/// freed on the network's side, used on the capture thread.
+/// A calibration ready for the capture thread: all that takes memory or time is done. Made on a
+/// worker thread, used on the capture thread, freed on the network thread.
 struct ActiveCalibration {
   CalibratedImage image;
   Resolutions maps;
   bool camera_mismatch = false;
-  std::uint64_t generation = 0;  ///< Counts the calibrations of this run.
-  std::uint64_t key = 0;         ///< UseCalibration::key.
 };
 
 /// Throws std::invalid_argument, saying what to do, when the calibration cannot be used with frames

@@ -16,7 +16,7 @@ constexpr std::int64_t kAwayPauseNs = 20'000'000;
 }  // namespace
 
 CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config,
-                         std::unique_ptr<ActiveCalibration> active, bool unusable)
+                         std::shared_ptr<ActiveCalibration> active, bool unusable)
     : camera_(parts.camera),
       light_(parts.light),
       exchange_(parts.exchange),
@@ -129,7 +129,7 @@ void CaptureLoop::label(DepthFrame& out, std::int64_t exposure_ns) noexcept {
   out.light_since_ns = timeline_.since_at(exposure_ns);
   if (out.light_since_ns) *out.light_since_ns += stamp_lag_ns(out.camera.meaning, period_ns_);
   out.calibration.reset();
-  if (desk_.active() != nullptr) out.calibration = desk_.active()->key;
+  if (desk_.active() != nullptr) out.calibration = desk_.key();
   out.times = {};
   out.times.decode_ns = out.camera.decode_ns;
 }

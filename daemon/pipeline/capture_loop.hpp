@@ -34,7 +34,7 @@ class CaptureLoop {
   /// `active` may be null: uncalibrated. `unusable`: there is a calibration, but for another camera
   /// mode.
   CaptureLoop(const CaptureParts& parts, const PipelineConfig& config,
-              std::unique_ptr<ActiveCalibration> active, bool unusable);
+              std::shared_ptr<ActiveCalibration> active, bool unusable);
 
   /// For what is not the loop's: its threads, what they say, and what is restored before the first
   /// step.

@@ -2,10 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
-#include <memory>
-#include <variant>
 
-#include "daemon/pipeline/active_calibration.hpp"
 #include "daemon/pipeline/event_fd.hpp"
 #include "daemon/pipeline/latest_slot.hpp"
 #include "daemon/pipeline/port.hpp"
@@ -14,43 +11,15 @@
 
 namespace dtact::pipeline {
 
-// Network thread → capture thread.
-struct RezeroOrder {
-  std::uint64_t ticket = 0;
-  bool force = false;
-};
-struct CalibrationOrder {
-  std::uint64_t ticket = 0;
-  std::unique_ptr<ActiveCalibration> next;
-  /// It is the calibration in use, with other maps: what is known of the untouched image stays.
-  bool same_image = false;
-};
-struct ReferenceOrder {
-  std::uint64_t ticket = 0;
-  ReferenceCopy* out = nullptr;  ///< With room for the image; stays until it is answered.
-};
-using Order = std::variant<std::monostate, RezeroOrder, CalibrationOrder, ReferenceOrder>;
-
-// Capture thread → network thread. Like Event, but without strings, which would allocate.
-struct Answer {
-  std::uint64_t ticket = 0;
-  Outcome outcome = Outcome::done;
-  const char* sentence = "";  ///< A literal.
-  Stamp at = {};              ///< Of a calibration.
-};
-using Report = std::variant<std::monostate, Answer, ContactChanged, ReferenceTaken, StateChanged>;
-
 /// All that the capture thread and the network thread share. Each queue has one producer and one
 /// consumer; the atomics are single values that need no order among them.
 struct Exchange {
   explicit Exchange(const DepthFrame& prototype) : slot(prototype) {}
 
   LatestSlot<DepthFrame> slot;
-  SpscQueue<Order, 16> orders;
-  SpscQueue<Report, 64> reports;
-  /// Calibrations out of use, on their way to be freed by the network thread.
-  SpscQueue<std::unique_ptr<ActiveCalibration>, 16> retired;
-  EventFd wake;  ///< Readable when a frame or an event waits.
+  SpscQueue<Command, 16> commands;
+  SpscQueue<Event, 64> events;  ///< CommandDone::message is empty: strings allocate.
+  EventFd wake;                 ///< Readable when a frame or an event waits.
   Statistics statistics;
 
   // Port::want().
@@ -70,10 +39,9 @@ struct Exchange {
   std::atomic<std::uint64_t> sequence{0};  ///< Of the newest frame.
   /// From a write to the ring until the timestamps of frames exposed under it; -1: not known yet.
   std::atomic<std::int64_t> light_lag_ns{-1};
-  std::atomic<std::uint64_t> turns{0};       ///< Of the capture loop.
-  std::atomic<double> camera_fps{0};         ///< By the frames' timestamps; 0 = not known yet.
-  std::atomic<double> light_followed{0};     ///< Share of the reference's light, ±.
-  std::atomic<std::uint64_t> generation{0};  ///< Of the calibration in use; 0 = none.
+  std::atomic<std::uint64_t> turns{0};    ///< Of the capture loop.
+  std::atomic<double> camera_fps{0};      ///< By the frames' timestamps; 0 = not known yet.
+  std::atomic<double> light_followed{0};  ///< Share of the reference's light, ±.
 };
 
 }  // namespace dtact::pipeline

@@ -1,19 +1,22 @@
 #include "daemon/pipeline/light_driver.hpp"
 
+#include <chrono>
 #include <utility>
 
 namespace dtact::pipeline {
 namespace {
 
 constexpr std::int64_t kRetryNs = 5'000'000;
-// A ring that writes by itself, to heal glitches, is asked so often how that goes.
-constexpr std::int64_t kLookNs = 250'000'000;
 
 }  // namespace
 
 LightDriver::LightDriver(std::unique_ptr<hal::LightRing> ring, const hal::Light& light,
                          base::Clock& clock, const Exchange& exchange)
-    : ring_(std::move(ring)), clock_(clock), exchange_(exchange), light_(light) {}
+    : ring_(std::move(ring)),
+      clock_(clock),
+      exchange_(exchange),
+      light_(light),
+      requested_(light) {}
 
 void LightDriver::start() {
   stop_ = false;
@@ -27,8 +30,14 @@ void LightDriver::stop() noexcept {
   thread_.join();
 }
 
-bool LightDriver::submit(std::uint64_t ticket, const hal::Light& light) {
-  if (!requests_.push({ticket, light})) return false;
+bool LightDriver::submit(Command command) {
+  {
+    const std::scoped_lock lock(mutex_);
+    const hal::Light light = std::get<SetLight>(command.what).light;
+    if (!commands_.push(std::move(command))) return false;
+    requested_ = light;
+    ++waiting_;
+  }
   work_.ring();
   return true;
 }
@@ -43,6 +52,11 @@ hal::Light LightDriver::light() const {
   return light_;
 }
 
+hal::Light LightDriver::requested() const {
+  const std::scoped_lock lock(mutex_);
+  return requested_;
+}
+
 std::optional<std::int64_t> LightDriver::light_since_ns() const {
   const std::int64_t lag_ns = exchange_.light_lag_ns.load(std::memory_order_relaxed);
   const std::scoped_lock lock(mutex_);
@@ -51,25 +65,33 @@ std::optional<std::int64_t> LightDriver::light_since_ns() const {
 }
 
 void LightDriver::run() {
+  std::chrono::nanoseconds due{};
   while (!stop_) {
-    if (!work_.wait_for(kLookNs)) look();
-    Request request;
-    while (!stop_ && requests_.pop(request)) serve(request);
+    if (!work_.wait_for(due.count())) due = attend();
+    Command command;
+    while (!stop_ && commands_.pop(command)) serve(std::move(command));
   }
 }
 
-void LightDriver::serve(const Request& request) {
+void LightDriver::serve(Command command) {
   const hal::Light before = light();
-  const hal::ShowResult result = write(request.light);
-  if (!result.ok) {
-    tell(result.away
-             ? CommandDone{request.ticket, Outcome::ring_away,
-                           result.message + ". The light is kept and shown when the ring is back"}
-             : CommandDone{request.ticket, Outcome::device_error, result.message});
-    return;
+  const hal::Light wanted = std::get<SetLight>(command.what).light;
+  const hal::ShowResult result = write(wanted);
+  {
+    const std::scoped_lock lock(mutex_);
+    if (--waiting_ == 0 && !result.ok && !result.away) requested_ = light_;
   }
-  tell(CommandDone{.ticket = request.ticket, .light_since_ns = light_since_ns()});
-  if (request.light != before) tell(changed());
+  CommandDone done{.command = std::move(command), .message = result.message};
+  if (result.away) {
+    done.outcome = Outcome::ring_away;
+    done.message += ". The light is kept and shown when the ring is back";
+  } else if (!result.ok) {
+    done.outcome = Outcome::device_error;
+  } else {
+    done.light_since_ns = light_since_ns();
+  }
+  tell(std::move(done));
+  if (result.ok && wanted != before) tell(changed());
 }
 
 /// Of the write that has just worked.
@@ -82,30 +104,35 @@ LightChanged LightDriver::changed() const {
           .since_ns = light_since_ns()};
 }
 
-void LightDriver::look() {
-  const hal::RingReport report = ring_->report();
+std::chrono::nanoseconds LightDriver::attend() {
+  const hal::RingReport report = ring_->attend();
   {
     const std::scoped_lock lock(mutex_);
     note_ = report.note;
   }
   if (report.away) {
-    if (!std::exchange(away_, true)) kept_ = light();
+    away_ = true;
     const std::scoped_lock lock(mutex_);
     shown_ns_.reset();
-  } else {
-    if (away_) return come_back();
-    if (report.writes == 0 || report.ok != trouble_) return;
+  } else if (away_) {
+    come_back();
+    return report.due;
   }
-  trouble_ = !report.ok;
-  const std::scoped_lock lock(mutex_);
-  message_ = report.message;
+  // A ring that never re-sends knows nothing of how it is.
+  if (report.away || (report.writes > 0 && report.ok == trouble_)) {
+    trouble_ = !report.ok;
+    const std::scoped_lock lock(mutex_);
+    message_ = report.message;
+  }
+  return report.due;
 }
 
 void LightDriver::come_back() {
   const hal::Light before = light();
-  if (!write(hal::Light(kept_)).ok) {
+  const hal::Light kept = requested();
+  if (!write(kept).ok) {
     away_ = true;  // so that it is tried again
-  } else if (kept_ != before) {
+  } else if (kept != before) {
     tell(changed());
   }
 }
@@ -115,7 +142,6 @@ hal::ShowResult LightDriver::write(const hal::Light& light) {
   hal::ShowResult result = ring_->show(light);
   trouble_ = !result.ok;
   const bool was_away = std::exchange(away_, result.away);
-  if (away_) kept_ = light;
   const std::int64_t ended_ns = clock_.monotonic_ns();
   hal::Light shown;
   {
@@ -136,8 +162,8 @@ void LightDriver::note(const LightNote& note) {
   }
 }
 
-void LightDriver::tell(const Event& event) {
-  while (!events_.push(Event(event)) && !stop_) {
+void LightDriver::tell(Event event) {
+  while (!events_.push(std::move(event)) && !stop_) {
     clock_.sleep_until(clock_.monotonic_ns() + kRetryNs);
   }
   exchange_.wake.signal();

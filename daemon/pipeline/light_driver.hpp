@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -25,7 +26,8 @@ struct LightNote {
   bool failed = false;     ///< The write did not work.
 };
 
-/// Owns the ring and the thread that writes to it, since a write blocks for a millisecond and more.
+/// Owns the ring and the one thread that uses it: it writes, re-sends and answers commands, since a
+/// write blocks for a millisecond and more.
 /// Commands come from the network thread, events go back there, notes go to the capture thread;
 /// each way is a queue of its own and none ever drops (a full one makes this thread wait).
 ///
@@ -46,13 +48,16 @@ class LightDriver {
   void stop() noexcept;
 
   // Network thread.
-  [[nodiscard]] bool submit(std::uint64_t ticket, const hal::Light& light);
+  /// A SetLight.
+  [[nodiscard]] bool submit(Command command);
   [[nodiscard]] bool next_event(Event& out) { return events_.pop(out); }
   [[nodiscard]] hal::RingInfo info() const { return ring_->info(); }
   /// The last error, or why the ring shows less light than it was asked for, or what else is worth
   /// knowing of it; empty when well.
   [[nodiscard]] std::string message() const;
   [[nodiscard]] hal::Light light() const;
+  /// As Status::light_requested.
+  [[nodiscard]] hal::Light requested() const;
   /// As DepthFrame::light_since_ns, of light().
   [[nodiscard]] std::optional<std::int64_t> light_since_ns() const;
 
@@ -61,23 +66,19 @@ class LightDriver {
   [[nodiscard]] bool trouble() const noexcept { return trouble_.load(std::memory_order_relaxed); }
 
  private:
-  struct Request {
-    std::uint64_t ticket = 0;
-    hal::Light light;
-  };
   void run();
-  void serve(const Request& request);
-  void look();
+  void serve(Command command);
+  std::chrono::nanoseconds attend();
   void come_back();
   hal::ShowResult write(const hal::Light& light);
   void note(const LightNote& note);
-  void tell(const Event& event);
+  void tell(Event event);
   [[nodiscard]] LightChanged changed() const;
 
   std::unique_ptr<hal::LightRing> ring_;
   base::Clock& clock_;
   const Exchange& exchange_;
-  SpscQueue<Request, 16> requests_;
+  SpscQueue<Command, 16> commands_;
   SpscQueue<Event, 64> events_;
   SpscQueue<LightNote, 16> notes_;
   base::Doorbell work_;
@@ -85,11 +86,12 @@ class LightDriver {
   std::atomic<bool> trouble_{false};
   mutable std::mutex mutex_;  // between this thread and the network thread, held for a copy
   hal::Light light_;
+  hal::Light requested_;                  // shown when the ring is back
+  int waiting_ = 0;                       // commands
   std::optional<std::int64_t> shown_ns_;  // CLOCK_MONOTONIC of its write; none: not known
   std::string message_;
   std::string note_;
   // This thread's own:
-  hal::Light kept_;        // to be shown when the ring is back
   bool away_ = false;      // when looked at last
   base::RtThread thread_;  // last: it uses all the others
 };

@@ -12,40 +12,44 @@
 
 namespace dtact::pipeline {
 
-/// Takes the network's orders, one at a time, has them done and answers them. Owns the calibration
-/// in use, which changes by order only. Capture thread only.
+/// Executes the commands from the network thread one at a time and reports their outcomes. Owns the
+/// calibration in use, which changes by command only. Capture thread only.
 class OrderDesk {
  public:
   OrderDesk(Exchange& exchange, Teller& teller, UntouchedImage& untouched, DepthMaker& depth)
       : exchange_(exchange), teller_(teller), untouched_(untouched), depth_(depth) {}
 
   /// The calibration to begin with; null: uncalibrated.
-  void begin(std::unique_ptr<ActiveCalibration> active) noexcept;
+  void begin(std::shared_ptr<ActiveCalibration> active) noexcept;
   void take(bool camera_away, const Stamp& now) noexcept;
-  /// The untouched image is another, whose last frame this was.
+  /// The reference is another, whose last frame this was.
   void reference_taken(std::uint64_t sequence) noexcept { reference_sequence_ = sequence; }
-  /// Answers the re-zero under way.
-  void answer(RezeroResult result) noexcept;
-  /// No frames come: the re-zero under way, if there is one, is given up.
+  /// Answers the re-zero in progress, if any.
+  void answer(Outcome outcome) noexcept;
+  /// No frames come: gives up the re-zero in progress, if any.
   void give_up_rezero() noexcept;
 
   /// What a frame is measured by; null: uncalibrated.
   [[nodiscard]] const ActiveCalibration* active() const noexcept { return active_.get(); }
+  /// UseCalibration::key of active().
+  [[nodiscard]] std::uint64_t key() const noexcept { return key_; }
 
  private:
-  void execute(const RezeroOrder& order, bool camera_away) noexcept;
-  void execute(CalibrationOrder& order, const Stamp& now) noexcept;
-  void execute(const ReferenceOrder& order) noexcept;
-  void use() noexcept;
+  // Each returns the outcome, or nothing while the command is in progress.
+  std::optional<Outcome> execute(const Rezero& command, bool camera_away) noexcept;
+  std::optional<Outcome> execute(UseCalibration& command) noexcept;
+  std::optional<Outcome> execute(SetReconstruction& command) noexcept;
+  std::optional<Outcome> execute(const CopyReference& command) noexcept;
   void use_maps() noexcept;
-  void answer(Outcome outcome, const char* sentence) noexcept;
 
   Exchange& exchange_;
   Teller& teller_;
   UntouchedImage& untouched_;
   DepthMaker& depth_;
-  std::unique_ptr<ActiveCalibration> active_;
-  std::optional<std::uint64_t> rezero_;  // ticket of the one under way
+  std::shared_ptr<ActiveCalibration> active_;
+  std::uint64_t key_ = 0;
+  std::uint64_t generation_ = 0;   // counts the changes of the maps
+  std::optional<Command> rezero_;  // in progress
   std::uint64_t reference_sequence_ = 0;
 };
 

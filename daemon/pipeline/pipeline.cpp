@@ -31,6 +31,30 @@ HealthSet health_of(std::uint32_t bits) noexcept {
   return set;
 }
 
+/// What happened, and the fix.
+const char* sentence(Outcome outcome) noexcept {
+  switch (outcome) {
+    case Outcome::refused_contact:
+      return "something touches: lift it and ask again, or force it";
+    case Outcome::refused_unsteady:
+      return "the image does not hold still: lift what touches and ask again, or force it";
+    case Outcome::refused_dark:
+      return "the image is too dark to be a reference: make the light brighter";
+    case Outcome::uncalibrated:
+      return "there is no calibration, so there is no reference: make one with dtact-calibrate "
+             "depth and send it with dtactctl calibration upload";
+    case Outcome::no_reference:
+      return "the reference is being taken: ask again when the state is serving";
+    case Outcome::camera_away:
+      return "the camera delivers no frames: see its condition in the status";
+    case Outcome::done:
+    case Outcome::device_error:  // The ring says what is wrong with it.
+    case Outcome::ring_away:
+      break;
+  }
+  return "";
+}
+
 std::size_t pixels(int width, int height) {
   return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
 }
@@ -53,9 +77,7 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
   if (calibration) {
     try {
       active = activate(calibration, info_, rules_);
-      active->generation = ++generations_;
-      exchange_.generation = generations_;
-      calibrations_.push_back({generations_, calibration, 0});
+      calibration_ = calibration;
     } catch (const std::invalid_argument& e) {
       const recon::RectifyTable& table = calibration->model->rectify;
       unusable = table.frame_width != info_.width || table.frame_height != info_.height;
@@ -64,7 +86,7 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
   }
   loop_ = std::make_unique<CaptureLoop>(CaptureParts{*camera_, light_, exchange_, clock_}, config_,
                                         std::move(active), unusable);
-  if (!calibrations_.empty()) {
+  if (calibration_) {
     try {
       loop_->untouched().restore(*calibration);
     } catch (const std::exception& e) {
@@ -118,125 +140,65 @@ void Pipeline::stop() noexcept {
 }
 
 std::optional<Event> Pipeline::next_event() {
-  free_retired();
   if (exchange_.camera_returned.exchange(false, std::memory_order_acquire)) compare_camera();
-  if (!own_events_.empty()) {
-    Event event = std::move(own_events_.front());
-    own_events_.pop_front();
-    return event;
-  }
   Event event;
-  if (light_.next_event(event)) return event;
-  Report report;
-  if (!exchange_.reports.pop(report)) return std::nullopt;
-  if (const auto* answer = std::get_if<Answer>(&report)) {
-    CommandDone done{answer->ticket, answer->outcome, answer->sentence, answer->at};
-    const auto copy = copies_.extract(answer->ticket);
-    if (copy && done.outcome == Outcome::done) done.reference = copy.mapped();
-    return done;
+  if (!light_.next_event(event) && !exchange_.events.pop(event)) return std::nullopt;
+  if (auto* done = std::get_if<CommandDone>(&event)) finish(*done);
+  return event;
+}
+
+void Pipeline::finish(CommandDone& done) {
+  if (done.message.empty()) done.message = sentence(done.outcome);
+  if (done.outcome != Outcome::done) return;
+  if (const auto* use = std::get_if<UseCalibration>(&done.command.what)) {
+    calibration_ = use->calibration;
+    restore_failure_.clear();  // of the calibration before
+    compare_camera();
   }
-  if (const auto* contact = std::get_if<ContactChanged>(&report)) return *contact;
-  if (const auto* reference = std::get_if<ReferenceTaken>(&report)) return *reference;
-  return std::get<StateChanged>(report);
+  if (const auto* how = std::get_if<SetReconstruction>(&done.command.what)) rules_ = how->rules;
 }
 
 bool Pipeline::submit(Command command) {
-  free_retired();
-  if (const auto* light = std::get_if<SetLight>(&command.what)) {
-    return light_.submit(command.ticket, light->light);
+  if (std::holds_alternative<SetLight>(command.what)) return light_.submit(std::move(command));
+  if (auto* to = std::get_if<CopyReference>(&command.what)) {
+    to->copy = std::make_shared<ReferenceCopy>();
+    to->copy->width = info_.width;
+    to->copy->height = info_.height;
+    to->copy->image_q8.resize(pixels(info_.width, info_.height));
   }
-  if (const auto* rezero = std::get_if<Rezero>(&command.what)) {
-    return exchange_.orders.push(RezeroOrder{command.ticket, rezero->force});
-  }
-  if (std::holds_alternative<CopyReference>(command.what)) return copy_reference(command.ticket);
-  if (const auto* how = std::get_if<SetReconstruction>(&command.what)) {
-    return reconstruct(command.ticket, how->rules);
-  }
-  return use(command.ticket, std::get<UseCalibration>(command.what));
+  return exchange_.commands.push(std::move(command));
 }
 
-bool Pipeline::copy_reference(std::uint64_t ticket) {
-  if (exchange_.orders.room() == 0) return false;
-  // Made and freed on this side; the capture thread only writes into it.
-  auto copy = std::make_shared<ReferenceCopy>();
-  copy->width = info_.width;
-  copy->height = info_.height;
-  copy->image_q8.resize(pixels(info_.width, info_.height));
-  (void)exchange_.orders.push(ReferenceOrder{ticket, copy.get()});  // room was made sure of
-  copies_.emplace(ticket, std::move(copy));
-  return true;
-}
-
-bool Pipeline::use(std::uint64_t ticket, const UseCalibration& command) {
-  if (exchange_.orders.room() == 0) return false;
-  try {
-    if (!command.calibration) throw std::invalid_argument("no calibration was given");
-    if (!order(ticket, {0, command.calibration, command.key}, rules_, false)) return false;
-    restore_failure_.clear();  // of the calibration before
-    return true;
-  } catch (const std::invalid_argument& e) {
-    return refuse(ticket, e.what());
-  }
-}
-
-bool Pipeline::reconstruct(std::uint64_t ticket, const ReconstructionRules& rules) {
-  if (exchange_.orders.room() == 0) return false;
-  if (calibrations_.empty()) {
-    rules_ = rules;
-    const Stamp now{exchange_.sequence.load(std::memory_order_relaxed), clock_.monotonic_ns(),
-                    clock_.wall_ns()};
-    own_events_.emplace_back(CommandDone{ticket, Outcome::done, "", now});
-    exchange_.wake.signal();
-    return true;
-  }
-  try {
-    const Known same = calibrations_.back();
-    if (!order(ticket, same, rules, true)) return false;
-    rules_ = rules;
-    return true;
-  } catch (const std::invalid_argument& e) {
-    return refuse(ticket, e.what());
-  }
-}
-
-bool Pipeline::order(std::uint64_t ticket, const Known& next, const ReconstructionRules& rules,
-                     bool same_image) {
+UseCalibration Pipeline::prepare(const std::shared_ptr<const calibration::Calibration>& calibration,
+                                 const ReconstructionRules& rules) const {
   // First: that it is for other frames says more than that it has no room.
-  auto active = activate(next.calibration, camera_->info(), rules);
-  const recon::RectifyTable& table = next.calibration->model->rectify;
+  std::shared_ptr<ActiveCalibration> active = activate(calibration, camera_->info(), rules);
+  const recon::RectifyTable& table = calibration->model->rectify;
   if (pixels(table.width, table.height) > depth_capacity_) {
     throw std::invalid_argument(
         fmt::format("a depth map of {}x{} pixels needs more memory than was taken at start: "
                     "restart dtactd with this calibration",
                     table.width, table.height));
   }
-  active->generation = ++generations_;
-  active->key = next.key;
-  calibrations_.push_back({generations_, next.calibration, next.key});
-  return exchange_.orders.push(CalibrationOrder{ticket, std::move(active), same_image});
+  return {.calibration = calibration, .prepared = std::move(active)};
 }
 
-bool Pipeline::refuse(std::uint64_t ticket, const char* sentence) {
-  own_events_.emplace_back(CommandDone{ticket, Outcome::invalid, sentence});
-  exchange_.wake.signal();
-  return true;
+SetReconstruction Pipeline::prepare_maps(
+    const std::shared_ptr<const calibration::Calibration>& in_use,
+    const ReconstructionRules& rules) const {
+  SetReconstruction command{.rules = rules};
+  if (in_use) {
+    command.prepared = std::make_shared<Resolutions>(
+        in_use->model, recon::CellLattice(in_use->model->rectify), rules);
+  }
+  return command;
 }
 
 // A camera may come up after the daemon, or as another one after a plug.
 void Pipeline::compare_camera() {
-  if (calibrations_.empty()) return;
-  exchange_.camera_mismatch.store(
-      camera_differs(*calibrations_.back().calibration, camera_->info()),
-      std::memory_order_relaxed);
-}
-
-void Pipeline::free_retired() {
-  std::unique_ptr<ActiveCalibration> old;
-  while (exchange_.retired.pop(old)) old.reset();
-  const std::uint64_t in_use = exchange_.generation.load(std::memory_order_acquire);
-  while (!calibrations_.empty() && calibrations_.front().generation < in_use) {
-    calibrations_.pop_front();
-  }
+  if (!calibration_) return;
+  exchange_.camera_mismatch.store(camera_differs(*calibration_, camera_->info()),
+                                  std::memory_order_relaxed);
 }
 
 void Pipeline::want(Wanted wanted) noexcept {
@@ -257,10 +219,8 @@ Status Pipeline::status() const {
   status.ring_message = light_.message();
   status.light = light_.light();
   status.light_since_ns = light_.light_since_ns();
-  const std::uint64_t in_use = exchange_.generation.load(std::memory_order_acquire);
-  for (const Known& known : calibrations_) {
-    if (known.generation == in_use) status.calibration = known.calibration;
-  }
+  status.light_requested = light_.requested();
+  status.calibration = calibration_;
   status.reconstruction = rules_;
   status.frames = exchange_.frames.load(std::memory_order_relaxed);
   status.skipped = exchange_.slot.replaced();

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -48,23 +46,17 @@ class Pipeline final : public Port {
   [[nodiscard]] bool submit(Command command) override;
   void want(Wanted wanted) noexcept override;
   [[nodiscard]] Status status() const override;
+  [[nodiscard]] UseCalibration prepare(
+      const std::shared_ptr<const calibration::Calibration>& calibration,
+      const ReconstructionRules& rules) const override;
+  [[nodiscard]] SetReconstruction prepare_maps(
+      const std::shared_ptr<const calibration::Calibration>& in_use,
+      const ReconstructionRules& rules) const override;
 
  private:
-  struct Known {
-    std::uint64_t generation = 0;
-    std::shared_ptr<const calibration::Calibration> calibration;
-    std::uint64_t key = 0;  ///< UseCalibration::key.
-  };
   [[nodiscard]] DepthFrame prototype(const calibration::Calibration* calibration) const;
-  [[nodiscard]] bool use(std::uint64_t ticket, const UseCalibration& command);
-  [[nodiscard]] bool reconstruct(std::uint64_t ticket, const ReconstructionRules& rules);
-  /// Has the capture thread measure by this from now on. Throws std::invalid_argument.
-  [[nodiscard]] bool order(std::uint64_t ticket, const Known& next,
-                           const ReconstructionRules& rules, bool same_image);
-  [[nodiscard]] bool refuse(std::uint64_t ticket, const char* sentence);
-  [[nodiscard]] bool copy_reference(std::uint64_t ticket);
+  void finish(CommandDone& done);
   void compare_camera();
-  void free_retired();
 
   PipelineConfig config_;
   base::Clock& clock_;
@@ -78,11 +70,8 @@ class Pipeline final : public Port {
   std::vector<std::string> realtime_;  // settings refused, one sentence each
   std::optional<int> cpu_;             // that the capture thread is pinned to
   // Network thread only.
-  ReconstructionRules rules_;  ///< As asked for last.
-  std::deque<Event> own_events_;
-  std::deque<Known> calibrations_;  // in use, and on their way to be
-  std::map<std::uint64_t, std::shared_ptr<ReferenceCopy>> copies_;  // being made, by ticket
-  std::uint64_t generations_ = 0;
+  ReconstructionRules rules_;
+  std::shared_ptr<const calibration::Calibration> calibration_;  // in use; null: none
   base::RtThread capture_;  // last: it uses all the others
 };
 

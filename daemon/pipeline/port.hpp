@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,27 +17,9 @@
 
 namespace dtact::pipeline {
 
-// Commands: what the network may ask of the pipeline. Each is answered by one CommandDone.
-struct SetLight {
-  hal::Light light = {};
-};
-struct Rezero {
-  bool force = false;  ///< Take the reference although something touches.
-};
-struct UseCalibration {
-  std::shared_ptr<const calibration::Calibration> calibration;
-  /// The caller's own name for it, in every frame measured by it. 0: the one at start.
-  std::uint64_t key = 0;
-};
-struct CopyReference {};
-/// How depth is made from now on; the untouched image stays.
-struct SetReconstruction {
-  ReconstructionRules rules;
-};
-struct Command {
-  std::uint64_t ticket = 0;  ///< Comes back in CommandDone.
-  std::variant<SetLight, Rezero, UseCalibration, CopyReference, SetReconstruction> what;
-};
+struct ActiveCalibration;
+class Resolutions;
+struct CommandDone;
 
 /// When something happened.
 struct Stamp {
@@ -55,25 +38,56 @@ struct ReferenceCopy {
   std::uint64_t calibration = 0;        ///< UseCalibration::key.
 };
 
-// Events: what the pipeline tells the network. Never lost: when the queue is full the pipeline
-// keeps its state and tells later.
+// Commands: what the network may ask of the pipeline.
+struct SetLight {
+  hal::Light light = {};
+};
+struct Rezero {
+  bool force = false;  ///< Take the reference although something touches.
+};
+/// Made by Port::prepare().
+struct UseCalibration {
+  std::shared_ptr<const calibration::Calibration> calibration;
+  /// The caller's own name for it, in every frame measured by it. 0: the one at start.
+  std::uint64_t key = 0;
+  std::shared_ptr<ActiveCalibration> prepared = {};  ///< When done: the one used before.
+};
+struct CopyReference {
+  std::shared_ptr<ReferenceCopy> copy = {};  ///< Port::submit() makes it; filled when done.
+};
+/// How depth is made from now on; the reference stays. Made by Port::prepare_maps().
+struct SetReconstruction {
+  ReconstructionRules rules;
+  std::shared_ptr<Resolutions> prepared = {};  ///< Null: uncalibrated. When done: those before.
+};
+/// The element of the command queues. It goes to the thread that executes it and comes back in one
+/// CommandDone, so that its memory is allocated and freed on the network's side only.
+struct Command {
+  std::variant<SetLight, Rezero, UseCalibration, CopyReference, SetReconstruction> what;
+  /// The caller's own continuation; whoever takes the CommandDone calls it. The pipeline may keep
+  /// the command longer than the caller lives: capture nothing that must not outlive the caller.
+  std::function<void(const CommandDone&)> then = {};
+};
+
+// Events: what the pipeline reports to the network. Never lost: when the queue is full the pipeline
+// keeps its state and reports later.
 enum class Outcome : std::uint8_t {
   done,
   refused_contact,
+  refused_unsteady,  ///< The image does not hold still long enough to be averaged.
+  refused_dark,      ///< The image is too dark to be a reference.
   device_error,
   camera_away,
   ring_away,  ///< The light is kept and shown once there is a ring.
-  invalid,
   uncalibrated,
-  no_reference  ///< The untouched image is being taken.
+  no_reference  ///< The reference is being taken.
 };
 struct CommandDone {
-  std::uint64_t ticket = 0;
+  Command command = {};
   Outcome outcome = Outcome::done;
-  std::string message = {};  ///< Empty when done; else what happened and what to do.
-  Stamp at = {};             ///< Of UseCalibration and SetReconstruction, when it was done.
-  std::optional<std::int64_t> light_since_ns = {};      ///< Of SetLight, as DepthFrame's.
-  std::shared_ptr<const ReferenceCopy> reference = {};  ///< Of CopyReference, when done.
+  std::string message = {};  ///< Empty when done; else what happened and the fix.
+  Stamp at = {};             ///< When a calibration or maps came into use.
+  std::optional<std::int64_t> light_since_ns = {};  ///< Of SetLight, as DepthFrame's.
 };
 /// What is touched, or not any more, by two measured frames: while nothing can be measured nothing
 /// is told, and what was touched before counts as held.
@@ -132,9 +146,11 @@ struct Status {
   hal::RingInfo ring;
   std::string ring_message;  ///< The ring's last error, or what to know; empty when well.
   hal::Light light = {};
-  std::optional<std::int64_t> light_since_ns;                   ///< As DepthFrame::light_since_ns.
+  std::optional<std::int64_t> light_since_ns;  ///< As DepthFrame::light_since_ns.
+  /// The light requested last, unless the ring failed to show it: what a partial update changes.
+  hal::Light light_requested = {};
   std::shared_ptr<const calibration::Calibration> calibration;  ///< Null when uncalibrated.
-  ReconstructionRules reconstruction;                           ///< As asked for last.
+  ReconstructionRules reconstruction;                           ///< In use.
   std::uint64_t frames = 0;                                     ///< Published since start.
   std::uint64_t skipped = 0;          ///< Published but replaced before the network fetched them.
   double fps = 0;                     ///< Over the last second.
@@ -163,8 +179,8 @@ struct Wanted {
   bool operator==(const Wanted&) const = default;
 };
 
-/// The one seam between the network thread (the only caller) and the pipeline's threads. No call
-/// blocks.
+/// The one seam between the network thread (the only caller, but for prepare() and prepare_maps())
+/// and the pipeline's threads. No other call blocks.
 class Port {
  public:
   Port() = default;
@@ -180,6 +196,16 @@ class Port {
   [[nodiscard]] virtual std::optional<Event> next_event() = 0;
   /// False: too many commands wait; ask again later.
   [[nodiscard]] virtual bool submit(Command command) = 0;
+  /// Makes all that a calibration needs at run time. Takes up to a second, so it is meant for a
+  /// worker thread; any thread. One change at a time: `rules` and the calibration in use must not
+  /// change before the command is done. Throws std::invalid_argument with the fix.
+  [[nodiscard]] virtual UseCalibration prepare(
+      const std::shared_ptr<const calibration::Calibration>& calibration,
+      const ReconstructionRules& rules) const = 0;
+  /// As prepare(), for the calibration in use, or null, by other rules: makes only the maps.
+  [[nodiscard]] virtual SetReconstruction prepare_maps(
+      const std::shared_ptr<const calibration::Calibration>& in_use,
+      const ReconstructionRules& rules) const = 0;
   virtual void want(Wanted wanted) noexcept = 0;
   [[nodiscard]] virtual Status status() const = 0;
 };

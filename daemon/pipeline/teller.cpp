@@ -1,6 +1,7 @@
 #include "daemon/pipeline/teller.hpp"
 
 #include <atomic>
+#include <utility>
 
 namespace dtact::pipeline {
 namespace {
@@ -9,8 +10,10 @@ constexpr std::int64_t kLastsNs = 1'000'000'000;
 
 }  // namespace
 
-bool Teller::push(const Report& report) noexcept {
-  if (!exchange_.reports.push(Report(report))) return false;
+/// Moves from `event` only when true.
+template <typename T>
+bool Teller::push(T&& event) noexcept {
+  if (!exchange_.events.push(std::forward<T>(event))) return false;
   exchange_.wake.signal();
   return true;
 }
@@ -34,7 +37,7 @@ void Teller::state(State state, HealthSet health, const Stamp& now) noexcept {
 }
 
 void Teller::flush() noexcept {
-  if (answer_ && push(*answer_)) answer_.reset();
+  if (answer_ && push(std::move(*answer_))) answer_.reset();
   if (reference_ && push(*reference_)) reference_.reset();
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "daemon/pipeline/exchange.hpp"
 
@@ -9,14 +10,14 @@ namespace dtact::pipeline {
 
 /// Tells the network what changed. What does not fit into the queue stays due and is told with a
 /// later frame, with that frame's numbers: a change that has been undone by then is not told.
-/// Answers to orders are all told. Capture thread only.
+/// Answers to commands are all told. Capture thread only.
 class Teller {
  public:
   explicit Teller(Exchange& exchange) : exchange_(exchange) {}
 
   /// Reference and answer: one of each may be due at a time.
   void reference(const ReferenceTaken& taken) noexcept { reference_ = taken; }
-  void answer(const Answer& answer) noexcept { answer_ = answer; }
+  void answer(CommandDone&& answer) noexcept { answer_ = std::move(answer); }
   [[nodiscard]] bool answer_due() const noexcept { return answer_.has_value(); }
 
   /// A frame that was not measured changes nothing: what touched before it counts as held.
@@ -28,14 +29,15 @@ class Teller {
   void flush() noexcept;
 
  private:
-  [[nodiscard]] bool push(const Report& report) noexcept;
+  template <typename T>
+  [[nodiscard]] bool push(T&& event) noexcept;
 
   Exchange& exchange_;
   bool touching_ = false;              // as told
   std::optional<StateChanged> state_;  // as told
   std::int64_t beyond_until_ns_ = INT64_MIN;
   std::optional<ReferenceTaken> reference_;
-  std::optional<Answer> answer_;
+  std::optional<CommandDone> answer_;
 };
 
 }  // namespace dtact::pipeline

@@ -1,11 +1,16 @@
 #include "hal/base/side_thread.hpp"
 
-#include <utility>
-
 namespace dtact::base {
 
-SideThread::SideThread(std::string name, std::function<void()> job)
-    : name_(std::move(name)), job_(std::move(job)) {}
+SideThread::Job::Job(SideThread& thread, std::function<void()> work)
+    : thread_(thread), work_(std::move(work)) {
+  thread_.jobs_.push_back(this);
+}
+
+void SideThread::Job::hand_over() noexcept {
+  busy_.store(true, std::memory_order_release);
+  thread_.work_.ring();
+}
 
 void SideThread::start() {
   stop_ = false;
@@ -18,20 +23,17 @@ void SideThread::stop() noexcept {
   thread_.join();
 }
 
-void SideThread::hand_over() noexcept {
-  busy_.store(true, std::memory_order_release);
-  work_.ring();
-}
-
 void SideThread::run() {
   for (;;) {
     work_.wait();
-    if (busy()) {
-      job_();
-      busy_.store(false, std::memory_order_release);
-      busy_.notify_all();
+    const bool last = stop_;  // what was handed over before stop() is seen below
+    for (Job* job : jobs_) {
+      if (!job->busy()) continue;
+      job->work_();
+      job->busy_.store(false, std::memory_order_release);
+      job->busy_.notify_all();
     }
-    if (stop_) return;
+    if (last) return;
   }
 }
 

@@ -23,29 +23,26 @@ Ring::Ring(RingParts parts, const Ws2812Config& config)
     throw std::invalid_argument(fmt::format("ring.ws2812.first_led = {}: allowed are 0 … {}",
                                             config_.first_led, kLedCount - 1));
   }
-  thread_ = base::RtThread({.name = "ring", .cpu = {}}, [this] { run(); });
-  std::unique_lock lock(mutex_);
-  written_.wait(lock, [this] { return looked_; });
+  look_for_ring();
 }
 
 Ring::~Ring() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-  }
-  wake_.notify_one();
-  thread_.join();
+  if (wire_ && !config_.leave_on) (void)write(Leds{});
   if (power_ && config_.leave_on) power_->leave_on();
 }
 
 ShowResult Ring::show(const Light& light) {
   const Dimmed dimmed = dim(light, dimming_);
-  std::unique_lock lock(mutex_);
   wanted_ = in_chain_order(dimmed.leds);
-  const std::uint64_t ticket = ++asked_;
-  wake_.notify_one();
-  written_.wait(lock, [&] { return done_ >= ticket; });
-  if (!outcome_.empty()) return {false, outcome_, dimmed.scale, report_.away};
+  if (!wire_ && std::chrono::steady_clock::now() >= next_look_) look_for_ring();
+  const std::string error = wire_ ? write(wanted_) : report_.message;
+  if (error.empty()) {
+    shown_ = wanted_;
+  } else {
+    // The command has failed, so that the light before it is still the one to show.
+    if (wire_ && shown_) wanted_ = *shown_;
+    return {false, error, dimmed.scale, report_.away};
+  }
   if (dimmed.scale >= 1) return {};
   return {true,
           fmt::format("dimmed to {:.0f} % of the light asked for, {:.0f} mA: "
@@ -54,29 +51,22 @@ ShowResult Ring::show(const Light& light) {
           dimmed.scale};
 }
 
-RingReport Ring::report() const {
-  const std::lock_guard lock(mutex_);
+RingReport Ring::attend() {
+  const Time now = std::chrono::steady_clock::now();
+  if (!wire_ && now >= next_look_) {
+    look_for_ring();
+  } else if (wire_ && now >= next_send_) {
+    (void)write(wanted_);
+  }
+  report_.due = RingReport{}.due;
+  if (wire_ && next_send_ != Time::max()) {
+    report_.due = std::clamp<std::chrono::nanoseconds>(
+        next_send_ - std::chrono::steady_clock::now(), {}, report_.due);
+  }
   return report_;
 }
 
-void Ring::run() {
-  std::unique_lock lock(mutex_);
-  while (true) {
-    if (!wire_ && std::chrono::steady_clock::now() >= next_look_) look_for_ring(lock);
-    wait(lock);
-    const bool asked = asked_ != done_;
-    if (!asked && stop_) break;
-    if (wire_) {
-      write(lock, Leds(wanted_));  // else than what was asked for: the timer's re-send
-    } else if (asked) {
-      answer(asked_, report_.message);
-    }
-  }
-  if (wire_ && !config_.leave_on) write(lock, Leds{});
-}
-
-void Ring::look_for_ring(std::unique_lock<std::mutex>& lock) {
-  lock.unlock();
+void Ring::look_for_ring() {
   std::unique_ptr<Wire> wire;
   std::string refused;
   try {
@@ -86,19 +76,13 @@ void Ring::look_for_ring(std::unique_lock<std::mutex>& lock) {
   } catch (const std::exception& e) {
     refused = e.what();
   }
-  lock.lock();
-  if (refused.empty()) {
-    wire_ = std::move(wire);
-    pause_ = {};
-    report_.ok = true;
-    report_.away = false;
-    report_.message.clear();
-    report_.note = wire_->note();
-  } else {
-    be_away(refused);
-  }
-  looked_ = true;
-  written_.notify_all();
+  if (!refused.empty()) return be_away(refused);
+  wire_ = std::move(wire);
+  pause_ = {};
+  report_.ok = true;
+  report_.away = false;
+  report_.message.clear();
+  report_.note = wire_->note();
 }
 
 void Ring::be_away(const std::string& why) {
@@ -110,42 +94,18 @@ void Ring::be_away(const std::string& why) {
   next_look_ = std::chrono::steady_clock::now() + pause_;
 }
 
-void Ring::wait(std::unique_lock<std::mutex>& lock) {
-  const auto woken = [this] { return stop_ || asked_ != done_; };
-  if (!wire_) {
-    (void)wake_.wait_until(lock, next_look_, woken);
-  } else if (config_.resend_ms > 0 && asked_ > 0) {
-    (void)wake_.wait_for(lock, std::chrono::milliseconds(config_.resend_ms), woken);
-  } else {
-    wake_.wait(lock, woken);  // before the first show() there is nothing to repeat
-  }
-}
-
-void Ring::write(std::unique_lock<std::mutex>& lock, const Leds& leds) {
-  const std::uint64_t ticket = asked_;
-  lock.unlock();
+std::string Ring::write(const Leds& leds) {
   const std::string error = wire_->send(leds);
-  lock.lock();
+  if (config_.resend_ms > 0) {
+    next_send_ = std::chrono::steady_clock::now() + std::chrono::milliseconds(config_.resend_ms);
+  }
   ++report_.writes;
   report_.failures += error.empty() ? 0U : 1U;
   report_.ok = error.empty();
   report_.message = error;
   report_.note = wire_->note();
-  if (done_ != ticket) {  // else a re-send, which is nobody's command
-    if (report_.ok) shown_ = leds;
-    // The command has failed, so that the light before it is still the one to show.
-    if (!report_.ok && shown_ && asked_ == ticket) wanted_ = *shown_;
-  }
   if (!report_.ok && wire_->lost()) be_away(error);
-  answer(ticket, error);
-}
-
-void Ring::answer(std::uint64_t ticket, const std::string& error) {
-  if (done_ != ticket) {
-    outcome_ = error;
-    done_ = ticket;
-  }
-  written_.notify_all();
+  return error;
 }
 
 Ring::Leds Ring::in_chain_order(const Leds& leds) const {

@@ -2,15 +2,11 @@
 
 #include <array>
 #include <chrono>
-#include <condition_variable>
-#include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 
-#include "hal/base/rt_thread.hpp"
 #include "hal/config.hpp"
 #include "hal/gpiod/power_switch.hpp"
 #include "hal/light_ring.hpp"
@@ -28,10 +24,9 @@ struct RingParts {
   std::function<std::unique_ptr<gpiod::PowerSwitch>()> switch_on;
 };
 
-/// A ring of WS2812B. One thread of its own does every write: what show() asks for, which waits
-/// for the outcome, and the re-sends, by which an LED that caught a glitch finds back to its
-/// colour. What is sent again is the last light that show() brought to the LEDs; when none has got
-/// there yet, the one asked for last. A re-send that fails shows in report().
+/// A ring of WS2812B. attend() sends the light again every `resend_ms`, by which an LED that caught
+/// a glitch gets back to its colour: the last light that show() brought to the LEDs or, before the
+/// first, the one requested last.
 ///
 /// A ring that is absent, busy, forbidden or refused by its own wire is away: show() says so at
 /// once, and the ring is looked for, first after a quarter of a second, then ever more rarely down
@@ -39,50 +34,35 @@ struct RingParts {
 /// on.
 class Ring final : public LightRing {
  public:
-  /// Waits until the ring has been looked for once. Throws std::invalid_argument for settings that
-  /// make no sense.
+  /// Looks for the ring once. Throws std::invalid_argument for settings that make no sense.
   Ring(RingParts parts, const Ws2812Config& config);
   ~Ring() override;
 
   [[nodiscard]] RingInfo info() const override { return parts_.info; }
   [[nodiscard]] ShowResult show(const Light& light) override;
-  [[nodiscard]] RingReport report() const override;
+  [[nodiscard]] RingReport attend() override;
 
  private:
   using Leds = std::array<Rgb, kLedCount>;
-
   using Time = std::chrono::steady_clock::time_point;
 
-  void run();
-  // The thread's steps. Each is called and returns with the lock held.
-  void look_for_ring(std::unique_lock<std::mutex>& lock);
-  void wait(std::unique_lock<std::mutex>& lock);
-  void write(std::unique_lock<std::mutex>& lock, const Leds& leds);
-  void answer(std::uint64_t ticket, const std::string& error);
+  void look_for_ring();
+  /// Empty, or what failed.
+  std::string write(const Leds& leds);
   void be_away(const std::string& why);
   [[nodiscard]] Leds in_chain_order(const Leds& leds) const;
 
   RingParts parts_;
   Ws2812Config config_;
   DimmingSettings dimming_;
-  // The thread's alone once it runs:
   std::unique_ptr<gpiod::PowerSwitch> power_;
   std::unique_ptr<Wire> wire_;  // null: the ring is away
   std::chrono::milliseconds pause_{};
   Time next_look_;
-
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;     // for the thread: a new light, or stop
-  std::condition_variable written_;  // for callers: a write is through
-  // Guarded by mutex_:
-  Leds wanted_{};              // in chain order
-  std::optional<Leds> shown_;  // the last that got there
-  std::uint64_t asked_ = 0, done_ = 0;
-  std::string outcome_;  // of the last light that was asked for
-  bool looked_ = false, stop_ = false;
+  Time next_send_ = Time::max();  // before the first show() there is nothing to repeat
+  Leds wanted_{};                 // in chain order
+  std::optional<Leds> shown_;     // the last that got there
   RingReport report_;
-
-  base::RtThread thread_;  // last: it uses all of the above
 };
 
 /// The rings that the registry offers. A device that is not there is looked for; what throws is a

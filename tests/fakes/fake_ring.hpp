@@ -44,7 +44,7 @@ class FakeRing final : public hal::LightRing {
     if (handle_.on_show) handle_.on_show(light);
     return {};
   }
-  [[nodiscard]] hal::RingReport report() const override {
+  [[nodiscard]] hal::RingReport attend() override {
     const std::scoped_lock lock(handle_.mutex);
     if (handle_.away) return {.ok = false, .away = true, .message = kAway, .note = {}};
     return handle_.report;

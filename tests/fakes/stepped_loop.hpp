@@ -40,17 +40,23 @@ class SteppedLoop {
   }
   [[nodiscard]] std::unique_ptr<pipeline::ActiveCalibration> activated(
       const std::shared_ptr<const calibration::Calibration>& calibration) {
-    auto active = pipeline::activate(calibration, camera.info(), config.reconstruction);
-    active->generation = ++generations;
-    return active;
+    return pipeline::activate(calibration, camera.info(), config.reconstruction);
+  }
+  /// For the next turn; false: the queue is full.
+  [[nodiscard]] bool submit(decltype(pipeline::Command::what) what) {
+    return exchange.commands.push(pipeline::Command{std::move(what)});
+  }
+  [[nodiscard]] bool use(const std::shared_ptr<const calibration::Calibration>& calibration,
+                         std::uint64_t key = 0) {
+    return submit(pipeline::UseCalibration{calibration, key, activated(calibration)});
   }
 
   /// One turn of the loop; true if it published a frame.
   bool step() {
     loop->untouched().settle();  // what it finds would else come a frame sooner or later
     loop->step();
-    pipeline::Report report;
-    while (exchange.reports.pop(report)) reports.push_back(report);
+    pipeline::Event event;
+    while (exchange.events.pop(event)) events.push_back(event);
     const pipeline::DepthFrame* const fetched = exchange.slot.fetch();
     if (fetched != nullptr) frame = fetched;
     return fetched != nullptr;
@@ -79,8 +85,8 @@ class SteppedLoop {
   template <typename T>
   [[nodiscard]] std::vector<T> all() const {
     std::vector<T> found;
-    for (const pipeline::Report& report : reports) {
-      if (const auto* one = std::get_if<T>(&report)) found.push_back(*one);
+    for (const pipeline::Event& event : events) {
+      if (const auto* one = std::get_if<T>(&event)) found.push_back(*one);
     }
     return found;
   }
@@ -134,8 +140,7 @@ class SteppedLoop {
   std::optional<pipeline::LightDriver> light;
   std::optional<pipeline::CaptureLoop> loop;
   const pipeline::DepthFrame* frame = nullptr;  ///< The newest.
-  std::vector<pipeline::Report> reports;
-  std::uint64_t generations = 0;
+  std::vector<pipeline::Event> events;
 
  private:
   static pipeline::DepthFrame prototype() {

@@ -9,8 +9,8 @@
 
 namespace dtact::pipeline {
 
-PlaceWatch::PlaceWatch(int width, int height, int frames)
-    : width_(width), average_(width, height, frames), thread_("dtact-place", [this] { judge(); }) {
+PlaceWatch::PlaceWatch(int width, int height, int frames, base::SideThread& thread)
+    : width_(width), average_(width, height, frames), compare_(thread, [this] { judge(); }) {
   job_.image_q8.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
 }
 
@@ -26,7 +26,7 @@ void PlaceWatch::hurry() noexcept {
 }
 
 void PlaceWatch::look(const hal::LumaView& luma, bool untouched, std::int64_t now_ns) noexcept {
-  if (!then_ || now_ns < due_ns_ || thread_.busy()) return;
+  if (!then_ || now_ns < due_ns_ || compare_.busy()) return;
   if (!untouched) {
     if (average_.added() > 0) average_.reset();
     return;
@@ -37,7 +37,7 @@ void PlaceWatch::look(const hal::LumaView& luma, bool untouched, std::int64_t no
   job_.then = then_;
   job_.epoch = epoch_;
   due_ns_ = now_ns + kPauseNs;
-  thread_.hand_over();
+  compare_.hand_over();
 }
 
 std::string PlaceWatch::message() const {

@@ -16,15 +16,12 @@ namespace dtact::pipeline {
 
 /// Tells when the camera has moved against the layer since calibration, by the layer's marks
 /// (layer_marks.hpp): then depth is right and lies in the wrong place. Averages untouched frames on
-/// the capture thread, once after a new reference and then every kPauseNs, and compares on a thread
-/// of its own, which takes a tenth of a second.
+/// the capture thread, once after a new reference and then every kPauseNs, and compares on the side
+/// thread, which takes a tenth of a second.
 class PlaceWatch {
  public:
   /// `frames`: so many are averaged, as for a reference.
-  PlaceWatch(int width, int height, int frames);
-
-  void start() { thread_.start(); }
-  void stop() noexcept { thread_.stop(); }
+  PlaceWatch(int width, int height, int frames, base::SideThread& thread);
 
   // On the capture thread; neither waits nor allocates.
 
@@ -43,7 +40,7 @@ class PlaceWatch {
   /// How far the marks have moved; empty before anything was found to have moved.
   [[nodiscard]] std::string message() const;
   /// Waits until what was averaged so far has been judged.
-  void settle() const noexcept { thread_.settle(); }
+  void settle() const noexcept { compare_.settle(); }
 
   static constexpr std::int64_t kPauseNs = 20'000'000'000;
 
@@ -62,11 +59,11 @@ class PlaceWatch {
     std::uint64_t epoch = 0;
     std::vector<std::uint16_t> image_q8;
   };
-  Job job_;                              // the thread's while it is busy, else look()'s
+  Job job_;                              // the side thread's while it is busy, else look()'s
   std::atomic<std::uint64_t> moved_{0};  // epoch in which the camera was last found to have moved
   mutable std::mutex mutex_;             // of message_; never taken on the capture thread
   std::string message_;
-  base::SideThread thread_;  // last: it uses the others
+  base::SideThread::Job compare_;  // last: it uses the others
 };
 
 }  // namespace dtact::pipeline

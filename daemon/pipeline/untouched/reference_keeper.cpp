@@ -112,8 +112,8 @@ void ReferenceKeeper::light_changed(bool touching, bool same_shape) noexcept {
   settle_.reset();
 }
 
-std::optional<RezeroResult> ReferenceKeeper::rezero(bool force, bool touching) noexcept {
-  if (!force && touching && ready() && footing_ != Footing::stale) return RezeroResult::touched;
+std::optional<Outcome> ReferenceKeeper::rezero(bool force, bool touching) noexcept {
+  if (!force && touching && ready() && footing_ != Footing::stale) return Outcome::refused_contact;
   request_ = Request{force};
   averaging_ = false;
   return std::nullopt;
@@ -163,7 +163,7 @@ KeeperStep ReferenceKeeper::settle(const hal::LumaView& luma) noexcept {
     waited_ = 0;
     dark_frames_ = std::min(dark_frames_ + 1, rules_.settle_frames);
     if (!std::exchange(request_, std::nullopt)) return {};
-    return {.reference_changed = false, .answer = RezeroResult::dark};
+    return {.reference_changed = false, .answer = Outcome::refused_dark};
   }
   dark_frames_ = 0;
   if (settle_.add(now_.mean) || ++waited_ > rules_.patience_frames) {
@@ -175,16 +175,16 @@ KeeperStep ReferenceKeeper::settle(const hal::LumaView& luma) noexcept {
 
 KeeperStep ReferenceKeeper::gather(const hal::LumaView& luma) noexcept {
   measure(luma, now_);
-  if (++waited_ > rules_.patience_frames) return decide(RezeroResult::unsteady);
+  if (++waited_ > rules_.patience_frames) return decide(Outcome::refused_unsteady);
   if (average_.added() > 0 && greatest_change(first_, now_, region_) > kStillGrey) average_.reset();
   if (average_.added() == 0) first_ = now_;
   if (!average_.add(luma)) return {};
   average_.write(candidate_);
   measure(candidate_, width_, height_, candidate_grid_);
-  if (candidate_grid_.mean < kUnlitGrey) return decide(RezeroResult::dark);
+  if (candidate_grid_.mean < kUnlitGrey) return decide(Outcome::refused_dark);
   if (request_ && request_->force) return take();
   now_ = candidate_grid_;
-  return touched(candidate_grid_) ? decide(RezeroResult::touched) : take();
+  return touched(candidate_grid_) ? decide(Outcome::refused_contact) : take();
 }
 
 void ReferenceKeeper::watch(const hal::LumaView& luma) noexcept {
@@ -211,15 +211,15 @@ KeeperStep ReferenceKeeper::take() noexcept {
   averaging_ = false;
   untouched_before_ = false;
   KeeperStep step{.reference_changed = true, .answer = std::nullopt};
-  if (std::exchange(request_, std::nullopt)) step.answer = RezeroResult::taken;
+  if (std::exchange(request_, std::nullopt)) step.answer = Outcome::done;
   return step;
 }
 
-KeeperStep ReferenceKeeper::decide(RezeroResult obstacle) noexcept {
+KeeperStep ReferenceKeeper::decide(Outcome obstacle) noexcept {
   KeeperStep step;
   averaging_ = false;
   if (phase_ != Phase::holding) {
-    if (obstacle == RezeroResult::dark) {
+    if (obstacle == Outcome::refused_dark) {
       phase_ = Phase::settling;
       settle_.reset();
       waited_ = 0;

@@ -9,6 +9,7 @@
 
 #include "daemon/pipeline/health.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/pipeline/port.hpp"
 #include "daemon/pipeline/untouched/luma_grid.hpp"
 #include "daemon/pipeline/untouched/reference_average.hpp"
 #include "daemon/pipeline/untouched/touch_check.hpp"
@@ -42,11 +43,9 @@ enum class Footing : std::uint8_t {
   stale      ///< Something touches: an older one brought to the present light as well as it goes.
 };
 
-enum class RezeroResult : std::uint8_t { taken, touched, unsteady, dark };
-
 struct KeeperStep {
-  bool reference_changed = false;      ///< reference() is another from now on.
-  std::optional<RezeroResult> answer;  ///< To the re-zero that was asked for.
+  bool reference_changed = false;  ///< reference() is another from now on.
+  std::optional<Outcome> answer;   ///< To the re-zero that was asked for.
 };
 
 /// Decides when the untouched image may be taken and what stands in until then. The sequence: wait
@@ -65,8 +64,6 @@ class ReferenceKeeper {
   /// begins again.
   void use_calibration(std::span<const std::uint16_t> reference_q8, const LumaGrid& grid,
                        const CellRegion& region, bool same_light) noexcept;
-  /// The calibration's grid, as it was given, lies at another place.
-  void grid_lies_at(const LumaGrid& grid) noexcept { calibration_.grid = &grid; }
   /// The camera has (re)started: begins the sequence.
   void begin() noexcept;
   /// The light is about to change or has just changed: no depth until the next reference.
@@ -74,7 +71,7 @@ class ReferenceKeeper {
   void light_changed(bool touching, bool same_shape) noexcept;
   /// Asks for the present image as reference. An answer means that it is refused at once, else it
   /// comes out of step().
-  [[nodiscard]] std::optional<RezeroResult> rezero(bool force, bool touching) noexcept;
+  [[nodiscard]] std::optional<Outcome> rezero(bool force, bool touching) noexcept;
   void cancel_rezero() noexcept {
     request_.reset();
     if (phase_ == Phase::holding) averaging_ = false;
@@ -115,7 +112,7 @@ class ReferenceKeeper {
   KeeperStep settle(const hal::LumaView& luma) noexcept;
   KeeperStep gather(const hal::LumaView& luma) noexcept;
   void watch(const hal::LumaView& luma) noexcept;
-  KeeperStep decide(RezeroResult obstacle) noexcept;
+  KeeperStep decide(Outcome obstacle) noexcept;
   KeeperStep take() noexcept;
   KeeperStep stand_in() noexcept;
   [[nodiscard]] bool touched(const LumaGrid& now) noexcept;

@@ -8,8 +8,9 @@
 
 namespace dtact::pipeline {
 
-ReferenceWriter::ReferenceWriter(int width, int height, std::filesystem::path folder)
-    : folder_(std::move(folder)), thread_("dtact-store", [this] { write(); }) {
+ReferenceWriter::ReferenceWriter(int width, int height, std::filesystem::path folder,
+                                 base::SideThread& thread)
+    : folder_(std::move(folder)), write_(thread, [this] { write(); }) {
   pending_.width = width;
   pending_.height = height;
   pending_.image_q8.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -18,11 +19,11 @@ ReferenceWriter::ReferenceWriter(int width, int height, std::filesystem::path fo
 bool ReferenceWriter::offer(std::span<const std::uint16_t> reference_q8, const hal::Light& light,
                             std::shared_ptr<const calibration::Calibration> calibration) noexcept {
   if (folder_.empty()) return true;
-  if (thread_.busy()) return false;
+  if (write_.busy()) return false;
   std::ranges::copy(reference_q8, pending_.image_q8.begin());
   pending_.light = light;
   calibration_ = std::move(calibration);
-  thread_.hand_over();
+  write_.hand_over();
   return true;
 }
 

@@ -12,16 +12,12 @@
 
 namespace dtact::pipeline {
 
-/// Writes references to the state folder on a thread of its own, since a disk may take seconds. It
+/// Writes references to the state folder on the side thread, since a disk may take seconds. It
 /// has room for one; while that is being written offer() refuses and the caller offers again.
 class ReferenceWriter {
  public:
   /// An empty folder keeps nothing.
-  ReferenceWriter(int width, int height, std::filesystem::path folder);
-
-  void start() { thread_.start(); }
-  /// Ends the thread after what it has been offered is written.
-  void stop() noexcept { thread_.stop(); }
+  ReferenceWriter(int width, int height, std::filesystem::path folder, base::SideThread& thread);
 
   /// Capture thread: copies the reference (Q8, frame sized) for writing. False while busy. Neither
   /// waits nor allocates.
@@ -39,13 +35,13 @@ class ReferenceWriter {
   void write();
 
   std::filesystem::path folder_;
-  // The thread's while it is busy, else offer()'s.
+  // The side thread's while it is busy, else offer()'s.
   StoredReference pending_;
   std::shared_ptr<const calibration::Calibration> calibration_;
   mutable std::mutex mutex_;  // of message_; never taken on the capture thread
   std::string message_;
   std::atomic<bool> has_written_{false};
-  base::SideThread thread_;  // last: it uses the others
+  base::SideThread::Job write_;  // last: it uses the others
 };
 
 }  // namespace dtact::pipeline

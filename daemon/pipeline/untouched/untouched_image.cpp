@@ -18,21 +18,11 @@ UntouchedImage::UntouchedImage(int width, int height, const hal::Light& light,
     : width_(width),
       height_(height),
       folder_(config.state_folder),
-      writer_(width, height, folder_),
-      place_(width, height, config.reference.frames),
+      writer_(width, height, folder_, side_),
+      place_(width, height, config.reference.frames, side_),
       keeper_(width, height, config.reference),
       follower_(config.drift),
       shown_(light) {}
-
-void UntouchedImage::start() {
-  writer_.start();
-  place_.start();
-}
-
-void UntouchedImage::stop() noexcept {
-  writer_.stop();
-  place_.stop();
-}
 
 void UntouchedImage::restore(const calibration::Calibration& calibration) {
   if (folder_.empty()) return;

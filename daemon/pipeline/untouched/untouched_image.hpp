@@ -32,7 +32,7 @@ struct Look {
   bool measurable = false;     ///< Depth can be measured in this frame, against reference().
   bool new_reference = false;  ///< reference() is another from this frame on, and light() is 1.
   bool new_light = false;      ///< light() is another from this frame on.
-  std::optional<RezeroResult> rezeroed;  ///< The answer to the re-zero that was asked for.
+  std::optional<Outcome> rezeroed;  ///< The answer to the re-zero that was asked for.
 };
 
 /// How far the reference can be trusted.
@@ -55,10 +55,10 @@ class UntouchedImage {
 
   // Not on the capture thread.
 
-  /// Its threads run: one writes good references to the state folder, one compares places.
-  void start();
-  /// Ends them after what they have been given is done.
-  void stop() noexcept;
+  /// Its thread runs: it writes good references to the state folder and compares places.
+  void start() { side_.start(); }
+  /// Ends it after what it has been given is done.
+  void stop() noexcept { side_.stop(); }
   /// Waits until all that was given to the comparison of places has been judged. Any thread.
   void settle() const noexcept { place_.settle(); }
   /// How far the camera has moved since calibration; empty: not. Any thread.
@@ -77,18 +77,13 @@ class UntouchedImage {
   void restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light);
   /// From now on this calibration; null: none. A fresh reference stays.
   void use(CalibratedImage* image) noexcept;
-  /// The image in use has moved to another place.
-  void lies_at(CalibratedImage* image) noexcept {
-    image_ = image;
-    keeper_.grid_lies_at(image->grid);
-  }
   /// The camera has begun anew: what was known of its image is in doubt.
   void camera_began() noexcept;
   /// The ring is about to show this, or shows it since just now.
   void light_changes(const hal::Light& light) noexcept;
   /// Asks for the present image as reference. An answer means that it is refused at once, else it
   /// comes with a look. Only while there is a calibration.
-  [[nodiscard]] std::optional<RezeroResult> rezero(bool force) noexcept {
+  [[nodiscard]] std::optional<Outcome> rezero(bool force) noexcept {
     return keeper_.rezero(force, touched_);
   }
   void cancel_rezero() noexcept { keeper_.cancel_rezero(); }
@@ -133,6 +128,7 @@ class UntouchedImage {
   int width_;
   int height_;
   const std::filesystem::path folder_;
+  base::SideThread side_{"dtact-side"};  // before its jobs
   ReferenceWriter writer_;
   PlaceWatch place_;
   CalibratedImage* image_ = nullptr;

@@ -176,11 +176,11 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
       judge_.take(next_ - 1, frame,
                   frame != nullptr ? frame->health.bits() : exchange_->health.load());
     }
-    pipeline::Report report;
-    while (exchange_->reports.pop(report)) {
+    pipeline::Event event;
+    while (exchange_->events.pop(event)) {
     }
     if (script_.rezero == next_) {
-      (void)exchange_->orders.push(pipeline::RezeroOrder{1, script_.force});
+      (void)exchange_->commands.push(pipeline::Command{pipeline::Rezero{script_.force}});
     }
   }
 

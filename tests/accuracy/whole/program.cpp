@@ -213,8 +213,8 @@ Program::~Program() { impl_->loop.untouched().stop(); }
 std::string Program::next() {
   impl_->loop.untouched().settle();  // what it finds would else come a frame sooner or later
   impl_->loop.step();
-  pipeline::Report report;
-  while (impl_->exchange.reports.pop(report)) {
+  pipeline::Event event;
+  while (impl_->exchange.events.pop(event)) {
   }
   const pipeline::DepthFrame* const fresh = impl_->exchange.slot.fetch();
   if (fresh == nullptr) throw std::runtime_error("the capture loop published no frame");

@@ -162,7 +162,7 @@ TEST(Rezero, IsRefusedUnlessForced) {
     port.answer([](const pipeline::Command& command) {
       const bool force = std::get<pipeline::Rezero>(command.what).force;
       return pipeline::CommandDone{
-          command.ticket, force ? pipeline::Outcome::done : pipeline::Outcome::refused_contact,
+          command, force ? pipeline::Outcome::done : pipeline::Outcome::refused_contact,
           force ? "" : "something touches"};
     });
   });

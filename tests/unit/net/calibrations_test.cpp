@@ -74,11 +74,7 @@ std::uint64_t in_use(RawClient& client) {
   return 999;
 }
 
-void refuse_as_invalid(FakePort& port) {
-  port.answer([](const pipeline::Command& command) {
-    return CommandDone{command.ticket, Outcome::invalid, "the camera gives 640x480"};
-  });
-}
+void refuse_as_invalid(FakePort& port) { port.set_unfit("the camera gives 640x480"); }
 
 TEST(Upload, IsCheckedUsedKeptAndTold) {
   Rig rig({}, answer_done);
@@ -287,8 +283,30 @@ TEST(ActivateCalibration, WaitsForAnotherChange) {
   ASSERT_TRUE(command.has_value());
   EXPECT_EQ(client.request(activate(0)).error().code(), v1::ERROR_BUSY);
   EXPECT_EQ(client.request(upload("other", "good")).error().code(), v1::ERROR_BUSY);
-  rig.port.emit(CommandDone{command->ticket, Outcome::done, ""});
+  rig.port.emit(CommandDone{*command, Outcome::done, ""});
   EXPECT_EQ(client.reply().id(), 50U);
+}
+
+// Preparing takes up to a second: were it done on the network thread, all streams would stop.
+TEST(ActivateCalibration, OthersAreServedWhileItIsPrepared) {
+  Rig rig({}, answer_done);
+  rig.port.set_slow(true);
+  RawClient client(rig.tcp_port());
+  client.hello();
+  auto message = activate(0);
+  message.set_id(50);
+  client.send(message);
+  RawClient other(rig.tcp_port());
+  other.hello();
+  v1::ClientMessage ping;
+  ping.mutable_ping();
+  EXPECT_TRUE(other.request(ping).has_pong());
+  v1::ClientMessage quarter;
+  quarter.mutable_set_reconstruction()->set_resolution("quarter");
+  EXPECT_EQ(other.request(quarter).error().code(), v1::ERROR_BUSY);
+  rig.port.set_slow(false);
+  EXPECT_EQ(client.reply().id(), 50U);
+  EXPECT_EQ(other.event().calibration().name(), "factory");
 }
 
 TEST(ActivateCalibration, IsRefusedAsBusyWhenThePipelineIsFull) {

@@ -171,9 +171,9 @@ TEST(ClientLibrary, CommandsAndRefusals) {
   Rig rig({}, [](FakePort& port) {
     port.answer([](const pipeline::Command& command) {
       if (std::holds_alternative<pipeline::Rezero>(command.what)) {
-        return pipeline::CommandDone{command.ticket, pipeline::Outcome::refused_contact, "free it"};
+        return pipeline::CommandDone{command, pipeline::Outcome::refused_contact, "free it"};
       }
-      return pipeline::CommandDone{command.ticket, pipeline::Outcome::done, ""};
+      return pipeline::CommandDone{command, pipeline::Outcome::done, ""};
     });
   });
   Client client(options(rig));
@@ -303,7 +303,7 @@ TEST(ClientLibrary, ALateAnswerIsNoneToTheNextRequest) {
   EXPECT_THROW(client.rezero(), client::TimeoutError);
   const auto command = rig.port.wait_command(0);
   ASSERT_TRUE(command.has_value());
-  rig.port.emit(pipeline::CommandDone{command->ticket, pipeline::Outcome::done, ""});
+  rig.port.emit(pipeline::CommandDone{*command, pipeline::Outcome::done, ""});
   EXPECT_EQ(client.status().version(), "9.8.7");
 }
 
@@ -316,8 +316,8 @@ TEST(ClientLibrary, WaitsLongerForCalibrationsThanForTheRest) {
   std::thread pipeline([&rig] {
     const auto command = rig.port.wait_command(0);
     std::this_thread::sleep_for(std::chrono::milliseconds(1500));
-    rig.port.emit(pipeline::CommandDone{command.value_or(pipeline::Command{}).ticket,
-                                        pipeline::Outcome::done, ""});
+    rig.port.emit(
+        pipeline::CommandDone{command.value_or(pipeline::Command{}), pipeline::Outcome::done, ""});
   });
   EXPECT_NO_THROW(client.activate_calibration(1));
   pipeline.join();

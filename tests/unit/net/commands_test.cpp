@@ -68,9 +68,7 @@ TEST(GetReference, SendsTheImageAsPng) {
       copy->image_q8 = {0, 1, 256, 25600, 65280, 65535};
       copy->light.brightness = 128;
       copy->sequence = 41;
-      CommandDone done{command.ticket, Outcome::done, ""};
-      done.reference = std::move(copy);
-      return done;
+      return CommandDone{{pipeline::CopyReference{std::move(copy)}, command.then}};
     });
   });
   RawClient client(rig.tcp_port());
@@ -92,7 +90,7 @@ TEST(GetReference, SaysWhyThereIsNone) {
   Outcome outcome = Outcome::uncalibrated;
   Rig rig({}, [&outcome](FakePort& port) {
     port.answer([&outcome](const pipeline::Command& command) {
-      return CommandDone{command.ticket, outcome, "ask again"};
+      return CommandDone{command, outcome, "ask again"};
     });
   });
   RawClient client(rig.tcp_port());
@@ -140,9 +138,9 @@ TEST(Rezero, IsRefusedUnderContactUnlessForced) {
   Rig rig({}, [](FakePort& port) {
     port.answer([](const pipeline::Command& command) {
       if (std::get<pipeline::Rezero>(command.what).force) {
-        return CommandDone{command.ticket, Outcome::done, ""};
+        return CommandDone{command, Outcome::done, ""};
       }
-      return CommandDone{command.ticket, Outcome::refused_contact, "something touches: free it"};
+      return CommandDone{command, Outcome::refused_contact, "something touches: free it"};
     });
   });
   RawClient client(rig.tcp_port());
@@ -173,8 +171,7 @@ TEST(Commands, OutliveTheClientThatSentThem) {
   ASSERT_TRUE(command.has_value());
   client.reset();
   ASSERT_TRUE(rig.wait_log("the client left"));
-  rig.port.emit(CommandDone{command->ticket, Outcome::done, ""});
-  rig.port.emit(CommandDone{999, Outcome::done, ""});  // a ticket nobody has
+  rig.port.emit(CommandDone{*command, Outcome::done, ""});
   RawClient other(rig.tcp_port());
   EXPECT_NO_THROW(other.hello());
 }

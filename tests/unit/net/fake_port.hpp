@@ -7,8 +7,11 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -44,6 +47,9 @@ class FakePort : public pipeline::Port {
     {
       const std::lock_guard lock(mutex_);
       if (full_) return false;
+      if (const auto* set = std::get_if<pipeline::SetLight>(&command.what)) {
+        status_.light_requested = set->light;
+      }
       commands_.push_back(command);
       changed_.notify_all();
     }
@@ -62,6 +68,19 @@ class FakePort : public pipeline::Port {
     ++status_calls_;
     changed_.notify_all();
     return status_;
+  }
+
+  [[nodiscard]] pipeline::UseCalibration prepare(
+      const std::shared_ptr<const calibration::Calibration>& calibration,
+      const pipeline::ReconstructionRules& /*rules*/) const override {
+    check_fit();
+    return {.calibration = calibration};
+  }
+  [[nodiscard]] pipeline::SetReconstruction prepare_maps(
+      const std::shared_ptr<const calibration::Calibration>& /*in_use*/,
+      const pipeline::ReconstructionRules& rules) const override {
+    check_fit();
+    return {.rules = rules};
   }
 
   // The test's side.
@@ -83,6 +102,14 @@ class FakePort : public pipeline::Port {
   void answer(std::function<std::optional<pipeline::CommandDone>(const pipeline::Command&)> f) {
     answer_ = std::move(f);
   }
+  /// Nothing is prepared until it is false again.
+  void set_slow(bool slow) {
+    const std::lock_guard lock(mutex_);
+    slow_ = slow;
+    changed_.notify_all();
+  }
+  /// Why nothing can be prepared. Before the server runs.
+  void set_unfit(const std::string& why) { unfit_ = why; }
   void set_full(bool full) {
     const std::lock_guard lock(mutex_);
     full_ = full;
@@ -109,6 +136,11 @@ class FakePort : public pipeline::Port {
   }
 
  private:
+  void check_fit() const {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, kPatience, [this] { return !slow_; });
+    if (!unfit_.empty()) throw std::invalid_argument(unfit_);
+  }
   void ring() const {
     const std::uint64_t one = 1;
     (void)!::write(fd_.get(), &one, sizeof one);
@@ -127,6 +159,8 @@ class FakePort : public pipeline::Port {
   std::deque<pipeline::Event> events_;
   std::vector<pipeline::Command> commands_;
   std::function<std::optional<pipeline::CommandDone>(const pipeline::Command&)> answer_;
+  bool slow_ = false;
+  std::string unfit_;
   bool full_ = false;
   pipeline::Wanted wanted_;
   mutable int status_calls_ = 0;

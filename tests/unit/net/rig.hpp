@@ -134,10 +134,10 @@ class Rig {
 /// Answers every command with "done", at once; the untouched image is one grey pixel.
 inline void answer_done(FakePort& port) {
   port.answer([](const pipeline::Command& command) {
-    pipeline::CommandDone done{command.ticket, pipeline::Outcome::done, ""};
+    pipeline::CommandDone done{command, pipeline::Outcome::done, ""};
     if (std::holds_alternative<pipeline::CopyReference>(command.what)) {
-      done.reference = std::make_shared<const pipeline::ReferenceCopy>(
-          pipeline::ReferenceCopy{.width = 1, .height = 1, .image_q8 = {25600}, .light = {}});
+      done.command.what = pipeline::CopyReference{std::make_shared<pipeline::ReferenceCopy>(
+          pipeline::ReferenceCopy{.width = 1, .height = 1, .image_q8 = {25600}, .light = {}})};
     }
     return done;
   });

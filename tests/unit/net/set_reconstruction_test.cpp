@@ -25,7 +25,7 @@ v1::ClientMessage asking(Change change) {
 TEST(SetReconstruction, ChangesOnlyWhatIsSetAndTellsEveryone) {
   Rig rig({}, [](FakePort& port) {
     port.answer([](const pipeline::Command& command) {
-      return CommandDone{command.ticket, Outcome::done, "", {4, 5, 6}};
+      return CommandDone{command, Outcome::done, "", {4, 5, 6}};
     });
   });
   RawClient client(rig.tcp_port());
@@ -92,16 +92,33 @@ TEST(SetReconstruction, IsDoneOneAtATime) {
   other.hello();
   const auto again = asking([](auto& change) { change.set_resolution("quarter"); });
   EXPECT_EQ(other.request(again).error().code(), v1::ERROR_BUSY);
-  rig.port.emit(CommandDone{command->ticket, Outcome::done, ""});
+  rig.port.emit(CommandDone{*command, Outcome::done, ""});
   EXPECT_EQ(other.event().reconstruction().resolution(), "half");
 }
 
+// What is prepared for the one must fit the other.
+TEST(SetReconstruction, WaitsForAnotherCalibration) {
+  Rig rig;
+  RawClient client(rig.tcp_port());
+  client.hello();
+  v1::ClientMessage message;
+  message.mutable_activate_calibration()->set_number(0);
+  message.set_id(50);
+  client.send(message);
+  const auto command = rig.port.wait_command(0);
+  ASSERT_TRUE(command.has_value());
+  const auto half = asking([](auto& change) { change.set_resolution("half"); });
+  EXPECT_EQ(client.request(half).error().code(), v1::ERROR_BUSY);
+  rig.port.emit(CommandDone{*command, Outcome::done, ""});
+  EXPECT_EQ(client.reply().id(), 50U);
+  message = half;
+  message.set_id(51);
+  client.send(message);
+  EXPECT_TRUE(rig.port.wait_command(1).has_value());
+}
+
 TEST(SetReconstruction, WhatThePipelineRefusesIsToldToNobodyElse) {
-  Rig rig({}, [](FakePort& port) {
-    port.answer([](const pipeline::Command& command) {
-      return CommandDone{command.ticket, Outcome::invalid, "no list"};
-    });
-  });
+  Rig rig({}, [](FakePort& port) { port.set_unfit("no list"); });
   RawClient client(rig.tcp_port());
   client.hello();
   expect_invalid(client, asking([](auto& change) { change.set_sharpen("2"); }), "no list");

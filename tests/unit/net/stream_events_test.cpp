@@ -84,7 +84,7 @@ TEST(Stream, AFrameCarriesTheCalibrationThatItWasMeasuredBy) {
   rig.port.publish(frame);
   auto got = client.frame();
   EXPECT_EQ(got.calibration(), 1U) << "current in the store at start";
-  pipeline::CommandDone done{command->ticket, pipeline::Outcome::done, ""};
+  pipeline::CommandDone done{*command, pipeline::Outcome::done, ""};
   done.at = {1, 2, 3};
   rig.port.emit(done);
   const auto event = client.event();

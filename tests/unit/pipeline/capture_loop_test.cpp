@@ -38,8 +38,11 @@ TEST(CaptureLoop, FollowsTheLightBesideAPressThatLasts) {
   EXPECT_NEAR(loop.exchange.light_followed, -0.006, 0.001);
   EXPECT_TRUE(loop.frame->health.empty());
   // Other maps of the same calibration know what is known of the light.
-  ASSERT_TRUE(
-      loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration()), true}));
+  const auto model = toy_calibration()->model;
+  ASSERT_TRUE(loop.submit(
+      SetReconstruction{{},
+                        std::make_shared<Resolutions>(model, recon::CellLattice(model->rectify),
+                                                      loop.config.reconstruction)}));
   loop.step(2);
   EXPECT_NEAR(loop.frame->contact.deepest_mm, before_mm, 0.010);
   EXPECT_NEAR(loop.exchange.light_followed, -0.006, 0.001);
@@ -151,7 +154,7 @@ TEST(CaptureLoop, AGoodCalibrationTakesThePlaceOfAnUnusableOne) {
   loop.begin(nullptr, true);
   loop.step(2);
   EXPECT_TRUE(loop.health().has(Health::camera_mismatch));
-  ASSERT_TRUE(loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration())}));
+  ASSERT_TRUE(loop.use(toy_calibration()));
   ASSERT_TRUE(loop.until_fresh());
   EXPECT_FALSE(loop.health().has(Health::camera_mismatch));
 }
@@ -161,11 +164,10 @@ TEST(CaptureLoop, ACalibrationOutOfUseIsHeldByNobody) {
   const auto first = toy_calibration();
   loop.begin(first);
   ASSERT_TRUE(loop.until_fresh());
-  ASSERT_TRUE(loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration())}));
+  ASSERT_TRUE(loop.use(toy_calibration()));
   loop.step(30);
-  std::unique_ptr<ActiveCalibration> retired;
-  ASSERT_TRUE(loop.exchange.retired.pop(retired));
-  retired.reset();
+  ASSERT_EQ(loop.all<CommandDone>().size(), 1U);
+  loop.events.clear();  // it came back with its successor's command
   EXPECT_EQ(first.use_count(), 1) << "the watch on the camera's place, for one, has the new one";
 }
 
@@ -217,13 +219,13 @@ TEST(CaptureLoop, ARezeroOfACameraThatWentAwayIsGivenUp) {
   ASSERT_TRUE(loop.until_fresh());
   loop.camera.scene.press_mm = 1;
   loop.step(10);
-  ASSERT_TRUE(loop.exchange.orders.push(RezeroOrder{7, true}));
+  ASSERT_TRUE(loop.submit(Rezero{true}));
   loop.step(4);
   loop.camera.status = hal::GrabStatus::unplugged;
   loop.step(2);
-  const auto answers = loop.all<Answer>();
+  const auto answers = loop.all<CommandDone>();
   ASSERT_EQ(answers.size(), 1U);
-  EXPECT_EQ(answers[0].ticket, 7U);
+  EXPECT_TRUE(std::holds_alternative<Rezero>(answers[0].command.what));
   EXPECT_EQ(answers[0].outcome, Outcome::camera_away);
   loop.camera.status = hal::GrabStatus::ok;
   ASSERT_TRUE(loop.until([&] { return loop.frame->has_depth; }));
@@ -270,7 +272,7 @@ TEST(CaptureLoop, TakesNoReferenceUnderATouchThatNobodyHears) {
   loop.step(20);
   hal::Light dim = loop.config.light;
   dim.brightness = 128;
-  ASSERT_TRUE(loop.light->submit(1, dim));
+  ASSERT_TRUE(loop.light->submit({SetLight{dim}}));
   ASSERT_TRUE(loop.until([&] { return loop.health().has(Health::light_unsettled); }, 100'000));
   loop.camera.scene.light = 0.5;
   ASSERT_TRUE(loop.until([&] { return !loop.health().has(Health::light_unsettled); }));
@@ -282,7 +284,7 @@ TEST(CaptureLoop, AnotherCalibrationMeasuresAgainstTheReferenceThatStays) {
   loop.camera.scene.light = 0.9;
   loop.begin(toy_calibration());
   ASSERT_TRUE(loop.until_fresh());
-  ASSERT_TRUE(loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration())}));
+  ASSERT_TRUE(loop.use(toy_calibration()));
   loop.camera.scene.press_mm = 1;
   loop.step(6);
   EXPECT_NEAR(loop.frame->contact.deepest_mm, 1, 0.02);
@@ -296,8 +298,7 @@ TEST(CaptureLoop, NothingOfTheMapBeforeIsLeftInAnotherCalibrationsMap) {
   loop.camera.scene.press_mm = 1;
   loop.step(6);  // in each of the three buffers
   loop.camera.scene.press_mm = 0;
-  ASSERT_TRUE(
-      loop.exchange.orders.push(CalibrationOrder{1, loop.activated(toy_calibration({}, 128))}));
+  ASSERT_TRUE(loop.use(toy_calibration({}, 128)));
   for (int i = 0; i < 6; ++i) {
     ASSERT_TRUE(loop.step());
     ASSERT_TRUE(loop.frame->has_depth);
@@ -310,15 +311,15 @@ TEST(CaptureLoop, EveryRezeroIsAnswered) {
   SteppedLoop loop;
   loop.begin(toy_calibration());
   ASSERT_TRUE(loop.until_fresh());
-  ASSERT_TRUE(loop.exchange.orders.push(RezeroOrder{1, false}));
+  ASSERT_TRUE(loop.submit(Rezero{}));
   loop.step(1);
-  ASSERT_TRUE(loop.exchange.orders.push(RezeroOrder{2, false}));
+  ASSERT_TRUE(loop.submit(Rezero{true}));
   loop.step(40);
-  const auto answers = loop.all<Answer>();
+  const auto answers = loop.all<CommandDone>();
   ASSERT_EQ(answers.size(), 2U);
-  EXPECT_EQ(answers[0].ticket, 1U);
+  EXPECT_FALSE(std::get<Rezero>(answers[0].command.what).force);
   EXPECT_EQ(answers[0].outcome, Outcome::done);
-  EXPECT_EQ(answers[1].ticket, 2U);
+  EXPECT_TRUE(std::get<Rezero>(answers[1].command.what).force);
   EXPECT_EQ(answers[1].outcome, Outcome::done);
 }
 

@@ -3,8 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "daemon/pipeline/capture_loop.hpp"
@@ -39,7 +39,7 @@ TEST(CaptureLoop, WhatIsHeldWhileAReferenceIsTakenIsNotLost) {
   ASSERT_EQ(loop.all<ContactChanged>().size(), 1U);
   hal::Light dim = loop.config.light;
   dim.brightness = 128;
-  ASSERT_TRUE(loop.light->submit(1, dim));
+  ASSERT_TRUE(loop.light->submit({SetLight{dim}}));
   ASSERT_TRUE(loop.until([&] { return !loop.frame->has_depth; }, 100'000));
   loop.camera.scene.light = 0.5;
   EXPECT_EQ(loop.frame->contact_absence, ContactAbsence::referencing);
@@ -74,14 +74,12 @@ TEST(CaptureLoop, AFrameNamesTheCalibrationThatMeasuredIt) {
   loop.begin(toy_calibration());
   ASSERT_TRUE(loop.until_fresh());
   EXPECT_EQ(loop.frame->calibration, 0U) << "the one at start";
-  auto next = loop.activated(toy_calibration());
-  next->key = 9;
-  ASSERT_TRUE(loop.exchange.orders.push(CalibrationOrder{1, std::move(next)}));
+  ASSERT_TRUE(loop.use(toy_calibration(), 9));
   const std::uint64_t before = loop.frame->camera.sequence;
   const std::int64_t asked_ns = loop.clock.now;
   ASSERT_TRUE(loop.step());
   EXPECT_EQ(loop.frame->calibration, 9U);
-  const auto answers = loop.all<Answer>();
+  const auto answers = loop.all<CommandDone>();
   ASSERT_EQ(answers.size(), 1U);
   EXPECT_EQ(answers[0].at.sequence, before) << "the last frame of the other";
   EXPECT_EQ(answers[0].at.monotonic_ns, asked_ns);
@@ -165,19 +163,19 @@ TEST(CaptureLoop, PublishesTheCamerasJpegWhenItIsWanted) {
 TEST(CaptureLoop, CopiesTheUntouchedImageOut) {
   SteppedLoop loop;
   loop.begin(toy_calibration());
-  ReferenceCopy copy;
+  const auto made = std::make_shared<ReferenceCopy>();
+  ReferenceCopy& copy = *made;
   copy.image_q8.resize(std::size_t{fakes::kToyWidth} * fakes::kToyHeight);
-  ASSERT_TRUE(loop.exchange.orders.push(ReferenceOrder{5, &copy}));
+  ASSERT_TRUE(loop.submit(CopyReference{made}));
   loop.step(1);
-  ASSERT_EQ(loop.all<Answer>().size(), 1U);
-  EXPECT_EQ(loop.all<Answer>()[0].outcome, Outcome::no_reference);
+  ASSERT_EQ(loop.all<CommandDone>().size(), 1U);
+  EXPECT_EQ(loop.all<CommandDone>()[0].outcome, Outcome::no_reference);
   ASSERT_TRUE(loop.until_fresh());
   loop.step(5);
-  ASSERT_TRUE(loop.exchange.orders.push(ReferenceOrder{6, &copy}));
+  ASSERT_TRUE(loop.submit(CopyReference{made}));
   loop.step(1);
-  ASSERT_EQ(loop.all<Answer>().size(), 2U);
-  EXPECT_EQ(loop.all<Answer>()[1].ticket, 6U);
-  EXPECT_EQ(loop.all<Answer>()[1].outcome, Outcome::done);
+  ASSERT_EQ(loop.all<CommandDone>().size(), 2U);
+  EXPECT_EQ(loop.all<CommandDone>()[1].outcome, Outcome::done);
   EXPECT_EQ(copy.sequence, loop.all<ReferenceTaken>().at(0).at.sequence);
   EXPECT_EQ(copy.light, loop.config.light);
   // The toy's surface is untouched: the reference is the image itself.
@@ -188,10 +186,10 @@ TEST(CaptureLoop, CopiesTheUntouchedImageOut) {
 
   SteppedLoop uncalibrated;
   uncalibrated.begin(nullptr);
-  ASSERT_TRUE(uncalibrated.exchange.orders.push(ReferenceOrder{7, &copy}));
+  ASSERT_TRUE(uncalibrated.submit(CopyReference{made}));
   uncalibrated.step(1);
-  ASSERT_EQ(uncalibrated.all<Answer>().size(), 1U);
-  EXPECT_EQ(uncalibrated.all<Answer>()[0].outcome, Outcome::uncalibrated);
+  ASSERT_EQ(uncalibrated.all<CommandDone>().size(), 1U);
+  EXPECT_EQ(uncalibrated.all<CommandDone>()[0].outcome, Outcome::uncalibrated);
 }
 
 }  // namespace

@@ -5,10 +5,12 @@
 #include <memory>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "daemon/pipeline/histogram.hpp"
 #include "daemon/pipeline/latest_slot.hpp"
 #include "daemon/pipeline/spsc_queue.hpp"
+#include "hal/base/side_thread.hpp"
 
 namespace dtact::pipeline {
 namespace {
@@ -192,6 +194,23 @@ TEST(Histogram, CountsWhatIsWithinBounds) {
             4U);
   EXPECT_EQ(counts, (std::array<std::uint64_t, 4>{1, 1, 2, 3}));
   EXPECT_EQ(histogram.sum_ns(), 17'000'045);
+}
+
+TEST(SideThread, DoesWhatItWasGivenOfEachJobBeforeItEnds) {
+  std::vector<int> done;
+  base::SideThread thread("side");
+  base::SideThread::Job one(thread, [&] { done.push_back(1); });
+  base::SideThread::Job two(thread, [&] { done.push_back(2); });
+  two.hand_over();
+  EXPECT_TRUE(two.busy());
+  EXPECT_FALSE(one.busy());
+  thread.start();
+  two.settle();
+  one.hand_over();
+  two.hand_over();
+  thread.stop();
+  EXPECT_EQ(done, (std::vector<int>{2, 1, 2}));
+  EXPECT_FALSE(one.busy() || two.busy());
 }
 
 }  // namespace

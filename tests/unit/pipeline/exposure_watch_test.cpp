@@ -48,7 +48,7 @@ TEST_F(ExposureWatchTest, TellsAnExposureThatKeepsTheMeanAsAnEdgeIsCovered) {
   expose(1);
   loop_.step(150);
   EXPECT_TRUE(told()) << "the camera has not become another";
-  ASSERT_TRUE(loop_.exchange.orders.push(RezeroOrder{1, false}));
+  ASSERT_TRUE(loop_.submit(Rezero{}));
   loop_.step(60);
   EXPECT_FALSE(told());
 }

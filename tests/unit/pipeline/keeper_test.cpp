@@ -148,7 +148,7 @@ TEST_F(KeeperTest, AMovingPressAtStartIsTouchedInTheEnd) {
 TEST_F(KeeperTest, RezeroUnderContactIsRefusedAtOnce) {
   calibrate();
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.rezero(false, true), RezeroResult::touched);
+  EXPECT_EQ(keeper.rezero(false, true), Outcome::refused_contact);
 }
 
 TEST_F(KeeperTest, RezeroSeesATouchThatTheDepthMissed) {
@@ -157,12 +157,12 @@ TEST_F(KeeperTest, RezeroSeesATouchThatTheDepthMissed) {
   scene.press_mm = 0.09;  // 1.8 % of the light; the limit is 1.25 %
   EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(last.answer, RezeroResult::touched);
+  EXPECT_EQ(last.answer, Outcome::refused_contact);
   EXPECT_FALSE(last.reference_changed);
   scene.press_mm = 0.05;
   EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(last.answer, RezeroResult::taken);
+  EXPECT_EQ(last.answer, Outcome::done);
 }
 
 TEST_F(KeeperTest, WhatMovesSlowlyIsNotAveraged) {
@@ -174,7 +174,7 @@ TEST_F(KeeperTest, WhatMovesSlowlyIsNotAveraged) {
     ASSERT_FALSE(run(1)) << i;
   }
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(last.answer, RezeroResult::taken);
+  EXPECT_EQ(last.answer, Outcome::done);
   EXPECT_LT(worst_error(), 0.7);
 }
 
@@ -213,14 +213,14 @@ TEST_F(KeeperTest, ForcedRezeroTakesTheTouchedImageButDoesNotKeepIt) {
   scene.press_mm = 1;
   EXPECT_EQ(keeper.rezero(true, true), std::nullopt);
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(last.answer, RezeroResult::taken);
+  EXPECT_EQ(last.answer, Outcome::done);
   EXPECT_TRUE(last.reference_changed);
   EXPECT_FALSE(keeper.worth_keeping());
   // Lifted, the surface is brighter than its reference; re-zeroing then is no touch.
   scene.press_mm = 0;
   EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(last.answer, RezeroResult::taken);
+  EXPECT_EQ(last.answer, Outcome::done);
   EXPECT_TRUE(keeper.worth_keeping());
 }
 
@@ -230,7 +230,7 @@ TEST_F(KeeperTest, RezeroFollowsDrift) {
   scene.light = 0.985;  // −2 grey levels
   EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(last.answer, RezeroResult::taken);
+  EXPECT_EQ(last.answer, Outcome::done);
   EXPECT_LT(worst_error(), 0.7);
 }
 
@@ -242,7 +242,7 @@ TEST_F(KeeperTest, RezeroOfAMovingImageIsRefused) {
     scene.light = i % 2 == 0 ? 1 : 0.95;
     (void)run(1);
   }
-  EXPECT_EQ(last.answer, RezeroResult::unsteady);
+  EXPECT_EQ(last.answer, Outcome::refused_unsteady);
 }
 
 TEST_F(KeeperTest, ALightChangeWithoutContactTakesANewOne) {
@@ -301,7 +301,7 @@ TEST_F(KeeperTest, InTheDarkThereIsNoReference) {
   EXPECT_EQ(keeper.state(), State::settling);
   EXPECT_EQ(keeper.rezero(true, false), std::nullopt);
   ASSERT_TRUE(run(2));
-  EXPECT_EQ(last.answer, RezeroResult::dark);
+  EXPECT_EQ(last.answer, Outcome::refused_dark);
   scene.light = 1;
   ASSERT_TRUE(run(40));
   EXPECT_EQ(keeper.footing(), Footing::fresh);

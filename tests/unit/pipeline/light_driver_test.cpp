@@ -68,10 +68,10 @@ TEST_F(LightDriverTest, ShowsTheFirstLightBeforeItReturns) {
 
 TEST_F(LightDriverTest, AnswersAndTellsEveryone) {
   driver.start();
-  ASSERT_TRUE(driver.submit(5, dimmed(100)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   const auto done = next();
   ASSERT_TRUE(done);
-  EXPECT_EQ(std::get<CommandDone>(*done).ticket, 5U);
+  EXPECT_EQ(std::get<SetLight>(std::get<CommandDone>(*done).command.what).light.brightness, 100);
   EXPECT_EQ(std::get<CommandDone>(*done).outcome, Outcome::done);
   const auto changed = next();
   ASSERT_TRUE(changed);
@@ -83,7 +83,7 @@ TEST_F(LightDriverTest, AnswersAndTellsEveryone) {
 
 TEST_F(LightDriverTest, TheLastWriterWins) {
   driver.start();
-  for (int i = 0; i < 10; ++i) ASSERT_TRUE(driver.submit(0, dimmed(i)));
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(driver.submit({SetLight{dimmed(i)}}));
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(next());
   EXPECT_EQ(driver.light().brightness, 9);
   EXPECT_EQ(ring.all().back().brightness, 9);
@@ -92,7 +92,7 @@ TEST_F(LightDriverTest, TheLastWriterWins) {
 TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   driver.start();
   ring.broken = true;
-  ASSERT_TRUE(driver.submit(6, dimmed(100)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   const auto done = next();
   ASSERT_TRUE(done);
   EXPECT_EQ(std::get<CommandDone>(*done).outcome, Outcome::device_error);
@@ -101,7 +101,7 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   EXPECT_EQ(driver.message(), "the fake ring is broken: mend it");
   EXPECT_EQ(driver.light().brightness, 200);  // what it still shows
   ring.broken = false;
-  ASSERT_TRUE(driver.submit(7, dimmed(100)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   EXPECT_EQ(std::get<CommandDone>(next().value()).outcome, Outcome::done);
   EXPECT_FALSE(driver.trouble());
   EXPECT_EQ(driver.message(), "");
@@ -130,7 +130,7 @@ TEST_F(LightDriverTest, WhatIsWorthKnowingOfTheRingIsToldWhileNothingIsWrong) {
   EXPECT_TRUE(eventually([&] { return driver.message() == "one write was late"; }));
   EXPECT_FALSE(driver.trouble());
   ring.broken = true;
-  ASSERT_TRUE(driver.submit(6, dimmed(100)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   ASSERT_TRUE(next());
   EXPECT_EQ(driver.message(), "the fake ring is broken: mend it");
 }
@@ -139,7 +139,7 @@ TEST_F(LightDriverTest, WhatIsWorthKnowingOfTheRingIsToldWhileNothingIsWrong) {
 TEST_F(LightDriverTest, ARingThatNeverReSendsHealsByTheNextWriteAlone) {
   driver.start();
   ring.broken = true;
-  ASSERT_TRUE(driver.submit(6, dimmed(100)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   ASSERT_TRUE(next());
   ring.tell({.ok = true, .message = {}, .note = {}, .writes = 0, .failures = 0});
   std::this_thread::sleep_for(std::chrono::milliseconds(600));  // in which it is looked at twice
@@ -152,9 +152,9 @@ TEST_F(LightDriverTest, ALightAskedForWhileTheRingIsAwayIsShownWhenItComes) {
   driver.start();
   EXPECT_TRUE(driver.trouble());
   EXPECT_EQ(driver.message(), "the fake ring is away: plug it in");
-  ASSERT_TRUE(driver.submit(6, dimmed(50)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(50)}}));
   ASSERT_TRUE(next());
-  ASSERT_TRUE(driver.submit(7, dimmed(100)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   const auto done = std::get<CommandDone>(next().value());
   EXPECT_EQ(done.outcome, Outcome::ring_away);
   EXPECT_EQ(done.message,
@@ -177,7 +177,7 @@ TEST_F(LightDriverTest, ALightAskedForWhileTheRingIsAwayIsShownWhenItComes) {
 TEST_F(LightDriverTest, ARingThatWentAndCameShowsItsLightAgain) {
   driver.start();
   ring.broken = true;  // a write that fails first, as it does when the ring is on its way out
-  ASSERT_TRUE(driver.submit(6, dimmed(100)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   ASSERT_TRUE(next());
   ring.away = true;
   EXPECT_TRUE(eventually([&] { return driver.message() == "the fake ring is away: plug it in"; }));
@@ -193,14 +193,32 @@ TEST_F(LightDriverTest, ARingThatWentAndCameShowsItsLightAgain) {
   EXPECT_TRUE(notes.back().returned);
 }
 
+// What a partial update builds on.
+TEST_F(LightDriverTest, TheRequestedLightIsTheLastOneThatTheRingDidNotFailToShow) {
+  EXPECT_EQ(driver.requested().brightness, 200);
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(10)}}));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(20)}}));
+  EXPECT_EQ(driver.requested().brightness, 20) << "though it is not shown yet";
+  ring.broken = true;
+  driver.start();
+  ASSERT_TRUE(next());
+  ASSERT_TRUE(next());
+  EXPECT_EQ(driver.requested().brightness, 200) << "what is shown";
+  ring.broken = false;
+  ring.away = true;
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(30)}}));
+  ASSERT_TRUE(next());
+  EXPECT_EQ(driver.requested().brightness, 30) << "kept for the ring";
+}
+
 TEST_F(LightDriverTest, RefusesWhenTooManyWait) {
-  for (int i = 0; i < 16; ++i) ASSERT_TRUE(driver.submit(1, dimmed(i)));  // not started
-  EXPECT_FALSE(driver.submit(1, dimmed(0)));
+  for (int i = 0; i < 16; ++i) ASSERT_TRUE(driver.submit({SetLight{dimmed(i)}}));  // not started
+  EXPECT_FALSE(driver.submit({SetLight{dimmed(0)}}));
 }
 
 TEST_F(LightDriverTest, StopsWhileItsQueuesAreFull) {
   driver.start();
-  for (int i = 0; i < 16; ++i) ASSERT_TRUE(driver.submit(1, dimmed(i)));
+  for (int i = 0; i < 16; ++i) ASSERT_TRUE(driver.submit({SetLight{dimmed(i)}}));
   // The first light and seven more fill the 16 places for notes; the next one waits.
   for (int i = 0; i < 5000 && ring.all().size() < 8; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -222,7 +240,7 @@ TEST_F(LightDriverTest, TellsSinceWhenFramesAreExposedUnderALight) {
   ASSERT_EQ(notes.size(), 2U);
   EXPECT_EQ(driver.light_since_ns(), notes[1].at_ns + 1000);
   const std::int64_t wall_before = base::system_clock().wall_ns();
-  ASSERT_TRUE(driver.submit(7, dimmed(100)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   const auto done = std::get<CommandDone>(next().value());
   const auto changed = std::get<LightChanged>(next().value());
   take_notes();
@@ -234,7 +252,7 @@ TEST_F(LightDriverTest, TellsSinceWhenFramesAreExposedUnderALight) {
   EXPECT_GE(changed.at.wall_ns, wall_before - 1'000'000);
   EXPECT_LE(changed.at.wall_ns, base::system_clock().wall_ns());
   ring.broken = true;
-  ASSERT_TRUE(driver.submit(8, dimmed(50)));
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(50)}}));
   ASSERT_TRUE(next());
   EXPECT_EQ(driver.light_since_ns(), std::nullopt) << "what it shows is not known";
 }

@@ -82,7 +82,8 @@ class CaptureThread : public ::testing::Test {
                      .depth = true,
                      .luma = commands_ % 2 == 0,  // whole frames and parts of them
                      .jpeg = true});
-      if (grabbed > kEvery * (commands_ + 1)) commands_ += pipeline.submit(next()) ? 1U : 0U;
+      if (grabbed > kEvery * (commands_ + 1))
+        commands_ += pipeline.submit(next(pipeline)) ? 1U : 0U;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     pipeline.stop();
@@ -93,19 +94,20 @@ class CaptureThread : public ::testing::Test {
   }
 
  private:
-  [[nodiscard]] Command next() const {
+  [[nodiscard]] Command next(const Pipeline& pipeline) const {
     switch (commands_ % 4) {
       case 0:
-        return {commands_, Rezero{true}};
+        return {Rezero{true}};
       case 1: {
         hal::Light light;
         light.brightness = 250;
-        return {commands_, SetLight{light}};
+        return {SetLight{light}};
       }
       case 2:
-        return {commands_, CopyReference{}};
+        return {CopyReference{}};
       default:
-        return {commands_, UseCalibration{fakes::scattering_toy_calibration(15)}};
+        return {pipeline.prepare(fakes::scattering_toy_calibration(15),
+                                 pipeline.status().reconstruction)};
     }
   }
 

@@ -23,7 +23,7 @@ std::shared_ptr<const LayerMarks> calibrated(const recon::FrameRegion& part = {
 
 class PlaceWatchTest : public ::testing::Test {
  protected:
-  PlaceWatchTest() { watch.start(); }
+  PlaceWatchTest() { thread.start(); }
 
   /// So many frames of a layer that lies `dx` pixels to the right of where it was at calibration.
   void show(int frames, int dx, bool untouched = true) {
@@ -40,7 +40,8 @@ class PlaceWatchTest : public ::testing::Test {
     watch.settle();
   }
 
-  PlaceWatch watch{fakes::kToyWidth, fakes::kToyHeight, kFrames};
+  base::SideThread thread{"side"};
+  PlaceWatch watch{fakes::kToyWidth, fakes::kToyHeight, kFrames, thread};
   int still_columns = 0;  ///< At the left, of what is shown.
   std::uint64_t sequence = 0;
   std::int64_t now_ns = 0;

@@ -96,10 +96,11 @@ TEST_F(StoreTest, DamageNamesFileAndRemedy) {
 }
 
 TEST_F(StoreTest, TheWriterWritesBehind) {
-  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder);
-  writer.start();
+  base::SideThread thread("side");
+  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder, thread);
+  thread.start();
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
-  writer.stop();  // writes what was offered
+  thread.stop();  // writes what was offered
   EXPECT_EQ(writer.message(), "");
   ASSERT_TRUE(load());
   EXPECT_EQ(calibration.use_count(), 1);
@@ -107,27 +108,31 @@ TEST_F(StoreTest, TheWriterWritesBehind) {
 
 TEST_F(StoreTest, TheWriterSaysWhatFailed) {
   std::ofstream(folder.string()) << "a file where the folder should be";
-  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder);
-  writer.start();
+  base::SideThread thread("side");
+  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder, thread);
+  thread.start();
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
-  writer.stop();
+  thread.stop();
   EXPECT_NE(writer.message().find("make the state folder writable"), std::string::npos)
       << writer.message();
   std::filesystem::remove(folder);  // mended
-  writer.start();
+  thread.start();
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
-  writer.stop();
+  thread.stop();
   EXPECT_EQ(writer.message(), "");
 }
 
 TEST_F(StoreTest, WithoutAFolderNothingIsKept) {
-  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, {});
+  base::SideThread thread("side");
+  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, {}, thread);
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
 }
 
 TEST_F(StoreTest, ABusyWriterRefuses) {
-  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder);  // not started: stays busy
+  base::SideThread thread("side");
+  ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder,
+                         thread);  // not started: stays busy
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
   EXPECT_FALSE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
 }

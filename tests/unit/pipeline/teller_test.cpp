@@ -16,12 +16,12 @@ class TellerTest : public ::testing::Test {
  protected:
   /// Fills the queue with contact changes nobody reads.
   void fill() {
-    while (exchange.reports.room() > 0) ASSERT_TRUE(exchange.reports.push(Answer{}));
+    while (exchange.events.room() > 0) ASSERT_TRUE(exchange.events.push(CommandDone{}));
   }
-  std::optional<Report> next() {
-    Report report;
-    if (!exchange.reports.pop(report)) return std::nullopt;
-    return report;
+  std::optional<Event> next() {
+    Event event;
+    if (!exchange.events.pop(event)) return std::nullopt;
+    return event;
   }
   void drain() {
     while (next()) {
@@ -133,13 +133,13 @@ TEST_F(TellerTest, WhatDoesNotFitIsToldLater) {
   teller.contact(frame(true, 7));
   teller.state(State::serving, {}, {.monotonic_ns = 0});
   teller.reference({.restored = true, .at = {.sequence = 8}});
-  teller.answer({.ticket = 9});
+  teller.answer({.outcome = Outcome::camera_away});
   teller.flush();
   EXPECT_TRUE(teller.answer_due());
   drain();
   teller.flush();
   EXPECT_FALSE(teller.answer_due());
-  EXPECT_EQ(std::get<Answer>(next().value()).ticket, 9U);
+  EXPECT_EQ(std::get<CommandDone>(next().value()).outcome, Outcome::camera_away);
   EXPECT_EQ(std::get<ReferenceTaken>(next().value()).at.sequence, 8U);
   EXPECT_FALSE(next());
   teller.contact(frame(true, 10));  // the next frames carry the rest

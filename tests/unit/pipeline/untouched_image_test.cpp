@@ -78,21 +78,6 @@ TEST_F(UntouchedImageTest, AnotherLightThanAtCalibrationIsToldFromTheStart) {
   EXPECT_FALSE(has(Health::light_mismatch));
 }
 
-// Other maps of the calibration in use come with another home for it.
-TEST_F(UntouchedImageTest, WhatMovedIsComparedWithWhereItLies) {
-  scene_.press_mm = 1;
-  show(6 * kReferenceFrames);
-  ASSERT_EQ(image_.footing(), Footing::stale);
-  CalibratedImage moved = std::move(calibrated_);
-  calibrated_.grid = {};  // freed in the daemon
-  image_.lies_at(&moved);
-  show(6 * kReferenceFrames);
-  EXPECT_EQ(image_.footing(), Footing::stale);
-  scene_.press_mm = 0;
-  show(6 * kReferenceFrames);
-  EXPECT_EQ(image_.footing(), Footing::fresh);
-}
-
 TEST_F(UntouchedImageTest, TheLightThatIsFollowedOutlivesTheCalibration) {
   ASSERT_TRUE(settles());
   CalibratedImage next{fakes::toy_calibration(scene_)};
@@ -129,9 +114,9 @@ TEST_F(UntouchedImageTest, AFrameReadInPartIsNoPartOfAReference) {
   fakes::ToyFrame part = next();
   std::fill_n(part.pixels.begin(), std::ptrdiff_t{8} * fakes::kToyWidth, std::uint8_t{0});
   EXPECT_EQ(look(part, {.settled = true, .whole = false}).rezeroed, std::nullopt);
-  std::optional<RezeroResult> answer;
+  std::optional<Outcome> answer;
   for (int i = 0; i < kReferenceFrames; ++i) answer = look(next()).rezeroed;
-  EXPECT_EQ(answer, RezeroResult::taken);
+  EXPECT_EQ(answer, Outcome::done);
   // 103 levels; with a sixteenth of nothing in it, 97.
   EXPECT_NEAR(image_.reference()[0], fakes::toy_reference_q8(scene_)[0], 256);
 }

@@ -9,6 +9,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <variant>
@@ -56,7 +57,11 @@ class PipelineTest : public ::testing::Test {
   bool until(const std::function<bool()>& done) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     while (std::chrono::steady_clock::now() < deadline) {
-      while (auto event = pipeline->next_event()) events.push_back(std::move(*event));
+      while (auto event = pipeline->next_event()) {
+        const auto* answer = std::get_if<CommandDone>(&*event);
+        if (answer != nullptr && answer->command.then) answer->command.then(*answer);
+        events.push_back(std::move(*event));
+      }
       if (const DepthFrame* newest = pipeline->latest()) frame = newest;
       if (done()) return true;
       pollfd poll{.fd = pipeline->event_fd(), .events = POLLIN, .revents = 0};
@@ -81,17 +86,26 @@ class PipelineTest : public ::testing::Test {
   }
   /// Sends a command and waits for its answer.
   CommandDone ask(decltype(Command::what) what) {
-    const std::uint64_t ticket = ++tickets;
-    EXPECT_TRUE(pipeline->submit({ticket, std::move(what)}));
-    std::optional<CommandDone> answer;
-    EXPECT_TRUE(until([&] {
-      for (const Event& event : events) {
-        const auto* done = std::get_if<CommandDone>(&event);
-        if (done != nullptr && done->ticket == ticket) answer = *done;
-      }
-      return answer.has_value();
-    }));
-    return answer.value_or(CommandDone{});
+    const auto answer = std::make_shared<std::optional<CommandDone>>();
+    EXPECT_TRUE(
+        pipeline->submit({std::move(what), [answer](const CommandDone& done) { *answer = done; }}));
+    EXPECT_TRUE(until([&] { return answer->has_value(); }));
+    return answer->value_or(CommandDone{});
+  }
+  CommandDone use(const std::shared_ptr<const calibration::Calibration>& calibration) {
+    return ask(pipeline->prepare(calibration, pipeline->status().reconstruction));
+  }
+  CommandDone reconstruct(const ReconstructionRules& rules) {
+    return ask(pipeline->prepare_maps(pipeline->status().calibration, rules));
+  }
+  /// The sentence of the refusal; empty: there was none.
+  static std::string refusal(const std::function<void()>& prepare) {
+    try {
+      prepare();
+    } catch (const std::invalid_argument& e) {
+      return e.what();
+    }
+    return {};
   }
   template <typename T>
   std::vector<T> all() const {
@@ -114,7 +128,6 @@ class PipelineTest : public ::testing::Test {
   std::unique_ptr<Pipeline> pipeline;
   std::vector<Event> events;
   const DepthFrame* frame = nullptr;
-  std::uint64_t tickets = 0;
 };
 
 }  // namespace dtact::pipeline
