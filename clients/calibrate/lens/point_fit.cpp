@@ -111,8 +111,8 @@ class MarkCost {
 
 Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t terms) {
   const auto count = static_cast<Eigen::Index>(marks.size());
-  Eigen::MatrixX3d a(count, 3);
-  Eigen::MatrixX2d b(count, 2);
+  Eigen::MatrixXd a(count, 3);
+  Eigen::MatrixXd b(count, 2);
   Eigen::Index i = 0;
   for (const Mark& mark : marks) {
     a(i, 0) = (mark.mm.x - u.mm.x) / u.mm_size;
@@ -125,11 +125,11 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
   // Places on a line leave one direction of the plane open. The places are in units of their own
   // extent, so that noise alone stays far below a thousandth.
   constexpr double kLine = 1e-3;
-  const Eigen::BDCSVD<Eigen::MatrixX3d> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  const Eigen::BDCSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
   if (svd.singularValues()[2] < kLine * svd.singularValues()[0]) {
     throw std::runtime_error("lens: the points lie on a line; use a board with several rows");
   }
-  const Eigen::MatrixX2d x = svd.solve(b);
+  const Eigen::MatrixXd x = svd.solve(b);
   Parameters p(kHomography + 2 + terms, 0.0);
   for (int c = 0; c < 3; ++c) {
     p[static_cast<std::size_t>(c)] = x(c, 0);
