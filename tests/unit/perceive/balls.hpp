@@ -83,17 +83,19 @@ inline double indentation_mm(const Balls& object, const Motion& motion, const Su
   return depth;
 }
 
-constexpr int kSize = 160;  ///< Pixels along each side of a map.
+/// Pixels of a map, wider than high.
+constexpr int kWidth = 176;
+constexpr int kHeight = 160;
 constexpr double kPx = 0.05;
 
 /// What does not change between frames on a surface: the rays take long.
 struct Gel {
   explicit Gel(const recon::Surface& surface) : maker(surface) {
-    for (int row = 0; row < kSize; ++row) {
-      for (int column = 0; column < kSize; ++column) {
-        pixels.push_back(
-            cast_ray(surface, (column - 0.5 * (kSize - 1)) * kPx, (row - 0.5 * (kSize - 1)) * kPx)
-                .value());
+    for (int row = 0; row < kHeight; ++row) {
+      for (int column = 0; column < kWidth; ++column) {
+        pixels.push_back(cast_ray(surface, (column - 0.5 * (kWidth - 1)) * kPx,
+                                  (row - 0.5 * (kHeight - 1)) * kPx)
+                             .value());
       }
     }
   }
@@ -114,20 +116,20 @@ inline std::vector<double> blurred(const std::vector<double>& map) {
   constexpr int kReach = 3;
   std::vector<double> rows(map.size());
   std::vector<double> all(map.size());
-  const auto mean = [](const std::vector<double>& from, std::vector<double>& to, int step,
-                       int across) {
-    for (int line = 0; line < kSize; ++line) {
-      for (int i = 0; i < kSize; ++i) {
+  const auto mean = [](const std::vector<double>& from, std::vector<double>& to, int count,
+                       int step, int lines, int across) {
+    for (int line = 0; line < lines; ++line) {
+      for (int i = 0; i < count; ++i) {
         double sum = 0;
         for (int k = i - kReach; k <= i + kReach; ++k) {
-          sum += from[static_cast<std::size_t>(line * across + std::clamp(k, 0, kSize - 1) * step)];
+          sum += from[static_cast<std::size_t>(line * across + std::clamp(k, 0, count - 1) * step)];
         }
         to[static_cast<std::size_t>(line * across + i * step)] = sum / (2 * kReach + 1);
       }
     }
   };
-  mean(map, rows, 1, kSize);
-  mean(rows, all, kSize, 1);
+  mean(map, rows, kWidth, 1, kHeight, kWidth);
+  mean(rows, all, kHeight, kWidth, kWidth, 1);
   return all;
 }
 
@@ -144,7 +146,7 @@ struct Frame {
   explicit Frame(Depth depth_mm, double noise_um = 0, unsigned seed = 1,
                  const recon::Surface& surface = {})
       : gel(gel_of(surface)) {
-    values.resize(std::size_t{kSize} * kSize);
+    values.resize(std::size_t{kWidth} * kHeight);
     std::mt19937 random(seed);
     std::normal_distribution<double> normal;
     std::vector<double> noise(values.size());
@@ -155,24 +157,25 @@ struct Frame {
     // No gel has a kink at a contact's rim, nor does the camera see one: light scatters in it over
     // 0.2 mm. Two means over 7 pixels of 0.05 mm are as wide.
     for (int pass = 0; pass < 2; ++pass) depths = blurred(depths);
-    for (int row = 0; row < kSize; ++row) {
-      for (int column = 0; column < kSize; ++column) {
-        double depth = depths[static_cast<std::size_t>(row * kSize + column)];
+    for (int row = 0; row < kHeight; ++row) {
+      for (int column = 0; column < kWidth; ++column) {
+        double depth = depths[static_cast<std::size_t>(row * kWidth + column)];
         double error = 0;
         int count = 0;
-        for (int r = std::max(0, row - 1); r <= std::min(kSize - 1, row + 1); ++r) {
-          for (int c = std::max(0, column - 1); c <= std::min(kSize - 1, column + 1);
+        for (int r = std::max(0, row - 1); r <= std::min(kHeight - 1, row + 1); ++r) {
+          for (int c = std::max(0, column - 1); c <= std::min(kWidth - 1, column + 1);
                ++c, ++count) {
-            error += noise[static_cast<std::size_t>(r * kSize + c)];
+            error += noise[static_cast<std::size_t>(r * kWidth + c)];
           }
         }
         // The mean of n values has 1/√n of their deviation.
         depth += 1e-3 * noise_um * error / std::sqrt(count);
-        values[static_cast<std::size_t>(row * kSize + column)] =
+        values[static_cast<std::size_t>(row * kWidth + column)] =
             static_cast<std::int16_t>(std::lround(1000 * depth));
       }
     }
-    grid.width = grid.height = grid.full_width = grid.full_height = kSize;
+    grid.width = grid.full_width = kWidth;
+    grid.height = grid.full_height = kHeight;
     grid.mm_per_px = kPx;
     grid.values = values;
     gel.maker.make(grid, 1, cloud);
@@ -189,26 +192,26 @@ struct Frame {
 
 /// The same frame of a plane as a coarser map: means of `times` × `times` pixels.
 struct CoarseFrame {
-  CoarseFrame(const Frame& fine, int times) : size(kSize / times) {
-    for (int row = 0; row < size; ++row) {
-      for (int column = 0; column < size; ++column) {
+  CoarseFrame(const Frame& fine, int times) {
+    grid.width = grid.full_width = kWidth / times;
+    grid.height = grid.full_height = kHeight / times;
+    for (int row = 0; row < grid.height; ++row) {
+      for (int column = 0; column < grid.width; ++column) {
         int sum = 0;
         for (int i = 0; i < times * times; ++i) {
           const int r = row * times + i / times;
           const int c = column * times + i % times;
-          sum += fine.values[static_cast<std::size_t>(r * kSize + c)];
+          sum += fine.values[static_cast<std::size_t>(r * kWidth + c)];
         }
         values.push_back(static_cast<std::int16_t>(sum / (times * times)));
       }
     }
-    grid.width = grid.height = grid.full_width = grid.full_height = size;
     grid.mm_per_px = kPx * times;
     grid.values = values;
     CloudMaker().make(grid, 1, cloud);
   }
   [[nodiscard]] ContactView view() const { return ContactView(grid, cloud, nullptr, 10); }
 
-  int size;
   std::vector<std::int16_t> values;
   DepthGrid grid;
   PointCloud cloud;

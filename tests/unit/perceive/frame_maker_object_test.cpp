@@ -22,10 +22,10 @@ v1::Frame sent(const Frame& seen, std::uint64_t sequence) {
   frame.mutable_contact()->set_touching(true);
   v1::DepthMap& map = *frame.mutable_depth();
   map.set_encoding(v1::DEPTH_INT16);
-  map.set_width(kSize);
-  map.set_height(kSize);
-  map.set_full_width(kSize);
-  map.set_full_height(kSize);
+  map.set_width(kWidth);
+  map.set_height(kHeight);
+  map.set_full_width(kWidth);
+  map.set_full_height(kHeight);
   map.set_mm_per_px(kPx);
   map.set_um_per_unit(1);
   map.set_untrusted_value(-32768);

@@ -96,6 +96,17 @@ TEST(ObjectModel, ASparseCloudIsRefused) {
   EXPECT_EQ(message_of(cloud_of(ball, 12000), 1e-3), "none");
 }
 
+TEST(ContactPatch, IsAsLargeBesideEveryEdge) {
+  const Balls ball{{{{0, 0, 1.1}, 1.5}}};
+  const double area = make_patch(Frame(ball, Motion::Identity()).view()).area;
+  EXPECT_GT(area, 0);
+  for (const Vector3d& mm :
+       {Vector3d(3.1, 0, 0), Vector3d(-3.1, 0, 0), Vector3d(0, 2.7, 0), Vector3d(0, -2.7, 0)}) {
+    EXPECT_NEAR(make_patch(Frame(ball, moved(mm)).view()).area, area, 0.02 * area)
+        << mm.transpose();
+  }
+}
+
 TEST(SearchPlacement, FindsBumpsWhereverTheyAre) {
   const auto model = model_of(bumps());
   std::vector<recon::Surface> surfaces = curved();
