@@ -14,7 +14,7 @@
 
 int main(int argc, char** argv) {
   using namespace dtact::app;
-  std::string mend;        // what to try beside what an error says
+  std::string fix;         // what to try beside what an error says
   bool is_service = true;  // systemd hears of its main process alone, not of its reload's check
   try {
     spdlog::set_default_logger(make_logger());
@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
 
     is_service = !options.check_config;
     if (is_service) {
-      mend = "; once it is mended, check it: " + command_with(options, "--check-config");
+      fix = "; once it is fixed, check it: " + command_with(options, "--check-config");
     }
     const LoadedConfig loaded = load_config(options.config, options.settings);
     if (options.print_config) print_config(loaded, std::cout);
@@ -41,13 +41,13 @@ int main(int argc, char** argv) {
     if (options.doctor) return doctor(loaded.config.hal, std::cout);
 
     spdlog::set_level(spdlog::level::from_str(loaded.config.log_level));
-    mend = "; what else this machine lacks: " + command_with(options, "--doctor");
+    fix = "; what else this machine lacks: " + command_with(options, "--doctor");
     run_daemon(loaded.config,
                [&options] { return load_config(options.config, options.settings).config; });
     return 0;
   } catch (const std::exception& e) {
-    spdlog::critical("{}{}", e.what(), mend);
-    if (is_service) notify_status(e.what() + mend);
+    spdlog::critical("{}{}", e.what(), fix);
+    if (is_service) notify_status(e.what() + fix);
     return 1;
   }
 }

@@ -58,7 +58,7 @@ struct DamageCounts {
 /// Run-time condition of a camera. Any thread may ask.
 struct CameraReport {
   CameraState state = CameraState::streaming;
-  std::string remedy;           ///< A sentence saying what to do; empty while streaming.
+  std::string fix;              ///< A sentence saying what to do; empty while streaming.
   std::uint64_t delivered = 0;  ///< Frames handed out.
   /// Every gap in the sequence is counted in exactly one of the two. `lost`: the camera or its
   /// driver lost the frame. `skipped`: this process came late. It passed the frame over for a newer
@@ -91,7 +91,7 @@ class Camera {
 
   [[nodiscard]] virtual CameraInfo info() const = 0;
   [[nodiscard]] virtual CameraReport report() const = 0;
-  /// Begins streaming. Throws std::runtime_error with a sentence that names the remedy.
+  /// Begins streaming. Throws std::runtime_error with a sentence that names the fix.
   virtual void start() = 0;
   /// What of the images will be read from now on: a compressed frame need not be decoded beyond it,
   /// and what lies there is unspecified (a camera may deliver it all the same). It lies in the

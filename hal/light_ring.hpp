@@ -56,7 +56,7 @@ struct RingInfo {
 /// What became of a write to the ring.
 struct ShowResult {
   bool ok = true;
-  std::string message;   ///< When not ok: what failed and the remedy. When dimmed: why.
+  std::string message;   ///< When not ok: what failed and the fix. When dimmed: why.
   double dimmed_to = 1;  ///< What a current limit left of the light asked for; 1 = all of it.
   bool away = false;     ///< When not ok: there is no ring to write to now; attend() looks for it.
 };
@@ -65,7 +65,7 @@ struct ShowResult {
 struct RingReport {
   bool ok = true;              ///< The ring is there and the last write worked.
   bool away = false;           ///< It is looked for; once it is there, show() it its light again.
-  std::string message;         ///< When not ok: what failed and the remedy.
+  std::string message;         ///< When not ok: what failed and the fix.
   std::string note;            ///< Worth knowing, not wrong. Empty = nothing.
   std::uint64_t writes = 0;    ///< Tried, re-sends included.
   std::uint64_t failures = 0;  ///< Of these.

@@ -21,7 +21,7 @@ struct Devices {
 
 /// Makes the camera and the ring that the configuration names. The simulated camera sees the
 /// simulated ring's light; with any other ring it sees the calibration light (all white).
-/// Throws std::runtime_error naming the backend, what failed and the remedy.
+/// Throws std::runtime_error naming the backend, what failed and the fix.
 [[nodiscard]] Devices open_devices(const Config& config);
 
 }  // namespace dtact::hal

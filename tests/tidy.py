@@ -42,9 +42,9 @@ def digest_of(path):
 
 def headers(build):
     """Object file -> what ninja knows that it was compiled from."""
-    told = subprocess.run(["ninja", "-C", build, "-t", "deps"], check=True, capture_output=True, text=True)
+    reported = subprocess.run(["ninja", "-C", build, "-t", "deps"], check=True, capture_output=True, text=True)
     read, current = {}, None
-    for line in told.stdout.splitlines():
+    for line in reported.stdout.splitlines():
         if line.startswith("    "):
             current.append(line.strip())
         elif ": #deps" in line:
@@ -116,20 +116,20 @@ def main():
         in_tests = entry["file"].startswith(source + "tests/")
         return cache / key(entry, read, version + (rules_of_tests if in_tests else rules))
 
-    def verdict(entries, told):
-        if told.returncode == 0:
+    def verdict(entries, reported):
+        if reported.returncode == 0:
             for entry in entries:
                 passed(entry).touch()
             return collections.Counter(passed=len(entries))
-        print(told.stdout + told.stderr, flush=True)
+        print(reported.stdout + reported.stderr, flush=True)
         return collections.Counter(failed=len(entries))
 
     def check(entries):
         if len(entries) > 1:
-            told = run_together(entries)
+            reported = run_together(entries)
             # What does not compile together, or only with warnings, says nothing of the files.
-            if told.returncode == 0 or "[clang-diagnostic-" not in told.stdout:
-                return verdict(entries, told)
+            if reported.returncode == 0 or "[clang-diagnostic-" not in reported.stdout:
+                return verdict(entries, reported)
         verdicts = collections.Counter()
         for entry in entries:
             verdicts.update(verdict([entry], run([entry["file"], "--", *flags(entry)])))

@@ -31,7 +31,7 @@ void run_guided(const cli::Context& context, guided::Plan plan) {
     if (guided::Session(sensor, *console, plan).run() == guided::Outcome::unfinished) {
       throw cli::Failure(cli::kNotMet, "there is no calibration yet");
     }
-  } catch (const guided::NotTaken& e) {
+  } catch (const guided::CaptureTimeout& e) {
     throw cli::Failure(cli::kNotMet, e.what());
   }
 }
@@ -41,7 +41,7 @@ void run_guided(const cli::Context& context, guided::Plan plan) {
 void add_guided(CLI::App& app, cli::Context& context) {
   CLI::App* guided = app.add_subcommand(
       "guided",
-      "Make a calibration in a session with the running daemon, from the untouched surface over "
+      "Make a calibration in a session with the running daemon, from the undeformed surface over "
       "presses of a ball to the upload");
   const auto plan = std::make_shared<guided::Plan>();
   plan->folder = "dtact-calibration";
@@ -61,19 +61,19 @@ void add_guided(CLI::App& app, cli::Context& context) {
       ->type_name("FOLDER")
       ->capture_default_str();
   guided
-      ->add_option("--patience", plan->patience_s, "Seconds to wait for a surface that holds still")
+      ->add_option("--patience", plan->timeout_s, "Seconds to wait for a surface that holds still")
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   const auto method = std::make_shared<std::string>("auto");
-  guided->add_option("--method", *method, "How the list is made, as of dtact-calibrate depth")
+  guided->add_option("--method", *method, "How the LUT is made, as of dtact-calibrate depth")
       ->check(CLI::IsMember({"auto", "list", "model"}))
       ->capture_default_str();
   guided->add_flag("--force", plan->force,
-                   "Make the calibration although list and ball disagree: a wrong scale or radius, "
+                   "Make the calibration although LUT and ball disagree: a wrong scale or radius, "
                    "another light, a contact that is cut off");
   cli::add_json_option(*guided, context);
   guided->callback([&context, guided, plan, method] {
-    plan->method = list_method(*method);
+    plan->method = fit_method(*method);
     plan->again = cli::command_line(*guided);
     run_guided(context, *plan);
   });

@@ -46,10 +46,10 @@ recon::Surface surface_of(const v1::Surface& surface) {
   made.refraction = surface.refraction();
   made.radius_mm = surface.radius_mm();
   made.axis_deg = surface.axis_deg();
-  if (!within(made.air_mm, Limits::kLeastDistanceMm, Limits::kMostDistanceMm) ||
-      !within(made.gel_mm, Limits::kLeastDistanceMm, Limits::kMostDistanceMm) ||
-      !within(made.refraction, 1, Limits::kMostRefraction) ||
-      !within(made.radius_mm, Limits::kLeastRadiusMm, Limits::kMostRadiusMm) ||
+  if (!within(made.air_mm, Limits::kMinDistanceMm, Limits::kMaxDistanceMm) ||
+      !within(made.gel_mm, Limits::kMinDistanceMm, Limits::kMaxDistanceMm) ||
+      !within(made.refraction, 1, Limits::kMaxRefraction) ||
+      !within(made.radius_mm, Limits::kMinRadiusMm, Limits::kMaxRadiusMm) ||
       !within(made.axis_deg, -180, 180)) {
     refuse(fmt::format(
         "of {} mm radius, its axis at {} degrees, behind {} mm of air and {} mm of "
@@ -63,10 +63,10 @@ DepthImage depth_image(const v1::Frame& frame, std::span<const float> mm) {
   const v1::DepthMap& map = frame.depth();
   const std::uint64_t full_width = map.full_width();
   const std::uint64_t full_height = map.full_height();
-  constexpr std::uint64_t kMostSide = 1U << 20U;
+  constexpr std::uint64_t kMaxSide = 1U << 20U;
   if (std::uint64_t{map.x()} + map.width() > full_width ||
-      std::uint64_t{map.y()} + map.height() > full_height || full_width > kMostSide ||
-      full_height > kMostSide) {
+      std::uint64_t{map.y()} + map.height() > full_height || full_width > kMaxSide ||
+      full_height > kMaxSide) {
     throw client::ProtocolError(
         fmt::format("a depth map of {}x{} pixels at {}, {} of {}x{} contradicts itself: install "
                     "the same release on both sides",

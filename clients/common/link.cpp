@@ -62,7 +62,7 @@ void Link::wake() const noexcept {
 
 void Link::run() {
   client::BackOff pauses(kPauses, std::random_device{}());
-  std::string told;
+  std::string reported;
   // A daemon that greets and ends the connection at once is not asked any oftener for that.
   auto lasted_from = Clock::time_point::max();
   while (!stopping_) {
@@ -73,7 +73,7 @@ void Link::run() {
         const std::lock_guard lock(mutex_);
         up_ = true;
       }
-      told.clear();
+      reported.clear();
       lasted_from = Clock::now() + kPauses.max;
       handlers_.up(std::move(daemon), connection.local());
       serve(connection);
@@ -81,7 +81,7 @@ void Link::run() {
       forget_outgoing();
       if (stopping_) break;
       if (Clock::now() > std::exchange(lasted_from, Clock::time_point::max())) pauses.reset();
-      if (std::exchange(told, e.what()) != e.what()) handlers_.down(told);
+      if (std::exchange(reported, e.what()) != e.what()) handlers_.down(reported);
       (void)client::wait(-1, 0, {Clock::now() + pauses.next(), wake_.get()});
     }
   }

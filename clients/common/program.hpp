@@ -9,7 +9,7 @@
 
 namespace dtact::cli {
 
-/// What all commands of a program share. Filled while the command line is parsed.
+/// What all commands of a program share. FilledBuffer while the command line is parsed.
 struct Context {
   client::Options target;
   bool json = false;

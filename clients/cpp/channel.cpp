@@ -157,8 +157,8 @@ bool wait(int fd, short events, const Limit& limit) {
     const auto left =
         std::chrono::ceil<std::chrono::milliseconds>(limit.end - std::chrono::steady_clock::now());
     std::array<pollfd, 2> descriptors{{{fd, events, 0}, {limit.wake, POLLIN, 0}}};
-    const auto patience = std::clamp<std::chrono::milliseconds::rep>(left.count(), 0, 1'000'000);
-    const int ready = ::poll(descriptors.data(), descriptors.size(), static_cast<int>(patience));
+    const auto timeout = std::clamp<std::chrono::milliseconds::rep>(left.count(), 0, 1'000'000);
+    const int ready = ::poll(descriptors.data(), descriptors.size(), static_cast<int>(timeout));
     if (ready > 0) return descriptors[0].revents != 0;
     if (ready == 0 && left.count() <= 1'000'000) return false;
     if (ready < 0 && errno != EINTR) throw ConnectionError("cannot wait: " + text_of(errno));

@@ -61,7 +61,7 @@ struct Socket {
 
 /// Connects to the first address of the name that answers. A TCP peer that falls silent (a pulled
 /// cable) is given up after some ten seconds, with or without data on the way. Throws
-/// ConnectionError naming the remedy. Looking a name up is not bounded by the limit.
+/// ConnectionError naming the fix. Looking a name up is not bounded by the limit.
 [[nodiscard]] Socket connect_to(const Address& address, const Limit& limit);
 
 }  // namespace dtact::client

@@ -62,7 +62,7 @@ void Client::rezero(bool force) {
   message.mutable_rezero()->set_force(force);
   // On top of the timeout: the daemon averages frames before it answers.
   const auto within = std::chrono::duration_cast<std::chrono::milliseconds>(
-      std::chrono::duration<double>(server().rezero_within_s()));
+      std::chrono::duration<double>(server().rezero_timeout_s()));
   (void)session_->request(message, session_->options().timeout + within);
 }
 

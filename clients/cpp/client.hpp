@@ -82,7 +82,7 @@ class DTACT_EXPORT Client {
   /// How depth is made from now on; returns it once frames are made so.
   v1::Reconstruction set_reconstruction(const v1::SetReconstruction& change);
   [[nodiscard]] v1::Status status();
-  /// The untouched image that depth is measured against: a 16-bit grey PNG of the camera's size,
+  /// The reference image that depth is measured against: a 16-bit grey PNG of the camera's size,
   /// 256 units a grey level.
   [[nodiscard]] v1::ReferenceImage reference();
   /// The daemon's clocks, nanoseconds.
@@ -101,7 +101,7 @@ class DTACT_EXPORT Client {
   /// The next frame, event or reconnection; nothing when none came in time. Without
   /// Options::reconnect it throws a ConnectionError when the connection is lost. With it, it makes
   /// the connection again, whose last attempt may last for Options::timeout beyond `timeout`, and
-  /// throws what more attempts cannot mend: ProtocolError, IdentityError, and Refused when the
+  /// throws what more attempts cannot fix: ProtocolError, IdentityError, and Refused when the
   /// daemon no longer grants the token or the subscription. Called again, it tries again.
   [[nodiscard]] std::optional<Item> next(std::chrono::milliseconds timeout);
   /// next() and the handler for it, again and again on this thread, until `stop` is requested,

@@ -15,7 +15,7 @@ namespace dtact::client {
 class Connection {
  public:
   /// To the daemon that `options` names, verified where they ask for it. Throws Error,
-  /// ConnectionError or IdentityError naming the remedy.
+  /// ConnectionError or IdentityError naming the fix.
   Connection(const Options& options, const Limit& limit);
 
   /// One message with its length. Throws ConnectionError, also when the limit comes first: half of

@@ -9,7 +9,7 @@
 namespace dtact::client {
 
 /// What all of the library's exceptions are. The text is a sentence for the user and names the
-/// remedy. Thrown as such for options that make no sense.
+/// fix. Thrown as such for options that make no sense.
 class DTACT_EXPORT Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -63,7 +63,7 @@ class DTACT_EXPORT Refused : public Error {
   /// This program does not know the request, or a value in it.
   [[nodiscard]] bool unsupported() const noexcept { return code_ == v1::ERROR_UNSUPPORTED; }
   /// The same request may be granted later without any change.
-  [[nodiscard]] bool worth_repeating() const noexcept {
+  [[nodiscard]] bool is_transient() const noexcept {
     return code_ == v1::ERROR_BUSY || code_ == v1::ERROR_CONTACT;
   }
 

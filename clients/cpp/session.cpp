@@ -12,7 +12,7 @@
 namespace dtact::client {
 namespace {
 
-/// Frames kept while a request waits for its answer; the oldest give way.
+/// Frames kept while a request waits for its answer; the oldest yield.
 constexpr std::size_t kKeptFrames = 4;
 
 /// Throws what an error of the daemon is to the caller.

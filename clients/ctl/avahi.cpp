@@ -64,13 +64,13 @@ struct Instance {
 };
 
 /// What the browser has told.
-struct Told {
+struct Received {
   std::vector<Instance> instances;
   bool all = false;
 };
 
-int on_signal(sd_bus_message* message, void* told_, sd_bus_error*) {
-  auto& told = *static_cast<Told*>(told_);
+int on_signal(sd_bus_message* message, void* user_data, sd_bus_error*) {
+  auto& received = *static_cast<Received*>(user_data);
   if (sd_bus_message_is_signal(message, kBrowser, "ItemNew") > 0) {
     Instance one;
     const char* name = nullptr;
@@ -80,11 +80,11 @@ int on_signal(sd_bus_message* message, void* told_, sd_bus_error*) {
                             &domain) >= 0) {
       one.name = name;
       one.domain = domain;
-      told.instances.push_back(std::move(one));
+      received.instances.push_back(std::move(one));
     }
   } else if (sd_bus_message_is_signal(message, kBrowser, "AllForNow") > 0 ||
              sd_bus_message_is_signal(message, kBrowser, "Failure") > 0) {
-    told.all = true;
+    received.all = true;
   }
   return 0;
 }
@@ -103,25 +103,25 @@ Bus open_bus() {
   return Bus(opened);
 }
 
-std::vector<Instance> list_instances(sd_bus* bus, std::chrono::milliseconds patience) {
-  Told told;
+std::vector<Instance> list_instances(sd_bus* bus, std::chrono::milliseconds timeout) {
+  Received received;
   Error error;
   // Before the browser, which tells at once what it knows.
   int result =
-      sd_bus_match_signal(bus, nullptr, kAvahi, nullptr, kBrowser, nullptr, on_signal, &told);
+      sd_bus_match_signal(bus, nullptr, kAvahi, nullptr, kBrowser, nullptr, on_signal, &received);
   if (result >= 0) {
     result = sd_bus_call_method(bus, kAvahi, "/", kServer, "ServiceBrowserNew", error.get(),
                                 nullptr, "iissu", kAny, kAny, wire::kServiceType, "", 0U);
   }
   if (result < 0) fail(error.text(result));
-  const auto end = steady_clock::now() + patience;
-  while (!told.all && steady_clock::now() < end) {
+  const auto end = steady_clock::now() + timeout;
+  while (!received.all && steady_clock::now() < end) {
     if (sd_bus_process(bus, nullptr) > 0) continue;
     const auto left =
         std::chrono::duration_cast<std::chrono::microseconds>(end - steady_clock::now());
     if (left.count() > 0) sd_bus_wait(bus, static_cast<std::uint64_t>(left.count()));
   }
-  return std::move(told.instances);
+  return std::move(received.instances);
 }
 
 std::vector<std::string> read_strings(sd_bus_message* message) {
@@ -185,10 +185,10 @@ void read_txt(const std::vector<std::string>& txt, cli::FoundDaemon& to) {
   }
 }
 
-std::vector<cli::FoundDaemon> browse(std::chrono::milliseconds patience) {
+std::vector<cli::FoundDaemon> browse(std::chrono::milliseconds timeout) {
   const Bus bus = open_bus();
   std::vector<cli::FoundDaemon> all;
-  for (const auto& instance : list_instances(bus.get(), patience)) {
+  for (const auto& instance : list_instances(bus.get(), timeout)) {
     if (auto found = resolve(bus.get(), instance)) all.push_back(*std::move(found));
   }
   // On several interfaces it may be the same.

@@ -15,6 +15,6 @@ void read_txt(const std::vector<std::string>& txt, cli::FoundDaemon& to);
 /// Every dtactd that this machine's avahi-daemon knows of, one for each address, by name; looks
 /// until Avahi says that it has all for now, at most for so long. Throws cli::Failure with a
 /// sentence when there is no avahi-daemon to ask.
-[[nodiscard]] std::vector<cli::FoundDaemon> browse(std::chrono::milliseconds patience);
+[[nodiscard]] std::vector<cli::FoundDaemon> browse(std::chrono::milliseconds timeout);
 
 }  // namespace dtact::ctl

@@ -8,7 +8,7 @@
 
 namespace dtact::ctl {
 
-/// "ball, method list, 580x580 of 800x600 at 0.0414 mm/px, covers -0.02 to 1.40 mm, 2026-…"
+/// "ball, method lut, 580x580 of 800x600 at 0.0414 mm/px, covers -0.02 to 1.40 mm, 2026-…"
 [[nodiscard]] std::string text_of(const v1::CalibrationSummary& summary);
 
 /// What a calibration goes by on the command line: "17", or "configured".

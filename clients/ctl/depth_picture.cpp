@@ -127,7 +127,7 @@ std::vector<std::string> picture_of(const v1::Frame& frame, double full_scale_mm
   // The legend, and a line that is the caller's.
   const Pixels pixels(map, canvas.columns, canvas.rows - 2);
   const double mm_per_pixel = pixels.step() * map.mm_per_px();
-  const bool crossed = frame.contact().touching();
+  const bool crossed = frame.contact().in_contact();
   const int cross_x =
       pixels.width() / 2 + static_cast<int>(std::floor(frame.contact().x_mm() / mm_per_pixel));
   const int cross_y =

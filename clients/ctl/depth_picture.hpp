@@ -20,11 +20,11 @@ struct Canvas {
   int rows = 24;
   Palette palette = Palette::rgb;
 };
-inline constexpr int kLeastColumns = 24;
-inline constexpr int kLeastRows = 9;
+inline constexpr int kMinColumns = 24;
+inline constexpr int kMinRows = 9;
 
 /// The depth map of `frame` as lines of a terminal, at most columns × (rows − 1), no smaller than
-/// kLeastColumns × kLeastRows: two pixels a character, a cross at the middle of the contact, a
+/// kMinColumns × kMinRows: two pixels a character, a cross at the middle of the contact, a
 /// legend of depth and length below. Untrusted pixels are grey. Throws client::ProtocolError for a
 /// map that does not decode.
 [[nodiscard]] std::vector<std::string> picture_of(const v1::Frame& frame, double full_scale_mm,

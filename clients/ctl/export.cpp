@@ -117,7 +117,7 @@ class Stack {
 };
 
 constexpr const char* kFrameColumns =
-    "frame,sequence,time_ns,monotonic_ns,touching,area_mm2,x_mm,y_mm,deepest_mm,deepest_x_mm,"
+    "frame,sequence,time_ns,monotonic_ns,in_contact,area_mm2,x_mm,y_mm,deepest_mm,deepest_x_mm,"
     "deepest_y_mm,volume_mm3,force_n,force_uncertainty_n,brightness,calibration,health,map\n";
 
 /// What was not measured is empty.
@@ -126,7 +126,7 @@ std::string line_of(const v1::Frame& frame, std::uint64_t index, std::uint64_t t
   std::string contact = ",,,,,,,,,";
   if (frame.has_contact()) {
     const v1::Contact& c = frame.contact();
-    contact = fmt::format("{},{},{},{},{},{},{},{},{},{}", c.touching() ? 1 : 0, c.area_mm2(),
+    contact = fmt::format("{},{},{},{},{},{},{},{},{},{}", c.in_contact() ? 1 : 0, c.area_mm2(),
                           c.x_mm(), c.y_mm(), c.deepest_mm(), c.deepest_x_mm(), c.deepest_y_mm(),
                           c.volume_mm3(), c.has_force_n() ? fmt::to_string(c.force_n()) : "",
                           c.has_force_n() ? fmt::to_string(c.force_uncertainty_n()) : "");
@@ -144,7 +144,7 @@ std::string line_of(const v1::Event& event, std::uint64_t time) {
   std::string what = "unknown";
   switch (event.what_case()) {
     case v1::Event::kContact:
-      what = event.contact().contact().touching() ? "contact_made" : "contact_lost";
+      what = event.contact().contact().in_contact() ? "contact_made" : "contact_lost";
       detail = fmt::format("deepest_mm={}", event.contact().contact().deepest_mm());
       break;
     case v1::Event::kLight:
@@ -191,13 +191,15 @@ class Exporter {
   }
 
   void run(const mcap::Reader& file) {
-    recording::Takers takers;
-    takers.frame = [this](const v1::Frame& frame, std::uint64_t time) { return take(frame, time); };
-    takers.event = [this](const v1::Event& event, std::uint64_t time) {
+    recording::RecordingHandlers handlers;
+    handlers.frame = [this](const v1::Frame& frame, std::uint64_t time) {
+      return take(frame, time);
+    };
+    handlers.event = [this](const v1::Event& event, std::uint64_t time) {
       if (next_ >= range_.first) events_.write(line_of(event, time));
       return true;
     };
-    recording::read_recording(file, takers);
+    recording::read_recording(file, handlers);
     if (stack_) stack_->finish();
     frames_.close();
     events_.close();

@@ -101,7 +101,7 @@ void add_rezero(CLI::App& app, Context& context) {
   auto* command =
       app.add_subcommand("rezero", "Take the present image as untouched: the new reference");
   const auto force = std::make_shared<bool>(false);
-  command->add_flag("--force", *force, "Also when something touches: it will read as zero depth");
+  command->add_flag("--force", *force, "Also during contact: it will read as zero depth");
   command->callback([&context, force] { client::Client(context.target).rezero(*force); });
 }
 

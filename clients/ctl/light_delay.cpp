@@ -31,7 +31,7 @@ using std::chrono::milliseconds;
 /// of it of the worst there is.
 constexpr int kSteps = 10;
 constexpr int kTries = 5;  // of a step in which frames went missing
-constexpr milliseconds kPatience{5000};
+constexpr milliseconds kTimeout{5000};
 constexpr std::uint32_t kDim = 64;  // a brightness below is too little to step down from
 /// Successive multiples of the golden ratio fill a frame's time evenly, however many there are.
 constexpr double kGolden = 0.6180339887;
@@ -83,7 +83,7 @@ class Measurement {
 
  private:
   v1::Frame next_frame() {
-    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    const auto deadline = std::chrono::steady_clock::now() + kTimeout;
     while (std::chrono::steady_clock::now() < deadline) {
       if (cli::Interruptible::happened()) {
         throw failure("interrupted: nothing was measured, the light is as before");
@@ -101,13 +101,13 @@ class Measurement {
   void rest(const v1::LightState& light) {
     std::vector<double> greys;
     std::size_t lit = 0;
-    for (std::size_t i = 0; i < LightStep::kMostFrames; ++i) {
+    for (std::size_t i = 0; i < LightStep::kMaxFrames; ++i) {
       const v1::Frame frame = next_frame();
       // The first of them may rest under the light before.
       if (same(frame.light(), light)) ++lit;
       if (lit <= 2 * LightStep::kRest) continue;
-      if (frame.contact().touching()) {
-        throw failure("something touches the sensor: lift it and measure again");
+      if (frame.contact().in_contact()) {
+        throw failure("there is contact the sensor: lift it and measure again");
       }
       greys.push_back(mean_grey(frame.luma()));
       before_ = greys.back();

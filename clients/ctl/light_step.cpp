@@ -10,7 +10,7 @@ namespace {
 /// Of the step: what is nearer than this to where the mean comes to rest is complete.
 constexpr double kComplete = 0.02;
 /// Grey levels that a mean at rest may wander by, however small the step.
-constexpr double kWander = 0.25;
+constexpr double kMaxWander = 0.25;
 
 }  // namespace
 
@@ -26,14 +26,14 @@ LightStep::Verdict LightStep::add(std::uint64_t sequence, bool lit, double mean_
 LightStep::Verdict LightStep::judge() {
   const auto rest = std::span(seen_).last(kRest);
   double sum = 0;
-  for (const Seen& one : rest) sum += one.grey;
+  for (const Sample& one : rest) sum += one.grey;
   grey_ = sum / static_cast<double>(kRest);
   const double step = std::abs(grey_ - before_grey_);
-  const double near = std::max(kWander, kComplete * step);
-  const auto incomplete = [&](const Seen& one) { return std::abs(one.grey - grey_) > near; };
+  const double near = std::max(kMaxWander, kComplete * step);
+  const auto incomplete = [&](const Sample& one) { return std::abs(one.grey - grey_) > near; };
   const bool at_rest = std::ranges::none_of(rest, incomplete);
-  if (!at_rest || step < kLeastStep) {
-    if (seen_.size() < kMostFrames) return Verdict::going_on;
+  if (!at_rest || step < kMinStep) {
+    if (seen_.size() < kMaxFrames) return Verdict::going_on;
     return at_rest ? Verdict::unseen : Verdict::restless;
   }
   std::uint64_t last = before_;

@@ -32,11 +32,11 @@ class LightStep {
 
   static constexpr std::size_t kRest = 8;  ///< Frames that the mean has to stay where it is.
   /// Grey levels: less is no step, as noise and light that wanders do as much.
-  static constexpr double kLeastStep = 4;
-  static constexpr std::size_t kMostFrames = 120;
+  static constexpr double kMinStep = 4;
+  static constexpr std::size_t kMaxFrames = 120;
 
  private:
-  struct Seen {
+  struct Sample {
     std::uint64_t sequence;
     double grey;
   };
@@ -44,7 +44,7 @@ class LightStep {
 
   double before_grey_;
   std::uint64_t before_;  // the last frame's under the old light
-  std::vector<Seen> seen_;
+  std::vector<Sample> seen_;
   int frames_ = 0;
   double grey_ = 0;
 };

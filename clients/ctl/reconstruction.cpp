@@ -45,7 +45,7 @@ void add_reconstruction(CLI::App& app, Context& context) {
                       "The map's share of the calibration's resolution: full, half, quarter, or "
                       "auto: the coarsest within --max-error-um, for each frame");
   command->add_option("--sharpen", options->sharpen,
-                      "Steps of the filter that undoes the layer's blur: off, 1, 2, or auto: the "
+                      "Steps of the filter that undoes the gel's blur: off, 1, 2, or auto: the "
                       "fewest within --max-error-um, for each frame");
   command
       ->add_option("--max-error-um", options->max_error_um,

@@ -115,7 +115,7 @@ class Recording {
       // Uncalibrated, or busy with another one, which an event will tell.
     }
     try {
-      put(recording::kUntouchedPng, "image/png", client_.reference().png());
+      put(recording::kCurrentReferencePng, "image/png", client_.reference().png());
     } catch (const client::Refused&) {  // NOLINT(bugprone-empty-catch)
       // None is taken yet; its event will come.
     }

@@ -31,8 +31,8 @@ const char* words_of(const v1::CameraControl& control) {
 void print_camera(const v1::CameraStatus& camera, std::ostream& out) {
   fmt::print(out, "camera       {} {}, {}x{} {} at {:g} fps, {}\n", camera.backend(),
              camera.identity(), camera.width(), camera.height(), camera.pixel_format(),
-             camera.fps(), camera.condition());
-  if (!camera.remedy().empty()) fmt::print(out, "             {}\n", camera.remedy());
+             camera.fps(), camera.state());
+  if (!camera.fix().empty()) fmt::print(out, "             {}\n", camera.fix());
   fmt::print(out, "             delivered {}, lost {}, skipped {}, damaged {}, disconnects {}\n",
              camera.delivered(), camera.lost(), camera.skipped(), camera.damaged(),
              camera.disconnects());

@@ -116,12 +116,13 @@ class Watch {
 
   void draw(Screen& screen) {
     const Canvas canvas = screen.canvas();
-    if (canvas.columns < kLeastColumns || canvas.rows < kLeastRows) {
-      return screen.show({fmt::format("at least {} x {}, please", kLeastColumns, kLeastRows)});
+    if (canvas.columns < kMinColumns || canvas.rows < kMinRows) {
+      return screen.show({fmt::format("at least {} x {}, please", kMinColumns, kMinRows)});
     }
     // The line may need two of a narrow terminal.
     const Canvas above{canvas.columns, canvas.rows - 1, canvas.palette};
-    std::vector<std::string> lines = picture_of(last_, cli::full_scale_mm(all_.deepest_mm()), above);
+    std::vector<std::string> lines =
+        picture_of(last_, cli::full_scale_mm(all_.deepest_mm()), above);
     const auto width = static_cast<std::size_t>(canvas.columns);
     std::size_t end = below_.size() <= width ? below_.size() : below_.rfind("  ", width);
     end = std::min(end, below_.size());

@@ -98,8 +98,8 @@ Mesh parse_mesh(std::string_view bytes, const std::string& name) {
   const auto fail = [&name](const std::string& sentence) {
     throw std::runtime_error(fmt::format("{}: {}", name, sentence));
   };
-  if (bytes.size() > kMostMeshBytes) {
-    fail(fmt::format("larger than {} MiB: simplify the mesh", kMostMeshBytes >> 20U));
+  if (bytes.size() > kMaxMeshBytes) {
+    fail(fmt::format("larger than {} MiB: simplify the mesh", kMaxMeshBytes >> 20U));
   }
   Mesh mesh = bytes.starts_with("ply") ? parse_ply(bytes, name) : parse_stl(bytes, name);
   if (mesh.points.empty()) fail("there are no points in it");

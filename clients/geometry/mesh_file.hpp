@@ -16,9 +16,9 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-constexpr std::size_t kMostMeshBytes = std::size_t{64} << 20U;
+constexpr std::size_t kMaxMeshBytes = std::size_t{64} << 20U;
 /// Points, and triangles.
-constexpr std::size_t kMostMeshParts = 2'000'000;
+constexpr std::size_t kMaxMeshParts = 2'000'000;
 
 /// Reads a file's bytes: STL (ASCII or binary) and PLY (ASCII, little- or big-endian; polygons are
 /// cut into triangles). `name` stands for the file in messages. Throws std::runtime_error naming

@@ -78,7 +78,7 @@ Header parse_header(MeshReader& reader) {
       (void)reader.line();
     } else if (word == "element") {
       const std::string_view name = reader.word();
-      const std::size_t count = whole(reader.number(), static_cast<double>(kMostMeshParts),
+      const std::size_t count = whole(reader.number(), static_cast<double>(kMaxMeshParts),
                                       "an element's count (more: simplify the mesh)", reader);
       header.elements.push_back({name, count, {}});
     } else if (word == "property" && !header.elements.empty()) {
@@ -201,8 +201,8 @@ class Body {
           whole(value_of(property.type, format_, reader_), UINT32_MAX, "a face's corner", reader_));
       triangle.at(std::min<std::size_t>(i, 2)) = corner;
       if (i < 2) continue;
-      if (mesh.triangles.size() == kMostMeshParts) {
-        reader_.fail(fmt::format("more than {} triangles: simplify the mesh", kMostMeshParts));
+      if (mesh.triangles.size() == kMaxMeshParts) {
+        reader_.fail(fmt::format("more than {} triangles: simplify the mesh", kMaxMeshParts));
       }
       mesh.triangles.push_back(triangle);
       triangle[1] = corner;

@@ -13,7 +13,7 @@
 namespace dtact::perceive {
 namespace {
 
-constexpr std::size_t kMostTables = 3;
+constexpr std::size_t kMaxTables = 3;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 /// The first pixel of the whole map that is taken, as of blocks that leave both sides out alike.
@@ -44,7 +44,7 @@ struct CloudMaker::Work {
   Work(const DepthGrid& of, PointCloud& to)
       : depth(of),
         out(to),
-        tile(kTilePixels * (1 + (of.width - 1) / (kMostTiles * kTilePixels))),
+        tile(kTilePixels * (1 + (of.width - 1) / (kMaxTiles * kTilePixels))),
         reach(std::max(1, static_cast<int>(std::lround(kReachMm / of.mm_per_px)))),
         // Where 0 is no depth nothing is at rest.
         rests(of.untrusted != 0),
@@ -66,13 +66,13 @@ struct CloudMaker::Work {
     for (int first = std::countr_zero(set); first < count;) {
       const int last = std::min(count, first + std::countr_one(set >> first));
       back(first * tile, std::min(depth.width, last * tile));
-      first = last == kMostTiles ? kMostTiles : last + std::countr_zero(set >> last);
+      first = last == kMaxTiles ? kMaxTiles : last + std::countr_zero(set >> last);
     }
   }
 
   const DepthGrid& depth;
   PointCloud& out;
-  static constexpr int kMostTiles = 64;
+  static constexpr int kMaxTiles = 64;
   int tile;  ///< Pixels.
   int reach;
   bool rests;
@@ -94,7 +94,7 @@ void CloudMaker::prepare(const DepthGrid& depth) {
     std::rotate(tables_.begin(), known, known + 1);
     return;
   }
-  if (tables_.size() == kMostTables) tables_.pop_back();
+  if (tables_.size() == kMaxTables) tables_.pop_back();
   SurfaceTable table{depth.full_width, depth.full_height, depth.mm_per_px, {}, {}};
   if (!flat()) {
     table = make_surface_table(surface_, depth.full_width, depth.full_height, depth.mm_per_px);
@@ -115,7 +115,7 @@ Vector CloudMaker::point(const Work& work, int row, int column) const {
 }
 
 /// One point and its normal where one of the four neighbours at `reach` is missing.
-void CloudMaker::mend(const Work& work, int row, int column) {
+void CloudMaker::fix(const Work& work, int row, int column) {
   const auto trusted = [&](int r, int c) {
     return r >= 0 && r < work.depth.height && c >= 0 && c < work.depth.width &&
            !std::isnan(point(work, r, c)[2]);
@@ -177,23 +177,23 @@ void CloudMaker::place(const Work& work, int row) const {
   placed = ~std::uint64_t{0};
 }
 
-/// The points of a curved surface, where they are not the untouched surface's now and before.
+/// The points of a curved surface, where they are not the undeformed surface's now and before.
 void CloudMaker::press_row(const Work& work, int row) const {
   const DepthGrid& depth = work.depth;
-  const std::uint64_t touched = touched_[static_cast<std::size_t>(row)];
+  const std::uint64_t pressed = pressed_[static_cast<std::size_t>(row)];
   std::uint64_t& placed = work.drawn(row).placed;
   const SurfaceTable& table = tables_.front().table;
   const std::size_t from =
       static_cast<std::size_t>(depth.y + row) * static_cast<std::size_t>(depth.full_width) +
       static_cast<std::size_t>(depth.x);
-  work.for_each_run(touched | ~placed, [&](int begin, int end) {
+  work.for_each_run(pressed | ~placed, [&](int begin, int end) {
     const std::size_t at = from + static_cast<std::size_t>(begin);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       press(table.point[axis].data() + at, table.normal[axis].data() + at, work.values(row) + begin,
             work.unit, end - begin, work.part(static_cast<PointCloud::Part>(axis), row) + begin);
     }
   });
-  placed = ~touched;
+  placed = ~pressed;
 }
 
 /// Points of a plane, or the normals of points that are there, of a row's pixels.
@@ -217,22 +217,22 @@ void CloudMaker::make_part(const Work& work, int row, int begin, int end) {
   }
   if (count_holes(nz + begin, end - begin) == 0) return;
   for (int column = begin; column < end; ++column) {
-    if (std::isnan(nz[column])) mend(work, row, column);
+    if (std::isnan(nz[column])) fix(work, row, column);
   }
 }
 
-/// The tiles of a row in whose points' reach nothing touches.
+/// The tiles of a row in whose points' reach there is no contact.
 std::uint64_t CloudMaker::resting(const Work& work, int row) const {
   if (!work.rests) return 0;
-  std::uint64_t touched = 0;
+  std::uint64_t pressed = 0;
   const int end = std::min(work.depth.height, row + work.reach + 1);
   for (int i = std::max(0, row - work.reach); i < end; ++i) {
-    touched |= touched_[static_cast<std::size_t>(i)];
+    pressed |= pressed_[static_cast<std::size_t>(i)];
   }
   for (int pixels = 0; pixels < work.reach; pixels += work.tile) {
-    touched |= touched << 1U | touched >> 1U;
+    pressed |= pressed << 1U | pressed >> 1U;
   }
-  return ~touched;
+  return ~pressed;
 }
 
 void CloudMaker::make_row(const Work& work, int row) {
@@ -259,14 +259,14 @@ void CloudMaker::make_whole(const DepthGrid& depth, PointCloud& out) {
     out.drawn.rows.assign(rows, {});
     out.drawn.tables = number;
   }
-  touched_.resize(rows);
+  pressed_.resize(rows);
   lone_.clear();
   int placed = 0;
   for (int row = 0; row < depth.height; ++row) {
     // What the row's normals look at.
     for (; placed <= row + work.reach && placed < depth.height; ++placed) {
-      touched_[static_cast<std::size_t>(placed)] =
-          work.rests ? touched_tiles(work.values(placed), depth.width, work.tile)
+      pressed_[static_cast<std::size_t>(placed)] =
+          work.rests ? pressed_tiles(work.values(placed), depth.width, work.tile)
                      : ~std::uint64_t{0};
       flat() ? place(work, placed) : press_row(work, placed);
     }

@@ -41,7 +41,7 @@ struct PointCloud {
   /// values empties it.
   struct Drawn {
     std::uint64_t tables = 0;  ///< Which surface and whole map; 0: nothing is known.
-    /// Bits of a row's tiles: which hold the untouched surface's …
+    /// Bits of a row's tiles: which hold the undeformed surface's …
     struct Row {
       std::uint64_t rest = 0;    ///< … points and normals, …
       std::uint64_t placed = 0;  ///< … points; of a plane their x and y.
@@ -64,7 +64,7 @@ struct PointCloud {
 
 /// Makes point clouds of depth maps that belong to one surface. A table is made at the first map of
 /// a size and kept for the next ones, of the three sizes seen last: a sensor's full, half and
-/// quarter resolution, which it may change between two frames. Where nothing touches, now and when
+/// quarter resolution, which it may change between two frames. Outside the contact, now and when
 /// `out` was made before of the same part of a map, `out` is left as it is.
 class CloudMaker {
  public:
@@ -103,13 +103,13 @@ class CloudMaker {
   void place(const Work& work, int row) const;
   void press_row(const Work& work, int row) const;
   void make_part(const Work& work, int row, int begin, int end);
-  void mend(const Work& work, int row, int column);
+  void fix(const Work& work, int row, int column);
   void erase_lone(const Work& work) const;
   [[nodiscard]] Vector point(const Work& work, int row, int column) const;
 
   recon::Surface surface_;
   std::vector<Numbered> tables_;        ///< Begins with that of the maps made last.
-  std::vector<std::uint64_t> touched_;  ///< Of a row: bits of the tiles with a depth but 0.
+  std::vector<std::uint64_t> pressed_;  ///< Of a row: bits of the tiles with a depth but 0.
   std::vector<std::size_t> lone_;       ///< Points that turned out to have no normal.
   PointCloud whole_;                    ///< That a stride takes some of.
 };

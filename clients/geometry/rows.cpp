@@ -34,15 +34,15 @@ void with_neighbours(const RowPart& part, Some some) {
 
 }  // namespace
 
-std::uint64_t touched_tiles(const std::int16_t* values, int width, int tile) noexcept {
-  std::uint64_t touched = 0;
+std::uint64_t pressed_tiles(const std::int16_t* values, int width, int tile) noexcept {
+  std::uint64_t pressed = 0;
   for (int from = 0, number = 0; from < width; from += tile, ++number) {
     const int end = std::min(width, from + tile);
     int any = 0;
     for (int i = from; i < end; ++i) any |= values[i];
-    touched |= std::uint64_t{any != 0} << static_cast<unsigned>(number);
+    pressed |= std::uint64_t{any != 0} << static_cast<unsigned>(number);
   }
-  return touched;
+  return pressed;
 }
 
 int count_holes(const float* values, int count) noexcept {
@@ -64,12 +64,12 @@ float largest(const float* values, std::size_t count) noexcept {
 
 void quantise(const float* __restrict values, std::size_t count, float per_unit,
               std::int16_t* __restrict out) noexcept {
-  constexpr float kMost = 32767;
+  constexpr float kMax = 32767;
   constexpr float kWhole = 12582912;  // 1.5 · 2²³, whose floats lie 1 apart: a sum is rounded
   for (std::size_t i = 0; i < count; ++i) {
     const float units = values[i] * per_unit;
-    const float low = units > -kMost ? units : -kMost;  // of NaN too
-    const float whole = ((low < kMost ? low : kMost) + kWhole) - kWhole;
+    const float low = units > -kMax ? units : -kMax;  // of NaN too
+    const float whole = ((low < kMax ? low : kMax) + kWhole) - kWhole;
     out[i] = static_cast<std::int16_t>(units != units ? -32768 : static_cast<int>(whole));
   }
 }

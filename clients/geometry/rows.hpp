@@ -11,7 +11,7 @@ namespace dtact::perceive {
 /// Bit k: whether a value of [k · tile, (k + 1) · tile) is not 0. A tile is a multiple of
 /// kTilePixels; there are at most 64.
 inline constexpr int kTilePixels = 32;
-[[nodiscard]] std::uint64_t touched_tiles(const std::int16_t* values, int width, int tile) noexcept;
+[[nodiscard]] std::uint64_t pressed_tiles(const std::int16_t* values, int width, int tile) noexcept;
 
 /// How many of them are NaN.
 [[nodiscard]] int count_holes(const float* values, int count) noexcept;

@@ -18,8 +18,8 @@ void add_triangle(const std::array<std::array<double, 3>, 3>& corners, Mesh& mes
 }
 
 void check_count(std::size_t triangles, const MeshReader& reader) {
-  if (triangles <= kMostMeshParts) return;
-  reader.fail(fmt::format("more than {} triangles: simplify the mesh", kMostMeshParts));
+  if (triangles <= kMaxMeshParts) return;
+  reader.fail(fmt::format("more than {} triangles: simplify the mesh", kMaxMeshParts));
 }
 
 Mesh parse_text(MeshReader& reader) {

@@ -119,7 +119,8 @@ SurfaceTable make_surface_table(const recon::Surface& surface, int width, int he
   return table;
 }
 
-std::optional<Foot> foot_of(const SurfaceTable& table, const Vector& point) {
+std::optional<SurfaceProjection> project_to_surface(const SurfaceTable& table,
+                                                    const Vector& point) {
   if (table.width < 2 || table.height < 2) return std::nullopt;
   if (std::isnan(point[0]) || std::isnan(point[1]) || std::isnan(point[2])) return std::nullopt;
   const double last_column = table.width - 1;
@@ -130,9 +131,9 @@ std::optional<Foot> foot_of(const SurfaceTable& table, const Vector& point) {
   double row = point[1] / px + last_row / 2;
   // Gauss-Newton on the distance: the error of a step is that of the one before times the point's
   // distance over the surface's radius.
-  constexpr int kMostSteps = 8;
+  constexpr int kMaxSteps = 8;
   constexpr double kClose = 0.02;
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     const double c = std::clamp(column, 0.0, last_column);
     const double r = std::clamp(row, 0.0, last_row);
     const Between at = between(table, table.point, c, r);
@@ -151,7 +152,7 @@ std::optional<Foot> foot_of(const SurfaceTable& table, const Vector& point) {
     row = r + (cc * to_below - cr * to_right) / determinant;
     if (std::max(std::abs(column - c), std::abs(row - r)) >= kClose) continue;
     if (column < 0 || row < 0 || column > last_column || row > last_row) return std::nullopt;
-    return Foot{column, row, normal};
+    return SurfaceProjection{column, row, normal};
   }
   return std::nullopt;
 }

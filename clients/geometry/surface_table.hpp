@@ -9,7 +9,7 @@
 
 namespace dtact::perceive {
 
-/// A point of the untouched surface and the outward unit normal there.
+/// A point of the undeformed surface and the outward unit normal there.
 struct SurfacePoint {
   Vector point = {};  ///< Metres.
   Vector normal = {};
@@ -34,13 +34,14 @@ struct SurfaceTable {
                                               double mm_per_px);
 
 /// The place of a depth map whose normal goes through a point, above or below the surface.
-struct Foot {
+struct SurfaceProjection {
   double column = 0;  ///< Of the whole map; between pixels.
   double row = 0;
-  Vector normal = {};  ///< Of the untouched surface there, of length 1 but for the interpolation.
+  Vector normal = {};  ///< Of the undeformed surface there, of length 1 but for the interpolation.
 };
 /// The inverse of a table, for points (metres) that are much nearer to the surface than its radius
 /// of curvature; to a fiftieth of a pixel. Nothing for a point beside the table.
-[[nodiscard]] std::optional<Foot> foot_of(const SurfaceTable& table, const Vector& point);
+[[nodiscard]] std::optional<SurfaceProjection> project_to_surface(const SurfaceTable& table,
+                                                                  const Vector& point);
 
 }  // namespace dtact::perceive

@@ -13,11 +13,11 @@ static_assert(std::endian::native == std::endian::little);
 namespace dtact::perceive {
 namespace {
 
-constexpr float kMost = 32767;
+constexpr float kMax = 32767;
 
 /// A micrometre, or more where the cloud is too large for that.
 double unit_of(const PointCloud& cloud) {
-  return std::max(1e-6, double{largest(cloud.values.data(), 3 * cloud.size())} / kMost);
+  return std::max(1e-6, double{largest(cloud.values.data(), 3 * cloud.size())} / kMax);
 }
 
 }  // namespace
@@ -41,7 +41,7 @@ void fill(const PointCloud& cloud, int encoding, v1::PointCloud& out) {
   auto* units = reinterpret_cast<std::int16_t*>(data.data());
   const std::size_t half = 3 * cloud.size();
   quantise(cloud.values.data(), half, static_cast<float>(1 / unit), units);
-  quantise(cloud.values.data() + half, half, kMost, units + half);
+  quantise(cloud.values.data() + half, half, kMax, units + half);
 }
 
 }  // namespace dtact::perceive

@@ -43,16 +43,16 @@ void FrameMaker::begin(v1::Frame frame, bool pose) {
   // Each client has its own count.
   frame_.clear_dropped();
   if (frame_.has_depth()) {
-    if (frame_.contact().touching()) depth_.emplace(frame_.depth());
-    heed_sensor();
+    if (frame_.contact().in_contact()) depth_.emplace(frame_.depth());
+    follow_sensor();
   }
-  const bool gone = frame_.has_contact() && !frame_.contact().touching();
+  const bool gone = frame_.has_contact() && !frame_.contact().in_contact();
   if (!pose || gone) release();
   if (pose && depth_) follow(*depth_, frame_.depth().uncertainty_um());
   frame_.clear_depth();
 }
 
-void FrameMaker::heed_sensor() {
+void FrameMaker::follow_sensor() {
   const recon::Surface surface = cli::surface_of(frame_.surface());
   if (surface != clouds_.surface()) {
     clouds_ = CloudMaker(surface);
@@ -68,7 +68,7 @@ void FrameMaker::release() {
   if (object_) object_->release();
 }
 
-void FrameMaker::follow(DepthPart& depth, double uncertainty_um) {
+void FrameMaker::follow(DepthCrop& depth, double uncertainty_um) {
   const std::optional<DepthGrid> grid = depth.contact(frame_.contact().deepest_mm());
   if (!grid) return;
   const std::uint32_t took = timed([&] {
@@ -88,7 +88,7 @@ void FrameMaker::follow(DepthPart& depth, double uncertainty_um) {
   pose.set_track_ns(took);
 }
 
-void FrameMaker::add_cloud(DepthPart& depth, const net::FrameKind& kind, v1::PointCloud& out) {
+void FrameMaker::add_cloud(DepthCrop& depth, const net::FrameKind& kind, v1::PointCloud& out) {
   std::optional<DepthGrid> grid;
   if (kind.contact_box) {
     grid = depth.contact(frame_.contact().deepest_mm());

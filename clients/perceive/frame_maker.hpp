@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "clients/geometry/point_cloud.hpp"
-#include "clients/perceive/depth_part.hpp"
+#include "clients/perceive/depth_crop.hpp"
 #include "clients/perceive/pose/object_tracker.hpp"
 #include "clients/perceive/pose/tracker.hpp"
 #include "daemon/serve/encoded_frame.hpp"
@@ -36,13 +36,13 @@ class FrameMaker {
   [[nodiscard]] const v1::Frame& frame() const noexcept { return frame_; }
 
  private:
-  void add_cloud(DepthPart& depth, const net::FrameKind& kind, v1::PointCloud& out);
-  void follow(DepthPart& depth, double uncertainty_um);
+  void add_cloud(DepthCrop& depth, const net::FrameKind& kind, v1::PointCloud& out);
+  void follow(DepthCrop& depth, double uncertainty_um);
   /// Lets go of what was measured by another calibration or on another surface.
-  void heed_sensor();
+  void follow_sensor();
 
   v1::Frame frame_;  ///< Without what is made here, and without the depth map.
-  std::optional<DepthPart> depth_;
+  std::optional<DepthCrop> depth_;
   std::optional<std::uint64_t> calibration_;  ///< Of the depth before.
   CloudMaker clouds_;
   PointCloud cloud_;

@@ -7,7 +7,7 @@ namespace dtact::perceive {
 void NewestFrame::put(v1::Frame frame) {
   if (newest_) {
     const v1::Frame& before = newest_->frame;
-    parted_ |= before.has_contact() && !before.contact().touching();
+    parted_ |= before.has_contact() && !before.contact().in_contact();
   }
   const std::uint64_t missed = newest_ ? newest_->missed + 1 : 0;
   newest_ = Taken{std::move(frame), missed};

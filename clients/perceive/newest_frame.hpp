@@ -13,8 +13,8 @@ class NewestFrame {
   struct Taken {
     v1::Frame frame;
     std::uint64_t missed = 0;  ///< That came after the one before and were replaced.
-    /// What touches may be another contact than in the frame taken before: nothing touched in one
-    /// of those that were missed, or they came by another connection.
+    /// What touches may be another contact than in the frame taken before: there was no contact in
+    /// one of those that were missed, or they came by another connection.
     bool parted = false;
   };
 

@@ -11,7 +11,7 @@ namespace dtact::perceive {
 
 std::shared_ptr<const ObjectModel> load_object(const std::filesystem::path& file,
                                                const std::string& unit) {
-  const Mesh mesh = parse_mesh(base::read_file(file, kMostMeshBytes), file.string());
+  const Mesh mesh = parse_mesh(base::read_file(file, kMaxMeshBytes), file.string());
   try {
     return std::make_shared<const ObjectModel>(
         make_object(mesh, unit == "m" ? 1 : 1e-3, file.stem().string()));

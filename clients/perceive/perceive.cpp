@@ -89,7 +89,7 @@ void set_up(CLI::App& app, cli::Context& context) {
       ->description(
           "Makes point clouds of what a DTact tactile sensor touches, and follows how it moves: "
           "from "
-          "the frames of dtactd, on the same wire, only while something touches.");
+          "the frames of dtactd, on the same wire, only during contact.");
   cli::add_global_options(app, context);
   add_serve(app, context);
   add_watch(app, context);

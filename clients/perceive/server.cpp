@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "clients/cpp/errors.hpp"
-#include "clients/perceive/demand.hpp"
-#include "daemon/serve/who.hpp"
+#include "clients/perceive/upstream_subscription.hpp"
+#include "daemon/serve/client_status.hpp"
 #include "hal/base/clock.hpp"
 
 namespace dtact::perceive {
@@ -16,11 +16,11 @@ using net::Subscription;
 
 Server::Server(asio::io_context& io, net::NetConfig config, client::Options daemon,
                const std::shared_ptr<const ObjectModel>& object)
-    : io_(io), entrance_(io, std::move(config)), maker_(object), daemon_(std::move(daemon)) {}
+    : io_(io), listeners_(io, std::move(config)), maker_(object), daemon_(std::move(daemon)) {}
 
 void Server::start() {
   const auto weak = weak_from_this();
-  entrance_.open(weak, [this](const auto& session) { guests_.admit(session); });
+  listeners_.open(weak, [this](const auto& session) { session_list_.admit(session); });
   const auto frame = [weak, &io = io_] {
     asio::post(io, [weak] {
       if (const auto self = weak.lock()) self->on_frame();
@@ -29,7 +29,7 @@ void Server::start() {
   const auto notice = [weak, &io = io_](const std::string& sentence) {
     asio::post(io, [weak, sentence] {
       if (const auto self = weak.lock()) {
-        self->entrance_.config().log({net::LogLevel::info, sentence});
+        self->listeners_.config().log({net::LogLevel::info, sentence});
       }
     });
   };
@@ -38,8 +38,8 @@ void Server::start() {
 }
 
 void Server::stop() {
-  entrance_.close();
-  guests_.dismiss("dtact-perceive ends");
+  listeners_.close();
+  session_list_.dismiss("dtact-perceive ends");
   upstream_.reset();
 }
 
@@ -58,22 +58,22 @@ void Server::on_frame() {
   try {
     maker_.begin(std::move(taken->frame), pose_wanted_);
   } catch (const client::ProtocolError& e) {
-    return entrance_.config().log({net::LogLevel::warning, e.what()});
+    return listeners_.config().log({net::LogLevel::warning, e.what()});
   }
-  for (const auto& session : guests_.all()) {
+  for (const auto& session : session_list_.all()) {
     const auto kind = session->due(timestamp_ns, taken->missed);
     if (!kind) continue;
     if (auto encoded = maker_.make(*kind)) session->send_frame(std::move(encoded));
   }
-  if (maker_.frame().contact().touching() == touching_) return;
-  touching_ = !touching_;
+  if (maker_.frame().contact().in_contact() == in_contact_) return;
+  in_contact_ = !in_contact_;
   update_want();
 }
 
 void Server::update_want() {
-  Demand demand(touching_);
-  for (const auto& session : guests_.all()) {
-    if (session->greeted()) demand.add(session->subscription());
+  UpstreamSubscription demand(in_contact_);
+  for (const auto& session : session_list_.all()) {
+    if (session->ready()) demand.add(session->subscription());
   }
   pose_wanted_ = demand.pose();
   const v1::Subscribe wanted = demand.subscription();
@@ -120,7 +120,7 @@ void Server::on_request(const std::shared_ptr<net::Session>& session,
 }
 
 void Server::fill(v1::Status& status) const {
-  const net::NetConfig& config = entrance_.config();
+  const net::NetConfig& config = listeners_.config();
   status.set_state(v1::STATE_SERVING);
   status.set_version(config.version);
   status.set_name(config.name);
@@ -129,9 +129,9 @@ void Server::fill(v1::Status& status) const {
   status.set_skipped(skipped_);
   const std::chrono::duration<double> uptime = std::chrono::steady_clock::now() - start_;
   status.set_uptime_s(uptime.count());
-  for (const auto& endpoint : entrance_.endpoints()) net::fill(endpoint, *status.add_endpoints());
-  for (const auto& session : guests_.all()) {
-    if (session->greeted()) net::fill(*session, *status.add_clients());
+  for (const auto& endpoint : listeners_.endpoints()) net::fill(endpoint, *status.add_endpoints());
+  for (const auto& session : session_list_.all()) {
+    if (session->ready()) net::fill(*session, *status.add_clients());
   }
 }
 
@@ -140,7 +140,7 @@ void Server::on_closed(const net::Session& session) {
   asio::post(io_, [weak = weak_from_this(), gone = &session] {
     const auto self = weak.lock();
     if (self == nullptr) return;
-    (void)self->guests_.release(gone);
+    (void)self->session_list_.release(gone);
     self->update_want();
   });
 }

@@ -9,8 +9,8 @@
 
 #include "clients/perceive/frame_maker.hpp"
 #include "clients/perceive/upstream.hpp"
-#include "daemon/serve/entrance.hpp"
-#include "daemon/serve/guests.hpp"
+#include "daemon/serve/listeners.hpp"
+#include "daemon/serve/session_list.hpp"
 
 namespace dtact::perceive {
 
@@ -19,18 +19,18 @@ namespace dtact::perceive {
 class Server : public net::SessionHost, public std::enable_shared_from_this<Server> {
  public:
   /// Listens from here on; `object` as FrameMaker takes it. Throws std::runtime_error naming the
-  /// setting, address or port and the remedy.
+  /// setting, address or port and the fix.
   Server(boost::asio::io_context& io, net::NetConfig config, client::Options daemon,
          const std::shared_ptr<const ObjectModel>& object = nullptr);
 
   void start();
   void stop();
-  [[nodiscard]] std::vector<std::string> addresses() const { return entrance_.addresses(); }
+  [[nodiscard]] std::vector<std::string> addresses() const { return listeners_.addresses(); }
   /// The TCP port it listens on; 0 without TCP.
-  [[nodiscard]] std::uint16_t port() const { return entrance_.port(); }
+  [[nodiscard]] std::uint16_t port() const { return listeners_.port(); }
 
   void introduce(v1::HelloReply& reply) const override;
-  void on_greeted() override { update_want(); }
+  void on_authenticated() override { update_want(); }
   void on_request(const std::shared_ptr<net::Session>& session,
                   const v1::ClientMessage& message) override;
   void on_closed(const net::Session& session) override;
@@ -46,14 +46,14 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
   void fill(v1::Status& status) const;
 
   boost::asio::io_context& io_;
-  net::Entrance entrance_;
-  net::Guests guests_;
+  net::Listeners listeners_;
+  net::SessionList session_list_;
   FrameMaker maker_;
   std::unique_ptr<Upstream> upstream_;
   client::Options daemon_;
   v1::Subscribe wanted_;
   bool pose_wanted_ = false;
-  bool touching_ = false;  ///< In the last frame.
+  bool in_contact_ = false;  ///< In the last frame.
   std::uint64_t frames_ = 0;
   std::uint64_t skipped_ = 0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();

@@ -70,7 +70,7 @@ std::string force_words(const v1::Contact& contact) {
 /// ...".
 std::string line_of(const v1::Frame& frame, double fps) {
   std::string line = fmt::format("{:.1f} fps", fps);
-  if (!frame.contact().touching()) return line + "  nothing touches\n";
+  if (!frame.contact().in_contact()) return line + "  there is no contact\n";
   line += force_words(frame.contact());
   if (frame.has_cloud()) {
     line += fmt::format("  {} points in {:.2f} ms", frame.cloud().points(),
@@ -85,7 +85,7 @@ void watch(const cli::Context& context, double seconds) {
   client::Client client(context.target);
   client.subscribe(wanted());
   const auto start = Clock::now();
-  auto told = start;
+  auto reported = start;
   int frames = 0;
   while (!cli::Interruptible::happened()) {
     const auto item = client.next(std::chrono::milliseconds(100));
@@ -94,7 +94,7 @@ void watch(const cli::Context& context, double seconds) {
     const auto* frame = item ? std::get_if<v1::Frame>(&*item) : nullptr;
     if (frame == nullptr) continue;
     ++frames;
-    const std::chrono::duration<double> passed = now - told;
+    const std::chrono::duration<double> passed = now - reported;
     if (passed.count() < 1) continue;
     if (context.json) {
       v1::Frame shown = *frame;
@@ -104,7 +104,7 @@ void watch(const cli::Context& context, double seconds) {
       context.out << line_of(*frame, frames / passed.count());
     }
     context.out << std::flush;
-    told = now;
+    reported = now;
     frames = 0;
   }
 }

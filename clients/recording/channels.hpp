@@ -14,6 +14,6 @@ inline constexpr const char* kCameraTopic = "/camera/jpeg";
 inline constexpr const char* kCalibrationToml = "calibration.toml";
 inline constexpr const char* kReferencePng = "reference.png";
 /// What depth was measured against: 16-bit grey, grey level times 256.
-inline constexpr const char* kUntouchedPng = "untouched.png";
+inline constexpr const char* kCurrentReferencePng = "current_reference.png";
 
 }  // namespace dtact::recording

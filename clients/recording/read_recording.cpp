@@ -33,16 +33,16 @@ bool holds(const mcap::Reader& file, const char* topic, const std::string& schem
 
 }  // namespace
 
-void read_recording(const mcap::Reader& file, const Takers& takers) {
+void read_recording(const mcap::Reader& file, const RecordingHandlers& handlers) {
   if (!holds(file, kFrameTopic, v1::Frame::descriptor()->full_name())) {
     throw mcap::Error(fmt::format("no {} of dtact.v1.Frame in it: name a file of dtactctl record{}",
                                   kFrameTopic,
                                   file.damage().empty() ? "" : " (" + file.damage() + ")"));
   }
   std::set<std::string> topics;
-  if (takers.frame) topics.insert({kFrameTopic, kCameraTopic});
-  if (takers.event) topics.insert(kEventTopic);
-  if (takers.status) topics.insert(kStatusTopic);
+  if (handlers.frame) topics.insert({kFrameTopic, kCameraTopic});
+  if (handlers.event) topics.insert(kEventTopic);
+  if (handlers.status) topics.insert(kStatusTopic);
   // A frame's JPEG stands before it.
   std::pair<std::uint64_t, std::string> jpeg;
   file.read(topics, [&](const mcap::Channel& channel, const mcap::Message& message) {
@@ -52,17 +52,17 @@ void read_recording(const mcap::Reader& file, const Takers& takers) {
       return true;
     }
     if (channel.topic == kEventTopic) {
-      return takers.event(parse<v1::Event>(channel, message), message.log_time);
+      return handlers.event(parse<v1::Event>(channel, message), message.log_time);
     }
     if (channel.topic == kStatusTopic) {
-      return takers.status(parse<v1::Status>(channel, message), message.log_time);
+      return handlers.status(parse<v1::Status>(channel, message), message.log_time);
     }
     auto frame = parse<v1::Frame>(channel, message);
     if (jpeg.first == message.log_time && !jpeg.second.empty()) {
       frame.mutable_jpeg()->set_data(std::move(jpeg.second));
       jpeg = {};
     }
-    return takers.frame(frame, message.log_time);
+    return handlers.frame(frame, message.log_time);
   });
 }
 

@@ -12,7 +12,7 @@ namespace dtact::recording {
 
 /// What to do with each message of a recording; what is unset is passed over. They return false for
 /// enough. Times are the file's, nanoseconds since 1970.
-struct Takers {
+struct RecordingHandlers {
   /// As the daemon sent it, with its JPEG.
   std::function<bool(const v1::Frame& frame, std::uint64_t log_time)> frame;
   std::function<bool(const v1::Event& event, std::uint64_t log_time)> event;
@@ -21,7 +21,7 @@ struct Takers {
 
 /// Goes through a recording in the order of the file. Throws mcap::Error when it is damaged or
 /// holds no dtact.v1.Frame.
-void read_recording(const mcap::Reader& file, const Takers& takers);
+void read_recording(const mcap::Reader& file, const RecordingHandlers& handlers);
 
 /// The last attachment of that name that was taken up to `log_time`, or the first of all; none when
 /// there is none of that name.

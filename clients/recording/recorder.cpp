@@ -11,8 +11,8 @@ constexpr std::chrono::seconds kFlush{1};
 
 }  // namespace
 
-Recorder::Recorder(mcap::Sink& sink, const RecordingOptions& options, std::size_t most_waiting)
-    : writer_(sink, options), most_waiting_(most_waiting), thread_([this] { run(); }) {}
+Recorder::Recorder(mcap::Sink& sink, const RecordingOptions& options, std::size_t max_waiting)
+    : writer_(sink, options), max_waiting_(max_waiting), thread_([this] { run(); }) {}
 
 Recorder::~Recorder() { end(); }
 
@@ -39,7 +39,7 @@ void Recorder::add(v1::Frame frame) {
   {
     const std::scoped_lock lock(mutex_);
     if (failure_) return;
-    if (waiting_bytes_ + bytes > most_waiting_) {
+    if (waiting_bytes_ + bytes > max_waiting_) {
       ++counts_.dropped;
       return;
     }

@@ -30,10 +30,10 @@ class Recorder {
     std::uint64_t bytes = 0;    ///< Of the file.
   };
 
-  static constexpr std::size_t kMostWaiting = std::size_t{64} << 20U;  ///< Bytes.
+  static constexpr std::size_t kMaxWaiting = std::size_t{64} << 20U;  ///< Bytes.
 
   Recorder(mcap::Sink& sink, const RecordingOptions& options,
-           std::size_t most_waiting = kMostWaiting);
+           std::size_t max_waiting = kMaxWaiting);
   /// Without finish() the file is left without its index.
   ~Recorder();
   Recorder(const Recorder&) = delete;
@@ -62,7 +62,7 @@ class Recorder {
   void end();
 
   RecordingWriter writer_;
-  const std::size_t most_waiting_;
+  const std::size_t max_waiting_;
   mutable std::mutex mutex_;
   std::condition_variable arrived_;
   std::deque<Waiting> queue_;

@@ -14,7 +14,7 @@
 namespace dtact::web {
 
 /// A WebSocket whose handshake is done. `Stream` is a socket, or TLS over one. A peer that is gone
-/// without a word is found after `dead_after`, one that only does not read is kept: reading then
+/// without a word is found after `peer_timeout`, one that only does not read is kept: reading then
 /// ends with asio::error::timed_out.
 template <typename Stream>
 class BeastWebSocket final : public WebSocket {
@@ -22,10 +22,10 @@ class BeastWebSocket final : public WebSocket {
   using Channel = boost::beast::websocket::stream<Stream>;
 
  public:
-  BeastWebSocket(std::unique_ptr<Channel> channel, std::chrono::milliseconds dead_after)
+  BeastWebSocket(std::unique_ptr<Channel> channel, std::chrono::milliseconds peer_timeout)
       : channel_(std::move(channel)),
         watch_(std::make_shared<net::TcpWatch>(channel_->get_executor(), socket().native_handle(),
-                                               dead_after)) {
+                                               peer_timeout)) {
     watch_->start([this] {
       dead_ = true;
       Error ignored;

@@ -23,12 +23,12 @@ using boost::system::error_code;
 
 constexpr std::uint32_t kMaxHead = 8192;
 /// For TLS' handshake and a request's head; also how long a connection may lie idle.
-constexpr std::chrono::seconds kPatience{15};
+constexpr std::chrono::seconds kTimeout{15};
 /// For an answer, or the answer that opens a WebSocket, to be taken.
 constexpr std::chrono::seconds kDelivery{60};
 
-/// Nothing of strangers': no script, style, picture or connection but from here, none in the page's
-/// own text, and no other page around this one.
+/// Nothing of unauthenticated clients': no script, style, picture or connection but from here, none
+/// in the page's own text, and no other page around this one.
 constexpr const char* kPolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' "
     "blob:; font-src 'self'; connect-src 'self'; worker-src 'self'; manifest-src 'self'; "
@@ -39,17 +39,17 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
  public:
   template <typename... Arguments>
   HttpConnection(net::Peer peer, std::weak_ptr<Site> site, std::shared_ptr<void> ticket,
-                 std::chrono::milliseconds dead_after, Arguments&&... arguments)
+                 std::chrono::milliseconds peer_timeout, Arguments&&... arguments)
       : stream_(std::make_unique<Stream>(std::forward<Arguments>(arguments)...)),
         timer_(stream_->get_executor()),
         peer_(std::move(peer)),
         site_(std::move(site)),
         ticket_(std::move(ticket)),
-        dead_after_(dead_after) {}
+        peer_timeout_(peer_timeout) {}
 
   void start() {
     if constexpr (kTls) {
-      wait_at_most(kPatience);
+      wait_at_most(kTimeout);
       stream_->async_handshake(asio::ssl::stream_base::server,
                                [self = this->shared_from_this()](const error_code& error) {
                                  if (!error) self->read();
@@ -84,7 +84,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   void read() {
     Parser& parser = parser_.emplace();
     parser.header_limit(kMaxHead);
-    wait_at_most(kPatience);
+    wait_at_most(kTimeout);
     http::async_read_header(
         *stream_, buffer_, parser,
         [self = this->shared_from_this(), &parser](const error_code& error, std::size_t) {
@@ -181,7 +181,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
       self->timer_.cancel();
       if (error) return;
       wanted.open(
-          std::make_shared<BeastWebSocket<Stream>>(std::move(self->channel_), self->dead_after_),
+          std::make_shared<BeastWebSocket<Stream>>(std::move(self->channel_), self->peer_timeout_),
           std::move(self->peer_));
     });
   }
@@ -192,7 +192,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   net::Peer peer_;
   std::weak_ptr<Site> site_;
   std::shared_ptr<void> ticket_;
-  std::chrono::milliseconds dead_after_;
+  std::chrono::milliseconds peer_timeout_;
   beast::flat_buffer buffer_{kMaxHead};
   std::optional<Parser> parser_;  ///< Of the request at hand.
   Answer answer_;
@@ -203,7 +203,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
 
 std::shared_ptr<void> HttpLimits::admit(const std::string& host) {
   std::size_t& of_host = counts_->hosts[host];
-  if (counts_->all >= kMost || of_host >= kMostOfHost) {
+  if (counts_->all >= kMax || of_host >= kMaxOfHost) {
     if (of_host == 0) counts_->hosts.erase(host);
     return nullptr;
   }
@@ -218,14 +218,14 @@ std::shared_ptr<void> HttpLimits::admit(const std::string& host) {
 
 void serve_http(tcp::socket socket, net::Peer peer, asio::ssl::context* tls,
                 std::weak_ptr<Site> site, std::shared_ptr<void> ticket,
-                std::chrono::milliseconds dead_after) {
+                std::chrono::milliseconds peer_timeout) {
   if (tls != nullptr) {
     std::make_shared<HttpConnection<asio::ssl::stream<tcp::socket>>>(
-        std::move(peer), std::move(site), std::move(ticket), dead_after, std::move(socket), *tls)
+        std::move(peer), std::move(site), std::move(ticket), peer_timeout, std::move(socket), *tls)
         ->start();
   } else {
-    std::make_shared<HttpConnection<tcp::socket>>(std::move(peer), std::move(site),
-                                                  std::move(ticket), dead_after, std::move(socket))
+    std::make_shared<HttpConnection<tcp::socket>>(
+        std::move(peer), std::move(site), std::move(ticket), peer_timeout, std::move(socket))
         ->start();
   }
 }

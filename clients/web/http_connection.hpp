@@ -16,8 +16,8 @@ namespace dtact::web {
 /// Counts the connections that speak HTTP, so that they cannot take all descriptors. On one thread.
 class HttpLimits {
  public:
-  static constexpr std::size_t kMost = 128;
-  static constexpr std::size_t kMostOfHost = 64;
+  static constexpr std::size_t kMax = 128;
+  static constexpr std::size_t kMaxOfHost = 64;
 
   /// Counts until the returned is gone; null: there are too many, of all or of this Peer.host.
   [[nodiscard]] std::shared_ptr<void> admit(const std::string& host);
@@ -35,6 +35,6 @@ class HttpLimits {
 /// meanwhile. Without `tls` plain; it must outlive the connection.
 void serve_http(boost::asio::ip::tcp::socket socket, net::Peer peer, boost::asio::ssl::context* tls,
                 std::weak_ptr<Site> site, std::shared_ptr<void> ticket,
-                std::chrono::milliseconds dead_after);
+                std::chrono::milliseconds peer_timeout);
 
 }  // namespace dtact::web

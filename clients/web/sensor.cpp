@@ -46,14 +46,14 @@ Sensor::Sensor(asio::io_context& io, std::shared_ptr<Source> source, const net::
 
 void Sensor::start() {
   source_->follow(this, {.changed = [this] { on_changed(); },
-                         .event = [this](const auto& event) { guests_.broadcast(event); }});
+                         .event = [this](const auto& event) { session_list_.broadcast(event); }});
 }
 
 void Sensor::stop() {
   source_->unfollow(this);
-  for (const auto& session : guests_.all()) source_->leave(session.get());
+  for (const auto& session : session_list_.all()) source_->leave(session.get());
   viewers_.clear();
-  guests_.dismiss("dtact-web ends");
+  session_list_.dismiss("dtact-web ends");
 }
 
 void Sensor::admit(std::shared_ptr<WebSocket> socket, net::Peer peer) {
@@ -62,7 +62,7 @@ void Sensor::admit(std::shared_ptr<WebSocket> socket, net::Peer peer) {
   const auto session =
       std::make_shared<net::Session>(std::move(transport), config_, admission_, weak_from_this());
   viewers_[session.get()].transport = there;
-  guests_.admit(session);
+  session_list_.admit(session);
   there->tell(entry());
 }
 
@@ -87,7 +87,7 @@ void Sensor::on_changed() {
        fmt::format("the daemon of {} {}", source_->name(),
                    there ? "is there: " + daemon->program() : "is away: " + source_->reason())});
   const std::string text = entry();
-  for (const auto& session : guests_.all()) {
+  for (const auto& session : session_list_.all()) {
     if (!source_->connected()) session->subscribe(Subscription());
     viewers_[session.get()].transport->tell(text);
   }
@@ -101,7 +101,7 @@ void Sensor::introduce(v1::HelloReply& reply) const {
   *reply.mutable_surface_frame() = daemon->surface_frame();
   reply.set_name(daemon->name());
   reply.set_serial(daemon->serial());
-  reply.set_rezero_within_s(daemon->rezero_within_s());
+  reply.set_rezero_timeout_s(daemon->rezero_timeout_s());
   if (daemon->rights() == v1::RIGHTS_VIEW) reply.set_rights(v1::RIGHTS_VIEW);
 }
 
@@ -146,7 +146,7 @@ void Sensor::on_closed(const net::Session& session) {
     const auto self = weak.lock();
     if (self == nullptr || self->viewers_.erase(gone) == 0) return;
     self->source_->leave(gone);
-    (void)self->guests_.release(gone);
+    (void)self->session_list_.release(gone);
   });
 }
 

@@ -9,9 +9,9 @@
 #include "clients/web/source.hpp"
 #include "clients/web/wire_transport.hpp"
 #include "daemon/serve/admission.hpp"
-#include "daemon/serve/guests.hpp"
 #include "daemon/serve/net_config.hpp"
 #include "daemon/serve/session.hpp"
+#include "daemon/serve/session_list.hpp"
 
 namespace dtact::web {
 
@@ -33,7 +33,7 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
   [[nodiscard]] const std::shared_ptr<Source>& shared_source() const noexcept { return source_; }
 
   void introduce(v1::HelloReply& reply) const override;
-  void on_greeted() override {}
+  void on_authenticated() override {}
   void on_request(const std::shared_ptr<net::Session>& session,
                   const v1::ClientMessage& message) override;
   void on_closed(const net::Session& session) override;
@@ -53,7 +53,7 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
   std::shared_ptr<Source> source_;
   const net::NetConfig& config_;
   net::Admission& admission_;
-  net::Guests guests_;
+  net::SessionList session_list_;
   std::map<const net::Session*, Viewer> viewers_;
 };
 

@@ -54,15 +54,15 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
     calibrated.push_back({source, options});
     sensors_.push_back(std::make_shared<Sensor>(io, std::move(source), config_, admission_));
   }
-  foxglove_ = std::make_unique<foxglove::Door>(sources(), config_, admission_);
-  guided_ = std::make_unique<guided::Door>(std::move(calibrated), std::move(settings.work_folder),
-                                           config_, admission_);
+  foxglove_ = std::make_unique<foxglove::FoxgloveEndpoint>(sources(), config_, admission_);
+  guided_ = std::make_unique<guided::GuidedEndpoint>(
+      std::move(calibrated), std::move(settings.work_folder), config_, admission_);
   listener_ = net::listen_tcp(io, config_, [this](asio::ip::tcp::socket socket, net::Peer peer) {
     // One too many is let go of without a word, as any of HTTP would cost what there is too little
     // of.
     if (auto ticket = limits_.admit(peer.host)) {
       serve_http(std::move(socket), std::move(peer), tls_ ? &tls_->context : nullptr,
-                 weak_from_this(), std::move(ticket), config_.dead_after);
+                 weak_from_this(), std::move(ticket), config_.peer_timeout);
     }
   });
 }

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "clients/cpp/options.hpp"
-#include "clients/web/foxglove/door.hpp"
-#include "clients/web/guided/door.hpp"
+#include "clients/web/foxglove/foxglove_endpoint.hpp"
+#include "clients/web/guided/guided_endpoint.hpp"
 #include "clients/web/http_connection.hpp"
 #include "clients/web/page.hpp"
 #include "clients/web/request.hpp"
@@ -43,7 +43,7 @@ struct Settings {
 class Server : public Site, public std::enable_shared_from_this<Server> {
  public:
   /// Listens from here on. `page` must outlive it. Throws std::runtime_error naming the setting,
-  /// file, address or port and the remedy.
+  /// file, address or port and the fix.
   Server(boost::asio::io_context& io, Settings settings, const Page& page);
 
   void start();
@@ -70,8 +70,8 @@ class Server : public Site, public std::enable_shared_from_this<Server> {
   net::Admission admission_;
   HttpLimits limits_;
   std::vector<std::shared_ptr<Sensor>> sensors_;
-  std::unique_ptr<foxglove::Door> foxglove_;
-  std::unique_ptr<guided::Door> guided_;
+  std::unique_ptr<foxglove::FoxgloveEndpoint> foxglove_;
+  std::unique_ptr<guided::GuidedEndpoint> guided_;
   std::shared_ptr<net::Listener> listener_;
 };
 

@@ -75,7 +75,7 @@ void Source::on_up(const v1::HelloReply& daemon) {
   daemon_ = daemon;
   connected_ = true;
   reason_.clear();
-  tell_all();
+  notify_all();
 }
 
 void Source::on_down(const std::string& reason) {
@@ -89,10 +89,10 @@ void Source::on_down(const std::string& reason) {
     stream.members.clear();
   }
   retire_empty();
-  tell_all();
+  notify_all();
 }
 
-void Source::tell_all() {
+void Source::notify_all() {
   for (const auto& [who, follower] : followers_) follower.changed();
 }
 

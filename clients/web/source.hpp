@@ -89,7 +89,7 @@ class Source : public std::enable_shared_from_this<Source> {
   /// Tells those of a stream who wait for it, and takes them off their others when it flows.
   void settle(Stream& stream, const v1::Reply& reply);
   void retire_empty();
-  void tell_all();
+  void notify_all();
 
   boost::asio::io_context& io_;
   std::string name_;

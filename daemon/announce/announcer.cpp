@@ -72,7 +72,7 @@ struct Announcer::Impl : std::enable_shared_from_this<Impl> {
   void commit();
   void withdraw();
   void on_state(std::int32_t state, const std::string& error);
-  void tell(const std::string& line);
+  void set_state(const std::string& line);
 
   /// sd-bus' callback for member `handler`, which gets a reply or signal that is no error.
   template <void (Impl::*handler)(sd_bus_message*)>
@@ -82,7 +82,7 @@ struct Announcer::Impl : std::enable_shared_from_this<Impl> {
     try {
       impl.answer(message, handler);
     } catch (const std::exception& e) {
-      impl.tell(std::string("the service is not announced: ") + e.what());
+      impl.set_state(std::string("the service is not announced: ") + e.what());
     }
     return 0;
   }
@@ -93,7 +93,8 @@ struct Announcer::Impl : std::enable_shared_from_this<Impl> {
     }
     if (sd_bus_message_is_method_error(message, nullptr) > 0) {
       withdraw();
-      return tell("the service is not announced: " + text_of(sd_bus_message_get_error(message)));
+      return set_state("the service is not announced: " +
+                       text_of(sd_bus_message_get_error(message)));
     }
     (this->*handler)(message);
   }
@@ -112,13 +113,13 @@ struct Announcer::Impl : std::enable_shared_from_this<Impl> {
   std::string group;    ///< Its object path; empty: nothing is published.
   bool asking = false;  ///< For a group.
   Service published;
-  int alternative = 1;  ///< Above 1, the name has this number.
-  std::string told;     ///< The last line that was logged.
+  int alternative = 1;   ///< Above 1, the name has this number.
+  std::string reported;  ///< The last line that was logged.
   bool stopped = false;
 };
 
-void Announcer::Impl::tell(const std::string& line) {
-  if (std::exchange(told, line) != line) log(line);
+void Announcer::Impl::set_state(const std::string& line) {
+  if (std::exchange(reported, line) != line) log(line);
 }
 
 void Announcer::Impl::tick() {
@@ -130,7 +131,7 @@ void Announcer::Impl::tick() {
       publish();
     }
   } catch (const std::exception& e) {
-    tell(std::string("the service is not announced: ") + e.what());
+    set_state(std::string("the service is not announced: ") + e.what());
   }
   if (bus != nullptr) pump();
   timer.expires_after(kInterval);
@@ -162,7 +163,7 @@ void Announcer::Impl::connect() {
 }
 
 void Announcer::Impl::lose(const std::string& reason) {
-  tell("the service is not announced: no system bus (" + reason + ")");
+  set_state("the service is not announced: no system bus (" + reason + ")");
   error_code ignored;
   descriptor.close(ignored);
   group.clear();
@@ -199,7 +200,7 @@ void Announcer::Impl::on_has_owner(sd_bus_message* message) {
   int owned = 0;
   check(sd_bus_message_read(message, "b", &owned));
   if (owned != 0) return publish();
-  tell(
+  set_state(
       "the service is not announced until avahi-daemon runs (apt-get install avahi-daemon, or "
       "net.announce = false)");
 }
@@ -271,15 +272,15 @@ void Announcer::Impl::on_state_changed(sd_bus_message* message) {
 void Announcer::Impl::on_state(std::int32_t state, const std::string& error) {
   if (state == kEstablished) {
     const std::string number = alternative > 1 ? fmt::format(" #{}", alternative) : "";
-    tell(fmt::format("announced as \"{}{}\" ({}, port {})", published.name, number,
-                     wire::kServiceType, published.port));
+    set_state(fmt::format("announced as \"{}{}\" ({}, port {})", published.name, number,
+                          wire::kServiceType, published.port));
   } else if (state == kCollision) {
     ++alternative;
     withdraw();
     publish();
   } else if (state == kFailure) {
     withdraw();
-    tell("the service is not announced: " + error);
+    set_state("the service is not announced: " + error);
   }
 }
 

@@ -115,11 +115,11 @@ toml::table parse_setting(const std::string& setting) {
 void check_reference(const pipeline::ReferenceRules& rules) {
   for (const auto& [key, frames] :
        {std::pair("frames", rules.frames), std::pair("settle_frames", rules.settle_frames)}) {
-    if (rules.patience_frames >= frames) continue;
+    if (rules.timeout_frames >= frames) continue;
     throw std::runtime_error(fmt::format(
-        "reference.patience_frames = {} must be at least reference.{} = {}: no reference would "
+        "reference.timeout_frames = {} must be at least reference.{} = {}: no reference would "
         "ever be taken",
-        rules.patience_frames, key, frames));
+        rules.timeout_frames, key, frames));
   }
 }
 
@@ -155,11 +155,11 @@ LoadedConfig load_config(const std::optional<fs::path>& file,
   }
   check_reference(loaded.config.pipeline.reference);
   const pipeline::ContactRules& contact = loaded.config.pipeline.contact;
-  if (contact.lost_mm >= contact.made_mm) {
-    throw std::runtime_error(
-        fmt::format("contact.lost_mm = {} must be less than contact.made_mm = {}: contact would "
-                    "flicker",
-                    contact.lost_mm, contact.made_mm));
+  if (contact.release_mm >= contact.threshold_mm) {
+    throw std::runtime_error(fmt::format(
+        "contact.release_mm = {} must be less than contact.threshold_mm = {}: contact would "
+        "flicker",
+        contact.release_mm, contact.threshold_mm));
   }
   const hal::GpioLineConfig& power = loaded.config.hal.ring.ws2812.power;
   if (power.is_set() && (power.line >= 0) != power.name.empty()) {

@@ -18,11 +18,11 @@
 
 #include "daemon/announce/announcer.hpp"
 #include "daemon/app/files.hpp"
-#include "daemon/app/give_way.hpp"
 #include "daemon/app/journal.hpp"
+#include "daemon/app/realtime_throttle.hpp"
 #include "daemon/app/reload.hpp"
 #include "daemon/app/service.hpp"
-#include "daemon/app/status_teller.hpp"
+#include "daemon/app/status_reporter.hpp"
 #include "daemon/app/watchdog.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/metrics/endpoint.hpp"
@@ -74,7 +74,7 @@ std::shared_ptr<const calibration::Calibration> load_calibration(const fs::path&
     spdlog::info("calibration {} from {}", loaded->name, folder.string());
     return loaded;
   } catch (const std::exception& e) {
-    // What the configuration names is mended there. An uploaded one can be replaced only by a
+    // What the configuration names is fixed there. An uploaded one can be replaced only by a
     // daemon that runs.
     if (folder == configured) throw;
     spdlog::warn(
@@ -205,36 +205,36 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
   pipeline.start();
   for (const std::string& refused : pipeline.status().realtime) spdlog::warn("{}", refused);
 
-  pipeline::HealthSet told;
-  told.set(pipeline::Health::uncalibrated, uncalibrated);
-  told.set(pipeline::Health::ring_trouble, ring.away);
-  told.set(pipeline::Health::not_realtime, !pipeline.status().realtime.empty());
-  StatusTeller teller(
+  pipeline::HealthSet reported;
+  reported.set(pipeline::Health::uncalibrated, uncalibrated);
+  reported.set(pipeline::Health::ring_fault, ring.away);
+  reported.set(pipeline::Health::not_realtime, !pipeline.status().realtime.empty());
+  StatusReporter reporter(
       io, [&pipeline] { return pipeline.status(); },
-      fmt::format("listening on {}", fmt::join(server.addresses(), " and ")), told);
+      fmt::format("listening on {}", fmt::join(server.addresses(), " and ")), reported);
   Config running = config;
   bool stopping = false;
   std::function<void()> wait_for_hangup = [&] {
     hangups.async_wait([&](const boost::system::error_code& error, int) {
       if (error || stopping) return;  // one that came with the signal to stop has no error
       notify_reloading();
-      teller.set_note(reload(running, load, server));
-      notify_ready(teller.text());
+      reporter.set_note(reload(running, load, server));
+      notify_ready(reporter.text());
       wait_for_hangup();
     });
   };
   wait_for_hangup();
   Watchdog watchdog(io, [&pipeline] { return pipeline.heartbeat(); });
-  GiveWay give_way(io);
+  RealtimeThrottle realtime_throttle(io);
   signals.async_wait([&](const boost::system::error_code& error, int signal) {
     if (error) return;
     spdlog::info("{}: stopping", signal == SIGTERM ? "SIGTERM" : "SIGINT");
     notify_stopping();
     stopping = true;
     hangups.cancel();
-    teller.stop();
+    reporter.stop();
     watchdog.stop();
-    give_way.stop();
+    realtime_throttle.stop();
     if (announced) announced->stop();
     if (metrics) metrics->stop();
     server.stop();
@@ -249,7 +249,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
         "other machines get through where IPAddressAllow= of the unit names them: sudo systemctl "
         "edit dtactd, see network.conf in /usr/share/doc/dtactd/examples");
   }
-  notify_ready(teller.text());
+  notify_ready(reporter.text());
   io.run();
   pipeline.stop();
 }

@@ -8,7 +8,7 @@
 
 namespace dtact::app {
 
-/// Throws std::runtime_error, naming `key` and the remedy, where this process may not read the file
+/// Throws std::runtime_error, naming `key` and the fix, where this process may not read the file
 /// or folder that the configuration names there.
 void check_readable(const std::string& key, const std::filesystem::path& path);
 
@@ -20,7 +20,7 @@ void check_camera_files(const hal::CameraConfig& camera);
 void resolve_credentials(net::NetConfig& config);
 
 /// Reads certificate, key and token file and lets go of them. Throws std::runtime_error with file
-/// and remedy where a start would, and a reload keep what it has. A credential is looked at where
+/// and fix where a start would, and a reload keep what it has. A credential is looked at where
 /// this process has the unit's.
 void check_net_files(net::NetConfig config);
 

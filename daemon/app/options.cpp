@@ -29,7 +29,7 @@ void set_up(CLI::App& cli, Options& options) {
   CLI::Option* const doctor = cli.add_flag(
       "--doctor", options.doctor,
       "Check what the configuration needs of this machine, print what is wrong with the\n"
-      "command that mends it, and exit; status 1 when something is wrong");
+      "command that fixes it, and exit; status 1 when something is wrong");
   cli.add_flag("--report", options.report,
                "With --doctor: what this machine is and what is wrong, to be sent to others;\n"
                "no names of users and hosts and no serial numbers")

@@ -25,11 +25,11 @@ namespace dtact::app {
 namespace {
 
 /// What the manager waits for may wait for it: systemd that is busy reads on within moments.
-constexpr int kPatienceMs = 5000;
+constexpr int kTimeoutMs = 5000;
 
 /// sd_notify(3)'s datagram (its notes state the protocol). sd_notify() itself waits without end for
-/// a manager that does not read, and the network with it. False: not sent within `patience_ms`.
-bool notify(const std::string& message, int patience_ms) {
+/// a manager that does not read, and the network with it. False: not sent within `timeout_ms`.
+bool notify(const std::string& message, int timeout_ms) {
   const char* name = std::getenv("NOTIFY_SOCKET");
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -44,17 +44,17 @@ bool notify(const std::string& message, int patience_ms) {
     return true;
   }
   pollfd writable{socket.get(), POLLOUT, 0};
-  if (patience_ms > 0) (void)::poll(&writable, 1, patience_ms);
+  if (timeout_ms > 0) (void)::poll(&writable, 1, timeout_ms);
   return ::send(socket.get(), message.data(), message.size(), MSG_NOSIGNAL) >= 0 || errno != EAGAIN;
 }
 
 }  // namespace
 
 void notify_ready(const std::string& status) {
-  (void)notify("READY=1\nSTATUS=" + status, kPatienceMs);
+  (void)notify("READY=1\nSTATUS=" + status, kTimeoutMs);
 }
 bool notify_status(const std::string& status) { return notify("STATUS=" + status, 0); }
-void notify_stopping() { (void)notify("STOPPING=1", kPatienceMs); }
+void notify_stopping() { (void)notify("STOPPING=1", kTimeoutMs); }
 
 void notify_reloading() {
   using std::chrono::duration_cast;
@@ -63,7 +63,7 @@ void notify_reloading() {
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
   (void)notify(
       fmt::format("RELOADING=1\nMONOTONIC_USEC={}", duration_cast<microseconds>(now).count()),
-      kPatienceMs);
+      kTimeoutMs);
 }
 
 unsigned long long watchdog_interval_us() {

@@ -28,7 +28,7 @@ void notify_alive();
 /// The unit's state folder ($STATE_DIRECTORY), or empty.
 [[nodiscard]] std::string state_directory();
 /// The file that "credential:NAME" stands for, one that systemd handed in (LoadCredential= of the
-/// unit); any other path stays as it is. Throws std::runtime_error, with `key` and the remedy, when
+/// unit); any other path stays as it is. Throws std::runtime_error, with `key` and the fix, when
 /// there is none of that name.
 [[nodiscard]] std::filesystem::path resolve_credential(const std::string& key,
                                                        const std::filesystem::path& path);

@@ -14,9 +14,9 @@
 
 namespace dtact::calibration {
 
-/// The layer as it was fitted to presses of a ball, with standard errors: for people, and for a
+/// The gel as it was fitted to presses of a ball, with standard errors: for people, and for a
 /// simulator of this sensor. Depth is made without it.
-struct Layer {
+struct GelEstimate {
   /// A number and its standard error.
   struct Estimate {
     double value = 0;
@@ -33,7 +33,7 @@ struct Layer {
   std::array<Estimate, 5> slope = {};
   double bulge_factor = 1;     ///< On the slopes below zero: a kink there.
   double residual_levels = 0;  ///< Root mean square of what the fit leaves, grey levels.
-  bool operator==(const Layer&) const = default;
+  bool operator==(const GelEstimate&) const = default;
 };
 
 /// One photometric control at calibration time (the shape of hal::CameraControl, without the HAL).
@@ -66,12 +66,12 @@ struct Calibration {
   int crop_col = 0;
   int crop_row = 0;
   std::optional<recon::Lens> lens;  ///< None: the depth map is a part of the frame as it is.
-  std::optional<Layer> layer;       ///< Where a layer was fitted to the presses.
+  std::optional<GelEstimate> gel;   ///< Where a gel was fitted to the presses.
   Origin origin;
 };
 
 /// Reads and checks a calibration folder. Throws std::runtime_error with file, line, key and
-/// remedy.
+/// fix.
 [[nodiscard]] Calibration load(const std::filesystem::path& folder);
 
 /// Writes the folder so that at any moment it is either absent, the old one or the new one. Throws

@@ -115,7 +115,7 @@ std::string format(const LensFile& file) {
   t += fmt::format("version = {}\n\n[frame]\nwidth = {}\nheight = {}\n\n[lens]\n", kFormatVersion,
                    file.frame_width, file.frame_height);
   t += format_lens(file.lens) + "\n";
-  return file.gain_told ? t + format_gain(file.gain) : t;
+  return file.gain_specified ? t + format_gain(file.gain) : t;
 }
 
 LensFile load_lens(const std::filesystem::path& path) {
@@ -142,8 +142,8 @@ LensFile load_lens(const std::filesystem::path& path) {
   frame.finish();
   const std::optional<recon::Lens> lens =
       read_lens(top.table("lens"), file.frame_width, file.frame_height);
-  file.gain_told = top.has("gain");
-  if (file.gain_told) file.gain = read_gain(top.table("gain"));
+  file.gain_specified = top.has("gain");
+  if (file.gain_specified) file.gain = read_gain(top.table("gain"));
   top.finish();
   if (!lens) top.fail("lens", "is empty; make a lens with dtact-calibrate lens");
   file.lens = *lens;

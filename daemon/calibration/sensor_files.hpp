@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "daemon/calibration/calibration.hpp"
+#include "daemon/recon/flat_field_gain.hpp"
 #include "daemon/recon/lens.hpp"
-#include "daemon/recon/spatial_gain.hpp"
 #include "hal/files/key_reader.hpp"
 
 namespace dtact::calibration {
@@ -25,7 +25,7 @@ void read_camera_and_light(tomlfile::KeyReader& top, Origin& origin);
 /// The text of a sensor file.
 [[nodiscard]] std::string format_sensor(const Origin& origin);
 /// Camera, controls and light of a sensor file; the rest is empty. Throws std::runtime_error with
-/// file, line, key and remedy.
+/// file, line, key and fix.
 [[nodiscard]] Origin load_sensor(const std::filesystem::path& path);
 
 /// A lens and the camera frame it was measured in, and what the same images told of the gain: what
@@ -34,9 +34,9 @@ struct LensFile {
   int frame_width = 0;
   int frame_height = 0;
   recon::Lens lens;
-  recon::SpatialGain gain;         ///< Places in millimetres of the lens's surface.
+  recon::FlatFieldGain gain;       ///< Places in millimetres of the lens's surface.
   std::vector<std::string> notes;  ///< Comment lines: how it was measured and how well it fits.
-  bool gain_told = false;          ///< A board said so, also where `gain` is none.
+  bool gain_specified = false;     ///< A board said so, also where `gain` is none.
 };
 
 /// The keys of a `[lens]` table, one a line, without the header. Numbers are read back exactly.
@@ -50,8 +50,8 @@ struct LensFile {
 [[nodiscard]] std::string format(const LensFile& file);
 
 /// Reads a lens file, or the lens of a calibration folder (without its gain, which belongs to its
-/// list). Throws std::runtime_error with file,
-/// line, key and remedy.
+/// LUT). Throws std::runtime_error with file,
+/// line, key and fix.
 [[nodiscard]] LensFile load_lens(const std::filesystem::path& path);
 
 }  // namespace dtact::calibration

@@ -14,7 +14,7 @@
 namespace dtact::calibration {
 namespace {
 
-std::string shape_text(const recon::SpatialGain& gain) {
+std::string shape_text(const recon::FlatFieldGain& gain) {
   switch (gain.shape) {
     case recon::GainShape::none:
       break;
@@ -32,21 +32,21 @@ std::string shape_text(const recon::SpatialGain& gain) {
 
 using tomlfile::KeyReader;
 
-constexpr double kMost = 1e6;  // of anything here: only not finite numbers are impossible
+constexpr double kMax = 1e6;  // of anything here: only not finite numbers are impossible
 
-std::string estimate_text(const char* key, const Layer::Estimate& estimate) {
+std::string estimate_text(const char* key, const GelEstimate::Estimate& estimate) {
   return fmt::format("{} = [{}, {}]\n", key, estimate.value, estimate.error);
 }
 
-Layer::Estimate read_estimate(KeyReader& reader, const char* key) {
-  const std::vector<double> pair = reader.numbers(key, 0, kMost);
+GelEstimate::Estimate read_estimate(KeyReader& reader, const char* key) {
+  const std::vector<double> pair = reader.numbers(key, 0, kMax);
   if (pair.size() != 2) reader.fail(key, "expected a number and its standard error");
   return {pair[0], pair[1]};
 }
 
 std::vector<double> read_five(KeyReader& reader, const char* key, double least) {
-  std::vector<double> five = reader.numbers(key, least, kMost);
-  if (five.size() != std::tuple_size_v<decltype(Layer::slope)>) {
+  std::vector<double> five = reader.numbers(key, least, kMax);
+  if (five.size() != std::tuple_size_v<decltype(GelEstimate::slope)>) {
     reader.fail(key, "expected five numbers");
   }
   return five;
@@ -91,7 +91,7 @@ recon::ForceModel read_force(tomlfile::KeyReader reader) {
   return force;
 }
 
-std::string format_gain(const recon::SpatialGain& gain) {
+std::string format_gain(const recon::FlatFieldGain& gain) {
   std::string text = shape_text(gain);
   if (!gain.polynomial.empty()) {
     text += fmt::format(
@@ -102,8 +102,8 @@ std::string format_gain(const recon::SpatialGain& gain) {
   return text + "\n";
 }
 
-recon::SpatialGain read_gain(tomlfile::KeyReader reader) {
-  recon::SpatialGain gain;
+recon::FlatFieldGain read_gain(tomlfile::KeyReader reader) {
+  recon::FlatFieldGain gain;
   if (reader.keys().empty()) return gain;
   const std::string shape = reader.text("shape");
   if (shape == "radial") {
@@ -127,45 +127,45 @@ recon::SpatialGain read_gain(tomlfile::KeyReader reader) {
   return gain;
 }
 
-std::string format_layer(const Layer& layer) {
+std::string format_gel(const GelEstimate& gel) {
   std::array<double, 5> slopes{};
   std::array<double, 5> errors{};
   for (std::size_t i = 0; i < slopes.size(); ++i) {
-    slopes[i] = layer.slope[i].value;
-    errors[i] = layer.slope[i].error;
+    slopes[i] = gel.slope[i].value;
+    errors[i] = gel.slope[i].error;
   }
-  return "[layer]  # as fitted to the presses, for people and simulators: a number and its "
+  return "[gel]  # as fitted to the presses, for people and simulators: a number and its "
          "standard "
          "error\n" +
-         estimate_text("thickness_mm", layer.thickness_mm) +
-         estimate_text("narrow_mm", layer.narrow_mm) + estimate_text("wide_mm", layer.wide_mm) +
-         estimate_text("narrow_weight", layer.narrow_weight) +
+         estimate_text("thickness_mm", gel.thickness_mm) +
+         estimate_text("narrow_mm", gel.narrow_mm) + estimate_text("wide_mm", gel.wide_mm) +
+         estimate_text("narrow_weight", gel.narrow_weight) +
          fmt::format(
              "# Share of the light that is lost for each thickness indented, at some "
              "indentations over\n# the thickness; times the factor where it bulges.\n"
              "indentation = [{}]\nslope = [{}]\nslope_error = [{}]\nbulge_factor = {}\n"
              "residual_levels = {}\n\n",
-             fmt::join(layer.indentation, ", "), fmt::join(slopes, ", "), fmt::join(errors, ", "),
-             layer.bulge_factor, layer.residual_levels);
+             fmt::join(gel.indentation, ", "), fmt::join(slopes, ", "), fmt::join(errors, ", "),
+             gel.bulge_factor, gel.residual_levels);
 }
 
-Layer read_layer(KeyReader reader) {
-  Layer layer;
-  layer.thickness_mm = read_estimate(reader, "thickness_mm");
-  layer.narrow_mm = read_estimate(reader, "narrow_mm");
-  layer.wide_mm = read_estimate(reader, "wide_mm");
-  layer.narrow_weight = read_estimate(reader, "narrow_weight");
-  const std::vector<double> indentation = read_five(reader, "indentation", -kMost);
+GelEstimate read_gel(KeyReader reader) {
+  GelEstimate gel;
+  gel.thickness_mm = read_estimate(reader, "thickness_mm");
+  gel.narrow_mm = read_estimate(reader, "narrow_mm");
+  gel.wide_mm = read_estimate(reader, "wide_mm");
+  gel.narrow_weight = read_estimate(reader, "narrow_weight");
+  const std::vector<double> indentation = read_five(reader, "indentation", -kMax);
   const std::vector<double> slopes = read_five(reader, "slope", 0);
   const std::vector<double> errors = read_five(reader, "slope_error", 0);
-  for (std::size_t i = 0; i < layer.slope.size(); ++i) {
-    layer.indentation[i] = indentation[i];
-    layer.slope[i] = {slopes[i], errors[i]};
+  for (std::size_t i = 0; i < gel.slope.size(); ++i) {
+    gel.indentation[i] = indentation[i];
+    gel.slope[i] = {slopes[i], errors[i]};
   }
-  layer.bulge_factor = reader.number("bulge_factor", 0, kMost);
-  layer.residual_levels = reader.number("residual_levels", 0, kMost);
+  gel.bulge_factor = reader.number("bulge_factor", 0, kMax);
+  gel.residual_levels = reader.number("residual_levels", 0, kMax);
   reader.finish();
-  return layer;
+  return gel;
 }
 
 std::string format_surface(const recon::Surface& surface) {
@@ -188,11 +188,11 @@ recon::Surface read_surface(tomlfile::KeyReader reader) {
   } else {
     reader.fail("shape", "\"" + shape + "\" is not allowed; expected \"sphere\" or \"cylinder\"");
   }
-  surface.radius_mm = reader.number("radius_mm", Limits::kLeastRadiusMm, Limits::kMostRadiusMm);
+  surface.radius_mm = reader.number("radius_mm", Limits::kMinRadiusMm, Limits::kMaxRadiusMm);
   if (surface.kind == Kind::cylinder) surface.axis_deg = reader.number("axis_deg", -180, 180);
-  surface.air_mm = reader.number("air_mm", Limits::kLeastDistanceMm, Limits::kMostDistanceMm);
-  surface.gel_mm = reader.number("gel_mm", Limits::kLeastDistanceMm, Limits::kMostDistanceMm);
-  surface.refraction = reader.number("refraction", 1, Limits::kMostRefraction);
+  surface.air_mm = reader.number("air_mm", Limits::kMinDistanceMm, Limits::kMaxDistanceMm);
+  surface.gel_mm = reader.number("gel_mm", Limits::kMinDistanceMm, Limits::kMaxDistanceMm);
+  surface.refraction = reader.number("refraction", 1, Limits::kMaxRefraction);
   reader.finish();
   return surface;
 }

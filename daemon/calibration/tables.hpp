@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "daemon/calibration/calibration.hpp"
+#include "daemon/recon/flat_field_gain.hpp"
 #include "daemon/recon/force.hpp"
-#include "daemon/recon/spatial_gain.hpp"
 #include "daemon/recon/surface.hpp"
 #include "hal/files/key_reader.hpp"
 
@@ -33,16 +33,16 @@ std::string array_text(const std::vector<Value>& values) {
 
 /// A `[gain]` table of a calibration (places from the map's centre) or a lens file (places of the
 /// lens's millimetres).
-[[nodiscard]] std::string format_gain(const recon::SpatialGain& gain);
+[[nodiscard]] std::string format_gain(const recon::FlatFieldGain& gain);
 
 /// Takes a `[gain]` table's keys; an empty table is no gain, as in files from before there were
 /// gains. Throws as KeyReader.
-[[nodiscard]] recon::SpatialGain read_gain(tomlfile::KeyReader reader);
+[[nodiscard]] recon::FlatFieldGain read_gain(tomlfile::KeyReader reader);
 
-/// The `[layer]` table.
-[[nodiscard]] std::string format_layer(const Layer& layer);
+/// The `[gel]` table.
+[[nodiscard]] std::string format_gel(const GelEstimate& gel);
 /// Throws as KeyReader.
-[[nodiscard]] Layer read_layer(tomlfile::KeyReader reader);
+[[nodiscard]] GelEstimate read_gel(tomlfile::KeyReader reader);
 
 /// A `[surface]` table of a calibration; empty for a plane.
 [[nodiscard]] std::string format_surface(const recon::Surface& surface);

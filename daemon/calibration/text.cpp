@@ -7,7 +7,7 @@
 #include <string_view>
 
 #include "daemon/calibration/calibration.hpp"
-#include "daemon/calibration/list_tables.hpp"
+#include "daemon/calibration/lut_tables.hpp"
 #include "daemon/calibration/sensor_files.hpp"
 #include "daemon/calibration/tables.hpp"
 #include "daemon/recon/rectify.hpp"
@@ -37,7 +37,7 @@ std::vector<std::int64_t> runs_of(const std::vector<std::uint8_t>& mask) {
   return runs;
 }
 
-constexpr std::int64_t kMostFramePixels = std::int64_t{1} << 26U;  // 8192×8192, any camera's mode
+constexpr std::int64_t kMaxFramePixels = std::int64_t{1} << 26U;  // 8192×8192, any camera's mode
 
 std::vector<std::uint8_t> mask_of(tomlfile::KeyReader& reader, std::size_t pixels) {
   const auto limit = static_cast<std::int64_t>(pixels);
@@ -125,7 +125,7 @@ Files format(const Calibration& calibration) {
       "created = {}  # UTC\n"
       "mm_per_px = {}  # of the depth map\n"
       "smoothing_px = {}  # standard deviation of the Gaussian on the difference\n\n",
-      kFormatVersion, tomlfile::quoted(model.method == recon::Method::list ? "list" : "published"),
+      kFormatVersion, tomlfile::quoted(model.method == recon::Method::lut ? "lut" : "published"),
       tomlfile::quoted(calibration.origin.created), model.mm_per_px, model.smoothing_px);
   t += fmt::format("[frame]\nwidth = {}\nheight = {}\n\n", map.frame_width, map.frame_height);
   t += fmt::format(
@@ -150,11 +150,11 @@ Files format(const Calibration& calibration) {
   t += fmt::format(
       "[lens]  # where the surface appears in the frame; empty: the frame as it is\n{}\n",
       calibration.lens ? format_lens(*calibration.lens) : "");
-  t += fmt::format("[surface]  # of the untouched gel; empty: a plane\n{}\n",
+  t += fmt::format("[surface]  # of the undeformed gel; empty: a plane\n{}\n",
                    format_surface(model.surface));
   t += format_gain(model.gain);
-  if (calibration.layer) t += format_layer(*calibration.layer);
-  t += format_lists(model);
+  if (calibration.gel) t += format_gel(*calibration.gel);
+  t += format_luts(model);
   return files;
 }
 
@@ -168,10 +168,10 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   Calibration calibration;
   auto model = std::make_shared<recon::Model>();
   const std::string method = top.text("method");
-  if (method != "list" && method != "published") {
-    top.fail("method", "\"" + method + "\" is not allowed; expected \"list\" or \"published\"");
+  if (method != "lut" && method != "published") {
+    top.fail("method", "\"" + method + "\" is not allowed; expected \"lut\" or \"published\"");
   }
-  model->method = method == "list" ? recon::Method::list : recon::Method::published;
+  model->method = method == "lut" ? recon::Method::lut : recon::Method::published;
   calibration.origin.created = top.text("created");
   if (!calibration.origin.created.empty() && !is_utc_time(calibration.origin.created)) {
     top.fail("created", "expected a time as \"2026-01-31T12:00:00Z\"");
@@ -183,14 +183,14 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
   const int frame_width = small(frame, "width", 2, kMaxPixels);
   const int frame_height = small(frame, "height", 2, kMaxPixels);
   frame.finish();
-  check_area(frame, frame_width, frame_height, kMostFramePixels);
+  check_area(frame, frame_width, frame_height, kMaxFramePixels);
   tomlfile::KeyReader crop = top.table("crop");
   calibration.crop_col = small(crop, "col", 0, frame_width - 1);
   calibration.crop_row = small(crop, "row", 0, frame_height - 1);
   const int width = small(crop, "width", 1, frame_width - calibration.crop_col);
   const int height = small(crop, "height", 1, frame_height - calibration.crop_row);
   crop.finish();
-  check_area(crop, width, height, recon::kMostMapPixels);
+  check_area(crop, width, height, recon::kMaxMapPixels);
   if (top.has("lens")) {
     calibration.lens = read_lens(top.table("lens"), frame_width, frame_height);
   }
@@ -199,8 +199,8 @@ Calibration parse(const std::string& toml, const std::string& reference_png,
       calibration.lens, frame_width, frame_height,
       {calibration.crop_col, calibration.crop_row, width, height, model->mm_per_px}, outside);
 
-  read_lists(top, *model);
-  if (top.has("layer")) calibration.layer = read_layer(top.table("layer"));
+  read_luts(top, *model);
+  if (top.has("gel")) calibration.gel = read_gel(top.table("gel"));
   if (top.has("gain")) model->gain = read_gain(top.table("gain"));
   read_camera_and_light(top, calibration.origin);
   for (tomlfile::KeyReader& source : top.tables("source")) {

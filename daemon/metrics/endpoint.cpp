@@ -24,9 +24,9 @@ using boost::system::error_code;
 using tcp = asio::ip::tcp;
 
 /// Scrapers come one after another; whoever opens more is closed at once.
-constexpr std::size_t kMostConnections = 8;
-constexpr std::size_t kMostHeader = 8192;  // bytes
-constexpr std::chrono::seconds kPatience{5};
+constexpr std::size_t kMaxConnections = 8;
+constexpr std::size_t kMaxHeader = 8192;  // bytes
+constexpr std::chrono::seconds kTimeout{5};
 
 using Text = std::function<std::string()>;
 
@@ -56,11 +56,11 @@ http::response<http::string_body> answer(const http::request<http::empty_body>& 
 class Exchange : public std::enable_shared_from_this<Exchange> {
  public:
   Exchange(tcp::socket socket, const Text& text) : stream_(std::move(socket)), text_(text) {
-    parser_.header_limit(kMostHeader);
+    parser_.header_limit(kMaxHeader);
   }
 
   void start() {
-    stream_.expires_after(kPatience);
+    stream_.expires_after(kTimeout);
     http::async_read_header(stream_, buffer_, parser_,
                             [self = shared_from_this()](const error_code& error, std::size_t) {
                               if (!error) self->reply();
@@ -81,7 +81,7 @@ class Exchange : public std::enable_shared_from_this<Exchange> {
 
   beast::tcp_stream stream_;
   Text text_;
-  beast::flat_buffer buffer_{kMostHeader};
+  beast::flat_buffer buffer_{kMaxHeader};
   http::request_parser<http::empty_body> parser_;
   http::response<http::string_body> response_;
 };
@@ -123,7 +123,7 @@ struct Endpoint::Impl : std::enable_shared_from_this<Impl> {
 
   void take(tcp::socket socket) {
     open.remove_if([](const auto& exchange) { return exchange.expired(); });
-    if (open.size() >= kMostConnections) return;
+    if (open.size() >= kMaxConnections) return;
     const auto exchange = std::make_shared<Exchange>(std::move(socket), text);
     open.push_back(exchange);
     exchange->start();

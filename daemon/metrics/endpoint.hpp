@@ -22,7 +22,7 @@ struct EndpointConfig {
 class Endpoint {
  public:
   /// Listens from here on. `text` makes the answer. Throws std::runtime_error naming address, port
-  /// and remedy.
+  /// and fix.
   Endpoint(boost::asio::io_context& io, const EndpointConfig& config,
            std::function<std::string()> text);
   ~Endpoint();

@@ -66,8 +66,8 @@ std::string short_name(std::string name) {
   return name;
 }
 
-bool has(const v1::Status& status, v1::Health condition) {
-  return std::ranges::find(status.health(), condition) != status.health().end();
+bool has(const v1::Status& status, v1::Health flag) {
+  return std::ranges::find(status.health(), flag) != status.health().end();
 }
 
 void add_state(Families& to, const v1::Status& status) {
@@ -78,11 +78,11 @@ void add_state(Families& to, const v1::Status& status) {
     to.add(status.state() == state ? 1 : 0,
            {{"state", short_name(v1::State_Name(static_cast<v1::State>(state)))}});
   }
-  to.begin("dtactd_condition", "1 while depth deserves less trust under this condition.",
+  to.begin("dtactd_health_flag", "1 while depth deserves less trust under this condition.",
            MetricType::Gauge);
   for (int one = v1::HEALTH_NONE + 1; v1::Health_IsValid(one); ++one) {
-    const auto condition = static_cast<v1::Health>(one);
-    to.add(has(status, condition) ? 1 : 0, {{"condition", short_name(v1::Health_Name(condition))}});
+    const auto flag = static_cast<v1::Health>(one);
+    to.add(has(status, flag) ? 1 : 0, {{"flag", short_name(v1::Health_Name(flag))}});
   }
 }
 
@@ -121,10 +121,9 @@ void add_camera(Families& to, const v1::CameraStatus& camera) {
           {{"backend", camera.backend()},
            {"identity", camera.identity()},
            {"pixel_format", camera.pixel_format()}});
-  to.begin("dtactd_camera_condition", "1 for the condition that the camera is in.",
-           MetricType::Gauge);
-  for (const char* condition : {"streaming", "stalled", "unplugged", "busy", "denied", "ended"}) {
-    to.add(camera.condition() == condition ? 1 : 0, {{"condition", condition}});
+  to.begin("dtactd_camera_state", "1 for the condition that the camera is in.", MetricType::Gauge);
+  for (const char* flag : {"streaming", "stalled", "unplugged", "busy", "denied", "ended"}) {
+    to.add(camera.state() == flag ? 1 : 0, {{"state", flag}});
   }
   to.gauge("dtactd_camera_mode_frames_per_second", "What the camera's mode promises.",
            camera.fps());
@@ -139,7 +138,7 @@ void add_light(Families& to, const net::Overview& overview, std::int64_t now_ns)
   to.info("dtactd_ring_info", "Which LED ring.",
           {{"backend", status.ring().backend()}, {"identity", status.ring().identity()}});
   to.gauge("dtactd_ring_up", "0 while the ring is away or refused the last write.",
-           has(status, v1::HEALTH_RING_TROUBLE) ? 0 : 1);
+           has(status, v1::HEALTH_RING_FAULT) ? 0 : 1);
   to.gauge("dtactd_light_brightness_ratio", "The ring's brightness, 0 to 1.",
            status.light().brightness() / 255.0);
   to.gauge("dtactd_light_followed_ratio",
@@ -147,7 +146,7 @@ void add_light(Families& to, const net::Overview& overview, std::int64_t now_ns)
            status.light_followed());
   if (overview.reference_taken_ns.has_value()) {
     to.gauge("dtactd_reference_age_seconds",
-             "Since the untouched image was taken; absent for one of an earlier run.",
+             "Since the reference image was taken; absent for one of an earlier run.",
              static_cast<double>(now_ns - *overview.reference_taken_ns) * 1e-9);
   }
   if (status.has_calibration()) {

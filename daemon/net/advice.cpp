@@ -15,15 +15,15 @@ namespace {
 using pipeline::Health;
 using pipeline::State;
 
-struct Remedy {
+struct Fix {
   Health health;
   std::string_view sentence;
 };
 
-// In the order in which one should act: without a camera or a ring nothing else can be mended.
-constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
-    {Health::camera_trouble, "The camera gives no usable frames."},
-    {Health::ring_trouble, "The LED ring cannot be written to."},
+// In the order in which one should act: without a camera or a ring nothing else can be fixed.
+constexpr std::array<Fix, pipeline::kHealthCount> kFixes = {{
+    {Health::camera_fault, "The camera gives no usable frames."},
+    {Health::ring_fault, "The LED ring cannot be written to."},
     {Health::uncalibrated,
      "No calibration: dtact-calibrate guided --radius-mm MM --mm-per-px S guides through one with "
      "a "
@@ -32,8 +32,8 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::camera_mismatch,
      "Camera, mode or controls differ from the calibration's: restore them in the configuration "
      "or calibrate again."},
-    {Health::camera_moved,
-     "The layer's marks are not where they were at calibration: camera or layer has moved, and "
+    {Health::camera_shifted,
+     "The gel's marks are not where they were at calibration: camera or gel has moved, and "
      "depth "
      "lies in the wrong place. Fix it in its mount and calibrate again."},
     {Health::light_mismatch,
@@ -46,7 +46,7 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
      "The reference belongs to another light: leave the surface untouched for a second or run "
      "dtactctl rezero."},
     {Health::reference_restored,
-     "Something touched at start, so the last good reference is used: free the surface and run "
+     "There was contact at start, so the last good reference is used: free the surface and run "
      "dtactctl rezero."},
     {Health::beyond_calibration,
      "Pressed deeper than was calibrated: such pixels are marked untrusted; press less or "
@@ -68,7 +68,7 @@ constexpr std::array<Remedy, pipeline::kHealthCount> kRemedies = {{
     {Health::image_noisy,
      "Pixels are too noisy: raise the light and lower the camera's gain; many dead pixels look "
      "alike."},
-    {Health::exposure_follows,
+    {Health::exposure_unlocked,
      "The rest of the picture brightens as a part darkens: exposure or gain runs automatically, "
      "whatever the camera's controls say, and depth is wrong by as much. Switch it off with the "
      "camera's own program, or use another camera; then run dtactctl rezero."},
@@ -95,14 +95,14 @@ std::string detail(const pipeline::Status& status, Health health) {
     return fmt::format("By their timestamps {:.1f} come in a second instead of {:g}.",
                        status.camera_fps, status.camera.fps);
   }
-  if (health == Health::camera_trouble && status.camera_damaged) {
+  if (health == Health::camera_fault && status.camera_damaged) {
     return "All that come are damaged: check its USB cable, hub and port, or set another "
            "pixel_format or a lower camera.fps.";
   }
-  if (health == Health::camera_trouble) return status.camera_report.remedy;
+  if (health == Health::camera_fault) return status.camera_report.fix;
   if (health == Health::camera_mismatch) return status.camera_report.moved;
-  if (health == Health::camera_moved) return status.place_message;
-  if (health == Health::ring_trouble) return status.ring_message;
+  if (health == Health::camera_shifted) return status.camera_shift_message;
+  if (health == Health::ring_fault) return status.ring_message;
   return {};
 }
 
@@ -112,7 +112,7 @@ bool waits_for_light(const pipeline::HealthSet& health, Health flag) {
          (flag == Health::starting || flag == Health::light_unsettled);
 }
 
-/// "HEALTH_CAMERA_TROUBLE" without the enum's name, in small letters.
+/// "HEALTH_CAMERA_FAULT" without the enum's name, in small letters.
 std::string short_name(std::string name) {
   name.erase(0, name.find('_') + 1);
   std::ranges::transform(name, name.begin(),
@@ -133,15 +133,15 @@ std::string state_name(State state) {
 
 std::string advice(const pipeline::Status& status) {
   std::string text;
-  if (status.state == State::camera_lost && !status.health.has(Health::camera_trouble)) {
+  if (status.state == State::camera_lost && !status.health.has(Health::camera_fault)) {
     add(text, "The camera is away.");
-    add(text, status.camera_report.remedy);
+    add(text, status.camera_report.fix);
   }
-  for (const auto& remedy : kRemedies) {
-    if (!status.health.has(remedy.health)) continue;
-    if (waits_for_light(status.health, remedy.health)) continue;
-    add(text, remedy.sentence);
-    add(text, detail(status, remedy.health));
+  for (const auto& fix : kFixes) {
+    if (!status.health.has(fix.health)) continue;
+    if (waits_for_light(status.health, fix.health)) continue;
+    add(text, fix.sentence);
+    add(text, detail(status, fix.health));
   }
   add(text, status.storage_message);
   return text;

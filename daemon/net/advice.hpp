@@ -7,10 +7,10 @@
 namespace dtact::net {
 
 /// What the user should do about the state and the health conditions: a sentence for each, with
-/// its remedy, the most urgent first. Empty when all is well.
+/// its fix, the most urgent first. Empty when all is well.
 [[nodiscard]] std::string advice(const pipeline::Status& status);
 
-/// As on the wire, and as clients show it: "camera_trouble", "serving".
+/// As on the wire, and as clients show it: "camera_fault", "serving".
 [[nodiscard]] std::string health_name(pipeline::Health health);
 [[nodiscard]] std::string state_name(pipeline::State state);
 

@@ -10,7 +10,7 @@
 
 #include "daemon/net/hub.hpp"
 #include "daemon/net/messages.hpp"
-#include "daemon/net/reconstruction_words.hpp"
+#include "daemon/net/reconstruction_names.hpp"
 #include "hal/base/utf8.hpp"
 #include "hal/files/png.hpp"
 #include "proto/dtact.pb.h"
@@ -82,24 +82,26 @@ void CalibrationCommands::on_worker(Work work, Done done) {
   });
 }
 
-void CalibrationCommands::get(const Who& who, const v1::GetCalibration& request) {
+void CalibrationCommands::get(const Requester& requester, const v1::GetCalibration& request) {
   std::optional<std::uint64_t> number;
   if (request.has_number()) number = request.number();
   if (!number && port_.status().calibration == nullptr) {
-    return who.first->reply_error(who.second, v1::ERROR_UNCALIBRATED,
-                                  "there is no calibration: make one with dtact-calibrate "
-                                  "depth and send it with dtactctl calibration upload, or take one "
-                                  "that dtactctl calibration list shows");
+    return requester.first->reply_error(
+        requester.second, v1::ERROR_UNCALIBRATED,
+        "there is no calibration: make one with dtact-calibrate "
+        "depth and send it with dtactctl calibration upload, or take one "
+        "that dtactctl calibration list shows");
   }
-  if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+  if (reading_ >= kMaxReading)
+    return requester.first->reply_error(requester.second, v1::ERROR_BUSY, kBusy);
   ++reading_;
   on_worker(
       [&store = store_, number] {
         return attempt<CalibrationFiles>(v1::ERROR_STORAGE, [&] { return store.read(number); });
       },
-      [who](CalibrationCommands& self, Outcome<CalibrationFiles> read) {
+      [requester](CalibrationCommands& self, Outcome<CalibrationFiles> read) {
         --self.reading_;
-        const auto& [session, id] = who;
+        const auto& [session, id] = requester;
         if (read.failed()) {
           return session->reply_error(id, read.code, read.error);
         }
@@ -113,17 +115,18 @@ void CalibrationCommands::get(const Who& who, const v1::GetCalibration& request)
       });
 }
 
-void CalibrationCommands::list(const Who& who) {
-  if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+void CalibrationCommands::list(const Requester& requester) {
+  if (reading_ >= kMaxReading)
+    return requester.first->reply_error(requester.second, v1::ERROR_BUSY, kBusy);
   ++reading_;
   using List = std::vector<StoredCalibration>;
   on_worker(
       [&store = store_] {
         return attempt<List>(v1::ERROR_STORAGE, [&store] { return store.list(); });
       },
-      [who](CalibrationCommands& self, const Outcome<List>& list) {
+      [requester](CalibrationCommands& self, const Outcome<List>& list) {
         --self.reading_;
-        const auto& [session, id] = who;
+        const auto& [session, id] = requester;
         if (list.failed()) {
           return session->reply_error(id, list.code, list.error);
         }
@@ -139,8 +142,8 @@ void CalibrationCommands::list(const Who& who) {
       });
 }
 
-void CalibrationCommands::upload(const Who& who, const v1::UploadCalibration& request) {
-  const auto& [session, id] = who;
+void CalibrationCommands::upload(const Requester& requester, const v1::UploadCalibration& request) {
+  const auto& [session, id] = requester;
   if (!valid_name(request.name())) {
     return session->reply_error(
         id, v1::ERROR_INVALID,
@@ -157,21 +160,22 @@ void CalibrationCommands::upload(const Who& who, const v1::UploadCalibration& re
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
   auto files = std::make_shared<const CalibrationFiles>(CalibrationFiles{
       .name = request.name(), .toml = request.calibration_toml(), .png = request.reference_png()});
-  change(who, {.upload = std::move(files)});
+  change(requester, {.upload = std::move(files)});
 }
 
-void CalibrationCommands::activate(const Who& who, const v1::ActivateCalibration& request) {
-  const auto& [session, id] = who;
+void CalibrationCommands::activate(const Requester& requester,
+                                   const v1::ActivateCalibration& request) {
+  const auto& [session, id] = requester;
   if (!request.has_number()) {
     return session->reply_error(id, v1::ERROR_INVALID,
                                 "activate_calibration.number is not set: dtactctl calibration list "
                                 "shows the numbers there are");
   }
   if (changing_) return session->reply_error(id, v1::ERROR_BUSY, kChanging);
-  change(who, {.number = request.number()});
+  change(requester, {.number = request.number()});
 }
 
-void CalibrationCommands::change(const Who& who, Change change) {
+void CalibrationCommands::change(const Requester& requester, Change change) {
   changing_ = true;
   using Ready = pipeline::UseCalibration;
   on_worker(
@@ -182,23 +186,23 @@ void CalibrationCommands::change(const Who& who, Change change) {
               rules);
         });
       },
-      [who, change](CalibrationCommands& self, Outcome<Ready> ready) mutable {
+      [requester, change](CalibrationCommands& self, Outcome<Ready> ready) mutable {
         if (ready.failed()) {
           self.changing_ = false;
-          return who.first->reply_error(who.second, ready.code, ready.error);
+          return requester.first->reply_error(requester.second, ready.code, ready.error);
         }
         change.name = ready.value.calibration->name;
         change.key = ready.value.key = ++self.last_key_;
-        self.changing_ = submit(self.port_, who, std::move(ready.value),
-                                [&self, who = WeakWho(who), change = std::move(change)](
+        self.changing_ = submit(self.port_, requester, std::move(ready.value),
+                                [&self, requester = WeakWho(requester), change = std::move(change)](
                                     const pipeline::CommandDone& done) mutable {
                                   change.at = done.at;
-                                  self.keep(who, change);
+                                  self.keep(requester, change);
                                 });
       });
 }
 
-void CalibrationCommands::keep(const WeakWho& who, const Change& change) {
+void CalibrationCommands::keep(const WeakWho& requester, const Change& change) {
   config_.log({LogLevel::info, fmt::format("calibration {} is in use", change.name)});
   in_use_.reset();
   if (change.upload == nullptr) {
@@ -215,7 +219,7 @@ void CalibrationCommands::keep(const WeakWho& who, const Change& change) {
           return change.number;
         });
       },
-      [who, change](CalibrationCommands& self, const Outcome<std::uint64_t>& kept) {
+      [requester, change](CalibrationCommands& self, const Outcome<std::uint64_t>& kept) {
         self.changing_ = false;
         if (!kept.failed()) {
           self.in_use_ = kept.value;
@@ -229,7 +233,7 @@ void CalibrationCommands::keep(const WeakWho& who, const Change& change) {
                                         "the one before: {}",
                                         change.name, kept.error)});
         }
-        const auto& [weak, id] = who;
+        const auto& [weak, id] = requester;
         const auto session = weak.lock();
         if (session == nullptr) return;
         if (kept.failed()) {
@@ -255,8 +259,9 @@ void CalibrationCommands::tell(const Change& change, std::optional<std::uint64_t
   hub_.broadcast(message);
 }
 
-void CalibrationCommands::set_reconstruction(const Who& who, const v1::SetReconstruction& request) {
-  const auto& [session, id] = who;
+void CalibrationCommands::set_reconstruction(const Requester& requester,
+                                             const v1::SetReconstruction& request) {
+  const auto& [session, id] = requester;
   const pipeline::Status now = port_.status();
   pipeline::ReconstructionRules rules = now.reconstruction;
   const std::string wrong = net::change(request, rules);
@@ -268,28 +273,30 @@ void CalibrationCommands::set_reconstruction(const Who& who, const v1::SetRecons
       [&port = port_, in_use = now.calibration, rules] {
         return attempt<Ready>(v1::ERROR_INVALID, [&] { return port.prepare_maps(in_use, rules); });
       },
-      [who, rules](CalibrationCommands& self, Outcome<Ready> ready) {
+      [requester, rules](CalibrationCommands& self, Outcome<Ready> ready) {
         if (ready.failed()) {
           self.changing_ = false;
-          return who.first->reply_error(who.second, ready.code, ready.error);
+          return requester.first->reply_error(requester.second, ready.code, ready.error);
         }
         self.changing_ = submit(
-            self.port_, who, std::move(ready.value),
-            [&self, who = WeakWho(who), rules](const pipeline::CommandDone& done) {
+            self.port_, requester, std::move(ready.value),
+            [&self, requester = WeakWho(requester), rules](const pipeline::CommandDone& done) {
               self.changing_ = false;
               v1::ServerMessage message;
               auto& event = *message.mutable_event();
               fill(done.at, event);
               fill(rules, *event.mutable_reconstruction());
               self.hub_.broadcast(message);
-              reply(who, done, [&](v1::Reply& out) { fill(rules, *out.mutable_reconstruction()); });
+              reply(requester, done,
+                    [&](v1::Reply& out) { fill(rules, *out.mutable_reconstruction()); });
             });
       });
 }
 
-void CalibrationCommands::get_reference(const Who& who) {
-  if (reading_ >= kMaxReading) return who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
-  const auto copied = [this, weak = WeakWho(who)](const pipeline::CommandDone& done) {
+void CalibrationCommands::get_reference(const Requester& requester) {
+  if (reading_ >= kMaxReading)
+    return requester.first->reply_error(requester.second, v1::ERROR_BUSY, kBusy);
+  const auto copied = [this, weak = WeakWho(requester)](const pipeline::CommandDone& done) {
     --reading_;
     const auto session = weak.first.lock();
     if (session != nullptr && done.outcome == pipeline::Outcome::done) {
@@ -298,11 +305,11 @@ void CalibrationCommands::get_reference(const Who& who) {
     }
     reply(weak, done, [](v1::Reply&) {});
   };
-  if (submit(port_, who, pipeline::CopyReference{}, copied)) ++reading_;
+  if (submit(port_, requester, pipeline::CopyReference{}, copied)) ++reading_;
 }
 
 void CalibrationCommands::send_reference(
-    const Who& who, const std::shared_ptr<const pipeline::ReferenceCopy>& reference) {
+    const Requester& requester, const std::shared_ptr<const pipeline::ReferenceCopy>& reference) {
   ++reading_;
   on_worker(
       [reference] {
@@ -312,17 +319,18 @@ void CalibrationCommands::send_reference(
                                                  .pixels = reference->image_q8});
         });
       },
-      [who, reference, number = hub_.calibration_number(reference->calibration)](
+      [requester, reference, number = hub_.calibration_number(reference->calibration)](
           CalibrationCommands& self, Outcome<std::string> png) {
         --self.reading_;
-        if (png.failed()) return who.first->reply_error(who.second, png.code, png.error);
-        auto message = reply_to(who.second);
+        if (png.failed())
+          return requester.first->reply_error(requester.second, png.code, png.error);
+        auto message = reply_to(requester.second);
         auto& image = *message.mutable_reply()->mutable_reference();
         image.set_png(std::move(png.value));
         fill(reference->light, std::nullopt, *image.mutable_light());
         image.set_sequence(reference->sequence);
         if (number) image.set_calibration(*number);
-        who.first->send(message);
+        requester.first->send(message);
       });
 }
 

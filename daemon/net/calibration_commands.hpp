@@ -32,12 +32,12 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
                       const NetConfig& config, Hub& hub, pipeline::Port& port,
                       CalibrationStore& store);
 
-  void get(const Who& who, const v1::GetCalibration& request);
-  void list(const Who& who);
-  void upload(const Who& who, const v1::UploadCalibration& request);
-  void activate(const Who& who, const v1::ActivateCalibration& request);
-  void get_reference(const Who& who);
-  void set_reconstruction(const Who& who, const v1::SetReconstruction& request);
+  void get(const Requester& requester, const v1::GetCalibration& request);
+  void list(const Requester& requester);
+  void upload(const Requester& requester, const v1::UploadCalibration& request);
+  void activate(const Requester& requester, const v1::ActivateCalibration& request);
+  void get_reference(const Requester& requester);
+  void set_reconstruction(const Requester& requester, const v1::SetReconstruction& request);
 
  private:
   /// An upload, or without one the activation of a number.
@@ -50,10 +50,10 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   };
 
   /// Reads, checks and prepares on the worker; then the pipeline uses it, then keep().
-  void change(const Who& who, Change change);
+  void change(const Requester& requester, Change change);
   /// The pipeline uses the calibration: keeps it, reports and answers that.
-  void keep(const WeakWho& who, const Change& change);
-  void send_reference(const Who& who,
+  void keep(const WeakWho& requester, const Change& change);
+  void send_reference(const Requester& requester,
                       const std::shared_ptr<const pipeline::ReferenceCopy>& reference);
   void tell(const Change& change, std::optional<std::uint64_t> number);
   /// Runs `work` on the worker and then `done`(*this, its result) here.

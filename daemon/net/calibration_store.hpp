@@ -33,7 +33,7 @@ struct StoredCalibration {
   std::string uploaded;                       ///< ISO 8601, UTC; empty for the configured one.
   bool current = false;                       ///< The daemon starts with it.
   std::optional<CalibrationSummary> summary;  ///< None when it cannot be read, …
-  std::string damage;                         ///< … and why not: file, line, key and remedy.
+  std::string damage;                         ///< … and why not: file, line, key and fix.
 };
 
 /// There is none of the number that was asked for.
@@ -53,7 +53,7 @@ class CalibrationStore {
   virtual ~CalibrationStore() = default;
 
   /// The files as a calibration. Changes nothing. Throws std::runtime_error naming file, line, key
-  /// and remedy.
+  /// and fix.
   [[nodiscard]] virtual std::shared_ptr<const calibration::Calibration> check(
       const CalibrationFiles& files) = 0;
   /// Stores checked files under a new number, which it returns, and makes them current.

@@ -10,7 +10,7 @@ namespace dtact::net {
 /// What a calibration is, in a few words: dtact.v1.CalibrationSummary, where units stand.
 struct CalibrationSummary {
   std::string name;
-  std::string method;  ///< "list" or "published".
+  std::string method;  ///< "lut" or "published".
   double mm_per_px = 0;
   int width = 0;  ///< Of the depth map at full resolution, pixels.
   int height = 0;

@@ -7,7 +7,7 @@
 #include "daemon/net/hub.hpp"
 #include "daemon/net/light_schemes.hpp"
 #include "daemon/net/messages.hpp"
-#include "daemon/serve/who.hpp"
+#include "daemon/serve/client_status.hpp"
 #include "hal/base/clock.hpp"
 #include "proto/dtact.pb.h"
 
@@ -61,38 +61,38 @@ Commands::Commands(asio::io_context& io, asio::thread_pool& worker, const NetCon
 
 void Commands::on_request(const std::shared_ptr<Session>& session,
                           const v1::ClientMessage& message) {
-  const Who who{session, message.id()};
+  const Requester requester{session, message.id()};
   switch (message.request_case()) {
     case v1::ClientMessage::kSubscribe:
-      return subscribe(who, message.subscribe());
+      return subscribe(requester, message.subscribe());
     case v1::ClientMessage::kSetLight:
-      return set_light(who, message.set_light());
+      return set_light(requester, message.set_light());
     case v1::ClientMessage::kRezero:
-      return rezero(who, message.rezero().force());
+      return rezero(requester, message.rezero().force());
     case v1::ClientMessage::kGetStatus:
-      return get_status(who);
+      return get_status(requester);
     case v1::ClientMessage::kGetCalibration:
-      return calibrations_->get(who, message.get_calibration());
+      return calibrations_->get(requester, message.get_calibration());
     case v1::ClientMessage::kUploadCalibration:
-      return calibrations_->upload(who, message.upload_calibration());
+      return calibrations_->upload(requester, message.upload_calibration());
     case v1::ClientMessage::kListCalibrations:
-      return calibrations_->list(who);
+      return calibrations_->list(requester);
     case v1::ClientMessage::kActivateCalibration:
-      return calibrations_->activate(who, message.activate_calibration());
+      return calibrations_->activate(requester, message.activate_calibration());
     case v1::ClientMessage::kGetReference:
-      return calibrations_->get_reference(who);
+      return calibrations_->get_reference(requester);
     case v1::ClientMessage::kPing:
-      return ping(who);
+      return ping(requester);
     case v1::ClientMessage::kSetReconstruction:
-      return calibrations_->set_reconstruction(who, message.set_reconstruction());
+      return calibrations_->set_reconstruction(requester, message.set_reconstruction());
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::REQUEST_NOT_SET:
       return;  // The session's business.
   }
 }
 
-void Commands::subscribe(const Who& who, const v1::Subscribe& request) {
-  const auto& [session, id] = who;
+void Commands::subscribe(const Requester& requester, const v1::Subscribe& request) {
+  const auto& [session, id] = requester;
   Subscription::Map map;
   if (const auto calibration = port_.status().calibration) {
     const CalibrationSummary summary = summarise(*calibration);
@@ -109,29 +109,30 @@ void Commands::subscribe(const Who& who, const v1::Subscribe& request) {
   session->send(message);
 }
 
-void Commands::set_light(const Who& who, const v1::SetLight& request) {
+void Commands::set_light(const Requester& requester, const v1::SetLight& request) {
   hal::Light light = port_.status().light_requested;
   const std::string wrong = change(request, light);
-  if (!wrong.empty()) return who.first->reply_error(who.second, v1::ERROR_INVALID, wrong);
-  (void)submit(port_, who, pipeline::SetLight{light},
-               [who = WeakWho(who), light](const pipeline::CommandDone& done) {
-                 reply(who, done, [&](v1::Reply& out) {
+  if (!wrong.empty())
+    return requester.first->reply_error(requester.second, v1::ERROR_INVALID, wrong);
+  (void)submit(port_, requester, pipeline::SetLight{light},
+               [requester = WeakWho(requester), light](const pipeline::CommandDone& done) {
+                 reply(requester, done, [&](v1::Reply& out) {
                    fill(light, done.light_since_ns, *out.mutable_light());
                  });
                });
 }
 
-void Commands::rezero(const Who& who, bool force) {
-  (void)submit(port_, who, pipeline::Rezero{force},
-               [who = WeakWho(who)](const pipeline::CommandDone& done) {
-                 reply(who, done, [](v1::Reply& out) { out.mutable_done(); });
+void Commands::rezero(const Requester& requester, bool force) {
+  (void)submit(port_, requester, pipeline::Rezero{force},
+               [requester = WeakWho(requester)](const pipeline::CommandDone& done) {
+                 reply(requester, done, [](v1::Reply& out) { out.mutable_done(); });
                });
 }
 
-void Commands::get_status(const Who& who) {
-  auto message = reply_to(who.second);
+void Commands::get_status(const Requester& requester) {
+  auto message = reply_to(requester.second);
   *message.mutable_reply()->mutable_status() = overview().status;
-  who.first->send(message);
+  requester.first->send(message);
 }
 
 Overview Commands::overview() const {
@@ -149,7 +150,7 @@ Overview Commands::overview() const {
   }
   status.set_encoded(hub_.encoded());
   for (const auto& session : hub_.sessions()) {
-    if (session->greeted()) fill(*session, *status.add_clients());
+    if (session->ready()) fill(*session, *status.add_clients());
   }
   for (const auto& endpoint : hub_.endpoints()) fill(endpoint, *status.add_endpoints());
   status.set_version(config_.version);
@@ -160,13 +161,13 @@ Overview Commands::overview() const {
   return overview;
 }
 
-void Commands::ping(const Who& who) {
-  auto message = reply_to(who.second);
+void Commands::ping(const Requester& requester) {
+  auto message = reply_to(requester.second);
   auto& pong = *message.mutable_reply()->mutable_pong();
   auto& clock = base::system_clock();
   pong.set_monotonic_ns(clock.monotonic_ns());
   pong.set_wall_ns(clock.wall_ns());
-  who.first->send(message, true);
+  requester.first->send(message, true);
 }
 
 }  // namespace dtact::net

@@ -31,12 +31,12 @@ class Commands {
   [[nodiscard]] Overview overview() const;
 
  private:
-  void subscribe(const Who& who, const v1::Subscribe& request);
+  void subscribe(const Requester& requester, const v1::Subscribe& request);
   /// The last writer wins. A partial update changes the light that was requested last.
-  void set_light(const Who& who, const v1::SetLight& request);
-  void rezero(const Who& who, bool force);
-  void get_status(const Who& who);
-  void ping(const Who& who);
+  void set_light(const Requester& requester, const v1::SetLight& request);
+  void rezero(const Requester& requester, bool force);
+  void get_status(const Requester& requester);
+  void ping(const Requester& requester);
 
   const NetConfig& config_;
   Hub& hub_;

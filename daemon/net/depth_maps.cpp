@@ -10,7 +10,7 @@
 namespace dtact::net {
 
 std::optional<DepthRegion> contact_box(const pipeline::DepthFrame& frame) {
-  if (!frame.has_depth || !frame.contact.touching) return std::nullopt;
+  if (!frame.has_depth || !frame.contact.in_contact) return std::nullopt;
   int left = frame.width;
   int right = -1;
   int top = frame.height;

@@ -15,7 +15,7 @@ namespace dtact::net {
 inline constexpr int kContactMargin = 16;
 
 /// The box around what is pressed deeper than the contact threshold, kContactMargin larger on each
-/// side and not cut at the map's far borders. Nothing while nothing touches.
+/// side and not cut at the map's far borders. Nothing without contact.
 [[nodiscard]] std::optional<DepthRegion> contact_box(const pipeline::DepthFrame& frame);
 
 /// The depth maps of one frame as clients asked for them: each view is made once, whatever

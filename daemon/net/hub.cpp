@@ -55,7 +55,7 @@ void Hub::start(Commands& commands) {
 void Hub::stop() {
   error_code ignored;
   events_.close(ignored);
-  guests_.dismiss("the daemon ends");
+  session_list_.dismiss("the daemon ends");
   port_.want({});
 }
 
@@ -95,7 +95,7 @@ void Hub::on_event(const pipeline::Event& event) {
     if (!reference->restored) reference_taken_ns_ = reference->at.monotonic_ns;
   }
   v1::ServerMessage message;
-  if (fill(event, *message.mutable_event())) guests_.broadcast(message);
+  if (fill(event, *message.mutable_event())) session_list_.broadcast(message);
 }
 
 void Hub::on_frame(const pipeline::DepthFrame& frame) {
@@ -106,13 +106,13 @@ void Hub::on_frame(const pipeline::DepthFrame& frame) {
   encoder_.begin(frame, calibration_number(frame.calibration));
   // Calibrations come into use in the order of their keys.
   if (frame.calibration) numbers_.erase(numbers_.begin(), numbers_.lower_bound(*frame.calibration));
-  for (const auto& session : guests_.all()) {
+  for (const auto& session : session_list_.all()) {
     const auto kind = session->due(frame.camera.timestamp_ns, missed);
     if (!kind) continue;
     auto encoded = encoder_.encode(*kind);
     if (encoded != nullptr) {
       session->send_frame(std::move(encoded));
-    } else if (!std::exchange(told_too_large_, true)) {
+    } else if (!std::exchange(reported_too_large_, true)) {
       config_.log({LogLevel::warning,
                    "a frame is above the wire's cap and is not sent: subscribe to depth or luma "
                    "alone, or choose a smaller camera mode"});
@@ -122,7 +122,7 @@ void Hub::on_frame(const pipeline::DepthFrame& frame) {
 
 void Hub::admit(const std::shared_ptr<Session>& session) {
   ++gone_.connections;
-  guests_.admit(session);
+  session_list_.admit(session);
 }
 
 std::optional<std::uint64_t> Hub::calibration_number(std::optional<std::uint64_t> key) const {
@@ -134,8 +134,8 @@ std::optional<std::uint64_t> Hub::calibration_number(std::optional<std::uint64_t
 
 void Hub::update_want() {
   pipeline::Wanted wanted;
-  for (const auto& session : guests_.all()) {
-    if (!session->greeted()) continue;
+  for (const auto& session : session_list_.all()) {
+    if (!session->ready()) continue;
     wanted.contact = true;
     const auto parts = session->subscription().parts();
     // A summary tells of the contact, which comes from the depth.
@@ -149,7 +149,7 @@ void Hub::update_want() {
 
 Traffic Hub::traffic() const {
   Traffic all = gone_;
-  for (const auto& session : guests_.all()) add(*session, all);
+  for (const auto& session : session_list_.all()) add(*session, all);
   return all;
 }
 
@@ -166,7 +166,7 @@ std::string Hub::serial() const { return port_.status().camera.identity; }
 void Hub::introduce(v1::HelloReply& reply) const {
   const pipeline::Status status = port_.status();
   reply.set_serial(status.camera.identity);
-  reply.set_rezero_within_s(status.rezero_within_s);
+  reply.set_rezero_timeout_s(status.rezero_timeout_s);
 }
 
 void Hub::on_request(const std::shared_ptr<Session>& session, const v1::ClientMessage& message) {
@@ -178,10 +178,10 @@ void Hub::on_closed(const Session& session) {
   asio::post(io_, [weak = weak_from_this(), gone = &session] {
     const auto self = weak.lock();
     if (self == nullptr) return;
-    const auto left = self->guests_.release(gone);
+    const auto left = self->session_list_.release(gone);
     if (left == nullptr) return;
     add(*left, self->gone_);
-    if (!left->let_in()) ++self->gone_.refused;
+    if (!left->authenticated()) ++self->gone_.refused;
     self->update_want();
   });
 }

@@ -11,10 +11,10 @@
 #include "daemon/net/frame_encoder.hpp"
 #include "daemon/net/overview.hpp"
 #include "daemon/pipeline/port.hpp"
-#include "daemon/serve/guests.hpp"
 #include "daemon/serve/net_config.hpp"
 #include "daemon/serve/security.hpp"
 #include "daemon/serve/session.hpp"
+#include "daemon/serve/session_list.hpp"
 
 namespace dtact::net {
 
@@ -36,7 +36,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   /// A new connection.
   void admit(const std::shared_ptr<Session>& session);
   /// To every client that has been greeted and wants events.
-  void broadcast(const v1::ServerMessage& event) { guests_.broadcast(event); }
+  void broadcast(const v1::ServerMessage& event) { session_list_.broadcast(event); }
   /// What the calibration is called on the wire that the pipeline knows by this key.
   void number_calibration(std::uint64_t key, std::uint64_t number) { numbers_[key] = number; }
   [[nodiscard]] std::optional<std::uint64_t> calibration_number(
@@ -45,7 +45,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   /// lets go of what nobody wants any more.
   void update_want();
   [[nodiscard]] const std::vector<std::shared_ptr<Session>>& sessions() const noexcept {
-    return guests_.all();
+    return session_list_.all();
   }
 
   /// Where the daemon listens, for status.
@@ -56,7 +56,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   [[nodiscard]] std::vector<pipeline::StageStatistics> stages() const;
   /// All clients together since start, those that left included.
   [[nodiscard]] Traffic traffic() const;
-  /// When the untouched image in use was taken, CLOCK_MONOTONIC; nothing while there is none, and
+  /// When the reference image in use was taken, CLOCK_MONOTONIC; nothing while there is none, and
   /// for one of an earlier run.
   [[nodiscard]] std::optional<std::int64_t> reference_taken_ns() const noexcept {
     return reference_taken_ns_;
@@ -69,7 +69,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   /// The camera's, as far as it tells one.
   [[nodiscard]] std::string serial() const;
   void introduce(v1::HelloReply& reply) const override;
-  void on_greeted() override { update_want(); }
+  void on_authenticated() override { update_want(); }
   void on_closed(const Session& session) override;
 
  private:
@@ -85,11 +85,11 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   FrameEncoder encoder_;
   pipeline::Histogram handover_;  ///< From published until fetched here.
   Commands* commands_ = nullptr;  // while started
-  Guests guests_;
+  SessionList session_list_;
   std::vector<EndpointInfo> endpoints_;
   std::map<std::uint64_t, std::uint64_t> numbers_;  ///< By key, of those still in use.
   std::uint64_t number_ = 0;  ///< DepthFrame::number of the last frame; 0: none came yet.
-  bool told_too_large_ = false;
+  bool reported_too_large_ = false;
   Traffic gone_;  ///< Of the clients that left, and all connections.
   std::optional<std::int64_t> reference_taken_ns_;
 };

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "daemon/net/advice.hpp"
-#include "daemon/net/reconstruction_words.hpp"
+#include "daemon/net/reconstruction_names.hpp"
 #include "proto/dtact.pb.h"
 
 namespace dtact::net {
@@ -21,10 +21,10 @@ constexpr bool matches(Health ours, v1::Health theirs) {
 static_assert(matches(Health::uncalibrated, v1::HEALTH_UNCALIBRATED));
 static_assert(matches(Health::light_mismatch, v1::HEALTH_LIGHT_MISMATCH));
 static_assert(matches(Health::not_realtime, v1::HEALTH_NOT_REALTIME));
-static_assert(matches(Health::camera_moved, v1::HEALTH_CAMERA_MOVED));
+static_assert(matches(Health::camera_shifted, v1::HEALTH_CAMERA_SHIFTED));
 static_assert(matches(Health::camera_slow, v1::HEALTH_CAMERA_SLOW));
-static_assert(matches(Health::exposure_follows, v1::HEALTH_EXPOSURE_FOLLOWS));
-static_assert(pipeline::kHealthCount == static_cast<int>(v1::HEALTH_EXPOSURE_FOLLOWS));
+static_assert(matches(Health::exposure_unlocked, v1::HEALTH_EXPOSURE_UNLOCKED));
+static_assert(pipeline::kHealthCount == static_cast<int>(v1::HEALTH_EXPOSURE_UNLOCKED));
 
 v1::State to_wire(State state) {
   switch (state) {
@@ -120,8 +120,8 @@ void fill_camera(const hal::CameraInfo& info, const hal::CameraReport& report,
   out.set_width(static_cast<std::uint32_t>(info.width));
   out.set_height(static_cast<std::uint32_t>(info.height));
   out.set_fps(info.fps);
-  out.set_condition(name_of(report.state));
-  out.set_remedy(report.remedy);
+  out.set_state(name_of(report.state));
+  out.set_fix(report.fix);
   out.set_delivered(report.delivered);
   out.set_lost(report.lost);
   out.set_skipped(report.skipped);
@@ -179,7 +179,7 @@ void fill(const hal::Light& light, std::optional<std::int64_t> since_ns, v1::Lig
 }
 
 void fill(const pipeline::ContactSummary& contact, v1::Contact& out) {
-  out.set_touching(contact.touching);
+  out.set_in_contact(contact.in_contact);
   out.set_area_mm2(contact.area_mm2);
   out.set_x_mm(contact.x_mm);
   out.set_y_mm(contact.y_mm);
@@ -216,7 +216,7 @@ void fill(const pipeline::StageTimes& times, std::int64_t encode_ns, v1::StageTi
   out.set_decode_ns(clamp_ns(times.decode_ns));
   out.set_rectify_ns(clamp_ns(times.rectify_ns));
   out.set_smooth_ns(clamp_ns(times.smooth_ns));
-  out.set_list_ns(clamp_ns(times.list_ns));
+  out.set_lut_ns(clamp_ns(times.lut_ns));
   out.set_activity_ns(clamp_ns(times.activity_ns));
   out.set_inspect_ns(clamp_ns(times.inspect_ns));
   out.set_publish_ns(clamp_ns(times.publish_ns));
@@ -298,7 +298,7 @@ bool fill(const pipeline::Event& event, v1::Event& out) {
     to.set_sequence(contact->at.sequence);
     to.set_monotonic_ns(contact->at.monotonic_ns);
     fill(contact->contact, *to.mutable_contact());
-    to.mutable_contact()->set_touching(contact->touching);
+    to.mutable_contact()->set_in_contact(contact->in_contact);
   } else if (const auto* light = std::get_if<pipeline::LightChanged>(&event)) {
     fill(light->light, light->since_ns, *out.mutable_light());
   } else if (const auto* reference = std::get_if<pipeline::ReferenceTaken>(&event)) {

@@ -29,21 +29,22 @@ v1::ErrorCode code_of(pipeline::Outcome outcome) {
 
 }  // namespace
 
-bool submit(pipeline::Port& port, const Who& who, decltype(pipeline::Command::what) what,
+bool submit(pipeline::Port& port, const Requester& requester,
+            decltype(pipeline::Command::what) what,
             std::function<void(const pipeline::CommandDone&)> then) {
   if (port.submit({std::move(what), std::move(then)})) return true;
-  who.first->reply_error(who.second, v1::ERROR_BUSY, kBusy);
+  requester.first->reply_error(requester.second, v1::ERROR_BUSY, kBusy);
   return false;
 }
 
-void reply(const WeakWho& who, const pipeline::CommandDone& done,
+void reply(const WeakWho& requester, const pipeline::CommandDone& done,
            const std::function<void(v1::Reply&)>& fill) {
-  const auto session = who.first.lock();
+  const auto session = requester.first.lock();
   if (session == nullptr) return;
   if (done.outcome != pipeline::Outcome::done) {
-    return session->reply_error(who.second, code_of(done.outcome), done.message);
+    return session->reply_error(requester.second, code_of(done.outcome), done.message);
   }
-  auto message = reply_to(who.second);
+  auto message = reply_to(requester.second);
   fill(*message.mutable_reply());
   session->send(message);
 }

@@ -6,21 +6,21 @@
 
 #include "daemon/net/commands.hpp"
 #include "daemon/net/hub.hpp"
-#include "daemon/serve/entrance.hpp"
+#include "daemon/serve/listeners.hpp"
 
 namespace dtact::net {
 
 struct Server::Impl {
   Impl(boost::asio::io_context& io, NetConfig settings, pipeline::Port& port,
        CalibrationStore& store)
-      : entrance(io, std::move(settings)),
+      : listeners(io, std::move(settings)),
         worker(1),
-        hub(std::make_shared<Hub>(io, entrance.config(), port)),
-        commands(std::make_shared<Commands>(io, worker, entrance.config(), *hub, port, store)) {
-    hub->set_endpoints(entrance.endpoints());
+        hub(std::make_shared<Hub>(io, listeners.config(), port)),
+        commands(std::make_shared<Commands>(io, worker, listeners.config(), *hub, port, store)) {
+    hub->set_endpoints(listeners.endpoints());
   }
 
-  Entrance entrance;
+  Listeners listeners;
   boost::asio::thread_pool worker;
   std::shared_ptr<Hub> hub;
   std::shared_ptr<Commands> commands;
@@ -30,25 +30,25 @@ Server::Server(boost::asio::io_context& io, NetConfig config, pipeline::Port& po
                CalibrationStore& store)
     : impl_(std::make_unique<Impl>(io, std::move(config), port, store)) {
   impl_->hub->start(*impl_->commands);
-  impl_->entrance.open(impl_->hub,
-                       [&hub = *impl_->hub](const auto& session) { hub.admit(session); });
+  impl_->listeners.open(impl_->hub,
+                        [&hub = *impl_->hub](const auto& session) { hub.admit(session); });
 }
 
 Server::~Server() { stop(); }
 
 Overview Server::overview() const { return impl_->commands->overview(); }
 
-std::vector<std::string> Server::addresses() const { return impl_->entrance.addresses(); }
+std::vector<std::string> Server::addresses() const { return impl_->listeners.addresses(); }
 
 void Server::reload(const NetConfig& fresh) {
-  impl_->entrance.reload(fresh);
-  impl_->hub->set_endpoints(impl_->entrance.endpoints());
+  impl_->listeners.reload(fresh);
+  impl_->hub->set_endpoints(impl_->listeners.endpoints());
 }
 
-std::uint16_t Server::port() const { return impl_->entrance.port(); }
+std::uint16_t Server::port() const { return impl_->listeners.port(); }
 
 void Server::stop() {
-  impl_->entrance.close();
+  impl_->listeners.close();
   impl_->hub->stop();
 }
 

@@ -26,7 +26,7 @@ class Server {
  public:
   /// Listens from here on; clients are served once `io` runs. `io`, `port` and `store` must outlive
   /// the server. Throws std::runtime_error naming the setting, file, address or port and the
-  /// remedy.
+  /// fix.
   Server(boost::asio::io_context& io, NetConfig config, pipeline::Port& port,
          CalibrationStore& store);
   /// As stop(). `io` must not be running.

@@ -5,7 +5,7 @@
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/pipeline/depth/resolutions.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
-#include "daemon/pipeline/untouched/calibrated_image.hpp"
+#include "daemon/pipeline/reference/calibrated_image.hpp"
 #include "hal/camera.hpp"
 
 namespace dtact::pipeline {

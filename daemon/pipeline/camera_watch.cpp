@@ -16,7 +16,7 @@ void RateWatch::add(const hal::FrameInfo& info) noexcept {
   if (!goes_on) return;
   intervals_[count_++] = passed_ns / frames;
   span_ns_ += passed_ns;
-  if (count_ < kMost && (count_ < kLeast || span_ns_ < kWindowNs)) return;
+  if (count_ < kMax && (count_ < kMin || span_ns_ < kWindowNs)) return;
   const auto middle = intervals_.begin() + static_cast<std::ptrdiff_t>(count_ / 2);
   std::nth_element(intervals_.begin(), middle,
                    intervals_.begin() + static_cast<std::ptrdiff_t>(count_));

@@ -30,13 +30,13 @@ class RateWatch {
   static constexpr double kSlow = 0.9;
 
  private:
-  static constexpr std::size_t kMost = 256;
-  static constexpr std::size_t kLeast = 5;  // for a median worth the name, however slow they come
+  static constexpr std::size_t kMax = 256;
+  static constexpr std::size_t kMin = 5;  // for a median worth the name, however slow they come
   static constexpr std::int64_t kWindowNs = 1'000'000'000;
 
   std::int64_t promised_ns_;
   std::int64_t median_ns_ = 0;  // 0: not measured
-  std::array<std::int64_t, kMost> intervals_{};
+  std::array<std::int64_t, kMax> intervals_{};
   std::size_t count_ = 0;
   std::int64_t span_ns_ = 0;  // of the intervals gathered
   bool have_before_ = false;

@@ -24,19 +24,19 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       period_ns_(std::llround(1e9 / camera_.info().fps)),
       timeout_(std::min<std::chrono::nanoseconds>(
           std::chrono::nanoseconds(hal::stall_ns(period_ns_)), kLongestGrab)),
-      untouched_(camera_.info().width, camera_.info().height, config.light, config),
+      tracker_(camera_.info().width, camera_.info().height, config.light, config),
       depth_(config, clock_),
       watch_(period_ns_),
       timeline_(config.light, config.light_delay_frames.value_or(camera_.info().light_delay_frames),
                 period_ns_),
-      teller_(exchange_),
-      desk_(exchange_, teller_, untouched_, depth_),
+      reporter_(exchange_),
+      executor_(exchange_, reporter_, tracker_, depth_),
       whole_{0, 0, camera_.info().width, camera_.info().height},
       area_(whole_),
       unusable_(unusable) {
   const std::int64_t now_ns = clock_.monotonic_ns();
   watch_.started(now_ns);
-  desk_.begin(std::move(active));
+  executor_.begin(std::move(active));
   // What the status says until the first frame.
   exchange_.state = state();
   exchange_.health = health(now_ns).bits();
@@ -51,7 +51,7 @@ void CaptureLoop::run() noexcept {
 void CaptureLoop::step() noexcept {
   exchange_.turns.fetch_add(1, std::memory_order_relaxed);
   take_notes();
-  desk_.take(watch_.away(), stamp(clock_.monotonic_ns()));
+  executor_.take(watch_.away(), stamp(clock_.monotonic_ns()));
   choose_area();
   const std::int64_t asked_ns = clock_.monotonic_ns();
   const hal::GrabStatus status = camera_.grab(frame_, timeout_);
@@ -67,9 +67,9 @@ void CaptureLoop::step() noexcept {
 void CaptureLoop::take_notes() noexcept {
   LightNote note;
   while (light_.next_note(note)) {
-    untouched_.light_changes(note.light);
+    tracker_.light_changes(note.light);
     // What was seen under no light, or an unknown one, counts no more than before a start.
-    if (note.returned) untouched_.camera_began();
+    if (note.returned) tracker_.camera_began();
     if (note.begins) {
       timeline_.change_begins(note.light, note.at_ns);
     } else {
@@ -81,9 +81,9 @@ void CaptureLoop::take_notes() noexcept {
 // Decoding is most of the work on a frame: no more than somebody reads.
 void CaptureLoop::choose_area() noexcept {
   hal::Area area = whole_;
-  if (desk_.active() != nullptr && !untouched_.needs_whole_frame() &&
+  if (executor_.active() != nullptr && !tracker_.needs_whole_frame() &&
       !exchange_.want_luma.load(std::memory_order_relaxed)) {
-    const recon::FrameRegion region = desk_.active()->image.cells.lattice().region();
+    const recon::FrameRegion region = executor_.active()->image.cells.lattice().region();
     area = {region.x, region.y, region.width, region.height};
   }
   if (area == area_) return;
@@ -94,7 +94,7 @@ void CaptureLoop::choose_area() noexcept {
 void CaptureLoop::process(std::int64_t now_ns) noexcept {
   const hal::FrameInfo& info = frame_.info();
   if (watch_.arrived(info, now_ns)) {
-    untouched_.camera_began();
+    tracker_.camera_began();
     exchange_.camera_returned.store(true, std::memory_order_release);
     exchange_.wake.signal();
   }
@@ -113,12 +113,12 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
              .now_ns = now_ns,
              .settled = timeline_.settled_at(exposure_ns),
              .whole = area_ == whole_});
-  const HealthSet conditions = health(now_ns);
-  out.health = conditions;
-  teller_.contact(out);
-  teller_.flush();
+  const HealthSet health_flags = health(now_ns);
+  out.health = health_flags;
+  reporter_.contact(out);
+  reporter_.flush();
   publish(out);  // from here on `out` is the network's
-  tell(conditions, now_ns);
+  set_left(health_flags, now_ns);
   frame_.reset();
 }
 
@@ -129,38 +129,38 @@ void CaptureLoop::label(DepthFrame& out, std::int64_t exposure_ns) noexcept {
   out.light_since_ns = timeline_.since_at(exposure_ns);
   if (out.light_since_ns) *out.light_since_ns += stamp_lag_ns(out.camera.meaning, period_ns_);
   out.calibration.reset();
-  if (desk_.active() != nullptr) out.calibration = desk_.key();
+  if (executor_.active() != nullptr) out.calibration = executor_.key();
   out.times = {};
   out.times.decode_ns = out.camera.decode_ns;
 }
 
-/// What the frame shows: first of the untouched image, then, against that, of depth.
-void CaptureLoop::look(DepthFrame& out, const Moment& moment) noexcept {
+/// What the frame shows: first of the reference image, then, against that, of depth.
+void CaptureLoop::look(DepthFrame& out, const FrameState& moment) noexcept {
   const std::int64_t began_ns = clock_.monotonic_ns();
-  const Look look = untouched_.look(frame_.luma(), moment);
+  const Observation look = tracker_.look(frame_.luma(), moment);
   out.times.activity_ns = clock_.monotonic_ns() - began_ns;
   if (look.new_reference) {
-    depth_.set_reference(untouched_.reference());
-    desk_.reference_taken(out.camera.sequence);
-    if (untouched_.footing() != Footing::stale) {
-      teller_.reference({untouched_.footing() == Footing::restored,
-                         {out.camera.sequence, out.camera.timestamp_ns, out.wall_ns}});
+    depth_.set_reference(tracker_.reference());
+    executor_.reference_taken(out.camera.sequence);
+    if (tracker_.quality() != ReferenceQuality::stale) {
+      reporter_.reference({tracker_.quality() == ReferenceQuality::restored,
+                           {out.camera.sequence, out.camera.timestamp_ns, out.wall_ns}});
     }
   }
-  if (look.new_light) depth_.set_light(untouched_.light());
-  if (look.rezeroed) desk_.answer(*look.rezeroed);
+  if (look.new_light) depth_.set_light(tracker_.light());
+  if (look.rezeroed) executor_.answer(*look.rezeroed);
   const bool measured = look.measurable && exchange_.want_contact.load(std::memory_order_relaxed);
   if (measured) {
-    depth_.make(frame_.luma(), untouched_, want_depth_, out);
-  } else if (desk_.active() == nullptr) {
+    depth_.make(frame_.luma(), tracker_, want_depth_, out);
+  } else if (executor_.active() == nullptr) {
     depth_.skip(out, ContactAbsence::uncalibrated);
   } else {
     depth_.skip(out, look.measurable ? ContactAbsence::unasked : ContactAbsence::referencing);
   }
   if (look.measurable) {
-    untouched_.touched(measured ? depth_.touching() : untouched_.anything_active());
+    tracker_.set_in_contact(measured ? depth_.in_contact() : tracker_.any_active());
   }
-  exchange_.light_followed.store(untouched_.light() - 1, std::memory_order_relaxed);
+  exchange_.light_followed.store(tracker_.light() - 1, std::memory_order_relaxed);
 }
 
 void CaptureLoop::publish(DepthFrame& out) noexcept {
@@ -200,17 +200,17 @@ void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
                                 std::int64_t now_ns) noexcept {
   watch_.missed(status, now_ns);
   exchange_.camera_damaged.store(watch_.damaged(), std::memory_order_relaxed);
-  if (watch_.away() || watch_.silent_ns(now_ns) > kSecond) desk_.give_up_rezero();
-  tell(health(now_ns), now_ns);
-  teller_.flush();
+  if (watch_.away() || watch_.silent_ns(now_ns) > kSecond) executor_.abort_rezero();
+  set_left(health(now_ns), now_ns);
+  reporter_.flush();
   // A camera that answers at once is not asked again at once, unless it had a frame.
   if (status != hal::GrabStatus::damaged && now_ns - asked_ns < kAwayPauseNs) {
     clock_.sleep_until(asked_ns + kAwayPauseNs);
   }
 }
 
-void CaptureLoop::tell(HealthSet health, std::int64_t now_ns) noexcept {
-  teller_.state(state(), health, stamp(now_ns));
+void CaptureLoop::set_left(HealthSet health, std::int64_t now_ns) noexcept {
+  reporter_.state(state(), health, stamp(now_ns));
 }
 
 /// After the newest frame.
@@ -220,20 +220,20 @@ Stamp CaptureLoop::stamp(std::int64_t at_ns) const noexcept {
 }
 
 State CaptureLoop::state() const noexcept {
-  return watch_.away() ? State::camera_lost : untouched_.state();
+  return watch_.away() ? State::camera_lost : tracker_.state();
 }
 
 HealthSet CaptureLoop::health(std::int64_t now_ns) const noexcept {
-  HealthSet set = untouched_.conditions();
+  HealthSet set = tracker_.health_flags();
   const bool differs =
-      desk_.active() != nullptr && exchange_.camera_mismatch.load(std::memory_order_relaxed);
-  const bool unusable = unusable_ && desk_.active() == nullptr;
+      executor_.active() != nullptr && exchange_.camera_mismatch.load(std::memory_order_relaxed);
+  const bool unusable = unusable_ && executor_.active() == nullptr;
   set.set(Health::camera_mismatch, unusable || controls_moved_ || differs);
   set.set(Health::beyond_calibration, depth_.beyond());
   set.set(Health::frames_lost, watch_.lost_lately(now_ns));
-  set.set(Health::camera_trouble, watch_.trouble());
+  set.set(Health::camera_fault, watch_.trouble());
   set.set(Health::camera_slow, watch_.rate().slow());
-  set.set(Health::ring_trouble, light_.trouble());
+  set.set(Health::ring_fault, light_.trouble());
   set.set(Health::not_realtime, exchange_.not_realtime.load(std::memory_order_relaxed));
   return set;
 }

@@ -5,14 +5,14 @@
 #include <memory>
 
 #include "daemon/pipeline/camera_watch.hpp"
+#include "daemon/pipeline/command_executor.hpp"
 #include "daemon/pipeline/depth/depth_maker.hpp"
+#include "daemon/pipeline/event_reporter.hpp"
 #include "daemon/pipeline/exchange.hpp"
 #include "daemon/pipeline/light_driver.hpp"
 #include "daemon/pipeline/light_timeline.hpp"
-#include "daemon/pipeline/order_desk.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
-#include "daemon/pipeline/teller.hpp"
-#include "daemon/pipeline/untouched/untouched_image.hpp"
+#include "daemon/pipeline/reference/reference_tracker.hpp"
 #include "hal/base/clock.hpp"
 #include "hal/camera.hpp"
 
@@ -26,7 +26,7 @@ struct CaptureParts {
   base::Clock& clock;
 };
 
-/// The capture thread: grab, look at the untouched image, make depth, publish, tell. Depth is made
+/// The capture thread: grab, look at the reference image, make depth, publish, tell. Depth is made
 /// while anybody listens, and published, with its maps, when it is wanted. Never waits for another
 /// thread; in steady state it does not allocate, log or touch a socket.
 class CaptureLoop {
@@ -38,7 +38,7 @@ class CaptureLoop {
 
   /// For what is not the loop's: its threads, what they say, and what is restored before the first
   /// step.
-  [[nodiscard]] UntouchedImage& untouched() noexcept { return untouched_; }
+  [[nodiscard]] ReferenceTracker& tracker() noexcept { return tracker_; }
   /// Steps until Exchange::stop; notices it within a tenth of a second unless the camera blocks
   /// longer than it was asked to.
   void run() noexcept;
@@ -50,10 +50,10 @@ class CaptureLoop {
   void choose_area() noexcept;
   void process(std::int64_t now_ns) noexcept;
   void label(DepthFrame& out, std::int64_t exposure_ns) noexcept;
-  void look(DepthFrame& out, const Moment& moment) noexcept;
+  void look(DepthFrame& out, const FrameState& moment) noexcept;
   void publish(DepthFrame& out) noexcept;
   void without_frame(hal::GrabStatus status, std::int64_t asked_ns, std::int64_t now_ns) noexcept;
-  void tell(HealthSet health, std::int64_t now_ns) noexcept;
+  void set_left(HealthSet health, std::int64_t now_ns) noexcept;
   [[nodiscard]] Stamp stamp(std::int64_t at_ns) const noexcept;
   [[nodiscard]] State state() const noexcept;
   [[nodiscard]] HealthSet health(std::int64_t now_ns) const noexcept;
@@ -65,12 +65,12 @@ class CaptureLoop {
   const std::int64_t period_ns_;
   const std::chrono::nanoseconds timeout_;
 
-  UntouchedImage untouched_;
+  ReferenceTracker tracker_;
   DepthMaker depth_;
   CameraWatch watch_;
   LightTimeline timeline_;
-  Teller teller_;
-  OrderDesk desk_;
+  EventReporter reporter_;
+  CommandExecutor executor_;
   hal::Frame frame_;
   const hal::Area whole_;        // frame
   hal::Area area_;               // of the frame that is asked for

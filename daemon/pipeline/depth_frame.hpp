@@ -19,14 +19,14 @@ struct StageTimes {
   std::int64_t activity_ns = 0;  ///< The look for what changed.
   std::int64_t rectify_ns = 0;
   std::int64_t smooth_ns = 0;
-  std::int64_t list_ns = 0;
+  std::int64_t lut_ns = 0;
   std::int64_t inspect_ns = 0;  ///< The contact summary.
   std::int64_t publish_ns = 0;  ///< Copies of what subscribers want, until done_ns.
 };
 
 /// What touches, in the depth map's coordinates (origin at its centre, x right, y down).
 struct ContactSummary {
-  bool touching = false;
+  bool in_contact = false;
   double area_mm2 = 0;  ///< Area pressed deeper than the contact threshold.
   double x_mm = 0;      ///< Depth-weighted centroid of that area.
   double y_mm = 0;
@@ -34,7 +34,7 @@ struct ContactSummary {
   double deepest_x_mm = 0;
   double deepest_y_mm = 0;
   double volume_mm3 = 0;              ///< Indentation summed over the contact area.
-  std::optional<recon::Force> force;  ///< Along the surface's normal; 0 N when nothing touches.
+  std::optional<recon::Force> force;  ///< Along the surface's normal; 0 N without contact.
   recon::ForceAbsence force_absence = recon::ForceAbsence::none;  ///< Why there is none.
 };
 
@@ -42,7 +42,7 @@ struct ContactSummary {
 enum class ContactAbsence : std::uint8_t {
   none,          ///< It was measured.
   uncalibrated,  ///< There is nothing to measure by.
-  referencing,   ///< The light settles or the untouched image is being taken.
+  referencing,   ///< The light settles or the reference image is being taken.
   unasked        ///< Nobody wanted it when the frame was captured.
 };
 
@@ -78,7 +78,7 @@ struct DepthFrame {
   recon::DrawnTiles drawn;  ///< What depth_um holds, for the reconstruction.
   /// Calibration (ActiveCalibration) and its rung (Resolutions) that drew it.
   std::uint64_t drawn_generation = 0;
-  std::size_t drawn_rung = 0;
+  std::size_t drawn_resolution = 0;
 
   bool has_luma = false;
   int luma_width = 0;  ///< Pixels of the camera frame.

@@ -8,7 +8,7 @@ namespace dtact::pipeline {
 /// Where the pipeline is between power-on and shutdown.
 enum class State : std::uint8_t {
   settling,      ///< Ring and camera on; waiting for the mean grey to stop moving.
-  referencing,   ///< Averaging the untouched image.
+  referencing,   ///< Averaging the reference image.
   serving,       ///< Depth flows.
   uncalibrated,  ///< Luma flows; there is no calibration.
   camera_lost    ///< The camera is away; the report says why.
@@ -25,10 +25,10 @@ enum class Health : std::uint8_t {
   light_mismatch = 5,      ///< The ring shows another light than at calibration.
   camera_mismatch = 6,     ///< Camera, mode, format or controls differ from the calibration's, or a
                            ///< control moved by itself.
-  beyond_calibration = 7,  ///< Somewhere the image is darker than the calibrated list reaches.
+  beyond_calibration = 7,  ///< Somewhere the image is darker than the calibrated LUT reaches.
   frames_lost = 8,         ///< The camera lost frames within the last second.
-  camera_trouble = 9,      ///< Unplugged, stalled, busy, denied; status has the sentence.
-  ring_trouble = 10,       ///< The ring is away or refused the last write; status has the sentence.
+  camera_fault = 9,        ///< Unplugged, stalled, busy, denied; status has the sentence.
+  ring_fault = 10,         ///< The ring is away or refused the last write; status has the sentence.
   not_realtime = 11,       ///< The capture thread runs without real-time scheduling.
   // What the picture itself shows (image_watch.hpp).
   light_drifted = 12,    ///< The light is not the reference's, or most of the field is pressed.
@@ -37,9 +37,10 @@ enum class Health : std::uint8_t {
   image_dark = 15,       ///< The picture is too dark to measure in.
   image_noisy = 16,      ///< Pixels are noisier than smoothing makes up for, or many are dead.
   image_repeated = 17,   ///< All or part of the picture is the one before: frozen or torn.
-  camera_moved = 18,     ///< The layer's marks lie elsewhere than at calibration (place_watch.hpp).
-  camera_slow = 19,      ///< Fewer frames a second than the camera's mode promises.
-  exposure_follows = 20  ///< The rest brightens as a part darkens, as if exposure were automatic.
+  camera_shifted =
+      18,  ///< The gel's marks lie elsewhere than at calibration (camera_shift_detector.hpp).
+  camera_slow = 19,       ///< Fewer frames a second than the camera's mode promises.
+  exposure_unlocked = 20  ///< The rest brightens as a part darkens, as if exposure were automatic.
 };
 inline constexpr int kHealthCount = 21;
 

@@ -90,8 +90,8 @@ void LightDriver::serve(Command command) {
   } else {
     done.light_since_ns = light_since_ns();
   }
-  tell(std::move(done));
-  if (result.ok && wanted != before) tell(changed());
+  set_left(std::move(done));
+  if (result.ok && wanted != before) set_left(changed());
 }
 
 /// Of the write that has just worked.
@@ -133,7 +133,7 @@ void LightDriver::come_back() {
   if (!write(kept).ok) {
     away_ = true;  // so that it is tried again
   } else if (kept != before) {
-    tell(changed());
+    set_left(changed());
   }
 }
 
@@ -162,7 +162,7 @@ void LightDriver::note(const LightNote& note) {
   }
 }
 
-void LightDriver::tell(Event event) {
+void LightDriver::set_left(Event event) {
   while (!events_.push(std::move(event)) && !stop_) {
     clock_.sleep_until(clock_.monotonic_ns() + kRetryNs);
   }

@@ -72,7 +72,7 @@ class LightDriver {
   void come_back();
   hal::ShowResult write(const hal::Light& light);
   void note(const LightNote& note);
-  void tell(Event event);
+  void set_left(Event event);
   [[nodiscard]] LightChanged changed() const;
 
   std::unique_ptr<hal::LightRing> ring_;

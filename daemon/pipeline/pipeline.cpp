@@ -10,11 +10,11 @@ namespace dtact::pipeline {
 namespace {
 
 hal::CameraInfo checked(const hal::CameraInfo& info) {
-  if (info.width < kLeastFrameWidth || info.height < kLeastFrameHeight) {
+  if (info.width < kMinFrameWidth || info.height < kMinFrameHeight) {
     throw std::invalid_argument(
         fmt::format("camera {} delivers {}x{} pixels; at least {}x{} are needed: choose another "
                     "camera.width and camera.height",
-                    info.identity, info.width, info.height, kLeastFrameWidth, kLeastFrameHeight));
+                    info.identity, info.width, info.height, kMinFrameWidth, kMinFrameHeight));
   }
   if (!(info.fps > 0)) {
     throw std::invalid_argument(
@@ -35,7 +35,7 @@ HealthSet health_of(std::uint32_t bits) noexcept {
 const char* sentence(Outcome outcome) noexcept {
   switch (outcome) {
     case Outcome::refused_contact:
-      return "something touches: lift it and ask again, or force it";
+      return "there is contact: lift it and ask again, or force it";
     case Outcome::refused_unsteady:
       return "the image does not hold still: lift what touches and ask again, or force it";
     case Outcome::refused_dark:
@@ -88,7 +88,7 @@ Pipeline::Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::Lig
                                         std::move(active), unusable);
   if (calibration_) {
     try {
-      loop_->untouched().restore(*calibration);
+      loop_->tracker().restore(*calibration);
     } catch (const std::exception& e) {
       restore_failure_ = e.what();  // the calibration's own reference does instead
     }
@@ -105,8 +105,8 @@ DepthFrame Pipeline::prototype(const calibration::Calibration* calibration) cons
   // Sized, not only reserved: copies keep the size, and its pages are touched now.
   frame.depth_um.resize(map);
   // Any map up to so many rows takes its marks in here.
-  constexpr int kMostRows = 4096;
-  frame.drawn.tiles.resize(kMostRows / recon::TileGrid::kRows);
+  constexpr int kMaxRows = 4096;
+  frame.drawn.tiles.resize(kMaxRows / recon::TileGrid::kRows);
   frame.luma.resize(pixels(info_.width, info_.height));
   // As much as YUYV, which is what drivers make room for themselves (uvcvideo: the camera's
   // dwMaxVideoFrameSize).
@@ -121,7 +121,7 @@ void Pipeline::start() {
   light_.start();
   camera_->start();
   compare_camera();
-  loop_->untouched().start();
+  loop_->tracker().start();
   capture_ = base::RtThread(
       {.name = "dtact-capture", .cpu = config_.cpu, .fifo_priority = config_.fifo_priority},
       [this] { loop_->run(); });
@@ -136,7 +136,7 @@ void Pipeline::stop() noexcept {
   exchange_.stop = true;
   capture_.join();
   light_.stop();
-  loop_->untouched().stop();
+  loop_->tracker().stop();
 }
 
 std::optional<Event> Pipeline::next_event() {
@@ -226,19 +226,19 @@ Status Pipeline::status() const {
   status.skipped = exchange_.slot.replaced();
   status.fps = exchange_.statistics.fps(clock_.monotonic_ns());
   status.camera_fps = exchange_.camera_fps.load(std::memory_order_relaxed);
-  // The picture may settle for patience_frames and be averaged for as long again; without frames
+  // The picture may settle for timeout_frames and be averaged for as long again; without frames
   // the re-zero is refused after a second.
   const double fps =
       status.camera_fps > 0 ? std::min(status.camera_fps, status.camera.fps) : status.camera.fps;
-  status.rezero_within_s = 1 + 2 * config_.reference.patience_frames / fps;
+  status.rezero_timeout_s = 1 + 2 * config_.reference.timeout_frames / fps;
   status.realtime = realtime_;
   status.cpu = cpu_;
   status.stages = exchange_.statistics.stages();
   status.capture_thread = exchange_.statistics.usage();
   status.light_followed = exchange_.light_followed.load(std::memory_order_relaxed);
-  status.place_message = loop_->untouched().place_message();
-  status.storage_message = loop_->untouched().storage_message();
-  if (status.storage_message.empty() && !loop_->untouched().has_written()) {
+  status.camera_shift_message = loop_->tracker().camera_shift_message();
+  status.storage_message = loop_->tracker().storage_message();
+  if (status.storage_message.empty() && !loop_->tracker().has_written()) {
     status.storage_message = restore_failure_;
   }
   return status;

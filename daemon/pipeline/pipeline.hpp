@@ -20,14 +20,14 @@ namespace dtact::pipeline {
 class Pipeline final : public Port {
  public:
   /// `calibration` may be null: luma only. Takes all the memory that run time needs. Throws
-  /// std::invalid_argument naming the setting and its remedy. A calibration for another frame size
+  /// std::invalid_argument naming the setting and its fix. A calibration for another frame size
   /// is a health condition, not an error.
   Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::LightRing> ring,
            const std::shared_ptr<const calibration::Calibration>& calibration,
            PipelineConfig config, base::Clock& clock = base::system_clock());
   ~Pipeline() override { stop(); }
 
-  /// Ring on, camera on, threads running. Once only. Throws std::runtime_error with the remedy when
+  /// Ring on, camera on, threads running. Once only. Throws std::runtime_error with the fix when
   /// the camera does not start; a ring that fails is a health condition.
   void start();
   /// Ends and joins the threads: within a tenth of a second and what the camera's and the ring's
@@ -72,7 +72,7 @@ class Pipeline final : public Port {
   // Network thread only.
   ReconstructionRules rules_;
   std::shared_ptr<const calibration::Calibration> calibration_;  // in use; null: none
-  base::RtThread capture_;  // last: it uses all the others
+  base::RtThread capture_;                                       // last: it uses all the others
 };
 
 }  // namespace dtact::pipeline

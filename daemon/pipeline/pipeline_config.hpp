@@ -11,8 +11,9 @@ namespace dtact::pipeline {
 
 /// When something counts as touching.
 struct ContactRules {
-  double made_mm = 0.10;    ///< Contact is made where indentation exceeds this, millimetres, …
-  double lost_mm = 0.05;    ///< … and lost once it exceeds only this no longer. Below made_mm.
+  double threshold_mm = 0.10;  ///< Contact is made where indentation exceeds this, millimetres, …
+  double release_mm =
+      0.05;                 ///< … and lost once it exceeds only this no longer. Below threshold_mm.
   double area_mm2 = 0.5;    ///< On at least this much surface, square millimetres.
   int debounce_frames = 2;  ///< For this many frames in a row.
 };
@@ -20,18 +21,18 @@ struct ContactRules {
 /// At which share of the calibration's resolution depth is reconstructed.
 struct ReconstructionRules {
   static constexpr int kAutoSharpen = -1;
-  static constexpr double kLeastErrorUm = 1;
-  static constexpr double kMostErrorUm = 10000;
+  static constexpr double kMinErrorUm = 1;
+  static constexpr double kMaxErrorUm = 10000;
 
   /// 1, 2 or 4: a pixel of the map is the mean over so many of the calibration's in each direction.
   /// 0: chosen for every frame, the coarsest whose expected error stays within max_error_um.
   int decimation = 1;
-  /// Steps of the filter that undoes the layer's scattering (recon/sharpener.hpp): 0 … 2, or
+  /// Steps of the filter that undoes the gel's scattering (recon/sharpener.hpp): 0 … 2, or
   /// kAutoSharpen: for every frame the fewest whose expected error stays within max_error_um, all
   /// at recon::kSharpenedAt and interpolated to `decimation` (0: left so); as 0 where the
   /// calibration has none (recon::sharpening_steps()).
   int sharpen = 0;
-  double max_error_um = 50;  ///< kLeastErrorUm … kMostErrorUm, micrometres.
+  double max_error_um = 50;  ///< kMinErrorUm … kMaxErrorUm, micrometres.
 
   bool operator==(const ReconstructionRules&) const = default;
 };
@@ -48,12 +49,12 @@ struct DriftRules {
   double percent_per_minute = 2;  ///< At most so fast.
 };
 
-/// How the untouched image is taken.
+/// How the reference image is taken.
 struct ReferenceRules {
   int frames = 32;            ///< Averaged into one reference, 1 … 256.
   int settle_frames = 8;      ///< The mean grey has settled when over this many frames, 2 … 64, …
   double settle_grey = 0.25;  ///< … it moves by less than this many grey levels.
-  int patience_frames = 300;  ///< A picture that is not still by then is taken for touched.
+  int timeout_frames = 300;   ///< A picture that is not still by then is taken for touched.
 };
 
 /// Settings of the capture thread and what it decides. Does not change while it runs.

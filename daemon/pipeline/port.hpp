@@ -28,7 +28,7 @@ struct Stamp {
   std::int64_t wall_ns = 0;       ///< The same moment since 1970.
 };
 
-/// The untouched image in use.
+/// The reference image in use.
 struct ReferenceCopy {
   int width = 0;  ///< Pixels of the camera frame.
   int height = 0;
@@ -43,7 +43,7 @@ struct SetLight {
   hal::Light light = {};
 };
 struct Rezero {
-  bool force = false;  ///< Take the reference although something touches.
+  bool force = false;  ///< Take the reference although in contact.
 };
 /// Made by Port::prepare().
 struct UseCalibration {
@@ -92,7 +92,7 @@ struct CommandDone {
 /// What is touched, or not any more, by two measured frames: while nothing can be measured nothing
 /// is told, and what was touched before counts as held.
 struct ContactChanged {
-  bool touching = false;
+  bool in_contact = false;
   Stamp at = {};  ///< The frame that shows it.
   ContactSummary contact = {};
 };
@@ -161,9 +161,9 @@ struct Status {
   /// How far the reference follows the light since it was taken: a share, negative = dimmer.
   double light_followed = 0;
   ThreadUsage capture_thread;  ///< Renewed once a second.
-  /// How far the layer's marks lay from where they belong; meant while Health::camera_moved is set.
-  std::string place_message;
-  double rezero_within_s = 0;  ///< The longest time that a re-zero takes, seconds.
+  /// How far the gel's marks lay from where they belong; meant while Health::camera_shifted is set.
+  std::string camera_shift_message;
+  double rezero_timeout_s = 0;  ///< The longest time that a re-zero takes, seconds.
   /// Why the calibration or the last good reference could not be used or kept, and what to do;
   /// empty when all is well.
   std::string storage_message;

@@ -26,7 +26,7 @@ void Statistics::add(const StageTimes& times, bool has_depth, std::int64_t ready
     histograms_[kActivity].add(times.activity_ns);
     histograms_[kRectify].add(times.rectify_ns);
     histograms_[kSmooth].add(times.smooth_ns);
-    histograms_[kList].add(times.list_ns);
+    histograms_[kLut].add(times.lut_ns);
     histograms_[kInspect].add(times.inspect_ns);
     histograms_[kTotal].add(done_ns - ready_ns);
   }
@@ -45,7 +45,7 @@ void Statistics::add(const StageTimes& times, bool has_depth, std::int64_t ready
 
 std::vector<StageStatistics> Statistics::stages() const {
   static constexpr std::array<const char*, kStages> kNames = {
-      "decode", "activity", "rectify", "smooth", "list", "inspect", "publish", "total"};
+      "decode", "activity", "rectify", "smooth", "lut", "inspect", "publish", "total"};
   std::vector<StageStatistics> all;
   for (std::size_t i = 0; i < kStages; ++i) {
     if (histograms_[i].count() > 0) all.push_back(summarise(kNames[i], histograms_[i]));

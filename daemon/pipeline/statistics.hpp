@@ -37,7 +37,7 @@ class Statistics {
     kActivity,
     kRectify,
     kSmooth,
-    kList,
+    kLut,
     kInspect,
     kPublish,
     kTotal,

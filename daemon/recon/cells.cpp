@@ -138,12 +138,12 @@ CellTotals CompareCells(const CellPlanes& p, const ChangeLimits& limits) {
         Update(d32, hn::LoadU(d32, p.cell + i), change, limits.cell_on, limits.cell_off);
     hn::StoreU(cell, d32, p.cell + i);
     any = hn::Or(any, cell);
-    const V32 touched = hn::LoadU(d32, p.active + i);
+    const V32 in_contact = hn::LoadU(d32, p.active + i);
     grey = hn::Add(grey, sum);
-    change_sum = hn::Add(change_sum, hn::AndNot(touched, hn::ShiftRight<8>(change)));
-    rough = hn::Add(rough, hn::AndNot(touched, hn::LoadU(d32, p.rough + i)));
+    change_sum = hn::Add(change_sum, hn::AndNot(in_contact, hn::ShiftRight<8>(change)));
+    rough = hn::Add(rough, hn::AndNot(in_contact, hn::LoadU(d32, p.rough + i)));
     const V32 moved = hn::Abs(hn::Sub(sum, hn::LoadU(d32, p.sum_before + i)));
-    step = hn::Add(step, hn::AndNot(touched, moved));
+    step = hn::Add(step, hn::AndNot(in_contact, moved));
   }
   for (int row = 0; row < p.window_rows; ++row) {
     for (int i = row * p.stride; i < (row + 1) * p.stride; i += kLanes) {

@@ -3,11 +3,11 @@
 #include <cstddef>
 #include <cstdint>
 
-/// Sums over square cells of the raw frame: what the comparison with the untouched image works on.
+/// Sums over square cells of the raw frame: what the comparison with the reference image works on.
 namespace dtact::recon::vec {
 
 inline constexpr int kCell = 16;  ///< Side of a cell, pixels.
-/// Only every second row is read: the layer blurs over several, and the look is half as dear.
+/// Only every second row is read: the gel blurs over several, and the look is half as dear.
 inline constexpr int kRowStep = 2;
 inline constexpr int kCellPixels = kCell * kCell / kRowStep;  ///< Read of a cell.
 inline constexpr int kRoughPixels = 2 * kCell;                ///< Whose roughness is taken.

@@ -10,19 +10,19 @@ namespace dtact::recon {
 /// What is to be added up while a map is made. What a contact is, the caller knows. Thresholds in
 /// micrometres, above kUntrusted.
 struct SumRules {
-  std::int16_t made_um = 0;  ///< Deeper pixels are summed.
-  std::int16_t lost_um = 0;  ///< Deeper pixels are counted, too.
+  std::int16_t threshold_um = 0;  ///< Deeper pixels are summed.
+  std::int16_t release_um = 0;    ///< Deeper pixels are counted, too.
   /// Neighbours of the second difference lie so many pixels away; 0: nobody asks for the bend.
   int bend_reach = 0;
   std::int16_t bend_from_um = 0;  ///< Deeper pixels count for the bend.
 
   /// Every so many rows are looked at for the bend: as far apart as its neighbours, at most four.
   [[nodiscard]] constexpr int bend_step() const noexcept {
-    return bend_reach < kMostRows ? bend_reach : kMostRows;
+    return bend_reach < kMaxRows ? bend_reach : kMaxRows;
   }
 
  private:
-  static constexpr int kMostRows = 4;
+  static constexpr int kMaxRows = 4;
 };
 
 /// What the pixels of one map add up to, in pixels and micrometres. Untrusted pixels count for
@@ -31,11 +31,11 @@ struct DepthSums {
   explicit DepthSums(const SumRules& the_rules) noexcept : rules(the_rules) {}
 
   SumRules rules;
-  std::int64_t made = 0;  ///< Pixels deeper than rules.made_um, …
+  std::int64_t made = 0;  ///< Pixels deeper than rules.threshold_um, …
   std::int64_t um = 0;    ///< … the sum of their depth, and of depth times column and row.
   std::int64_t um_x = 0;
   std::int64_t um_y = 0;
-  std::int64_t lost = 0;                 ///< Pixels deeper than rules.lost_um.
+  std::int64_t lost = 0;                 ///< Pixels deeper than rules.release_um.
   std::int16_t deepest_um = kUntrusted;  ///< kUntrusted: no trusted pixel was looked at.
   int deepest_x = 0;                     ///< The first of the deepest in row-major order.
   int deepest_y = 0;

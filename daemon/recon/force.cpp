@@ -17,7 +17,7 @@ constexpr double kUnseenMm2 = 0.1;
 
 }  // namespace
 
-Force force_of(const ForceModel& model, const LayerResponse::Answer& answer,
+Force force_of(const ForceModel& model, const GelResponse::Answer& answer,
                double uncertainty_mm) noexcept {
   const double e = model.modulus_mpa;
   const double newtons = std::max(0.0, e * (answer.mm2 + model.zero_mm * answer.mm));

@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "daemon/recon/layer_response.hpp"
+#include "daemon/recon/gel_response.hpp"
 #include "daemon/recon/tiles.hpp"
 
 namespace dtact::recon {
@@ -23,7 +23,7 @@ enum class ForceAbsence : std::uint8_t {
   cut_off = 3              ///< The contact reaches the map's edge or pixels that are not trusted.
 };
 
-/// The force of an incompressible gel bonded to a stiff block (LayerResponse), as readings of a
+/// The force of an incompressible gel bonded to a stiff block (GelResponse), as readings of a
 /// scale calibrated it: with the indentation u + zero_mm and Young's modulus,
 ///
 ///     F = modulus_mpa ∫ q (u + zero_mm) dA.
@@ -42,7 +42,7 @@ struct ForceModel {
 /// The uncertainty adds in squares a share of what the depth's is worth by the contact's stiffness,
 /// a share of the force for the law itself and what a contact too light to be seen presses with. It
 /// grows beyond the greatest reading.
-[[nodiscard]] Force force_of(const ForceModel& model, const LayerResponse::Answer& answer,
+[[nodiscard]] Force force_of(const ForceModel& model, const GelResponse::Answer& answer,
                              double uncertainty_mm) noexcept;
 
 /// Measures the force in depth maps of one shape. One thread at a time; does not allocate after
@@ -58,13 +58,13 @@ class ForceMeter {
   /// Of a contact. `tiles`: where the map is not 0.
   [[nodiscard]] Reading read(std::span<const std::int16_t> depth_um, const TileRows& tiles,
                              double uncertainty_mm) noexcept;
-  /// Where nothing touches.
+  /// Outside the contact.
   [[nodiscard]] Force none() const noexcept { return force_of(model_, {}, 0); }
 
  private:
   ForceModel model_;
   CellMap cells_;
-  LayerResponse response_;
+  GelResponse response_;
 };
 
 }  // namespace dtact::recon

@@ -126,16 +126,16 @@ std::int16_t between(const Knots& knots, int place) noexcept {
   return static_cast<std::int16_t>(round_shift<Knots::kFraction>(knots.at_q3[k] + rise_q3));
 }
 
-int gain_list_mask_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12,
-                       const std::uint8_t* untrusted, const LookUp& list, int width,
-                       std::int16_t* depth_um) noexcept {
+int gain_lut_mask_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12,
+                      const std::uint8_t* untrusted, const LutView& lut, int width,
+                      std::int16_t* depth_um) noexcept {
   int beyond = 0;
   for (int x = 0; x < width; ++x) {
     const std::int32_t gain = gain_q12 == nullptr ? kGainOne : gain_q12[x];
     const std::int32_t lit = std::clamp(round_shift<12>(difference_q6[x] * gain), -32768, 32767);
     const bool trusted = untrusted == nullptr || untrusted[x] == 0;
-    beyond += static_cast<int>(trusted && lit > list.covered_q6);
-    const std::int16_t um = list.um[std::clamp(lit, list.first_q6, list.last_q6) - list.first_q6];
+    beyond += static_cast<int>(trusted && lit > lut.covered_q6);
+    const std::int16_t um = lut.um[std::clamp(lit, lut.first_q6, lut.last_q6) - lut.first_q6];
     depth_um[x] = trusted ? um : kUntrusted;
   }
   return beyond;
@@ -151,8 +151,8 @@ void sum_row(const std::int16_t* row_um, int y, int x0, int x1, DepthSums& sums)
   for (int x = x0; x < x1; ++x) {
     const std::int16_t um = row_um[x];
     if (um == kUntrusted) continue;
-    if (um > sums.rules.lost_um) ++sums.lost;
-    if (um > sums.rules.made_um) {
+    if (um > sums.rules.release_um) ++sums.lost;
+    if (um > sums.rules.threshold_um) {
       ++sums.made;
       sums.um += um;
       sums.um_x += std::int64_t{um} * x;

@@ -65,7 +65,7 @@ void smooth_horizontal_row(const std::int16_t* row, std::span<const std::int16_t
 void smooth_vertical_row(const std::int16_t* const* rows, std::span<const std::int16_t> taps,
                          int padded_width, std::int16_t* out) noexcept;
 
-/// A list that is straight between knots 2^step_bits entries apart: what between() says it is.
+/// A LUT that is straight between knots 2^step_bits entries apart: what between() says it is.
 struct alignas(64) Knots {
   static constexpr std::size_t kCount = 128;  ///< As many as four registers of 512 bits hold.
   static constexpr int kFraction = 3;         ///< Heights are in eighths of a micrometre, …
@@ -82,8 +82,8 @@ struct alignas(64) Knots {
 /// then the sum to whole ones.
 [[nodiscard]] std::int16_t between(const Knots& knots, int place) noexcept;
 
-/// A list in the shape the look-up wants.
-struct LookUp {
+/// A LUT in the shape the look-up wants.
+struct LutView {
   const std::int16_t* um = nullptr;  ///< um[0] belongs to first_q6.
   int first_q6 = 0;
   int last_q6 = 0;     ///< Index of the last entry, which stands for everything darker.
@@ -92,11 +92,11 @@ struct LookUp {
   const Knots* knots = nullptr;
 };
 
-/// Gain (32-bit product, rounded half up, saturated to int16), list, untrusted mark. `gain_q12`
+/// Gain (32-bit product, rounded half up, saturated to int16), LUT, untrusted mark. `gain_q12`
 /// null: one. `untrusted` null: no mark. Returns how many pixels were beyond the calibration.
-int gain_list_mask_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12,
-                       const std::uint8_t* untrusted, const LookUp& list, int width,
-                       std::int16_t* depth_um) noexcept;
+int gain_lut_mask_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12,
+                      const std::uint8_t* untrusted, const LutView& lut, int width,
+                      std::int16_t* depth_um) noexcept;
 
 /// Marks untrusted pixels in a row of depth.
 void mask_row(const std::uint8_t* untrusted, int width, std::int16_t* depth_um) noexcept;
@@ -123,8 +123,8 @@ void scale_row(const std::int16_t* row, std::int32_t factor_q15, int width,
                std::int16_t* out) noexcept;
 inline constexpr std::int32_t kFactorOne = 1 << 15;
 
-/// Eight grey levels. The response scales with the light: where an untouched pixel at 160 levels
-/// darkens by 31 levels a millimetre, one at 8 darkens by less than two, which is noise.
+/// Eight grey levels. The response scales with the light: where an pixel without contact at 160
+/// levels darkens by 31 levels a millimetre, one at 8 darkens by less than two, which is noise.
 inline constexpr int kDarkest_q6 = 8 * 64;
 
 }  // namespace dtact::recon::kernels

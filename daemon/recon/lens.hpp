@@ -8,7 +8,7 @@
 
 namespace dtact::recon {
 
-/// Where a point of the untouched surface appears in the camera frame: a pinhole camera that looks
+/// Where a point of the undeformed surface appears in the camera frame: a pinhole camera that looks
 /// at a plane, with radial distortion about its own centre (the even terms of Brown 1966; OpenCV's
 /// model with square pixels and without tangential terms). With h = homography · (x, y, 1),
 /// q = (h₀, h₁) / h₂ and ρ = |q − centre| / radius_px, the pixel is

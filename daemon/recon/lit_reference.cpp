@@ -20,7 +20,7 @@ constexpr int kMaxDecimation = 4;
 std::vector<std::int16_t> published_taps() { return {4608, 3584, 1792, 512}; }
 
 std::vector<std::int16_t> taps_of(const Model& model) {
-  return model.method == Method::list ? gaussian_taps(model.smoothing_px) : published_taps();
+  return model.method == Method::lut ? gaussian_taps(model.smoothing_px) : published_taps();
 }
 
 LitReference::LitReference(std::shared_ptr<const Model> model)

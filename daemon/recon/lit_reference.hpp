@@ -16,7 +16,7 @@ namespace dtact::recon {
 /// The taps that a model's method smooths with.
 [[nodiscard]] std::vector<std::int16_t> taps_of(const Model& model);
 
-/// The untouched image on the map's pixels, as it was taken and in the present light, and what a
+/// The reference image on the map's pixels, as it was taken and in the present light, and what a
 /// difference from it is multiplied by so that it is one from the calibration's reference. Rows are
 /// whole blocks. Allocates when it is made, never later.
 class LitReference {
@@ -44,7 +44,7 @@ class LitReference {
   [[nodiscard]] const std::uint8_t* untrusted(int y) const noexcept {
     return untrusted_.data() + at(y);
   }
-  /// Counts the references: each has its own untouched map.
+  /// Counts the references: each has its own reference map.
   [[nodiscard]] std::uint64_t count() const noexcept { return count_; }
 
  private:

@@ -50,18 +50,18 @@ void check(const Model& model) {
   require(model.untrusted.empty() || model.untrusted.size() == map,
           "untrusted: not the size of the depth map");
   require(model.mm_per_px > 0, "scale: mm_per_px must be positive");
-  check(model.list, model.method == Method::list);
+  check(model.lut, model.method == Method::lut);
   if (model.scattering) check(*model.scattering);
   int before = 0;
   for (const Model::Sharpened& sharpened : model.sharpened) {
-    require(model.method == Method::list, "sharpened: the published method has no such lists");
+    require(model.method == Method::lut, "sharpened: the published method has no such LUTs");
     require(model.scattering.has_value(),
-            "sharpened: its lists need the scattering that their levels were sharpened by");
-    require(sharpened.steps >= 1 && sharpened.steps <= kMostSharpeningSteps,
+            "sharpened: its LUTs need the scattering that their levels were sharpened by");
+    require(sharpened.steps >= 1 && sharpened.steps <= kMaxSharpeningSteps,
             "sharpened: steps must be 1 or 2");
-    require(sharpened.steps > before, "sharpened: steps must rise from one list to the next");
+    require(sharpened.steps > before, "sharpened: steps must rise from one LUT to the next");
     before = sharpened.steps;
-    check(sharpened.list, true);
+    check(sharpened.lut, true);
   }
 }
 

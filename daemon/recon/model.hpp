@@ -5,15 +5,15 @@
 #include <optional>
 #include <vector>
 
+#include "daemon/recon/depth_lut.hpp"
+#include "daemon/recon/flat_field_gain.hpp"
 #include "daemon/recon/force.hpp"
-#include "daemon/recon/list.hpp"
 #include "daemon/recon/rectify.hpp"
-#include "daemon/recon/spatial_gain.hpp"
 #include "daemon/recon/surface.hpp"
 
 namespace dtact::recon {
 
-/// Light that is scattered sideways in the layer: a point's loss of light appears as the sum of two
+/// Light that is scattered sideways in the gel: a point's loss of light appears as the sum of two
 /// Gaussians round it.
 struct Scattering {
   double narrow_mm = 0;      ///< Standard deviation, 0.01 … 5 mm.
@@ -28,10 +28,10 @@ inline constexpr double kWidestNarrowMm = 5;
 inline constexpr double kWidestMm = 20;
 
 /// Greatest number of Van Cittert's steps (sharpener.hpp): a third sharpens more and costs noise.
-inline constexpr int kMostSharpeningSteps = 2;
+inline constexpr int kMaxSharpeningSteps = 2;
 
 /// Levels are sharpened at 1/kSharpenedAt of the calibration's resolution in each direction, which
-/// the layer's own blur leaves enough of.
+/// the gel's own blur leaves enough of.
 inline constexpr int kSharpenedAt = 4;
 
 /// Throws std::invalid_argument, naming the key as in calibration.toml, outside those ranges.
@@ -41,42 +41,42 @@ void check(const Scattering& scattering);
 inline constexpr std::int16_t kUntrusted = INT16_MIN;
 
 enum class Method : std::uint8_t {
-  /// Ours: signed difference, smoothing, per-pixel gain, monotone list.
-  list,
-  /// The paper's single-image list as its authors run it: whole grey levels, list, two 7×7 Gaussian
-  /// filters. The list's entries below the threshold are 0 and the threshold's own depth is already
+  /// Ours: signed difference, smoothing, per-pixel gain, monotone LUT.
+  lut,
+  /// The paper's single-image LUT as its authors run it: whole grey levels, LUT, two 7×7 Gaussian
+  /// filters. The LUT's entries below the threshold are 0 and the threshold's own depth is already
   /// taken off the others (calibration/published.hpp); the light's gain is not applied.
   published
 };
 
 /// All that a calibration fixes. Immutable and shared between threads once made.
 struct Model {
-  Method method = Method::list;
+  Method method = Method::lut;
   RectifyTable rectify;  ///< Camera frame → depth map.
   double mm_per_px = 0;  ///< Millimetres per pixel of the depth map.
   /// Standard deviation of the Gaussian that smooths the difference, pixels of the depth map, 0 …
   /// 10. Method::published has filters of its own and ignores it.
   double smoothing_px = 0;
-  DepthList list;
-  /// What the list is uncertain by: mean absolute error in micrometres at some indentations,
+  DepthLut lut;
+  /// What the LUT is uncertain by: mean absolute error in micrometres at some indentations,
   /// ascending. Empty: not known.
   struct Uncertainty {
     double depth_mm = 0;
     double error_um = 0;
   };
   std::vector<Uncertainty> uncertainty;
-  /// How the layer spreads light sideways, as fitted. None: not known, nothing can be sharpened.
+  /// How the gel spreads light sideways, as fitted. None: not known, nothing can be sharpened.
   std::optional<Scattering> scattering;
-  /// A list holds for the levels of one filter only: these are for levels sharpened by so many
-  /// steps. Ascending, each of 1 and 2 at most once; with `scattering` and Method::list only.
+  /// A LUT holds for the levels of one filter only: these are for levels sharpened by so many
+  /// steps. Ascending, each of 1 and 2 at most once; with `scattering` and Method::lut only.
   struct Sharpened {
     int steps = 0;
-    DepthList list;
+    DepthLut lut;
     std::vector<Uncertainty> uncertainty;
   };
   std::vector<Sharpened> sharpened;
-  SpatialGain gain;  ///< Of Method::list.
-  /// The untouched image at calibration time, frame sized, Q8 luma (0…65280), row-major without
+  FlatFieldGain gain;  ///< Of Method::lut.
+  /// The reference image at calibration time, frame sized, Q8 luma (0…65280), row-major without
   /// padding: brings a differently lit image back to the calibration's light.
   std::vector<std::uint16_t> reference_q8;
   /// Depth-map sized; non-zero marks pixels that are never trusted. Empty: none.

@@ -46,8 +46,8 @@ void Reconstructor::run(const std::uint8_t* luma, std::ptrdiff_t stride,
   Stopwatch watch(times != nullptr);
   impl_->beyond = 0;
   impl_->plan.set_stride(stride);
-  if (impl_->model->method == Method::list) {
-    impl_->run_list(luma, impl_->all_tiles, depth_um.data(), nullptr, spent, watch);
+  if (impl_->model->method == Method::lut) {
+    impl_->apply_lut(luma, impl_->all_tiles, depth_um.data(), nullptr, spent, watch);
   } else {
     impl_->run_published(luma, depth_um.data(), spent, watch);
   }
@@ -62,11 +62,11 @@ void Reconstructor::run_active(const std::uint8_t* luma, std::ptrdiff_t stride,
   impl_->beyond = 0;
   impl_->plan.set_stride(stride);
   std::optional<StripSums> strips;
-  if (impl_->model->method == Method::list) {
+  if (impl_->model->method == Method::lut) {
     impl_->clear_rest(tiles, drawn, depth_um.data());
     if (sums != nullptr) strips.emplace(impl_->grid, tiles, depth_um.data(), *sums);
     if (count_tiles(tiles) > 0) {
-      impl_->run_list(luma, tiles, depth_um.data(), strips ? &*strips : nullptr, spent, watch);
+      impl_->apply_lut(luma, tiles, depth_um.data(), strips ? &*strips : nullptr, spent, watch);
     }
   } else {
     impl_->clear_rest(impl_->all_tiles, drawn, depth_um.data());

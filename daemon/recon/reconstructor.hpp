@@ -16,22 +16,22 @@ namespace dtact::recon {
 struct StepTimes {
   std::int64_t rectify_ns = 0;  ///< Rectify and difference.
   std::int64_t smooth_ns = 0;   ///< And sharpen.
-  std::int64_t list_ns = 0;     ///< Gain, list, untrusted mark.
+  std::int64_t lut_ns = 0;      ///< Gain, LUT, untrusted mark.
   std::int64_t sums_ns = 0;     ///< DepthSums; run_active() only.
 };
 
-/// What a depth buffer holds besides the untouched map: kept beside each buffer that run_active()
+/// What a depth buffer holds besides the reference map: kept beside each buffer that run_active()
 /// writes, so that only formerly active tiles are cleared. Starts as "anything at all".
 struct DrawnTiles {
   TileRows tiles;
-  std::uint64_t rest = 0;  ///< Which untouched map lies outside the tiles; 0: none.
+  std::uint64_t rest = 0;  ///< Which reference map lies outside the tiles; 0: none.
 };
 
 /// Bytes that must be readable after the last pixel of a luma image, for vector loads. The HAL's
 /// frames have as many (hal::kLumaPadding).
 inline constexpr std::size_t kLumaPadding = 64;
 
-/// By how many steps a calibration's levels can be sharpened, ascending: those that it has lists
+/// By how many steps a calibration's levels can be sharpened, ascending: those that it has LUTs
 /// for; none where its light is scattered wider than the filter reaches. `model`: at full
 /// resolution.
 [[nodiscard]] std::vector<int> sharpening_steps(const Model& model);
@@ -41,8 +41,8 @@ inline constexpr std::size_t kLumaPadding = 64;
 class Reconstructor {
  public:
   /// `sharpen_steps` 1 or 2: levels are sharpened by so many steps (sharpener.hpp) and looked up in
-  /// the model's list for that. Throws std::invalid_argument when the model's parts disagree in
-  /// size, it has no such list or its scattering is too wide for its map.
+  /// the model's LUT for that. Throws std::invalid_argument when the model's parts disagree in
+  /// size, it has no such LUT or its scattering is too wide for its map.
   explicit Reconstructor(std::shared_ptr<const Model> model, int sharpen_steps = 0);
   ~Reconstructor();
   Reconstructor(Reconstructor&&) noexcept;
@@ -51,20 +51,20 @@ class Reconstructor {
   [[nodiscard]] const Model& model() const noexcept;
   [[nodiscard]] int sharpen_steps() const noexcept;
 
-  /// Takes the untouched image under the present light: frame sized, Q8 luma, row-major without
+  /// Takes the reference image under the present light: frame sized, Q8 luma, row-major without
   /// padding. Until then the model's own reference is used. Does not allocate, and takes about as
   /// long as six frames: call it between frames.
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
 
   /// The light has changed by a factor since set_reference(), 0.6 … 1.6: from now on as if the
   /// reference had been taken in it, within one unit of Q6 (0.5 µm) and of the gain. Replaces an
-  /// earlier factor; the untouched map does not change. Method::published subtracts whole levels
+  /// earlier factor; the reference map does not change. Method::published subtracts whole levels
   /// and goes on as it is. Does not allocate, and takes about as long as a frame.
   void set_light(double factor) noexcept;
 
   /// `luma`: frame sized, rows `stride` bytes apart, kLumaPadding bytes readable after the last
   /// pixel. `depth_um`: width × height of the model's table, row-major. Borders are replicated when
-  /// smoothing. Beyond the list's covered range on the deep side Method::list writes kUntrusted; so
+  /// smoothing. Beyond the LUT's covered range on the deep side Method::lut writes kUntrusted; so
   /// do both methods where the mask says so and where either reference is darker than eight grey
   /// levels or the light less than an eighth of the calibration's.
   void run(const std::uint8_t* luma, std::ptrdiff_t stride, std::span<std::int16_t> depth_um,
@@ -83,7 +83,7 @@ class Reconstructor {
   /// How many pixels of the map a result depends on, on every side.
   [[nodiscard]] int radius() const noexcept;
 
-  /// Pixels of the last run() or run_active() that were darker than the list covers, masked ones
+  /// Pixels of the last run() or run_active() that were darker than the LUT covers, masked ones
   /// not counted.
   [[nodiscard]] int beyond_pixels() const noexcept;
 

@@ -11,15 +11,15 @@
 namespace dtact::recon {
 namespace {
 
-const DepthList& list_for(const Model& model, int steps) {
-  if (steps == 0) return model.list;
+const DepthLut& lut_for(const Model& model, int steps) {
+  if (steps == 0) return model.lut;
   const auto found = std::ranges::find(model.sharpened, steps, &Model::Sharpened::steps);
   if (found == model.sharpened.end()) {
-    throw std::invalid_argument("sharpened: the calibration has no list for " +
+    throw std::invalid_argument("sharpened: the calibration has no LUT for " +
                                 std::to_string(steps) + (steps == 1 ? " step" : " steps") +
                                 " of sharpening");
   }
-  return found->list;
+  return found->lut;
 }
 
 }  // namespace
@@ -36,9 +36,9 @@ Reconstructor::Impl::Impl(std::shared_ptr<const Model> the_model, int the_steps)
       between(2, grid.width),
       out(2 * kStrip, grid.width),
       sharpener_tiles(static_cast<std::size_t>(grid.rows())),
-      list(list_for(*model, steps), model->method),
+      lut(lut_for(*model, steps), model->method),
       reference(model) {
-  // check() wants the scattering where there are lists for steps.
+  // check() wants the scattering where there are LUTs for steps.
   if (const auto& scattering = model->scattering; steps > 0 && scattering) {
     sharpener.emplace(*scattering, steps, model->mm_per_px, grid.width, grid.height);
   }
@@ -142,23 +142,23 @@ void Reconstructor::Impl::smooth_tiles(const std::uint8_t* luma, const TileRows&
   }
 }
 
-void Reconstructor::Impl::run_list(const std::uint8_t* luma, const TileRows& tiles,
-                                   std::int16_t* depth, StripSums* sums, StepTimes& times,
-                                   Stopwatch& watch) noexcept {
+void Reconstructor::Impl::apply_lut(const std::uint8_t* luma, const TileRows& tiles,
+                                    std::int16_t* depth, StripSums* sums, StepTimes& times,
+                                    Stopwatch& watch) noexcept {
   if (sharpener) return run_sharpened(*sharpener, luma, tiles, depth, sums, times, watch);
-  const auto look_up = [&](int row, int first, int last) {
-    look_up_rows({out.row(0), out.stride(), reference.gain_q12(row * TileGrid::kRows),
-                  vec::padded(grid.width)},
-                 row, first, last, depth);
-    times.list_ns += watch.lap();
+  const auto view = [&](int row, int first, int last) {
+    apply_lut_rows({out.row(0), out.stride(), reference.gain_q12(row * TileGrid::kRows),
+                    vec::padded(grid.width)},
+                   row, first, last, depth);
+    times.lut_ns += watch.lap();
   };
   smooth_tiles(
-      luma, tiles, times, watch, [&](int row) { prefetch(tiles, row, depth); }, look_up,
+      luma, tiles, times, watch, [&](int row) { prefetch(tiles, row, depth); }, view,
       [&](int row) { finish(row, sums, times, watch); });
 }
 
-void Reconstructor::Impl::look_up_rows(vec::ListRows rows, int row, int first, int last,
-                                       std::int16_t* depth) noexcept {
+void Reconstructor::Impl::apply_lut_rows(vec::LutRows rows, int row, int first, int last,
+                                         std::int16_t* depth) noexcept {
   const int x = first * vec::kBlock;
   const int y = row * TileGrid::kRows;
   rows.difference_q6 += x;
@@ -167,7 +167,7 @@ void Reconstructor::Impl::look_up_rows(vec::ListRows rows, int row, int first, i
   rows.depth_stride = grid.width;
   rows.width = std::min(last * vec::kBlock, grid.width) - x;
   rows.height = std::min(TileGrid::kRows, grid.height - y);
-  beyond += vec::gain_list_mask(rows, list.look_up());
+  beyond += vec::gain_lut_mask(rows, lut.view());
 }
 
 void Reconstructor::Impl::finish(int row, StripSums* sums, StepTimes& times,
@@ -215,7 +215,7 @@ void Reconstructor::Impl::run_sharpened(Sharpener& filter, const std::uint8_t* l
     for (int y = y0; y < std::min(y0 + TileGrid::kRows, grid.height); ++y) {
       vec::lit_row(out.row(y - y0), reference.gain_q12(y), first, last, filter.level(y));
     }
-    times.list_ns += watch.lap();
+    times.lut_ns += watch.lap();
   };
   const auto nothing = [](int) {};
   smooth_tiles(luma, sharpener_tiles, times, watch, nothing, take_levels, nothing);
@@ -224,12 +224,12 @@ void Reconstructor::Impl::run_sharpened(Sharpener& filter, const std::uint8_t* l
   for (int row = 0; row < grid.rows(); ++row) {
     const int y = row * TileGrid::kRows;
     for_each_run(tiles[static_cast<std::size_t>(row)], [&](int first, int last) {
-      look_up_rows(
+      apply_lut_rows(
           {filter.sharpened(y), filter.stride(), reference.marks_q12(y), vec::padded(grid.width)},
           row, first * grid.blocks_per_tile, std::min(last * grid.blocks_per_tile, grid.blocks()),
           depth);
     });
-    times.list_ns += watch.lap();
+    times.lut_ns += watch.lap();
     finish(row, sums, times, watch);
   }
 }
@@ -245,10 +245,10 @@ void Reconstructor::Impl::run_published(const std::uint8_t* luma, std::int16_t* 
     for (; pushed < std::min(pairs, pair + 2 * reach + 1); ++pushed) {
       rectify_pair(luma, pushed, grid.all(), 0);
       times.rectify_ns += watch.lap();
-      beyond += vec::gain_list_mask({in.row(0), in.stride(), nullptr, 0, in.row(0), in.stride(),
-                                     grid.width, std::min(2, grid.height - 2 * pushed)},
-                                    list.look_up());
-      times.list_ns += watch.lap();
+      beyond += vec::gain_lut_mask({in.row(0), in.stride(), nullptr, 0, in.row(0), in.stride(),
+                                    grid.width, std::min(2, grid.height - 2 * pushed)},
+                                   lut.view());
+      times.lut_ns += watch.lap();
       smoother.push(pushed, in.row(0), in.row(1), 0, blocks);
     }
     for (; passed_on < std::min(pairs, pair + reach + 1); ++passed_on) {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "daemon/recon/depth_sums.hpp"
-#include "daemon/recon/list_table.hpp"
+#include "daemon/recon/kernel_lut.hpp"
 #include "daemon/recon/lit_reference.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/sharpener.hpp"
@@ -51,8 +51,8 @@ struct Reconstructor::Impl {
     return std::ptrdiff_t{y} * grid.width;
   }
   /// `sums` null: nobody asks.
-  void run_list(const std::uint8_t* luma, const TileRows& tiles, std::int16_t* depth,
-                StripSums* sums, StepTimes& times, Stopwatch& watch) noexcept;
+  void apply_lut(const std::uint8_t* luma, const TileRows& tiles, std::int16_t* depth,
+                 StripSums* sums, StepTimes& times, Stopwatch& watch) noexcept;
   void clear_rest(const TileRows& tiles, DrawnTiles& drawn, std::int16_t* depth) const noexcept;
   void run_published(const std::uint8_t* luma, std::int16_t* depth, StepTimes& times,
                      Stopwatch& watch) noexcept;
@@ -69,7 +69,7 @@ struct Reconstructor::Impl {
   RowBuffer out;  ///< A strip after smoothing.
   std::optional<Sharpener> sharpener;
   TileRows sharpener_tiles;  ///< Whose levels it reads.
-  ListTable list;
+  KernelLut lut;
   LitReference reference;
   int beyond = 0;
 
@@ -83,9 +83,10 @@ struct Reconstructor::Impl {
   template <typename Begin, typename Made, typename Done>
   void smooth_tiles(const std::uint8_t* luma, const TileRows& tiles, StepTimes& times,
                     Stopwatch& watch, Begin begin_row, Made made, Done done) noexcept;
-  /// The list for the blocks [first, last) of a row of tiles. `rows`: levels and gains from the
+  /// The LUT for the blocks [first, last) of a row of tiles. `rows`: levels and gains from the
   /// row's first pixel on.
-  void look_up_rows(vec::ListRows rows, int row, int first, int last, std::int16_t* depth) noexcept;
+  void apply_lut_rows(vec::LutRows rows, int row, int first, int last,
+                      std::int16_t* depth) noexcept;
   void finish(int row, StripSums* sums, StepTimes& times, Stopwatch& watch) const noexcept;
   /// The smallest area that holds the tiles, and the tiles that hold an area.
   [[nodiscard]] MapArea area_of(const TileRows& tiles) const noexcept;

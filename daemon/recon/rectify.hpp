@@ -6,7 +6,7 @@
 namespace dtact::recon {
 
 /// Pixels of the largest depth map: with 16 bits each they fill a message.
-inline constexpr std::int64_t kMostMapPixels = std::int64_t{1} << 23U;
+inline constexpr std::int64_t kMaxMapPixels = std::int64_t{1} << 23U;
 
 /// For every pixel of the depth map, where it is read in the camera frame. Bilinear with weights of
 /// 1/128; identity and crop are tables like any other. All four source pixels of an entry lie in

@@ -12,7 +12,7 @@ inline constexpr int kCoarse = 4;
 
 /// The level that is sharpened: the difference under its gain (32-bit product, rounded half up),
 /// clamped. Where the gain is 0, an untrusted pixel, as if it were one: it is marked after the
-/// list, and its neighbours are best served by what stands there.
+/// LUT, and its neighbours are best served by what stands there.
 void lit_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12, int width,
              std::int16_t* level_q6) noexcept;
 

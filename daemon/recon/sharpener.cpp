@@ -32,9 +32,9 @@ double wide_px(const Scattering& scattering, double mm_per_px) {
   return std::sqrt(std::max(0.0, sigma_px * sigma_px - kOwn)) / kCoarse;
 }
 
-[[noreturn]] void too_wide(const char* key, double mm, double most_mm, double mm_per_px) {
+[[noreturn]] void too_wide(const char* key, double mm, double max_mm, double mm_per_px) {
   throw std::invalid_argument("scattering." + std::string(key) + ": " + std::to_string(mm) +
-                              " mm is more than the " + std::to_string(most_mm) +
+                              " mm is more than the " + std::to_string(max_mm) +
                               " mm that a map of " + std::to_string(mm_per_px) +
                               " mm per pixel can be sharpened by; set reconstruction.sharpen = "
                               "\"auto\" or \"off\", or calibrate with a coarser mm_per_px");

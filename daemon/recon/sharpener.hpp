@@ -19,7 +19,7 @@ struct MapArea {
   bool operator==(const MapArea&) const = default;
 };
 
-/// Undoes the layer's scattering H in levels L by Van Cittert's steps: x₀ = L, x ← x + L − Hx
+/// Undoes the gel's scattering H in levels L by Van Cittert's steps: x₀ = L, x ← x + L − Hx
 /// (P. H. van Cittert, "Zum Einfluß der Spaltbreite auf die Intensitätsverteilung in
 /// Spektrallinien. II", Z. Phys. 69, 1931). What H keeps of a pattern, h, becomes 1 − (1 − h)ⁿ⁺¹
 /// after n steps, and noise that H blurs away is n + 1 times as strong. The narrow Gaussian runs on

@@ -4,7 +4,7 @@
 
 namespace dtact::recon {
 
-/// The untouched gel's outer surface, in the surface frame: origin where the camera's axis leaves
+/// The undeformed gel's outer surface, in the surface frame: origin where the camera's axis leaves
 /// it, z away from the camera. Indentation is measured from it, along its normal.
 struct Surface {
   enum class Kind : std::uint8_t {
@@ -27,11 +27,11 @@ struct Surface {
 
 /// What a Surface may be, in a calibration and on the wire.
 struct SurfaceLimits {
-  static constexpr double kLeastRadiusMm = 1;
-  static constexpr double kMostRadiusMm = 10000;
-  static constexpr double kLeastDistanceMm = 0.01;  ///< Of air and of gel on the camera's axis.
-  static constexpr double kMostDistanceMm = 1000;
-  static constexpr double kMostRefraction = 3;  ///< From 1.
+  static constexpr double kMinRadiusMm = 1;
+  static constexpr double kMaxRadiusMm = 10000;
+  static constexpr double kMinDistanceMm = 0.01;  ///< Of air and of gel on the camera's axis.
+  static constexpr double kMaxDistanceMm = 1000;
+  static constexpr double kMaxRefraction = 3;  ///< From 1.
 };
 
 }  // namespace dtact::recon

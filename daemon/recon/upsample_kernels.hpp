@@ -8,14 +8,14 @@
 namespace dtact::recon::kernels {
 
 /// Greatest number of fine pixels that lie in a coarse one.
-inline constexpr int kMostPhases = 4;
+inline constexpr int kMaxPhases = 4;
 
 /// Where the fine pixels of a coarse one lie: beside its middle, towards one of its neighbours.
 struct Phases {
   int count = 0;  ///< 2 or 4.
   /// Share of the neighbour in Q15, 0 … 1/2; of the one before for the first half of the phases, of
   /// the next one for the others.
-  std::array<std::int16_t, kMostPhases> share_q15{};
+  std::array<std::int16_t, kMaxPhases> share_q15{};
 };
 
 /// near + share · (other − near), rounded half up; untrusted where `near` is, `near` where `other`

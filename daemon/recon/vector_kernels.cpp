@@ -44,7 +44,7 @@ struct PairSum {
 };
 #endif
 
-#include "daemon/recon/vector_list-inl.hpp"
+#include "daemon/recon/vector_lut-inl.hpp"
 #include "daemon/recon/vector_rectify-inl.hpp"
 #include "daemon/recon/vector_sharpen-inl.hpp"
 #include "daemon/recon/vector_smooth-inl.hpp"
@@ -63,7 +63,7 @@ HWY_EXPORT(RectifyDifference);
 HWY_EXPORT(RectifyMeanDifference);
 HWY_EXPORT(SmoothAcross);
 HWY_EXPORT(SmoothDown);
-HWY_EXPORT(GainListMask);
+HWY_EXPORT(GainLutMask);
 HWY_EXPORT(LitRow);
 HWY_EXPORT(ShrinkRow);
 HWY_EXPORT(SharpenRow);
@@ -98,8 +98,8 @@ void smooth_down(const std::int16_t* const* pairs, const TapPairs& taps, int fir
   HWY_DYNAMIC_DISPATCH(SmoothDown)(pairs, taps, first, last, row_a, row_b);
 }
 
-int gain_list_mask(const ListRows& rows, const kernels::LookUp& list) noexcept {
-  return HWY_DYNAMIC_DISPATCH(GainListMask)(rows, list);
+int gain_lut_mask(const LutRows& rows, const kernels::LutView& lut) noexcept {
+  return HWY_DYNAMIC_DISPATCH(GainLutMask)(rows, lut);
 }
 
 void lit_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12, int first, int last,

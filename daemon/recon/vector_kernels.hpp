@@ -67,7 +67,7 @@ void smooth_down(const std::int16_t* const* pairs, const TapPairs& taps, int fir
 
 /// A rectangle of rows. Pointers are to the first pixel of the first row; rows of each plane lie
 /// their own number of values apart.
-struct ListRows {
+struct LutRows {
   const std::int16_t* difference_q6 = nullptr;
   std::ptrdiff_t difference_stride = 0;
   /// 0: untrusted (no light has that gain), which saves a plane of marks. Null: one everywhere.
@@ -79,10 +79,10 @@ struct ListRows {
   int height = 0;
 };
 
-/// kernels::gain_list_mask_row of each row: `width` pixels are written, inputs are read in whole
-/// blocks. The depth may be written over the difference. After the list's last entry must stand
+/// kernels::gain_lut_mask_row of each row: `width` pixels are written, inputs are read in whole
+/// blocks. The depth may be written over the difference. After the LUT's last entry must stand
 /// kUntrusted once more: untrusted pixels look that up.
-int gain_list_mask(const ListRows& rows, const kernels::LookUp& list) noexcept;
+int gain_lut_mask(const LutRows& rows, const kernels::LutView& lut) noexcept;
 
 /// kernels::lit_row for the blocks [first, last).
 void lit_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12, int first, int last,

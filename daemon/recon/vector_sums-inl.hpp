@@ -47,11 +47,11 @@ template <class D16>
 HWY_INLINE void SumRowPart(D16 d16, const int16_t* row, int y, int x0, int x1, DepthSums& sums) {
   using V16 = hn::VFromD<D16>;
   const hn::RepartitionToWide<D16> d32;
-  const V16 made_um = hn::Set(d16, sums.rules.made_um);
-  const V16 lost_um = hn::Set(d16, sums.rules.lost_um);
+  const V16 threshold_um = hn::Set(d16, sums.rules.threshold_um);
+  const V16 release_um = hn::Set(d16, sums.rules.release_um);
   const V16 one = hn::Set(d16, 1);
   const V16 columns = hn::Iota(d16, 0);
-  const V16 low = hn::Min(made_um, lost_um);
+  const V16 low = hn::Min(threshold_um, release_um);
   // Most pixels of most maps are shallower than this and leave nothing to be done.
   const auto ignored = [&] {
     const auto below = static_cast<int16_t>(HWY_MAX(sums.deepest_um - 1, int{kUntrusted}));
@@ -64,8 +64,8 @@ HWY_INLINE void SumRowPart(D16 d16, const int16_t* row, int y, int x0, int x1, D
   size_t lost = 0;
   ForEachVector(d16, row, x0, x1, [&](int x, V16 pixels) HWY_ATTR {
     if (HWY_LIKELY(hn::AllFalse(d16, hn::Gt(pixels, shallow)))) return;
-    lost += hn::CountTrue(d16, hn::Gt(pixels, lost_um));
-    const auto pressed = hn::Gt(pixels, made_um);
+    lost += hn::CountTrue(d16, hn::Gt(pixels, release_um));
+    const auto pressed = hn::Gt(pixels, threshold_um);
     made += hn::CountTrue(d16, pressed);
     const V16 depth = hn::IfThenElseZero(pressed, pixels);
     um.Add(depth, one);

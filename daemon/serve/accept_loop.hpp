@@ -36,7 +36,7 @@ class AcceptLoop : public std::enable_shared_from_this<AcceptLoop<Protocol>> {
       if (error && error != boost::asio::error::connection_aborted) {
         return self->retry_later(error.message());
       }
-      self->told_ = false;
+      self->reported_ = false;
       if (!error) self->on_socket_(std::move(socket));
       self->accept();
     });
@@ -53,7 +53,7 @@ class AcceptLoop : public std::enable_shared_from_this<AcceptLoop<Protocol>> {
 
   /// Without descriptors every accept fails at once: wait instead of spinning, and say it once.
   void retry_later(const std::string& reason) {
-    if (!std::exchange(told_, true)) {
+    if (!std::exchange(reported_, true)) {
       log_({LogLevel::warning,
             fmt::format("cannot accept clients: {}; trying again every second", reason)});
     }
@@ -68,7 +68,7 @@ class AcceptLoop : public std::enable_shared_from_this<AcceptLoop<Protocol>> {
   boost::asio::steady_timer timer_;
   const Log& log_;
   std::function<void(Socket)> on_socket_;
-  bool told_ = false;  ///< The present trouble has been logged.
+  bool reported_ = false;  ///< The present trouble has been logged.
 };
 
 }  // namespace dtact::net

@@ -14,15 +14,15 @@ using google::protobuf::internal::WireFormatLite;
 using google::protobuf::io::CodedInputStream;
 
 /// Of a message: those of today, some of tomorrow.
-constexpr int kMostFields = 16;
+constexpr int kMaxFields = 16;
 
-/// Whether `bytes` are at most kMostFields fields, numbers or bytes, of which `may_be_bytes` allows
+/// Whether `bytes` are at most kMaxFields fields, numbers or bytes, of which `may_be_bytes` allows
 /// those of bytes.
 template <typename MayBeBytes>
 bool few_fields(std::string_view bytes, const MayBeBytes& may_be_bytes) {
   CodedInputStream in(reinterpret_cast<const std::uint8_t*>(bytes.data()),
                       static_cast<int>(bytes.size()));
-  for (int fields = 0; fields <= kMostFields; ++fields) {
+  for (int fields = 0; fields <= kMaxFields; ++fields) {
     const std::uint32_t tag = in.ReadTag();
     if (tag == 0) return in.ConsumedEntireMessage();
     const auto type = WireFormatLite::GetTagWireType(tag);

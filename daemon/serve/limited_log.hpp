@@ -10,21 +10,21 @@
 
 namespace dtact::net {
 
-/// `log` with at most 100 lines at once and 10 a second, so that strangers cannot fill the journal.
-/// The next line says how many were left out.
+/// `log` with at most 100 lines at once and 10 a second, so that unauthenticated clients cannot
+/// fill the journal. The next line says how many were left out.
 [[nodiscard]] inline Log limited(Log log) {
   struct State {
     Log log;
     TokenBucket lines{10, 100};
-    unsigned long left_out = 0;
+    unsigned long suppressed = 0;
   };
   return [state = std::make_shared<State>(State{std::move(log)})](LogLine line) {
     if (!state->lines.take(1)) {
-      ++state->left_out;
+      ++state->suppressed;
       return;
     }
-    const auto left_out = std::exchange(state->left_out, 0);
-    if (left_out > 0) line.text += fmt::format(" ({} lines left out before)", left_out);
+    const auto suppressed = std::exchange(state->suppressed, 0);
+    if (suppressed > 0) line.text += fmt::format(" ({} lines left out before)", suppressed);
     state->log(line);
   };
 }

@@ -35,7 +35,7 @@ class Listener {
 using OnSocket = std::function<void(boost::asio::ip::tcp::socket, Peer)>;
 
 /// Binds config.address and listens, also on an address that no interface has yet: clients can
-/// connect once one has. Throws std::runtime_error naming address, port and remedy. What is passed
+/// connect once one has. Throws std::runtime_error naming address, port and fix. What is passed
 /// by reference or pointer must outlive it; without `tls` it speaks plain TCP.
 [[nodiscard]] std::shared_ptr<Listener> listen_tcp(boost::asio::io_context& io,
                                                    const NetConfig& config,
@@ -47,7 +47,7 @@ using OnSocket = std::function<void(boost::asio::ip::tcp::socket, Peer)>;
 
 /// Binds config.unix_socket, open to every user of this machine: Peer.trusted says who needs no
 /// token. Takes the place of a socket that nobody listens on any more, and removes its own at the
-/// end. Throws std::runtime_error naming path and remedy, also when another program listens there.
+/// end. Throws std::runtime_error naming path and fix, also when another program listens there.
 [[nodiscard]] std::shared_ptr<Listener> listen_unix(boost::asio::io_context& io,
                                                     const NetConfig& config,
                                                     Listener::OnConnection on_connection);

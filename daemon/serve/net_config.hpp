@@ -51,7 +51,7 @@ struct NetConfig {
   std::chrono::milliseconds hello_timeout{5000};  ///< A client silent for so long is let go.
   /// A peer whose machine has not answered for so long is dead: a pulled cable. One that answers
   /// and only does not read is not.
-  std::chrono::milliseconds dead_after{30000};
+  std::chrono::milliseconds peer_timeout{30000};
   /// SCHED_FIFO priority of the thread that runs the network part, below the capture thread's; 0 =
   /// normal scheduling. Whoever owns the thread sets it, …
   int fifo_priority = 20;

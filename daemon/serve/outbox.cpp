@@ -35,7 +35,7 @@ bool Outbox::push(const v1::ServerMessage& message, bool first) {
 void Outbox::push(std::shared_ptr<const EncodedFrame> frame) {
   if (frame_ != nullptr) {
     ++dropped_;
-    ++in_vain_;
+    ++replaced_during_write_;
   }
   frame_ = std::move(frame);
   if (!writing_) write_next();
@@ -87,7 +87,7 @@ void Outbox::write_frame() {
 
 void Outbox::on_written(const error_code& error, std::size_t size) {
   writing_ = false;
-  in_vain_ = 0;
+  replaced_during_write_ = 0;
   if (error) return owner_.on_write_failed(error.message());
   sent_bytes_ += size;
   write_next();

@@ -53,7 +53,7 @@ class Outbox {
   void drop_frame() noexcept { frame_.reset(); }
   /// The reader has stopped: a frame made for it would be made for nobody. Ends when what is being
   /// sent has gone.
-  [[nodiscard]] bool stalled() const noexcept { return in_vain_ >= kStalledAfter; }
+  [[nodiscard]] bool stalled() const noexcept { return replaced_during_write_ >= kStalledAfter; }
   /// Sends what is queued, then ends the sending side. Nothing may be pushed after it.
   void finish();
   /// The transport is closed: nothing more is sent, and on_write_failed() is not called any more.
@@ -92,7 +92,7 @@ class Outbox {
   bool writing_ = false;
   bool finishing_ = false;
   bool closed_ = false;
-  int in_vain_ = 0;  ///< Frames replaced since this write began.
+  int replaced_during_write_ = 0;  ///< Frames replaced since this write began.
   std::uint64_t sent_ = 0;
   std::uint64_t dropped_ = 0;
   std::uint64_t sent_bytes_ = 0;

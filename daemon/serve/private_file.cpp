@@ -15,7 +15,7 @@
 namespace dtact::net {
 namespace {
 
-constexpr std::size_t kMostBytes = std::size_t{64} * 1024;
+constexpr std::size_t kMaxBytes = std::size_t{64} * 1024;
 
 }  // namespace
 
@@ -47,7 +47,7 @@ std::string read_private_file(const std::filesystem::path& path, const std::stri
     }
     if (n == 0) return text;
     text.append(piece.data(), static_cast<std::size_t>(n));
-    if (text.size() > kMostBytes) fail(fmt::format("is larger than {} bytes", kMostBytes));
+    if (text.size() > kMaxBytes) fail(fmt::format("is larger than {} bytes", kMaxBytes));
   }
 }
 

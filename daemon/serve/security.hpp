@@ -20,12 +20,12 @@ struct EndpointInfo {
 /// Such an address without TLS or without a token, see Endpoint.insecure.
 [[nodiscard]] bool is_insecure(const NetConfig& config);
 
-/// Throws std::runtime_error, naming the keys and the remedies, when the settings would open the
+/// Throws std::runtime_error, naming the keys and the fixes, when the settings would open the
 /// daemon to the network without TLS and token and do not say that this is meant, or name half a
 /// TLS pair.
 void check_security(const NetConfig& config);
-/// `config` after check_security(), with a log that strangers cannot fill. Warns of what it leaves
-/// open.
+/// `config` after check_security(), with a log that unauthenticated clients cannot fill. Warns of
+/// what it leaves open.
 [[nodiscard]] NetConfig checked(NetConfig config);
 
 }  // namespace dtact::net

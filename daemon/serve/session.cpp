@@ -97,7 +97,7 @@ void Session::read() {
 }
 
 void Session::take(std::string_view input) {
-  while (state_ == State::fresh || state_ == State::greeted) {
+  while (state_ == State::fresh || state_ == State::ready) {
     const auto result = decoder_.feed(input);
     if (result == wire::MessageDecoder::Result::too_large) {
       return end_with(
@@ -199,7 +199,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   if (!verdict.rights) return end_with(0, verdict.error_code, verdict.sentence);
   rights_ = verdict.rights;
   timer_.cancel();
-  state_ = State::greeted;
+  state_ = State::ready;
   decoder_.set_cap(wire::kMaxMessage);
   program_ = printable(hello.program());
   config_.log({LogLevel::info,
@@ -224,7 +224,7 @@ void Session::on_hello(std::uint64_t id, const v1::Hello& hello) {
   const auto host = host_.lock();
   if (host != nullptr) host->introduce(reply);
   send(message);
-  if (host != nullptr) host->on_greeted();
+  if (host != nullptr) host->on_authenticated();
 }
 
 void Session::deny(std::uint64_t id, const std::string& sentence) {
@@ -279,13 +279,15 @@ void Session::subscribe(const Subscription& subscription) {
 }
 
 std::optional<FrameKind> Session::due(std::int64_t timestamp_ns, std::uint64_t missed) {
-  if (state_ != State::greeted) return std::nullopt;
+  if (state_ != State::ready) return std::nullopt;
   const Subscription::Due due = subscription_.next(timestamp_ns, missed);
   outbox_.count_dropped(due.missed);
   if (due.parts == 0) return std::nullopt;
-  waiting_ = due.parts | (outbox_.frame_waits() || spared_ ? waiting_ : Subscription::Parts{0});
-  spared_ = outbox_.stalled();
-  if (spared_) {
+  waiting_ =
+      due.parts |
+      (outbox_.frame_waits() || skipping_stalled_reader_ ? waiting_ : Subscription::Parts{0});
+  skipping_stalled_reader_ = outbox_.stalled();
+  if (skipping_stalled_reader_) {
     // The one that waits is old: the next after the reader goes on takes its place.
     outbox_.count_dropped(outbox_.frame_waits() ? 2 : 1);
     outbox_.drop_frame();
@@ -295,12 +297,12 @@ std::optional<FrameKind> Session::due(std::int64_t timestamp_ns, std::uint64_t m
 }
 
 void Session::send_frame(std::shared_ptr<const EncodedFrame> frame) {
-  if (state_ == State::greeted) outbox_.push(std::move(frame));
+  if (state_ == State::ready) outbox_.push(std::move(frame));
 }
 
 void Session::close(const std::string& reason, LogLevel level) {
   if (state_ == State::closed) return;
-  const bool known = state_ == State::greeted;
+  const bool known = state_ == State::ready;
   state_ = State::closed;
   if (rights_) admission_.leave(peer());
   (void)admission_.hold(std::exchange(held_, 0), 0);

@@ -40,7 +40,7 @@ class SessionHost {
   /// that another daemon says of itself.
   virtual void introduce(v1::HelloReply& reply) const = 0;
   /// The handshake is over: events and, once subscribed, frames flow.
-  virtual void on_greeted() = 0;
+  virtual void on_authenticated() = 0;
   /// A request after the handshake, its id checked. Every one is owed exactly one reply.
   virtual void on_request(const std::shared_ptr<Session>& session,
                           const v1::ClientMessage& message) = 0;
@@ -73,11 +73,13 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   void close(const std::string& reason, LogLevel level = LogLevel::info);
 
   [[nodiscard]] const Subscription& subscription() const noexcept { return subscription_; }
-  [[nodiscard]] bool greeted() const noexcept { return state_ == State::greeted; }
+  [[nodiscard]] bool ready() const noexcept { return state_ == State::ready; }
   /// It said Hello, with a right token where one is needed, and there was room.
-  [[nodiscard]] bool let_in() const noexcept { return rights_.has_value(); }
+  [[nodiscard]] bool authenticated() const noexcept { return rights_.has_value(); }
   /// It has not been let in, and may never be.
-  [[nodiscard]] bool stranger() const noexcept { return !rights_ && state_ != State::closed; }
+  [[nodiscard]] bool unauthenticated() const noexcept {
+    return !rights_ && state_ != State::closed;
+  }
   /// Once it is greeted; before that it has the least.
   [[nodiscard]] Rights rights() const noexcept { return rights_.value_or(Rights::view); }
   [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
@@ -87,10 +89,10 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
 
  private:
   enum class State : std::uint8_t {
-    fresh,    ///< Hello has not come.
-    denied,   ///< It came without a right; the answer waits, what comes is thrown away.
-    greeted,  ///< Requests and frames flow.
-    ending,   ///< What is queued is sent, what comes is thrown away, then the connection ends.
+    fresh,   ///< Hello has not come.
+    denied,  ///< It came without a right; the answer waits, what comes is thrown away.
+    ready,   ///< Requests and frames flow.
+    ending,  ///< What is queued is sent, what comes is thrown away, then the connection ends.
     closed
   };
 
@@ -118,7 +120,8 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   State state_ = State::fresh;
   Subscription subscription_;
   Subscription::Parts waiting_ = 0;  ///< What the frame holds, or owes, that waits to be sent.
-  bool spared_ = false;              ///< The last frame was not made, since the reader has stopped.
+  bool skipping_stalled_reader_ =
+      false;  ///< The last frame was not made, since the reader has stopped.
 
   std::optional<Rights> rights_;  ///< Once it is let in.
   TokenBucket requests_;

@@ -30,7 +30,7 @@ tcp::endpoint endpoint_of(const NetConfig& config) {
   return {address, config.port};
 }
 
-const char* remedy_for(const error_code& error) {
+const char* fix_for(const error_code& error) {
   if (error == asio::error::address_in_use) {
     return "another dtactd may be running (systemctl status dtactd); stop it or choose another "
            "port";
@@ -83,7 +83,7 @@ tcp::acceptor listen(asio::io_context& io, const tcp::endpoint& endpoint, const 
   if (error) {
     throw std::runtime_error(fmt::format("cannot listen on {} port {}: {}; {}",
                                          endpoint.address().to_string(), endpoint.port(),
-                                         error.message(), remedy_for(error)));
+                                         error.message(), fix_for(error)));
   }
   return acceptor;
 }
@@ -123,11 +123,12 @@ class TcpListener : public Listener {
 std::shared_ptr<Listener> listen_tcp(asio::io_context& io, const NetConfig& config,
                                      asio::ssl::context* tls,
                                      Listener::OnConnection on_connection) {
-  return listen_tcp(io, config,
-                    [tls, dead_after = config.dead_after, on_connection = std::move(on_connection)](
-                        tcp::socket socket, Peer peer) {
-                      on_connection(over_tcp(std::move(socket), std::move(peer), dead_after, tls));
-                    });
+  return listen_tcp(
+      io, config,
+      [tls, peer_timeout = config.peer_timeout, on_connection = std::move(on_connection)](
+          tcp::socket socket, Peer peer) {
+        on_connection(over_tcp(std::move(socket), std::move(peer), peer_timeout, tls));
+      });
 }
 
 std::shared_ptr<Listener> listen_tcp(asio::io_context& io, const NetConfig& config,

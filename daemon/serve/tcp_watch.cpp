@@ -28,20 +28,20 @@ bool PeerJudge::alive(const TcpProgress& progress, Clock::time_point now) {
   // most the retransmission time-out after it. So user_timeout() leaves it five intervals, of which
   // one passes until it is told again, and an answer to its probes is missing after six and that
   // time-out. Before the stand-still there may have been nothing to answer.
-  return std::min(standing_, progress.since_ack) < dead_after_ * 3 / 4;
+  return std::min(standing_, progress.since_ack) < peer_timeout_ * 3 / 4;
 }
 
 TcpWatch::TcpWatch(const boost::asio::any_io_executor& executor, int socket,
-                   milliseconds dead_after)
-    : timer_(executor), socket_(socket), judge_(dead_after, PeerJudge::Clock::now()) {
+                   milliseconds peer_timeout)
+    : timer_(executor), socket_(socket), judge_(peer_timeout, PeerJudge::Clock::now()) {
   set(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, judge_.user_timeout().count());
   // An idle client has nothing unacknowledged: probe it, so that a vanished one is let go.
   const auto seconds = [](milliseconds time) {
     return std::max<std::int64_t>(1, time / milliseconds(1000));
   };
   set(socket, SOL_SOCKET, SO_KEEPALIVE, 1);
-  set(socket, IPPROTO_TCP, TCP_KEEPIDLE, seconds(dead_after / 2));
-  set(socket, IPPROTO_TCP, TCP_KEEPINTVL, seconds(dead_after / 6));
+  set(socket, IPPROTO_TCP, TCP_KEEPIDLE, seconds(peer_timeout / 2));
+  set(socket, IPPROTO_TCP, TCP_KEEPINTVL, seconds(peer_timeout / 6));
   set(socket, IPPROTO_TCP, TCP_KEEPCNT, 3);
 }
 

@@ -24,20 +24,20 @@ class PeerJudge {
  public:
   using Clock = std::chrono::steady_clock;
 
-  PeerJudge(std::chrono::milliseconds dead_after, Clock::time_point now)
-      : dead_after_(dead_after), moved_(now) {}
+  PeerJudge(std::chrono::milliseconds peer_timeout, Clock::time_point now)
+      : peer_timeout_(peer_timeout), moved_(now) {}
 
   /// How often to look.
-  [[nodiscard]] std::chrono::milliseconds interval() const { return dead_after_ / 16; }
+  [[nodiscard]] std::chrono::milliseconds interval() const { return peer_timeout_ / 16; }
   /// False: the peer is gone. user_timeout() is what TCP_USER_TIMEOUT is to be from here on.
   [[nodiscard]] bool alive(const TcpProgress& progress, Clock::time_point now);
   /// While nothing stands still it bounds the keep-alive's probes, of which some may be lost.
   [[nodiscard]] std::chrono::milliseconds user_timeout() const {
-    return standing_.count() == 0 ? dead_after_ : standing_ + dead_after_ * 3 / 8;
+    return standing_.count() == 0 ? peer_timeout_ : standing_ + peer_timeout_ * 3 / 8;
   }
 
  private:
-  std::chrono::milliseconds dead_after_;
+  std::chrono::milliseconds peer_timeout_;
   Clock::time_point moved_;  ///< When the peer had taken everything, or took something.
   std::uint64_t acked_bytes_ = 0;
   std::chrono::milliseconds standing_{0};  ///< Since moved_.
@@ -48,7 +48,7 @@ class TcpWatch : public std::enable_shared_from_this<TcpWatch> {
  public:
   /// Sets the socket's keep-alive and TCP_USER_TIMEOUT. `socket` is only looked at.
   TcpWatch(const boost::asio::any_io_executor& executor, int socket,
-           std::chrono::milliseconds dead_after);
+           std::chrono::milliseconds peer_timeout);
 
   /// Calls `on_dead` once when the peer is gone, unless stop() came before.
   void start(std::function<void()> on_dead);

@@ -21,7 +21,7 @@ namespace asio = boost::asio;
 namespace ssl = asio::ssl;
 using boost::system::error_code;
 
-constexpr const char* kMakeOne = "dtactctl cert makes a pair";
+constexpr const char* kCertificateHint = "dtactctl cert makes a pair";
 
 [[noreturn]] void fail(const std::filesystem::path& file, const std::string& why) {
   throw std::runtime_error(fmt::format("{}: {}", file.string(), why));
@@ -31,7 +31,8 @@ std::string read_certificate(const std::filesystem::path& file) {
   try {
     return base::read_file(file, 1U << 20U);
   } catch (const std::exception& e) {
-    throw std::runtime_error(fmt::format("the TLS certificate: {}; {}", e.what(), kMakeOne));
+    throw std::runtime_error(
+        fmt::format("the TLS certificate: {}; {}", e.what(), kCertificateHint));
   }
 }
 
@@ -39,7 +40,7 @@ void use_certificate(ssl::context& context, const std::filesystem::path& file) {
   error_code error;
   context.use_certificate_chain(asio::buffer(read_certificate(file)), error);
   if (error) {
-    fail(file, fmt::format("is no PEM certificate ({}); {}", error.message(), kMakeOne));
+    fail(file, fmt::format("is no PEM certificate ({}); {}", error.message(), kCertificateHint));
   }
 }
 
@@ -69,14 +70,15 @@ void use_key(ssl::context& context, const std::filesystem::path& file,
   if (is_mismatch(error) || (!error && ::SSL_CTX_check_private_key(context.native_handle()) != 1)) {
     fail(file, fmt::format("does not belong to the certificate {}: name the two files of one "
                            "pair; {}",
-                           certificate.string(), kMakeOne));
+                           certificate.string(), kCertificateHint));
   }
-  if (error) fail(file, fmt::format("is no PEM key ({}); {}", error.message(), kMakeOne));
+  if (error) fail(file, fmt::format("is no PEM key ({}); {}", error.message(), kCertificateHint));
 }
 
 void check_dates(const X509* certificate, const std::filesystem::path& file) {
   if (::X509_cmp_current_time(::X509_get0_notAfter(certificate)) < 0) {
-    fail(file, fmt::format("has expired, or this machine's clock is wrong (date); {}", kMakeOne));
+    fail(file,
+         fmt::format("has expired, or this machine's clock is wrong (date); {}", kCertificateHint));
   }
 }
 

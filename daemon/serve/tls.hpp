@@ -12,7 +12,7 @@ namespace dtact::net {
 /// The daemon's side of TLS 1.2 and 1.3.
 struct Tls {
   /// Reads a PEM certificate, with those that signed it behind it if any, and its PEM key. Throws
-  /// std::runtime_error naming the file and the remedy: unreadable, a key that others may read, one
+  /// std::runtime_error naming the file and the fix: unreadable, a key that others may read, one
   /// that wants a pass phrase or belongs to another certificate, a certificate out of date.
   Tls(const std::filesystem::path& certificate, const std::filesystem::path& key);
 

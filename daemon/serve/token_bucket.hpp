@@ -5,7 +5,7 @@
 
 namespace dtact::net {
 
-/// So much a second, and as much at once as `burst` after a rest.
+/// Per second, and as much at once as `burst` after a rest.
 class TokenBucket {
  public:
   using Clock = std::chrono::steady_clock;

@@ -39,11 +39,11 @@ std::string wrong_with(const std::vector<std::string_view>& words) {
     return "only printable ASCII characters are allowed";
   }
   const std::size_t size = words[1].size();
-  if (size < Tokens::kLeastBytes || size > wire::kMaxToken) {
+  if (size < Tokens::kMinBytes || size > wire::kMaxToken) {
     return fmt::format(
         "the token has {} bytes, allowed are {} to {}: dtactctl token --new {} "
         "prints one",
-        size, Tokens::kLeastBytes, wire::kMaxToken, words[0]);
+        size, Tokens::kMinBytes, wire::kMaxToken, words[0]);
   }
   return {};
 }

@@ -15,7 +15,7 @@ namespace dtact::net {
 class Tokens {
  public:
   /// Shorter ones can be guessed.
-  static constexpr std::size_t kLeastBytes = 16;
+  static constexpr std::size_t kMinBytes = 16;
 
   struct Grant {
     Rights rights = Rights::view;
@@ -24,7 +24,7 @@ class Tokens {
 
   /// A line for each token: "view TOKEN" or "control TOKEN", with a name behind it or not;
   /// printable ASCII, separated by spaces; empty lines, and such as begin with '#', are passed
-  /// over. `file` names the text in errors. Throws std::runtime_error with file, line and remedy,
+  /// over. `file` names the text in errors. Throws std::runtime_error with file, line and fix,
   /// never with a token; a text without any token is an error, too.
   Tokens(std::string_view text, const std::string& file);
 

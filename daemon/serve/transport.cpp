@@ -78,10 +78,10 @@ class TcpTransport : public StreamTransport<Stream> {
 
  public:
   template <typename... Arguments>
-  TcpTransport(Peer peer, std::chrono::milliseconds dead_after, Arguments&&... arguments)
+  TcpTransport(Peer peer, std::chrono::milliseconds peer_timeout, Arguments&&... arguments)
       : Base(std::move(peer), std::forward<Arguments>(arguments)...),
         watch_(std::make_shared<TcpWatch>(
-            this->executor(), this->stream().lowest_layer().native_handle(), dead_after)) {
+            this->executor(), this->stream().lowest_layer().native_handle(), peer_timeout)) {
     watch_->start([this] {
       dead_ = true;
       error_code ignored;
@@ -141,11 +141,11 @@ Peer peer_of(const tcp::socket& socket, std::string endpoint) {
 }
 
 std::unique_ptr<Transport> over_tcp(tcp::socket socket, Peer peer,
-                                    std::chrono::milliseconds dead_after, ssl::context* tls) {
+                                    std::chrono::milliseconds peer_timeout, ssl::context* tls) {
   if (tls != nullptr) {
-    return std::make_unique<TlsTransport>(std::move(peer), dead_after, std::move(socket), *tls);
+    return std::make_unique<TlsTransport>(std::move(peer), peer_timeout, std::move(socket), *tls);
   }
-  return std::make_unique<TcpTransport<tcp::socket>>(std::move(peer), dead_after,
+  return std::make_unique<TcpTransport<tcp::socket>>(std::move(peer), peer_timeout,
                                                      std::move(socket));
 }
 

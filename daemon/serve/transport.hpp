@@ -64,11 +64,11 @@ void prepare(boost::asio::ip::tcp::socket& socket);
 /// Who is at the other end.
 [[nodiscard]] Peer peer_of(const boost::asio::ip::tcp::socket& socket, std::string endpoint);
 
-/// TCP over a prepared socket; a peer that is gone is found after `dead_after`, one that only does
-/// not read kept (TcpWatch): reading then ends with asio::error::timed_out. Without `tls` plain; it
-/// must outlive the transport.
+/// TCP over a prepared socket; a peer that is gone is found after `peer_timeout`, one that only
+/// does not read kept (TcpWatch): reading then ends with asio::error::timed_out. Without `tls`
+/// plain; it must outlive the transport.
 [[nodiscard]] std::unique_ptr<Transport> over_tcp(boost::asio::ip::tcp::socket socket, Peer peer,
-                                                  std::chrono::milliseconds dead_after,
+                                                  std::chrono::milliseconds peer_timeout,
                                                   boost::asio::ssl::context* tls);
 
 /// A Unix socket; the peer is who it was when it connected (SO_PEERCRED).

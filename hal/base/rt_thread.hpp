@@ -35,7 +35,7 @@ class RtThread {
   void join() noexcept;
   /// The CPU that the thread is pinned to.
   [[nodiscard]] std::optional<int> cpu() const noexcept { return cpu_; }
-  /// One sentence for each setting the system refused, with the remedy.
+  /// One sentence for each setting the system refused, with the fix.
   [[nodiscard]] const std::vector<std::string>& refused() const noexcept { return refused_; }
 
  private:

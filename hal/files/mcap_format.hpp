@@ -36,7 +36,7 @@ inline constexpr std::size_t kRecordHead = 9;
 /// Of a footer's fields.
 inline constexpr std::size_t kFooterLength = 20;
 /// A record, and a chunk once it is decompressed, has at most this many bytes: what a reader holds.
-inline constexpr std::uint64_t kMostRecord = std::uint64_t{256} << 20U;
+inline constexpr std::uint64_t kMaxRecord = std::uint64_t{256} << 20U;
 
 /// What the messages of a channel look like; id 0 means none.
 struct Schema {

@@ -60,8 +60,8 @@ std::string RecordFile::load(std::uint64_t offset, std::uint64_t length) const {
   if (offset > size_ || length > size_ - offset) {
     fail(offset, fmt::format("{} bytes are announced, the file ends at {}", length, size_));
   }
-  if (length > kMostRecord) {
-    fail(offset, fmt::format("a record of {} bytes, at most {} are read", length, kMostRecord));
+  if (length > kMaxRecord) {
+    fail(offset, fmt::format("a record of {} bytes, at most {} are read", length, kMaxRecord));
   }
   std::string bytes(static_cast<std::size_t>(length), '\0');
   std::size_t done = 0;
@@ -93,8 +93,8 @@ std::string RecordFile::load_chunk(std::uint64_t offset) const {
   const auto expected = fields.take<std::uint32_t>();
   const std::string compression = fields.string();
   const std::string_view bytes = fields.bytes(fields.take<std::uint64_t>());
-  if (length > kMostRecord) {
-    fields.fail(fmt::format("a chunk of {} bytes, at most {} are read", length, kMostRecord));
+  if (length > kMaxRecord) {
+    fields.fail(fmt::format("a chunk of {} bytes, at most {} are read", length, kMaxRecord));
   }
   std::string records;
   if (compression == "zstd") {

@@ -111,8 +111,8 @@ std::string holder_name(const char* consumer) {
 
 std::unique_ptr<OutputLine> open_output(const GpioLineConfig& line, bool active,
                                         const std::string& key) {
-  const auto fail = [&](const std::string& why, const std::string& mend) {
-    return std::runtime_error(fmt::format("{}: {}: {}: {}", key, describe(line), why, mend));
+  const auto fail = [&](const std::string& why, const std::string& fix) {
+    return std::runtime_error(fmt::format("{}: {}: {}: {}", key, describe(line), why, fix));
   };
   const Survey here = survey();
   const Place place = find_line(here.chips, line, key);
@@ -121,7 +121,7 @@ std::unique_ptr<OutputLine> open_output(const GpioLineConfig& line, bool active,
                "put the user into the group that owns it (sudo usermod -aG gpio <user>) and "
                "install config/udev/60-dtactd.rules");
   }
-  if (!place.why.empty()) throw fail(place.why, place.mend);
+  if (!place.why.empty()) throw fail(place.why, place.fix);
   int error = 0;
   auto output = request_output(place.chip, place.line, line, active, error);
   if (output != nullptr) return output;

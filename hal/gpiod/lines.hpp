@@ -41,12 +41,12 @@ struct ChipFacts {
 /// The chips of this machine that may be opened, by path.
 [[nodiscard]] std::vector<Chip> list_chips();
 
-/// Where a configured line is. When it is nowhere, `why` says so and `mend` how to go on; both name
+/// Where a configured line is. When it is nowhere, `why` says so and `fix` how to go on; both name
 /// `key`, the configuration's, where they have to.
 struct Place {
   std::string chip;  ///< Path.
   int line = -1;     ///< Offset.
-  std::string why, mend;
+  std::string why, fix;
   bool unknown = false;  ///< None of the chips has the chip's or the line's name.
 };
 [[nodiscard]] Place find_line(const std::vector<Chip>& chips, const GpioLineConfig& line,
@@ -57,7 +57,7 @@ struct Place {
 
 /// Takes the line as output with the given first level. The chip may be named by path
 /// ("/dev/gpiochip0"), name ("gpiochip0") or label. `key` is the configuration's key, for the
-/// error's sentence. Throws std::runtime_error naming key, line and the remedy.
+/// error's sentence. Throws std::runtime_error naming key, line and the fix.
 [[nodiscard]] std::unique_ptr<OutputLine> open_output(const GpioLineConfig& line, bool active,
                                                       const std::string& key);
 

@@ -30,7 +30,7 @@ struct Choice {
                                    const CameraConfig& asked, Sensor sensor,
                                    const std::string& identity);
 
-/// How a payload of the first plane of `stream` is to be read, as it was granted. `lendable` is
+/// How a payload of the first plane of `stream` is to be read, as it was granted. `zero_copy` is
 /// left open.
 [[nodiscard]] live::Format format_of(const libcamera::StreamConfiguration& stream,
                                      const Choice& choice);

@@ -15,7 +15,7 @@
 #include "hal/libcamera/photometry.hpp"
 #include "hal/libcamera/session.hpp"
 #include "hal/live/live_camera.hpp"
-#include "hal/live/search_pace.hpp"
+#include "hal/live/search_throttle.hpp"
 #include "hal/live/source.hpp"
 
 namespace dtact::hal::libcamera_backend {

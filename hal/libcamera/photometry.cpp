@@ -34,7 +34,7 @@ constexpr const char* kFrameDuration = "frame_duration";
 constexpr double kDefaultExposure = 20000;
 /// Of a frame's duration. The rest is what sensors need between two exposures: 4 to some 40 lines
 /// of about a thousand (cam_helper_*.cpp: frameIntegrationDiff).
-constexpr double kMostOfAFrame = 0.9;
+constexpr double kMaxFrameShare = 0.9;
 /// Microseconds: sensors count exposure in lines, of which the longest last about so long.
 constexpr std::int64_t kLine = 64;
 
@@ -140,7 +140,7 @@ std::optional<double> default_of(const Control& control, const lc::ControlInfo& 
   std::optional<double> value = number(offered.def());
   // Longer ones are clipped without a word (ipa_base.cpp: applyAGC()).
   if (control.name == std::string(kExposure)) {
-    value = std::min(value.value_or(kDefaultExposure), kMostOfAFrame * frame_us);
+    value = std::min(value.value_or(kDefaultExposure), kMaxFrameShare * frame_us);
   }
   if (!value && control.name == std::string(kGain)) value = number(offered.min());
   return value;
@@ -173,13 +173,14 @@ PhotometricLock::PhotometricLock(const LibcameraConfig& config, double fps)
   }
 }
 
-PhotometricLock::Wishes PhotometricLock::wishes(const lc::ControlInfoMap& offered) const {
+PhotometricLock::RequestedControls PhotometricLock::requested_controls(
+    const lc::ControlInfoMap& offered) const {
   // libcamera 0.0.3: count() counts every control there is, not the camera's, and find() needs
   // some.
   const auto find_offered = [&](const lc::ControlId& id) {
     return offered.empty() ? offered.end() : offered.find(id.id());
   };
-  Wishes wishes{lc::ControlList(lc::controls::controls), {}};
+  RequestedControls requested_controls{lc::ControlList(lc::controls::controls), {}};
   for (const Control& control : known_controls()) {
     const auto info = find_offered(control.id);
     const auto configured = config_.controls.find(control.name);
@@ -193,7 +194,7 @@ PhotometricLock::Wishes PhotometricLock::wishes(const lc::ControlInfoMap& offere
     if (info == offered.end()) {
       if (!asked) continue;
       entry.note = fmt::format("this camera has no {}", control.name);
-      wishes.controls.push_back(std::move(entry));
+      requested_controls.controls.push_back(std::move(entry));
       continue;
     }
     if (!value) value = default_of(control, info->second, 1e6 / fps_);
@@ -204,20 +205,20 @@ PhotometricLock::Wishes PhotometricLock::wishes(const lc::ControlInfoMap& offere
       entry.note = fmt::format("{} = {} is outside this camera's {} to {}", control.name, *value,
                                least.value_or(0), most.value_or(0));
     } else {
-      wishes.list.set(control.id.id(), value_of(control.id.type(), *value));
+      requested_controls.list.set(control.id.id(), value_of(control.id.type(), *value));
       entry.value = report_value(control.id, *value);
       entry.verdict = ControlVerdict::accepted;
       entry.note = "set; the frames have not said yet what came of it";
     }
-    wishes.controls.push_back(std::move(entry));
+    requested_controls.controls.push_back(std::move(entry));
   }
   if (find_offered(lc::controls::FrameDurationLimits) != offered.end()) {
     const auto us = static_cast<std::int64_t>(std::llround(1e6 / fps_));
-    wishes.list.set(lc::controls::FrameDurationLimits, {us, us});
-    wishes.controls.push_back({kFrameDuration, us, ControlVerdict::accepted,
-                               "set; the frames have not said yet how long they last"});
+    requested_controls.list.set(lc::controls::FrameDurationLimits, {us, us});
+    requested_controls.controls.push_back({kFrameDuration, us, ControlVerdict::accepted,
+                                           "set; the frames have not said yet how long they last"});
   }
-  return wishes;
+  return requested_controls;
 }
 
 void PhotometricLock::read(const lc::ControlList& metadata, Readings& readings) {

@@ -26,18 +26,19 @@ class PhotometricLock {
 
   /// What to hand to the camera at its start, and the controls as they are reported until the first
   /// frames say what came of it.
-  struct Wishes {
+  struct RequestedControls {
     libcamera::ControlList list;
     std::vector<CameraControl> controls;
   };
-  [[nodiscard]] Wishes wishes(const libcamera::ControlInfoMap& offered) const;
+  [[nodiscard]] RequestedControls requested_controls(
+      const libcamera::ControlInfoMap& offered) const;
 
   /// The readings of the controls that matter, out of a frame's metadata.
   static void read(const libcamera::ControlList& metadata, Readings& readings);
 
   /// Compares the readings of frames that were taken with what was asked for, and notes it in
   /// `controls`: at first what each has become, with the nearest that the sensor has as its value
-  /// or with the remedy where it is something else. Returns the sentence that says which locked
+  /// or with the fix where it is something else. Returns the sentence that says which locked
   /// ones have moved since; empty when none.
   [[nodiscard]] static std::string compare(const Readings& readings,
                                            std::vector<CameraControl>& controls);

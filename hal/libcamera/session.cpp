@@ -14,8 +14,8 @@
 #include <utility>
 
 #include "hal/base/clock.hpp"
-#include "hal/libcamera/pass_over.hpp"
 #include "hal/libcamera/sensor_mode.hpp"
+#include "hal/libcamera/skip_frames.hpp"
 #include "hal/live/source.hpp"
 
 namespace dtact::hal::libcamera_backend {
@@ -135,7 +135,7 @@ void Session::configure(const CameraConfig& config) {
                                      mode->width, mode->height, mode->bit_depth)});
   }
   format_ = format_of(configuration_->at(0), choice);
-  format_.lendable = true;
+  format_.zero_copy = true;
   pixel_format_ = choice.name;
   note_pictures(choice);
 }
@@ -159,7 +159,7 @@ void Session::make_requests(const DmaHeap* heap) {
   for (const auto& buffer : own_buffers_) add_slot(*buffer);
   if (!own_buffers_.empty()) return;
   // Without caches it is to be read once only.
-  if (!driver_memory_is_cached(sensor_)) format_.lendable = false;
+  if (!driver_memory_is_cached(sensor_)) format_.zero_copy = false;
   lc::Stream* stream = configuration_->at(0).stream();
   allocator_ = std::make_unique<lc::FrameBufferAllocator>(camera_);
   if (const int n = allocator_->allocate(stream); n < 2) {
@@ -194,19 +194,21 @@ void Session::add_slot(lc::FrameBuffer& buffer) {
   // The last page is there as a whole, and may be read beyond the buffer's end.
   const std::size_t image =
       static_cast<std::size_t>(format_.bytes_per_line) * static_cast<std::size_t>(format_.height);
-  if (slot.offset + image + kLumaPadding > page_bytes(end)) format_.lendable = false;
+  if (slot.offset + image + kLumaPadding > page_bytes(end)) format_.zero_copy = false;
   slots_.push_back(std::move(slot));
 }
 
 void Session::start(const PhotometricLock& lock) {
   camera_->requestCompleted.connect(this, &Session::on_completed);
   camera_->disconnected.connect(this, &Session::on_disconnected);
-  PhotometricLock::Wishes wishes = lock.wishes(camera_->controls());
-  std::ranges::move(wishes.controls, std::back_inserter(controls_));
-  if (const int e = camera_->start(&wishes.list); e != 0) fail(e, "start", camera_->id());
+  PhotometricLock::RequestedControls requested_controls =
+      lock.requested_controls(camera_->controls());
+  std::ranges::move(requested_controls.controls, std::back_inserter(controls_));
+  if (const int e = camera_->start(&requested_controls.list); e != 0)
+    fail(e, "start", camera_->id());
   for (Slot& slot : slots_) {
     // Some pipelines look at a request's controls only, not at those of the start.
-    slot.request->controls().merge(wishes.list);
+    slot.request->controls().merge(requested_controls.list);
     if (const int e = camera_->queueRequest(slot.request.get()); e != 0) {
       fail(e, "queue requests of", camera_->id());
     }
@@ -218,12 +220,12 @@ void Session::settle(double fps) {
   // Now, since the controls are compared with a calibration's, which has what became of them, when
   // the camera has been opened, and only then.
   // This may be the capture thread, for which the watchdog waits ten seconds.
-  constexpr double kMostNs = 4e9;
-  const auto patience =
-      static_cast<std::int64_t>(std::min(kMostNs, 1e9 + kSettlingFrames * 1e9 / fps));
+  constexpr double kMaxNs = 4e9;
+  const auto timeout =
+      static_cast<std::int64_t>(std::min(kMaxNs, 1e9 + kSettlingFrames * 1e9 / fps));
   const bool said =
-      pass_over(*this, kSettlingFrames, base::system_clock().monotonic_ns() + patience,
-                [this] { return !readings_.empty(); });
+      skip_frames(*this, kSettlingFrames, base::system_clock().monotonic_ns() + timeout,
+                  [this] { return !readings_.empty(); });
   if (said) (void)PhotometricLock::compare(readings_, controls_);
 }
 
@@ -265,7 +267,7 @@ void Session::wait(std::int64_t deadline_ns) noexcept {
   changed_.wait_until(guard, deadline, [this] { return completed_count_ > 0 || gone_; });
 }
 
-live::DequeueStatus Session::dequeue(live::Filled& out) noexcept {
+live::DequeueStatus Session::dequeue(live::FilledBuffer& out) noexcept {
   {
     const std::lock_guard guard(mutex_);
     if (gone_ || !acquired_) return live::DequeueStatus::failed;

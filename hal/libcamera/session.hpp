@@ -37,7 +37,7 @@ class Session final : public live::Source {
 
   [[nodiscard]] live::Format format() const noexcept override { return format_; }
   void wait(std::int64_t deadline_ns) noexcept override;
-  [[nodiscard]] live::DequeueStatus dequeue(live::Filled& out) noexcept override;
+  [[nodiscard]] live::DequeueStatus dequeue(live::FilledBuffer& out) noexcept override;
   [[nodiscard]] int queued() const noexcept override { return queued_; }
   [[nodiscard]] bool enqueue(int index) noexcept override;
   void stop() noexcept override;

@@ -41,14 +41,14 @@ LiveCamera::LiveCamera(const CameraConfig& config, const std::string& backend,
     : open_(std::move(opener)),
       period_ns_(std::llround(1e9 / config.fps)),
       cpus_(base::allowed_cpus()),
-      lender_(config.width, config.height) {
+      leases_(config.width, config.height) {
   if (!(config.fps > 0)) throw std::runtime_error("camera.fps must be positive");
   info_.backend = backend;
   info_.identity = identity;
   info_.width = config.width;
   info_.height = config.height;
   info_.fps = config.fps;
-  remedy_ = "the camera has not been started";
+  fix_ = "the camera has not been started";
   watcher_ = std::thread([this] { watch_controls(); });
   ::pthread_setname_np(watcher_.native_handle(), "camera-watch");
 }
@@ -79,7 +79,7 @@ CameraReport LiveCamera::report() const {
                    report.damage.undecodable;
   const std::lock_guard guard(mutex_);
   report.state = state_.load();
-  report.remedy = remedy_;
+  report.fix = fix_;
   report.moved = moved_;
   return report;
 }
@@ -113,8 +113,8 @@ void LiveCamera::connect() {
   info_.identity = std::move(opened.identity);
   info_.pixel_format = std::move(opened.pixel_format);
   info_.controls = std::move(opened.controls);
-  remedy_ = "the camera has been opened; its first frame is awaited";
-  lender_.use(opened.source);
+  fix_ = "the camera has been opened; its first frame is awaited";
+  leases_.use(opened.source);
   connection_ = std::move(fresh);
 }
 
@@ -135,14 +135,14 @@ bool LiveCamera::try_connect() noexcept {
   return false;
 }
 
-void LiveCamera::disconnect(CameraState state, const std::string& remedy) {
+void LiveCamera::disconnect(CameraState state, const std::string& fix) {
   std::shared_ptr<Connection> old;
   {
     const std::lock_guard guard(mutex_);
     old = std::exchange(connection_, nullptr);
-    lender_.use(nullptr);
+    leases_.use(nullptr);
     state_.store(state);
-    remedy_ = remedy;
+    fix_ = fix;
   }
   // The watcher may keep the object for a moment; the device must be free at once.
   if (old) {
@@ -204,16 +204,16 @@ GrabStatus LiveCamera::grab(Frame& out, std::chrono::nanoseconds timeout) noexce
 LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
   Source& source = *connection_->source;
   // The newest whole frame, and the one before in case that the newest cannot be decoded.
-  std::array<std::pair<Filled, std::uint64_t>, 2> whole;  // with its sequence; oldest first
+  std::array<std::pair<FilledBuffer, std::uint64_t>, 2> whole;  // with its sequence; oldest first
   std::size_t count = 0;
   bool damaged = false;
   for (unsigned taken = 0; taken < kMaxTaken; ++taken) {
-    Filled filled;
+    FilledBuffer filled;
     const Collected got = take(filled);
     if (got == Collected::nothing) break;
     if (got == Collected::lost) return Collected::lost;
     const PayloadStatus payload = connection_->decoder.inspect(filled);
-    int home = filled.index;
+    int index_to_requeue = filled.index;
     if (payload != PayloadStatus::ok) {
       count_damage(payload);
       damaged = true;
@@ -221,11 +221,11 @@ LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
       whole[count++] = {filled, sequence_};
       continue;
     } else {
-      home = whole[0].first.index;
+      index_to_requeue = whole[0].first.index;
       whole[0] = std::exchange(whole[1], {filled, sequence_});
       add(counters_.skipped);
     }
-    if (!source.enqueue(home)) return Collected::lost;
+    if (!source.enqueue(index_to_requeue)) return Collected::lost;
   }
   bool done = false;
   for (std::size_t i = count; i-- > 0;) {
@@ -235,7 +235,7 @@ LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
     } else {
       bool kept = false;
       const PayloadStatus status =
-          lender_.deliver(connection_->decoder, filled, facts_of(filled, sequence), out, kept);
+          leases_.deliver(connection_->decoder, filled, facts_of(filled, sequence), out, kept);
       done = status == PayloadStatus::ok;
       if (done) {
         note_delivery();
@@ -252,7 +252,7 @@ LiveCamera::Collected LiveCamera::collect(Frame& out) noexcept {
   return damaged ? Collected::damaged : Collected::nothing;
 }
 
-LiveCamera::Collected LiveCamera::take(Filled& out) noexcept {
+LiveCamera::Collected LiveCamera::take(FilledBuffer& out) noexcept {
   switch (connection_->source->dequeue(out)) {
     case DequeueStatus::failed:
       return Collected::lost;
@@ -270,7 +270,7 @@ LiveCamera::Collected LiveCamera::take(Filled& out) noexcept {
   return Collected::frame;
 }
 
-FrameInfo LiveCamera::facts_of(const Filled& filled, std::uint64_t sequence) const noexcept {
+FrameInfo LiveCamera::facts_of(const FilledBuffer& filled, std::uint64_t sequence) const noexcept {
   FrameInfo frame;
   frame.sequence = sequence;
   frame.timestamp_ns = filled.timestamp_ns;
@@ -289,7 +289,7 @@ void LiveCamera::note_delivery() noexcept {
   if (state_.load(std::memory_order_relaxed) == CameraState::streaming) return;
   const std::lock_guard guard(mutex_);
   state_.store(CameraState::streaming);
-  remedy_.clear();
+  fix_.clear();
 }
 
 void LiveCamera::count_gap(std::uint32_t counted) noexcept {
@@ -337,12 +337,12 @@ void LiveCamera::note_silence(std::int64_t now) noexcept {
     const std::lock_guard guard(mutex_);
     state_.store(CameraState::stalled);
     try {
-      remedy_ = fmt::format(
+      fix_ = fmt::format(
           "{} is attached but sends nothing: it is restarted every {} s; if that "
           "doesn't help, plug it in again",
           info_.identity, kReopenAfter / 1'000'000'000);
     } catch (const std::exception&) {
-      remedy_.clear();
+      fix_.clear();
     }
   }
   if (silent < kReopenAfter) return;
@@ -350,7 +350,7 @@ void LiveCamera::note_silence(std::int64_t now) noexcept {
   {
     const std::lock_guard guard(mutex_);
     old = std::exchange(connection_, nullptr);
-    lender_.use(nullptr);
+    leases_.use(nullptr);
   }
   old->source->stop();
   next_try_ns_ = now;

@@ -13,7 +13,7 @@
 
 #include "hal/camera.hpp"
 #include "hal/config.hpp"
-#include "hal/live/frame_lender.hpp"
+#include "hal/live/frame_leases.hpp"
 #include "hal/live/payload.hpp"
 #include "hal/live/source.hpp"
 
@@ -53,7 +53,7 @@ class LiveCamera : public Camera {
 
   void connect();
   [[nodiscard]] bool try_connect() noexcept;
-  void disconnect(CameraState state, const std::string& remedy);
+  void disconnect(CameraState state, const std::string& fix);
   void lose(const char* what) noexcept;
   [[nodiscard]] bool wait_for_device(std::int64_t deadline_ns) noexcept;
   /// Since the last buffer, or since the stream began.
@@ -63,9 +63,10 @@ class LiveCamera : public Camera {
   /// What collect() found in the driver's queue.
   enum class Collected : std::uint8_t { frame, damaged, nothing, lost };
   [[nodiscard]] Collected collect(Frame& out) noexcept;
-  [[nodiscard]] FrameInfo facts_of(const Filled& filled, std::uint64_t sequence) const noexcept;
+  [[nodiscard]] FrameInfo facts_of(const FilledBuffer& filled,
+                                   std::uint64_t sequence) const noexcept;
   void note_delivery() noexcept;
-  [[nodiscard]] Collected take(Filled& out) noexcept;
+  [[nodiscard]] Collected take(FilledBuffer& out) noexcept;
   void count_gap(std::uint32_t sequence) noexcept;
   void count_damage(PayloadStatus status) noexcept;
   void watch_controls() noexcept;
@@ -75,7 +76,7 @@ class LiveCamera : public Camera {
   const cpu_set_t cpus_;  // that the thread which made this may use
 
   // The capture thread's own.
-  FrameLender lender_;
+  FrameLeases leases_;
   std::optional<Area> area_;  // what will be read; none: the whole image
   std::int64_t next_try_ns_ = 0;
   std::int64_t last_buffer_ns_ = 0;  // the last sign of life, damaged or not
@@ -93,7 +94,7 @@ class LiveCamera : public Camera {
   std::condition_variable wake_watcher_;
   std::shared_ptr<Connection> connection_;  // written by the capture thread only
   CameraInfo info_;
-  std::string remedy_;
+  std::string fix_;
   std::string moved_;
   bool stopping_ = false;
   std::atomic<CameraState> state_{CameraState::unplugged};

@@ -41,7 +41,7 @@ void PayloadDecoder::will_read(const Area& area) noexcept {
   if (jpeg_) jpeg_->set_crop(area);
 }
 
-PayloadStatus PayloadDecoder::inspect(const Filled& filled) const noexcept {
+PayloadStatus PayloadDecoder::inspect(const FilledBuffer& filled) const noexcept {
   if (filled.flagged) return PayloadStatus::flagged;
   if (filled.payload.empty()) return PayloadStatus::too_short;
   if (jpeg_) return has_markers(filled.payload) ? PayloadStatus::ok : PayloadStatus::markers;
@@ -50,7 +50,7 @@ PayloadStatus PayloadDecoder::inspect(const Filled& filled) const noexcept {
   return filled.payload.size() < needed ? PayloadStatus::too_short : PayloadStatus::ok;
 }
 
-PayloadStatus PayloadDecoder::decode(const Filled& filled, luma::LumaBuffer& out) noexcept {
+PayloadStatus PayloadDecoder::decode(const FilledBuffer& filled, luma::LumaBuffer& out) noexcept {
   if (!jpeg_) {
     const auto status = luma::extract(layout_of(format_.encoding),
                                       format_.full_range ? luma::Range::full : luma::Range::limited,

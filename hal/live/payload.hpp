@@ -20,9 +20,9 @@ class PayloadDecoder {
   void will_read(const Area& area) noexcept;
   /// What can be told without decoding: the driver's mark, the length, a JPEG's first and last
   /// marker.
-  [[nodiscard]] PayloadStatus inspect(const Filled& filled) const noexcept;
+  [[nodiscard]] PayloadStatus inspect(const FilledBuffer& filled) const noexcept;
   /// Unless ok, `out` is partly written and must not be used.
-  [[nodiscard]] PayloadStatus decode(const Filled& filled, luma::LumaBuffer& out) noexcept;
+  [[nodiscard]] PayloadStatus decode(const FilledBuffer& filled, luma::LumaBuffer& out) noexcept;
 
  private:
   Format format_;

@@ -14,7 +14,7 @@
 
 namespace dtact::hal::live {
 
-/// Why a camera cannot be used now: a condition that may pass by itself, with the remedy.
+/// Why a camera cannot be used now: a condition that may pass by itself, with the fix.
 class DeviceError : public std::runtime_error {
  public:
   DeviceError(CameraState state, const std::string& sentence)
@@ -43,11 +43,11 @@ struct Format {
   bool full_range = true;             ///< Of raw luma.
   /// Full-range grey payloads may be lent as they are: kLumaPadding bytes after them can be read,
   /// and they stay readable until the source is destroyed.
-  bool lendable = false;
+  bool zero_copy = false;
 };
 
 /// A buffer that the driver has filled.
-struct Filled {
+struct FilledBuffer {
   int index = -1;
   std::span<const std::uint8_t> payload;
   std::uint32_t sequence = 0;     ///< The driver's count since the stream began.
@@ -70,7 +70,7 @@ class Source {
   /// Waits at most until `deadline_ns` (CLOCK_MONOTONIC) for a buffer or an error.
   virtual void wait(std::int64_t deadline_ns) noexcept = 0;
   /// The oldest filled buffer, if any. `failed`: the stream is of no more use.
-  [[nodiscard]] virtual DequeueStatus dequeue(Filled& out) noexcept = 0;
+  [[nodiscard]] virtual DequeueStatus dequeue(FilledBuffer& out) noexcept = 0;
   /// Number of buffers that the driver holds, filled or empty.
   [[nodiscard]] virtual int queued() const noexcept = 0;
   /// Hands a buffer back to the driver. False: the stream is of no more use.

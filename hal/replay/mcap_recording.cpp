@@ -118,9 +118,9 @@ Recording load_mcap(const fs::path& file) {
     }
     add_jpeg(recording, std::string(fields.at(kData)), decoder, name);
     bytes += recording.payloads.back().size();
-    if (bytes > kMostBytes) {
+    if (bytes > kMaxBytes) {
       fail(file, fmt::format("more than {} MiB of frames, of which {} are read: record less",
-                             kMostBytes >> 20U, recording.count()));
+                             kMaxBytes >> 20U, recording.count()));
     }
     if (!first) first = message.log_time;
     if (message.log_time < *first ||

@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kTimestamps = "timestamps.csv";
-constexpr int kMostPixels = 16384;  // of a side: what luma buffers and the decoder take
+constexpr int kMaxPixels = 16384;  // of a side: what luma buffers and the decoder take
 
 std::string lower_extension(const fs::path& file) {
   std::string extension = file.extension().string();
@@ -59,9 +59,9 @@ std::vector<fs::path> frames_in(const fs::path& folder) {
 }
 
 void check_size(Recording& recording, int width, int height, const fs::path& file) {
-  if (width > kMostPixels || height > kMostPixels) {
+  if (width > kMaxPixels || height > kMaxPixels) {
     fail(file, fmt::format("is {}x{} pixels, a side has at most {}: remove the file", width, height,
-                           kMostPixels));
+                           kMaxPixels));
   }
   if (recording.count() == 0) {
     recording.width = width;
@@ -163,10 +163,10 @@ Recording load_recording(const fs::path& path) {
       add_jpeg(recording, base::read_file(file), decoder, file);
       bytes += recording.payloads.back().size();
     }
-    if (bytes > kMostBytes) {
+    if (bytes > kMaxBytes) {
       fail(folder, fmt::format("more than {} MiB of frames, of which {} are read: split the "
                                "recording, or keep it as JPEG",
-                               kMostBytes >> 20U, recording.count()));
+                               kMaxBytes >> 20U, recording.count()));
     }
   }
   if (fs::exists(folder / kTimestamps)) {

@@ -31,10 +31,10 @@ struct Recording {
 };
 
 /// Recordings that need more memory than this are refused (PNG: about 2,100 frames of 800×600).
-inline constexpr std::size_t kMostBytes = std::size_t{1} << 30U;
+inline constexpr std::size_t kMaxBytes = std::size_t{1} << 30U;
 
 /// Reads the whole folder, or a file whose name ends in .mcap; of one that is not whole, what is
-/// there. Throws std::runtime_error naming the file (and line) and the remedy: no frames, both
+/// there. Throws std::runtime_error naming the file (and line) and the fix: no frames, both
 /// kinds, different sizes, an unreadable file, too much memory, bad timestamps.
 [[nodiscard]] Recording load_recording(const std::filesystem::path& path);
 

@@ -52,7 +52,7 @@ CameraReport ReplayCamera::report() const {
   report.damaged = damaged_;
   if (ended_) {
     report.state = CameraState::ended;
-    report.remedy = "the recording has been played: set camera.replay.loop = true to repeat it";
+    report.fix = "the recording has been played: set camera.replay.loop = true to repeat it";
   }
   return report;
 }

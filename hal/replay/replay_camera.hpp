@@ -15,7 +15,7 @@ namespace dtact::hal::replay {
 
 /// Recorded frames at their own rate (timestamps.csv) or the configured one, once or in a loop. The
 /// recording's size is the camera's, whatever the configuration says. All of it is held in memory,
-/// at most kMostBytes: PNG as pixels, JPEG as payloads that grab() decodes into one of two buffers.
+/// at most kMaxBytes: PNG as pixels, JPEG as payloads that grab() decodes into one of two buffers.
 ///
 /// Paced: a caller that is late gets the newest frame that is due; those passed over are skipped
 /// and leave a gap in the sequence. Unpaced: every frame in turn, at once.

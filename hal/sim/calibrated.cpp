@@ -34,26 +34,26 @@ void take_from_calibration(const std::filesystem::path& folder, Scene& scene) {
   const std::filesystem::path file = folder / "calibration.toml";
   const toml::table parsed = tomlfile::parse(base::read_file(file), file.string());
   KeyReader root(parsed, file.string());
-  if (!root.has("layer")) {
+  if (!root.has("gel")) {
     throw std::runtime_error(file.string() +
-                             ": has no [layer]: its list was not made by a model of the sensor, "
+                             ": has no [gel]: its LUT was not made by a model of the sensor, "
                              "which a simulator of it needs");
   }
-  KeyReader layer = root.table("layer");
-  scene.layer.thickness_mm = estimate(layer, "thickness_mm", 0.5, 5);
+  KeyReader gel = root.table("gel");
+  scene.gel.thickness_mm = estimate(gel, "thickness_mm", 0.5, 5);
   OpticsModel& optics = scene.optics;
-  optics.narrow_mm = estimate(layer, "narrow_mm", 0, 3);
-  optics.wide_mm = estimate(layer, "wide_mm", 0, 6);
-  optics.narrow_weight = estimate(layer, "narrow_weight", 0, 1);
+  optics.narrow_mm = estimate(gel, "narrow_mm", 0, 3);
+  optics.wide_mm = estimate(gel, "wide_mm", 0, 6);
+  optics.narrow_weight = estimate(gel, "narrow_weight", 0, 1);
   optics.far_weight = 0;
   optics.growth = 0;
-  const std::vector<double> knots = layer.numbers("indentation", -1, 1);
-  const std::vector<double> slopes = layer.numbers("slope", 1e-4, 1e3);
+  const std::vector<double> knots = gel.numbers("indentation", -1, 1);
+  const std::vector<double> slopes = gel.numbers("slope", 1e-4, 1e3);
   if (knots.size() < 2 || slopes.size() != knots.size() ||
       std::ranges::adjacent_find(knots, std::greater_equal()) != knots.end()) {
-    layer.fail("indentation", "must ascend and be as many as slope");
+    gel.fail("indentation", "must ascend and be as many as slope");
   }
-  const double bulge_factor = layer.number("bulge_factor", 1e-3, 1e3);
+  const double bulge_factor = gel.number("bulge_factor", 1e-3, 1e3);
   optics.knots.clear();
   optics.slopes.clear();
   for (std::size_t i = 0; i < knots.size(); ++i) {

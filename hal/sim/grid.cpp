@@ -39,9 +39,9 @@ Place pixel_place(const CameraModel& camera, double column, double row) noexcept
 
 Grid make_grid(const Scene& scene) {
   Grid grid;
-  grid.spacing_mm = scene.layer.grid_mm;
+  grid.spacing_mm = scene.gel.grid_mm;
   const Place reach = reach_of(scene);
-  const double margin = 2 * kMargin * scene.layer.thickness_mm;
+  const double margin = 2 * kMargin * scene.gel.thickness_mm;
   const auto side = [&](double field_mm) {
     return cv::getOptimalDFTSize(
         static_cast<int>(std::ceil((field_mm + margin) / grid.spacing_mm)));

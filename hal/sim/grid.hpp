@@ -9,7 +9,7 @@
 
 namespace dtact::hal::sim {
 
-/// The points on which contact is solved, of a curved layer unrolled (Place). Point (column, row)
+/// The points on which contact is solved, of a curved gel unrolled (Place). Point (column, row)
 /// lies at x = x0_mm + column·spacing, y = y0_mm + row·spacing from the image's centre.
 struct Grid {
   int width = 0;
@@ -27,7 +27,7 @@ struct Grid {
 /// a free border; sides are lengths the FFT likes.
 [[nodiscard]] Grid make_grid(const Scene& scene);
 
-/// Where pixel (column, row) lies on the layer, lens included; of a curved layer on the plane that
+/// Where pixel (column, row) lies on the gel, lens included; of a curved gel on the plane that
 /// touches it in its apex.
 [[nodiscard]] Place pixel_place(const CameraModel& camera, double column, double row) noexcept;
 

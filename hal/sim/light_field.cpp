@@ -70,7 +70,7 @@ std::array<Place, kLedCount> led_places(const LightModel& light) {
   return places;
 }
 
-// One LED's direct light at a place of the layer, relative to that at its foot.
+// One LED's direct light at a place of the gel, relative to that at its foot.
 double direct(const Place& led, const Place& at, double distance_mm) {
   const double dx = (at.x_mm - led.x_mm) / distance_mm;
   const double dy = (at.y_mm - led.y_mm) / distance_mm;
@@ -106,7 +106,7 @@ LightField::LightField(const Scene& scene)
   const CameraModel& camera = scene.camera;
   const LightModel& light = scene.light;
   const auto leds = led_places(light);
-  const Texture texture(scene.layer.texture, scene.layer.texture_mm);
+  const Texture texture(scene.gel.texture, scene.gel.texture_mm);
   double at_centre = 0;
   for (const Place& led : leds) at_centre += direct(led, {}, light.led_distance_mm);
 

@@ -11,7 +11,7 @@
 
 namespace dtact::hal::sim {
 
-/// What a real layer shows untouched beside smooth light: bubbles, dust under the paint, old dents.
+/// What a real gel shows untouched beside smooth light: bubbles, dust under the paint, old dents.
 /// Random numbers on a lattice, joined by cubic B-splines; always the same ones, for they belong to
 /// the sensor. Immutable.
 class Texture {
@@ -34,10 +34,10 @@ using LedLevels = std::array<std::uint16_t, kLedCount>;
 /// Half of each: what a frame sees whose exposure lies half before and half after a change.
 [[nodiscard]] LedLevels mean(const LedLevels& a, const LedLevels& b) noexcept;
 
-/// The light on the untouched layer as the camera sees it. Every LED shines through the diffuser
+/// The light on the undeformed gel as the camera sees it. Every LED shines through the diffuser
 /// as a point source on a plane, (1 + ρ²/d²)^−2 at the distance ρ from its foot (inverse square,
 /// and Lambert's cosine at both ends), plus an even share; the lens vignettes with the square of
-/// the radius, and the layer has its faint texture.
+/// the radius, and the gel has its faint texture.
 class LightField {
  public:
   explicit LightField(const Scene& scene);

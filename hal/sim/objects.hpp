@@ -9,8 +9,8 @@ namespace dtact::hal::sim {
 /// Height of the places where an object has no surface at all, mm.
 inline constexpr double kNoSurface = 1e3;
 
-/// A rigid thing that is pressed into the layer, in its own frame: origin at its centre on the
-/// level of its lowest point, x and y in the plane of the layer, z away from the camera.
+/// A rigid thing that is pressed into the gel, in its own frame: origin at its centre on the
+/// level of its lowest point, x and y in the plane of the gel, z away from the camera.
 struct Object {
   std::string kind;     ///< The name it has in a scene.
   double reach_mm = 0;  ///< Radius of a circle about the origin that holds all of it.
@@ -44,7 +44,7 @@ struct Object {
 [[nodiscard]] Object screw_cap();
 [[nodiscard]] Object usb_c_plug();
 [[nodiscard]] Object key();
-/// Any relief: a PNG, white nearest to the layer, black `relief` higher up; the image's centre is
+/// Any relief: a PNG, white nearest to the gel, black `relief` higher up; the image's centre is
 /// the origin and its columns run along x. Throws std::runtime_error naming the file.
 [[nodiscard]] Object height_map(const std::filesystem::path& png, double mm_per_px, double relief);
 

@@ -12,7 +12,7 @@ namespace {
 constexpr std::int32_t kOne = 1 << 15;
 constexpr std::int32_t kHalf = kOne / 2;
 constexpr std::int32_t kShareOne = 1 << 12;
-constexpr double kThinnest = 0.2;  // of the mean thickness, beyond the field of a tapered layer
+constexpr double kThinnest = 0.2;  // of the mean thickness, beyond the field of a tapered gel
 
 // Shares of the thickness that widths are kept for, where they follow it; in between, two are
 // mixed. Nothing bulges or is pressed beyond the outer ones.
@@ -53,15 +53,15 @@ double coarse_sigma(double sigma_mm, const Grid& grid, std::size_t count) {
   return std::sqrt(std::max(sigma * sigma - own, 0.0)) / factor;
 }
 
-std::vector<std::uint16_t> thickness_shares(const LayerModel& layer, const Grid& grid) {
+std::vector<std::uint16_t> thickness_shares(const GelModel& gel, const Grid& grid) {
   std::vector<std::uint16_t> shares;
-  if (layer.taper_x == 0 && layer.taper_y == 0) return shares;
+  if (gel.taper_x == 0 && gel.taper_y == 0) return shares;
   shares.reserve(grid.size());
   for (int row = 0; row < grid.height; ++row) {
     for (int column = 0; column < grid.width; ++column) {
       const double x = grid.x0_mm + column * grid.spacing_mm;
       const double y = grid.y0_mm + row * grid.spacing_mm;
-      const double thickness = std::max(kThinnest, 1 + layer.taper_x * x + layer.taper_y * y);
+      const double thickness = std::max(kThinnest, 1 + gel.taper_x * x + gel.taper_y * y);
       shares.push_back(static_cast<std::uint16_t>(std::lround(kShareOne / thickness)));
     }
   }
@@ -147,7 +147,7 @@ void Optics::Blur::run(std::span<const std::int16_t> in, std::span<std::int16_t>
   }
 }
 
-Optics::Optics(const OpticsModel& optics, const Grid& grid, const LayerModel& layer)
+Optics::Optics(const OpticsModel& optics, const Grid& grid, const GelModel& gel)
     : width_(static_cast<std::size_t>(grid.width)),
       height_(static_cast<std::size_t>(grid.height)),
       factor_(coarse_factor(optics, grid)),
@@ -158,7 +158,7 @@ Optics::Optics(const OpticsModel& optics, const Grid& grid, const LayerModel& la
                       ? static_cast<std::int32_t>(
                             std::lround(optics.far_weight / (1 - optics.narrow_weight) * kOne))
                       : 0),
-      shares_(thickness_shares(layer, grid)),
+      shares_(thickness_shares(gel, grid)),
       sharp_(grid.size()),
       one_(optics.growth > 0 ? grid.size() : 0),
       coarse_(coarse_width_ * coarse_height_),
@@ -175,8 +175,8 @@ Optics::Optics(const OpticsModel& optics, const Grid& grid, const LayerModel& la
                       coarse(optics.wide_mm), coarse(optics.far_mm)});
     for (int i = 0; i < 1 << 16; ++i) {
       const double d_mm = static_cast<double>(i - kOne) / Truth::kPerMm;
-      const double share = response(optics, d_mm, layer.thickness_mm);
-      const double of_part = parts > 1 ? share_of(part, 1 - d_mm / layer.thickness_mm) : 1;
+      const double share = response(optics, d_mm, gel.thickness_mm);
+      const double of_part = parts > 1 ? share_of(part, 1 - d_mm / gel.thickness_mm) : 1;
       // No more than everything can be lost, nor the light more than double.
       parts_.back().responses[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(
           std::lround(of_part * std::clamp(share, -0.9999, 0.9999) * kOne));

@@ -23,11 +23,11 @@ namespace dtact::hal::sim {
 /// widths.
 class Optics {
  public:
-  /// Of `layer` the taper counts and, with knots or growth, the thickness; left out: it is even.
-  Optics(const OpticsModel& optics, const Grid& grid, const LayerModel& layer = {});
+  /// Of `gel` the taper counts and, with knots or growth, the thickness; left out: it is even.
+  Optics(const OpticsModel& optics, const Grid& grid, const GelModel& gel = {});
 
   /// `indentation` in 1/Truth::kPerMm, `loss` as Q15 share of the local light; both grid sized.
-  /// Outside the grid the layer is as at its border.
+  /// Outside the grid the gel is as at its border.
   void run(std::span<const std::int16_t> indentation, std::span<std::int16_t> loss) noexcept;
 
  private:

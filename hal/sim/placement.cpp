@@ -182,11 +182,11 @@ std::optional<PressKey> key_at(const Press& press, double time_s) {
 }
 
 Pose pose_of(const SurfaceModel& surface, const Object& object, const PressKey& key) {
-  const SurfacePoint touched = point_at(surface, {key.x_mm, key.y_mm});
+  const SurfacePoint contact_point = point_at(surface, {key.x_mm, key.y_mm});
   const Quaternion turn = turn_of(key);
   const double lowest = upright(key) ? 0 : lowest_mm(object, matrix_of(turn));
-  const cv::Vec3d origin = touched.at + (-key.depth_mm - lowest) * touched.normal;
-  const auto& lean = touched.turn_deg;
+  const cv::Vec3d origin = contact_point.at + (-key.depth_mm - lowest) * contact_point.normal;
+  const auto& lean = contact_point.turn_deg;
   return {origin[0], origin[1], origin[2],
           vector_of(quaternion_of({lean[0], lean[1], lean[2]}) * turn)};
 }

@@ -10,9 +10,9 @@
 namespace dtact::hal::sim {
 
 /// Where a rigid object is: its point p, in its own frame (Object), lies at turn · p + (x, y, z) in
-/// the sensor's frame, whose origin is the image's centre on the untouched surface, x to the right,
-/// y down, z away from the camera; right-handed, the wire's surface frame. An upright object whose
-/// lowest point is its origin, pressed d deep, has z = −d.
+/// the sensor's frame, whose origin is the image's centre on the undeformed surface, x to the
+/// right, y down, z away from the camera; right-handed, the wire's surface frame. An upright object
+/// whose lowest point is its origin, pressed d deep, has z = −d.
 struct Pose {
   double x_mm = 0;
   double y_mm = 0;
@@ -34,8 +34,8 @@ struct Pose {
 /// its surface: within 0.01 mm, and what the pose says holds exactly.
 [[nodiscard]] Pose pose_of(const SurfaceModel& surface, const Object& object, const PressKey& key);
 
-/// Raises `target` (grid sized, mm below the untouched surface) to what `object` at `key` asks of
-/// the layer: the greatest depth that it reaches on the surface's normal through each point. Unless
+/// Raises `target` (grid sized, mm below the undeformed surface) to what `object` at `key` asks of
+/// the gel: the greatest depth that it reaches on the surface's normal through each point. Unless
 /// it stands upright on a plane, the normal is followed up to `highest_mm` above the untouched
 /// surface in steps of a quarter of the grid's spacing, and the crossing found by bisection.
 void lower_object(const SurfaceModel& surface, const Object& object, const PressKey& key,

@@ -129,7 +129,7 @@ int main(int argc, char** argv) {
     app.add_option("--scene", arguments.scene, "scene file; left out: the built-in scene")
         ->check(CLI::ExistingFile);
     app.add_option("--calibration", arguments.calibration,
-                   "folder of a calibration made by a model: render that sensor's layer and light")
+                   "folder of a calibration made by a model: render that sensor's gel and light")
         ->check(CLI::ExistingDirectory);
     app.add_option("--frames", arguments.frames, "frame, or first:end without the end");
     app.add_option("--seed", arguments.seed, "noise seed");

@@ -20,7 +20,7 @@ Renderer::Renderer(const Scene& scene, std::uint64_t seed)
 
 Renderer::Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::uint64_t seed)
     : truth_(std::move(truth)),
-      optics_(scene.optics, truth_->grid(), scene.layer),
+      optics_(scene.optics, truth_->grid(), scene.gel),
       field_(scene),
       noise_(seed, scene.camera.read_noise, scene.camera.shot_noise),
       indentation_(truth_->grid().size()),

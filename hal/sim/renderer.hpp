@@ -21,7 +21,7 @@ class Renderer {
  public:
   /// Solves the scene's contacts. Throws std::runtime_error as Truth does.
   Renderer(const Scene& scene, std::uint64_t seed);
-  /// The same presses under the camera, optics and light of `scene`, whose camera mode and layer
+  /// The same presses under the camera, optics and light of `scene`, whose camera mode and gel
   /// must be the truth's: contact is solved once for many lights.
   Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::uint64_t seed);
 

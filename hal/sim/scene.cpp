@@ -18,13 +18,13 @@ namespace {
 
 using tomlfile::KeyReader;
 
-// A rigid object deeper than this would have to squeeze the layer to nothing, where a linear law
+// A rigid object deeper than this would have to squeeze the gel to nothing, where a linear law
 // no longer holds.
-constexpr double kDeepest = 0.9;  // of the layer's thickness
+constexpr double kDeepest = 0.9;  // of the gel's thickness
 
 // About either axis. The lowest point of an object that is tilted farther may lie on its upper
 // side.
-constexpr double kMostTilt = 60;  // degrees
+constexpr double kMaxTilt = 60;  // degrees
 
 const std::vector<std::string> kObjects = {
     "ball",        "ball_array", "disc",       "cube",        "cylinder",
@@ -100,8 +100,8 @@ Press read_press(KeyReader& table, const std::filesystem::path& folder, double t
     entry.number_if("y", key.y_mm, -100, 100);
     entry.number_if("depth", key.depth_mm, -10, kDeepest * thickness_mm);
     entry.number_if("rotation", key.rotation_deg, -3600, 3600);
-    entry.number_if("tilt_x", key.tilt_x_deg, -kMostTilt, kMostTilt);
-    entry.number_if("tilt_y", key.tilt_y_deg, -kMostTilt, kMostTilt);
+    entry.number_if("tilt_x", key.tilt_x_deg, -kMaxTilt, kMaxTilt);
+    entry.number_if("tilt_y", key.tilt_y_deg, -kMaxTilt, kMaxTilt);
     entry.number_if("drag_x", key.drag_x_mm, -thickness_mm, thickness_mm);
     entry.number_if("drag_y", key.drag_y_mm, -thickness_mm, thickness_mm);
     entry.finish();
@@ -227,20 +227,20 @@ void read_scene(std::string_view toml_text, const std::string& name,
   if (!calibration.empty()) take_from_calibration(folder / calibration, scene);
   read_camera(root.table_if("camera"), scene.camera);
 
-  KeyReader layer = root.table_if("layer");
-  layer.number_if("thickness_mm", scene.layer.thickness_mm, 0.5, 5);
-  layer.number_if("youngs_modulus_mpa", scene.layer.youngs_modulus_mpa, 0.001, 10);
-  layer.number_if("poisson", scene.layer.poisson, 0.4, 0.5);
-  layer.number_if("grid_mm", scene.layer.grid_mm, 0.05, 0.5);
-  layer.number_if("solve_step_mm", scene.layer.solve_step_mm, 0.02, 5);
-  layer.number_if("taper_x", scene.layer.taper_x, -0.02, 0.02);
-  layer.number_if("taper_y", scene.layer.taper_y, -0.02, 0.02);
-  layer.number_if("texture", scene.layer.texture, 0, 0.02);
-  layer.number_if("texture_mm", scene.layer.texture_mm, 0.05, 5);
-  layer.finish();
+  KeyReader gel = root.table_if("gel");
+  gel.number_if("thickness_mm", scene.gel.thickness_mm, 0.5, 5);
+  gel.number_if("youngs_modulus_mpa", scene.gel.youngs_modulus_mpa, 0.001, 10);
+  gel.number_if("poisson", scene.gel.poisson, 0.4, 0.5);
+  gel.number_if("grid_mm", scene.gel.grid_mm, 0.05, 0.5);
+  gel.number_if("solve_step_mm", scene.gel.solve_step_mm, 0.02, 5);
+  gel.number_if("taper_x", scene.gel.taper_x, -0.02, 0.02);
+  gel.number_if("taper_y", scene.gel.taper_y, -0.02, 0.02);
+  gel.number_if("texture", scene.gel.texture, 0, 0.02);
+  gel.number_if("texture_mm", scene.gel.texture_mm, 0.05, 5);
+  gel.finish();
 
   read_surface(root.table_if("surface"), scene.surface);
-  read_optics(root.table_if("optics"), scene.optics, scene.layer.thickness_mm);
+  read_optics(root.table_if("optics"), scene.optics, scene.gel.thickness_mm);
   read_light(root.table_if("light"), scene.light);
 
   KeyReader loop = root.table_if("loop");
@@ -252,7 +252,7 @@ void read_scene(std::string_view toml_text, const std::string& name,
   loop.finish();
 
   for (KeyReader& press : root.tables("press")) {
-    scene.presses.push_back(read_press(press, folder, scene.layer.thickness_mm));
+    scene.presses.push_back(read_press(press, folder, scene.gel.thickness_mm));
   }
   for (KeyReader& fault : root.tables("fault")) scene.faults.push_back(read_fault(fault));
   root.finish();

@@ -16,7 +16,7 @@ struct CameraModel {
   int width = 0;   ///< Pixels.
   int height = 0;  ///< Pixels.
   double fps = 0;
-  double mm_per_px = 0;  ///< On the layer, at the image's centre.
+  double mm_per_px = 0;  ///< On the gel, at the image's centre.
   double barrel = 0;
   double exposure = 0;
   double gamma = 0;
@@ -25,7 +25,7 @@ struct CameraModel {
   int light_delay_frames = 0;
 };
 
-struct LayerModel {
+struct GelModel {
   double thickness_mm = 0;
   double youngs_modulus_mpa = 0;
   double poisson = 0.5;
@@ -106,7 +106,7 @@ struct Fault {
 struct Scene {
   std::string sensor;  ///< Names the simulated sensor: its camera's identity.
   CameraModel camera;
-  LayerModel layer;
+  GelModel gel;
   SurfaceModel surface;
   OpticsModel optics;
   LightModel light;
@@ -124,7 +124,7 @@ struct Scene {
 /// The built-in scene, config/scenes/default.toml as it was when the library was built.
 [[nodiscard]] Scene default_scene();
 
-/// A scene file. What its tables leave out of camera, layer, optics and light is as in the built-in
+/// A scene file. What its tables leave out of camera, gel, optics and light is as in the built-in
 /// scene; presses, faults and the loop are its own. Throws std::runtime_error naming file, line,
 /// key and what is allowed.
 [[nodiscard]] Scene load_scene(const std::filesystem::path& file);

@@ -178,11 +178,11 @@ CameraReport SimCamera::report() const {
   CameraReport report;
   report.state = impl_->device.state();
   if (report.state == CameraState::unplugged) {
-    report.remedy =
+    report.fix =
         "the scene has unplugged the simulated camera: it comes back when the scripted fault "
         "ends, or take the [[fault]] out of the scene";
   } else if (report.state == CameraState::stalled) {
-    report.remedy =
+    report.fix =
         "the scene has stalled the simulated camera: it goes on when the scripted fault ends, or "
         "take the [[fault]] out of the scene";
   }

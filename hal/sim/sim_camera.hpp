@@ -20,7 +20,7 @@ namespace dtact::hal::sim {
 class SimCamera final : public Camera, private FrameOwner {
  public:
   /// Loads and solves the scene (seconds for many presses). Throws std::runtime_error naming file,
-  /// line, key and remedy.
+  /// line, key and fix.
   SimCamera(const CameraConfig& config, std::shared_ptr<LightLink> link,
             base::Clock& clock = base::system_clock());
   ~SimCamera() override;

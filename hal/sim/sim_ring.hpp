@@ -8,7 +8,7 @@
 
 namespace dtact::hal::sim {
 
-/// What the simulated ring and the simulated camera share: the light on the layer. Any thread may
+/// What the simulated ring and the simulated camera share: the light on the gel. Any thread may
 /// call either function; both hold the lock for one copy only. Until somebody shows something, all
 /// LEDs are white at full brightness.
 class LightLink {

@@ -8,16 +8,16 @@ namespace dtact::hal::sim {
 
 enum class SurfaceShape : std::uint8_t { plane, sphere, cylinder };
 
-/// The untouched surface. Of a curved one the apex, where the camera's axis meets it, is the origin
-/// of the sensor's frame (Pose), and it falls away from there towards the camera; a cylinder's axis
-/// lies along x.
+/// The undeformed surface. Of a curved one the apex, where the camera's axis meets it, is the
+/// origin of the sensor's frame (Pose), and it falls away from there towards the camera; a
+/// cylinder's axis lies along x.
 struct SurfaceModel {
   SurfaceShape shape = SurfaceShape::plane;
   double radius_mm = 0;
   double camera_mm = 0;  ///< How far behind the apex the camera's rays start, at most the radius.
 };
 
-/// A place on the layer, mm from the image's centre: x to the right and y down on a plane. On a
+/// A place on the gel, mm from the image's centre: x to the right and y down on a plane. On a
 /// curved surface it is unrolled: along a cylinder's axis and the arc across it; on a sphere the
 /// arc from the apex, in the direction in which it leaves it.
 struct Place {
@@ -25,7 +25,8 @@ struct Place {
   double y_mm = 0;
 };
 
-/// A point of the untouched surface in the sensor's frame. Pressed d deep it lies at at − d normal.
+/// A point of the undeformed surface in the sensor's frame. Pressed d deep it lies at at − d
+/// normal.
 struct SurfacePoint {
   cv::Vec3d at;      ///< mm
   cv::Vec3d normal;  ///< Outward, length 1.

@@ -10,7 +10,7 @@
 #include <set>
 #include <vector>
 
-#include "hal/sim/layer.hpp"
+#include "hal/sim/elastic_layer.hpp"
 
 namespace dtact::hal::sim {
 namespace {
@@ -52,13 +52,13 @@ double sample(const cv::Mat1d& map, double column, double row) {
 /// The indentation after an object that sticks to the gel has dragged it along by (x_mm, y_mm).
 /// Where they touch the map follows the object. Around it the gel is sheared and comes after: there
 /// the map is that of the object where it was, drawn towards where it is. The shear fades out over
-/// about the gel's thickness. `touching`: > 0 where they touch. All are grid sized.
-cv::Mat1d dragged(const cv::Mat1d& indentation_mm, const cv::Mat1d& touching, double x_mm,
+/// about the gel's thickness. `in_contact`: > 0 where they touch. All are grid sized.
+cv::Mat1d dragged(const cv::Mat1d& indentation_mm, const cv::Mat1d& in_contact, double x_mm,
                   double y_mm, double thickness_mm, const Grid& grid) {
   cv::Mat1d held(grid.height, grid.width);
   for (int row = 0; row < grid.height; ++row) {
     for (int column = 0; column < grid.width; ++column) {
-      held(row, column) = touching(row, column) > 0 ? 1 : 0;
+      held(row, column) = in_contact(row, column) > 0 ? 1 : 0;
     }
   }
   const double sigma = thickness_mm / 2 / grid.spacing_mm;
@@ -96,7 +96,7 @@ double movement(const Press& press, double t0, double t1) {
                    std::abs(b->depth_mm - a->depth_mm), turn * press.object.reach_mm});
 }
 
-// Times at which the layer is solved.
+// Times at which the gel is solved.
 std::vector<double> solve_times(const Scene& scene) {
   std::set<double> keys = {0};
   for (const Press& press : scene.presses) {
@@ -113,7 +113,7 @@ std::vector<double> solve_times(const Scene& scene) {
       farthest = std::max(farthest, movement(press, t0, t1));
     }
     // A little less than one step more is one step: 1.2 / 0.3 is not exactly 4.
-    const int steps = static_cast<int>(std::ceil(farthest / scene.layer.solve_step_mm - 1e-6));
+    const int steps = static_cast<int>(std::ceil(farthest / scene.gel.solve_step_mm - 1e-6));
     for (int i = 1; i < steps; ++i) times.push_back(t0 + (t1 - t0) * i / steps);
   }
   return times;
@@ -127,8 +127,8 @@ Truth::Truth(const Scene& scene)
 }
 
 void Truth::solve_all() {
-  const Layer layer(grid_.width, grid_.height, grid_.spacing_mm, scene_.layer.thickness_mm,
-                    scene_.layer.poisson);
+  const ElasticLayer gel(grid_.width, grid_.height, grid_.spacing_mm, scene_.gel.thickness_mm,
+                         scene_.gel.poisson);
   maps_.push_back(
       {std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size()), 0});
 
@@ -152,16 +152,16 @@ void Truth::solve_all() {
                        std::lround(at->drag_y_mm * 1e6)});
       drag_x_mm += at->drag_x_mm;
       drag_y_mm += at->drag_y_mm;
-      lower_object(scene_.surface, scene_.presses[i].object, *at, scene_.layer.thickness_mm, grid_,
+      lower_object(scene_.surface, scene_.presses[i].object, *at, scene_.gel.thickness_mm, grid_,
                    target);
     }
     auto found = solved.find(state);
     if (found == solved.end()) {
-      Pressed pressed = layer.solve(target, guess);
+      Pressed pressed = gel.solve(target, guess);
       guess = pressed.pressure;
       if (drag_x_mm != 0 || drag_y_mm != 0) {
         pressed.indentation_mm = dragged(pressed.indentation_mm, pressed.pressure, drag_x_mm,
-                                         drag_y_mm, scene_.layer.thickness_mm, grid_);
+                                         drag_y_mm, scene_.gel.thickness_mm, grid_);
       }
       Map map{std::vector<std::int16_t>(grid_.size()), std::vector<std::int16_t>(grid_.size()), 0};
       for (std::size_t i = 0; i < grid_.size(); ++i) {
@@ -169,7 +169,7 @@ void Truth::solve_all() {
             std::lround(pressed.indentation_mm.ptr<double>()[i] * kPerMm));
         map.contact[i] = pressed.pressure.ptr<double>()[i] > 0 ? 256 : 0;
       }
-      map.force_n = cv::sum(pressed.pressure)[0] * scene_.layer.youngs_modulus_mpa *
+      map.force_n = cv::sum(pressed.pressure)[0] * scene_.gel.youngs_modulus_mpa *
                     grid_.spacing_mm * grid_.spacing_mm;  // 1 MPa = 1 N/mm²
       found = solved.emplace(state, static_cast<int>(maps_.size())).first;
       maps_.push_back(std::move(map));

@@ -11,14 +11,14 @@
 
 namespace dtact::hal::sim {
 
-/// What is true of every frame, a pure function of scene and sequence: the layer's indentation, the
+/// What is true of every frame, a pure function of scene and sequence: the gel's indentation, the
 /// objects' poses and the force. Contact is solved once at construction, at the presses' keys and
 /// as often between them as solve_step_mm asks; in between, maps are blended linearly in time,
 /// while poses are exact: where a map is judged against a pose, solve_step_mm has to be small.
 /// Immutable afterwards: any thread may ask.
 ///
 /// Of a curved surface the geometry is exact: rays, normals, and how deep an object reaches along
-/// them. The layer's answer is that of a flat one on the unrolled surface, which is longer along a
+/// them. The gel's answer is that of a flat one on the unrolled surface, which is longer along a
 /// sphere's parallels by the arc over its sine (4 % at half a radius from the apex); so are light
 /// and scattering.
 class Truth {
@@ -40,13 +40,13 @@ class Truth {
   /// Where the object of a press (its number in the scene, from 0) is, touching or not; nothing
   /// before its first key.
   [[nodiscard]] std::optional<Pose> pose(std::size_t press, std::uint64_t sequence) const;
-  /// The point of the untouched surface that a pixel shows.
+  /// The point of the undeformed surface that a pixel shows.
   [[nodiscard]] SurfacePoint surface_at(double column, double row) const;
   /// Newtons that all objects together press with along the surface's normal, ≥ 0: the pressure
-  /// integrated, and so, the layer being linear, that of the blended map exactly.
+  /// integrated, and so, the gel being linear, that of the blended map exactly.
   [[nodiscard]] double force_n(std::uint64_t sequence) const noexcept;
 
-  /// The state of the layer at one frame: `from` + (`to` − `from`)·weight/2^15.
+  /// The state of the gel at one frame: `from` + (`to` − `from`)·weight/2^15.
   struct Moment {
     int from = 0;
     int to = 0;

@@ -17,7 +17,7 @@ struct Attached {
   std::string card;     ///< The camera's own name.
   std::string driver;
   bool usb = false;
-  std::string problem;    ///< Why the node could not be opened, with the remedy; else empty.
+  std::string problem;    ///< Why the node could not be opened, with the fix; else empty.
   std::string not_taken;  ///< Why it is not the camera that no name means; else empty.
 
   /// The name to configure: by-path, or what else there is.

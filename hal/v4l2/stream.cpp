@@ -20,7 +20,7 @@ namespace dtact::hal::v4l2 {
 namespace {
 
 using live::DequeueStatus;
-using live::Filled;
+using live::FilledBuffer;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 constexpr std::uint32_t kType = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -72,7 +72,7 @@ TimestampMeaning Stream::meaning_of(std::uint32_t flags) const noexcept {
 
 /// A buffer's time, if its clock is ours and the moment is plausible: uvcvideo's conversion of
 /// camera clocks has been seen to give times in the future.
-void Stream::set_time(const v4l2_buffer& buffer, Filled& out) const noexcept {
+void Stream::set_time(const v4l2_buffer& buffer, FilledBuffer& out) const noexcept {
   const std::int64_t now = base::system_clock().monotonic_ns();
   out.timestamp_ns = now;
   out.meaning = TimestampMeaning::arrival;
@@ -214,7 +214,7 @@ void Stream::wait(std::int64_t deadline_ns) noexcept {
   (void)::ppoll(&events, 1, &timeout, nullptr);
 }
 
-DequeueStatus Stream::dequeue(Filled& out) noexcept {
+DequeueStatus Stream::dequeue(FilledBuffer& out) noexcept {
   v4l2_buffer buffer = buffer_request();
   const int error = call(fd_.get(), VIDIOC_DQBUF, buffer);
   if (error == EAGAIN) return DequeueStatus::none;

@@ -37,7 +37,7 @@ class Stream final : public live::Source {
 
   [[nodiscard]] live::Format format() const noexcept override { return format_; }
   void wait(std::int64_t deadline_ns) noexcept override;
-  [[nodiscard]] live::DequeueStatus dequeue(live::Filled& out) noexcept override;
+  [[nodiscard]] live::DequeueStatus dequeue(live::FilledBuffer& out) noexcept override;
   [[nodiscard]] int queued() const noexcept override { return queued_; }
   [[nodiscard]] bool enqueue(int index) noexcept override;
   void stop() noexcept override;
@@ -49,7 +49,7 @@ class Stream final : public live::Source {
   void map_buffers();
   /// What a buffer's time is, as its flags say and as this driver keeps to it.
   [[nodiscard]] TimestampMeaning meaning_of(std::uint32_t flags) const noexcept;
-  void set_time(const v4l2_buffer& buffer, live::Filled& out) const noexcept;
+  void set_time(const v4l2_buffer& buffer, live::FilledBuffer& out) const noexcept;
 
   base::UniqueFd fd_;
   std::string node_;

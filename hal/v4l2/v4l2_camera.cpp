@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "hal/live/search_pace.hpp"
+#include "hal/live/search_throttle.hpp"
 #include "hal/v4l2/finder.hpp"
 #include "hal/v4l2/modes.hpp"
 #include "hal/v4l2/photometry.hpp"

@@ -33,9 +33,9 @@ double current_ma(const std::array<Rgb, kLedCount>& leds) {
   return kRingIdle + kPerStep * steps;
 }
 
-Dimmed dim(const Light& light, const DimmingSettings& settings) {
+DimmedLight dim(const Light& light, const DimmingSettings& settings) {
   check(settings);
-  Dimmed out;
+  DimmedLight out;
   const double factor = std::pow(light.brightness / 255.0, settings.gamma);
   const auto shade = [&](std::uint8_t channel) {
     if (channel == 0 || light.brightness == 0) return std::uint8_t{0};

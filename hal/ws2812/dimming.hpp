@@ -21,7 +21,7 @@ struct DimmingSettings {
 };
 
 /// What goes to the wire.
-struct Dimmed {
+struct DimmedLight {
   std::array<Rgb, kLedCount> leds{};
   double milliamps = 0;  ///< Computed draw of `leds`.
   double scale = 1;      ///< What the budget left of the light; 1 = all of it.
@@ -34,6 +34,6 @@ struct Dimmed {
 /// scaled by one factor, so that colours keep their hue, and rounded down, so that the budget
 /// holds. A channel that is on stays on (at least 1) unless the budget forbids. Throws
 /// std::invalid_argument for a gamma outside 0.2 … 5 or a budget below the sleeping ring's draw.
-[[nodiscard]] Dimmed dim(const Light& light, const DimmingSettings& settings);
+[[nodiscard]] DimmedLight dim(const Light& light, const DimmingSettings& settings);
 
 }  // namespace dtact::hal::ws2812

@@ -76,7 +76,7 @@ std::string why_refused(const SpiFormat& format) {
   };
   check("a 0's high pulse", p.zero_high, kZeroHighMinNs, kZeroHighMaxNs);
   check("a 1's high pulse", p.one_high, kOneHighMinNs, kOneHighMaxNs);
-  check("the low after a 1", p.least_low, kLowMinNs, kLatchNs);
+  check("the low after a 1", p.min_low, kLowMinNs, kLatchNs);
   if (outside.empty()) return {};
 
   const RateWindow window = window_of(format.bits);

@@ -18,7 +18,7 @@ namespace dtact::hal::ws2812 {
 //   low  T0L, T1L    from 220        from 300            from 220
 //   latch  RES       over 280 000    over 50 000         300 000
 //
-// The accepted window is what both generations tell apart: between 400 and 600 one chip may read a
+// The accepted window is what both generations distinguish: between 400 and 600 one chip may read a
 // 0 where another reads a 1, and a low shorter than 220 no chip promises to see.
 inline constexpr double kZeroHighMinNs = 200;
 inline constexpr double kZeroHighMaxNs = 400;
@@ -49,7 +49,7 @@ struct SpiFormat {
 struct Pulses {
   double zero_high = 0;
   double one_high = 0;
-  double least_low = 0;
+  double min_low = 0;
 };
 /// Throws std::invalid_argument when `bits` is not 3, 4 or 8.
 [[nodiscard]] Pulses pulses_of(const SpiFormat& format);

@@ -80,18 +80,18 @@ int PioWire::write(std::span<const std::uint8_t> bytes) noexcept {
 }
 
 std::string PioWire::failed(int error) const {
-  const char* remedy = "see the kernel's log (dmesg) for the driver's own words";
+  const char* fix = "see the kernel's log (dmesg) for the driver's own words";
   if (error == EACCES || error == EPERM) {
-    remedy =
+    fix =
         "put the user into the group that owns it (sudo usermod -aG gpio <user>) and install "
         "config/udev/60-dtactd.rules";
   } else if (is_gone(error)) {
-    remedy =
+    fix =
         "on a Raspberry Pi 5 put dtoverlay=ws2812-pio,gpio=<the data line's GPIO>,num_leds=8 into "
         "/boot/firmware/config.txt and reboot (dmesg says why when it is there already); other "
         "boards have no such driver: ring.backend = \"ws2812_spi\"";
   }
-  return fmt::format("{}: write failed: {}: {}", device_, std::strerror(error), remedy);
+  return fmt::format("{}: write failed: {}: {}", device_, std::strerror(error), fix);
 }
 
 }  // namespace dtact::hal::ws2812

@@ -32,7 +32,7 @@ Ring::~Ring() {
 }
 
 ShowResult Ring::show(const Light& light) {
-  const Dimmed dimmed = dim(light, dimming_);
+  const DimmedLight dimmed = dim(light, dimming_);
   wanted_ = in_chain_order(dimmed.leds);
   if (!wire_ && std::chrono::steady_clock::now() >= next_look_) look_for_ring();
   const std::string error = wire_ ? write(wanted_) : report_.message;

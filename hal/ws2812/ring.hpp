@@ -16,7 +16,7 @@
 namespace dtact::hal::ws2812 {
 
 /// How a ring is got at. Both functions throw std::runtime_error with a sentence that names device
-/// and remedy, and are called again when the ring is away.
+/// and fix, and are called again when the ring is away.
 struct RingParts {
   RingInfo info;
   std::function<std::unique_ptr<Wire>()> open_wire;

@@ -27,7 +27,7 @@ std::size_t read_bufsiz() {
 
 }  // namespace
 
-std::string spi_remedy(int error) {
+std::string spi_fix(int error) {
   switch (error) {
     case EACCES:
     case EPERM:
@@ -56,7 +56,7 @@ Spidev::Spidev(const std::string& device, std::uint32_t hz)
       fd_(::open(device.c_str(), O_RDWR | O_CLOEXEC)) {
   const auto fail = [&](int error, const char* what) {
     throw std::runtime_error(
-        fmt::format("{}: {}: {}: {}", device_, what, std::strerror(error), spi_remedy(error)));
+        fmt::format("{}: {}: {}: {}", device_, what, std::strerror(error), spi_fix(error)));
   };
   if (!fd_) fail(errno, "cannot be opened");
   std::uint8_t mode = SPI_MODE_0;
@@ -81,16 +81,16 @@ namespace {
 constexpr std::size_t kLongestProbe = 16384;
 constexpr std::size_t kProbes = 8;
 // Above this a deviation is worth a note although the pulses still fit.
-constexpr double kNoteworthy = 0.03;
+constexpr double kReportedDeviation = 0.03;
 
 // Transfers that are off in a row before the clock is suspected.
-constexpr int kInARow = 3;
+constexpr int kConsecutive = 3;
 
 // What makes the clock run off on a Raspberry Pi: the SPI clock is divided from the core clock
 // (spi-bcm2835.c), which the firmware scales with load, and the divider is set for one of its
 // values. A Pi 4 ignores core_freq=250 and falls to 200 at idle unless core_freq_min holds it
 // (README of jgarff/rpi_ws281x; rpi-ws281x/rpi-ws281x-python#35).
-constexpr const char* kCure =
+constexpr const char* kFix =
     "on a Raspberry Pi hold the core clock still in /boot/firmware/config.txt and reboot (Pi 4: "
     "core_freq=500 and core_freq_min=500, Pi 3: core_freq=250, or on either force_turbo=1); "
     "elsewhere ring.ws2812.spi_bits = 8 with spi_hz = 8000000 stands the most, a clock that falls "
@@ -128,7 +128,7 @@ std::string why_rate_refused(const SpiFormat& asked, double measured_hz) {
   return fmt::format(
       "asked for {:.3f} MHz, the controller really sends {:.3f} MHz; {}. Cure: {}; where the "
       "controller merely pauses between bytes, set ring.ws2812.spi_check_rate = false",
-      asked.hz / 1e6, measured_hz / 1e6, outside, kCure);
+      asked.hz / 1e6, measured_hz / 1e6, outside, kFix);
 }
 
 SpiWire::SpiWire(std::unique_ptr<SpiPort> port, const SpiFormat& format, bool check_rate,
@@ -159,7 +159,7 @@ std::string SpiWire::send(std::span<const Rgb> leds) {
   const std::vector<std::uint8_t> bytes = encode(leds, format_);
   const RateWindow window = window_of(format_.bits);
   const auto bits = static_cast<double>(8 * bytes.size());
-  for (int i = 0; i < kInARow; ++i) {
+  for (int i = 0; i < kConsecutive; ++i) {
     const Timed timed = transfer(bytes);
     if (timed.error != 0) return gave_up(timed.error);
     const double ns = timed.ns - overhead_ns_;
@@ -194,9 +194,9 @@ std::string SpiWire::check_rate() {
   overhead_ns_ = rate.overhead_ns;
   const double off = rate.hz / format_.hz - 1;
   deviation_.clear();
-  if (std::abs(off) > kNoteworthy) {
+  if (std::abs(off) > kReportedDeviation) {
     deviation_ = fmt::format("{}: asked for {:.3f} MHz, measured {:.3f} MHz ({:+.1f} %); {}",
-                             port_->name(), format_.hz / 1e6, rate.hz / 1e6, off * 100, kCure);
+                             port_->name(), format_.hz / 1e6, rate.hz / 1e6, off * 100, kFix);
   }
   return {};
 }
@@ -206,7 +206,7 @@ std::string SpiWire::gave_up(int error) {
   lost_ = error == ESHUTDOWN || error == ENODEV || error == ENXIO;
   if (error == 0) return {};
   return fmt::format("{}: write failed: {}: {}", port_->name(), std::strerror(error),
-                     spi_remedy(error));
+                     spi_fix(error));
 }
 
 }  // namespace dtact::hal::ws2812

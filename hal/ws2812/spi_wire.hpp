@@ -31,7 +31,7 @@ class SpiPort {
 /// /dev/spidevB.C in mode 0, 8 bits a word.
 class Spidev final : public SpiPort {
  public:
-  /// Throws std::runtime_error naming the device and the remedy (absent, no permission, refuses
+  /// Throws std::runtime_error naming the device and the fix (absent, no permission, refuses
   /// mode or speed).
   Spidev(const std::string& device, std::uint32_t hz);
 
@@ -46,8 +46,8 @@ class Spidev final : public SpiPort {
   base::UniqueFd fd_;
 };
 
-/// What an errno of a spidev call means for its user: the remedy as a sentence's end.
-[[nodiscard]] std::string spi_remedy(int error);
+/// What an errno of a spidev call means for its user: the fix as a sentence's end.
+[[nodiscard]] std::string spi_fix(int error);
 
 /// The rate at which a controller really clocks bits out, by timing all-zero transfers (LEDs read
 /// them as a latch). Asking the driver is no use: it returns what was asked for. Two lengths are

@@ -8,7 +8,7 @@
 namespace dtact::hal::ws2812 {
 
 /// What carries colours to the LEDs. After construction used by one thread, the ring's own. Errors
-/// are sentences with the remedy; an empty string is success.
+/// are sentences with the fix; an empty string is success.
 class Wire {
  public:
   Wire() = default;

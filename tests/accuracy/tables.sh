@@ -24,7 +24,7 @@ for part in "$@"; do
       echo "atlas: tests/accuracy/atlas/README.md"
       ;;
     thickness)
-      "$bin/thickness/layer_thickness" --out "$here/thickness" >/dev/null
+      "$bin/thickness/gel_thickness" --out "$here/thickness" >/dev/null
       "$bin/thickness/several_presses" --out "$here/thickness"
       /usr/bin/python3 "$here/thickness/plot.py" "$here/thickness/thickness.csv" "$here/thickness/thickness.svg"
       echo "thickness: tests/accuracy/thickness/thickness.svg"

@@ -11,7 +11,7 @@
 
 #include "daemon/pipeline/depth/contact.hpp"
 #include "daemon/pipeline/depth/uncertainty.hpp"
-#include "daemon/pipeline/untouched/cells.hpp"
+#include "daemon/pipeline/reference/cells.hpp"
 #include "daemon/recon/kernels.hpp"
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
@@ -98,7 +98,7 @@ class DaemonFrame {
     recon::DepthSums sums(rules());
     look(luma, stride);
     reconstructor_.run_active(luma, stride, tiles_, depth_, drawn_, nullptr, &sums);
-    told_ = tell(sums, contact_);
+    reported_ = tell(sums, contact_);
   }
   /// The same without contact and uncertainty.
   void run_bare(const std::uint8_t* luma, std::ptrdiff_t stride) {
@@ -120,7 +120,7 @@ class DaemonFrame {
     if (!difference.empty()) return difference;
     add_up(sums);
     pipeline::ContactDetector contact({});
-    const Told is = told_;
+    const Told is = reported_;
     const Told expected = tell(sums, contact);
     if (is.contact.area_mm2 != expected.contact.area_mm2 ||
         is.contact.x_mm != expected.contact.x_mm || is.contact.y_mm != expected.contact.y_mm ||
@@ -144,13 +144,13 @@ class DaemonFrame {
   [[nodiscard]] recon::SumRules rules() const {
     recon::SumRules rules = contact_.sum_rules();
     rules.bend_reach = pipeline::bend_reach(model_->mm_per_px);
-    rules.bend_from_um = rules.made_um;
+    rules.bend_from_um = rules.threshold_um;
     return rules;
   }
   [[nodiscard]] Told tell(const recon::DepthSums& sums, pipeline::ContactDetector& contact) const {
-    constexpr double kListUm = 20;
+    constexpr double kLutUm = 20;
     return {contact.inspect(sums, grid().width, grid().height, model_->mm_per_px),
-            pipeline::uncertainty_at_um(kListUm, pipeline::bend_um(sums, model_->mm_per_px),
+            pipeline::uncertainty_at_um(kLutUm, pipeline::bend_um(sums, model_->mm_per_px),
                                         model_->rectify.decimation)};
   }
   [[nodiscard]] bool drawn(int x, int y) const {
@@ -182,7 +182,7 @@ class DaemonFrame {
   pipeline::ContactDetector contact_{{}};
   Depth depth_;
   recon::DrawnTiles drawn_;
-  Told told_;
+  Told reported_;
 };
 
 /// Share of the map's pixels that lie in the tiles: the tiles at its right edge are narrower.
@@ -249,7 +249,7 @@ Case opencv(const Inputs& in) {
     OpenCvPipeline pipeline;
     cv::Mat depth;
   };
-  auto state = std::make_shared<State>(OpenCvPipeline(in.lens, in.model->reference_q8, list_mm()),
+  auto state = std::make_shared<State>(OpenCvPipeline(in.lens, in.model->reference_q8, lut_mm_of()),
                                        cv::Mat());
   return {"opencv", [&in, state] { state->depth = state->pipeline.run(in.press); },
           [&in, state] { return compare_roughly(state->depth.ptr<float>(), in.specified); }};
@@ -323,12 +323,12 @@ const Inputs& inputs() {
 
 }  // namespace
 
-std::vector<float> list_mm() {
-  const recon::DepthList& list = inputs().model->list;
+std::vector<float> lut_mm_of() {
+  const recon::DepthLut& lut = inputs().model->lut;
   std::vector<float> mm;
   for (int level = 0; level < 256; ++level) {
-    const int q6 = std::min(level * recon::kEntriesPerLevel, list.covered_to_q6);
-    mm.push_back(static_cast<float>(list.um[static_cast<std::size_t>(q6 - list.first_q6)]) / 1000);
+    const int q6 = std::min(level * recon::kEntriesPerLevel, lut.covered_to_q6);
+    mm.push_back(static_cast<float>(lut.um[static_cast<std::size_t>(q6 - lut.first_q6)]) / 1000);
   }
   return mm;
 }
@@ -348,18 +348,18 @@ Case make_case(const std::string& name) {
 
 void export_inputs(const std::string& folder) {
   const Inputs& in = inputs();
-  Image untouched;
+  Image reference_image;
   for (const std::uint16_t q8 : in.model->reference_q8) {
-    untouched.push_back(static_cast<std::uint8_t>((q8 + 128) / 256));
+    reference_image.push_back(static_cast<std::uint8_t>((q8 + 128) / 256));
   }
   Image frame = in.press;
   frame.resize(std::size_t{kFrameWidth} * kFrameHeight);
   write(folder + "/frame.raw", frame);
-  write(folder + "/reference.raw", untouched);
+  write(folder + "/reference.raw", reference_image);
   write(folder + "/frame.jpg", in.jpeg);
   write(folder + "/map_x.f32", in.lens.x);
   write(folder + "/map_y.f32", in.lens.y);
-  write(folder + "/list.f32", list_mm());
+  write(folder + "/list.f32", lut_mm_of());
   write(folder + "/depth.i16", in.specified);
 }
 

@@ -27,6 +27,6 @@ struct Case {
 void export_inputs(const std::string& folder);
 
 /// Millimetres of a darkening of 0 … 255 whole grey levels: the model's list, for others.
-[[nodiscard]] std::vector<float> list_mm();
+[[nodiscard]] std::vector<float> lut_mm_of();
 
 }  // namespace dtact::bench

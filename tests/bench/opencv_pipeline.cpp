@@ -6,7 +6,7 @@
 namespace dtact::bench {
 
 OpenCvPipeline::OpenCvPipeline(const LensMap& lens, const std::vector<std::uint16_t>& reference_q8,
-                               std::span<const float> list_mm)
+                               std::span<const float> lut_mm_of)
     : list_(1, 256, CV_32F) {
   cv::setNumThreads(1);
   cv::Mat x(kMapSide, kMapSide, CV_32F);
@@ -14,12 +14,12 @@ OpenCvPipeline::OpenCvPipeline(const LensMap& lens, const std::vector<std::uint1
   std::ranges::copy(lens.x, x.begin<float>());
   std::ranges::copy(lens.y, y.begin<float>());
   cv::convertMaps(x, y, map_xy_, map_fraction_, CV_16SC2);
-  std::ranges::copy(list_mm, list_.begin<float>());
-  cv::Mat untouched(kFrameHeight, kFrameWidth, CV_8U);
-  std::ranges::transform(reference_q8, untouched.begin<std::uint8_t>(), [](std::uint16_t q8) {
+  std::ranges::copy(lut_mm_of, list_.begin<float>());
+  cv::Mat reference_image(kFrameHeight, kFrameWidth, CV_8U);
+  std::ranges::transform(reference_q8, reference_image.begin<std::uint8_t>(), [](std::uint16_t q8) {
     return static_cast<std::uint8_t>((q8 + 128) / 256);
   });
-  cv::remap(untouched, reference_, map_xy_, map_fraction_, cv::INTER_LINEAR);
+  cv::remap(reference_image, reference_, map_xy_, map_fraction_, cv::INTER_LINEAR);
 }
 
 const cv::Mat& OpenCvPipeline::run(const Image& frame) {

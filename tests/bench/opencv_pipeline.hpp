@@ -13,9 +13,9 @@ namespace dtact::bench {
 /// filters.
 class OpenCvPipeline {
  public:
-  /// `list_mm`: depth of the darkening 0 … 255 grey levels, millimetres.
+  /// `lut_mm_of`: depth of the darkening 0 … 255 grey levels, millimetres.
   OpenCvPipeline(const LensMap& lens, const std::vector<std::uint16_t>& reference_q8,
-                 std::span<const float> list_mm);
+                 std::span<const float> lut_mm_of);
 
   /// Millimetres, kMapSide². Valid until the next call.
   const cv::Mat& run(const Image& frame);

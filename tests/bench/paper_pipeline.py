@@ -2,7 +2,7 @@
 """The paper's reconstruction in Python with OpenCV, written from its text: rectify the colour
 frame, crop, grey, difference, list, two 7x7 Gaussian filters. What the daemon is compared with. The
 authors' program does more for every frame, which is left out here: it computes the rectification's
-maps anew (cv2.undistort), mirrors the image, smooths the difference before the list as well, and
+maps anew (cv2.undistort), mirrors the image, smooths the difference before the LUT as well, and
 draws.
 
 Depth is in double precision, which is what a numpy array of millimetres is: in the times that the
@@ -27,14 +27,14 @@ TOP, LEFT = (HEIGHT - SIDE) // 2, (WIDTH - SIDE) // 2
 
 class PaperPipeline:
     """`map_x`, `map_y`: where in the frame each pixel of the crop lies, SIDE x SIDE float32;
-    `untouched`: the reference image, HEIGHT x WIDTH x 3 bytes."""
+    `reference_image`: the reference image, HEIGHT x WIDTH x 3 bytes."""
 
-    def __init__(self, map_x, map_y, untouched):
+    def __init__(self, map_x, map_y, reference_image):
         # The published way rectifies the whole frame before it is cropped; outside the crop the
         # map's content does not matter.
         self.maps = [np.ascontiguousarray(np.pad(m, ((TOP, TOP), (LEFT, LEFT)), mode="edge"))
                      for m in (map_x, map_y)]
-        self.reference = self.rectified_grey(untouched)
+        self.reference = self.rectified_grey(reference_image)
 
     def rectified_grey(self, frame):
         rectified = cv2.remap(frame, self.maps[0], self.maps[1], cv2.INTER_LINEAR)
@@ -61,8 +61,8 @@ class Cases(PaperPipeline):
         self.list = self.list32.astype(np.float64)
         self.expected = read("depth.i16", np.int16).reshape(SIDE, SIDE)
         crop = [read(f"map_{axis}.f32", np.float32).reshape(SIDE, SIDE) for axis in "xy"]
-        untouched = read("reference.raw", np.uint8).reshape(HEIGHT, WIDTH)
-        super().__init__(*crop, cv2.cvtColor(untouched, cv2.COLOR_GRAY2BGR))
+        reference_image = read("reference.raw", np.uint8).reshape(HEIGHT, WIDTH)
+        super().__init__(*crop, cv2.cvtColor(reference_image, cv2.COLOR_GRAY2BGR))
 
     def python(self):
         return self.depth(self.frame, self.list)

@@ -189,11 +189,11 @@ def goals(medians, rounds, shares):
         met = value <= most
         lines.append((f"{name}: at most {most:.2f} of the full field", f"{value:.2f} ±{s:.0f} %",
                       met, "" if met else f"short by {100 * (value / most - 1):.0f} %"))
-    told = 100 * (1 - ratio("full-bare", "full")[0])
-    lines.append(("contact and uncertainty: at most 10 % of the full field", f"{told:.1f} %",
-                  told <= 10, "" if told <= 10 else f"short by {told - 10:.1f} % of the full field"))
+    reported = 100 * (1 - ratio("full-bare", "full")[0])
+    lines.append(("contact and uncertainty: at most 10 % of the full field", f"{reported:.1f} %",
+                  reported <= 10, "" if reported <= 10 else f"short by {reported - 10:.1f} % of the full field"))
     idle = 100 * medians["press:0"] / full
-    lines.append(("nothing touching: at most 3 % of the full field", f"{idle:.1f} %", idle <= 3,
+    lines.append(("no contact: at most 3 % of the full field", f"{idle:.1f} %", idle <= 3,
                   "" if idle <= 3 else f"short by {idle - 3:.1f} % of the full field"))
     excess = {c: medians[c] / full - 1.2 * shares[c] - 0.03 for c in shares}
     worst = max(excess, key=excess.get)

@@ -73,13 +73,13 @@ recon::Model make_model() {
   model.rectify = make_lens_table(make_lens_map());
   model.mm_per_px = 24.0 / kMapSide;
   model.smoothing_px = 2;
-  model.list.first_q6 = -40 * 64;
+  model.lut.first_q6 = -40 * 64;
   for (int q6 = -40 * 64; q6 <= 110 * 64; ++q6) {
-    model.list.um.push_back(
+    model.lut.um.push_back(
         static_cast<std::int16_t>(std::lround(q6 < 0 ? q6 * 9 / 64.0 : q6 / 2.0)));
   }
-  model.list.covered_from_q6 = model.list.first_q6;
-  model.list.covered_to_q6 = 110 * 64;
+  model.lut.covered_from_q6 = model.lut.first_q6;
+  model.lut.covered_to_q6 = 110 * 64;
   model.reference_q8 = make_reference_q8();
   return model;
 }

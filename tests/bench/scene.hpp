@@ -6,7 +6,7 @@
 #include "daemon/recon/model.hpp"
 
 /// What the benchmarks compute on: a camera frame of 800×600 with barrel distortion, a depth map of
-/// 580×580, one ball pressed into a layer that bulges around it. Synthetic: a light field, noise of
+/// 580×580, one ball pressed into a gel that bulges around it. Synthetic: a light field, noise of
 /// one grey level and a radial profile shaped like sensor_a's (shared/data), no mechanics.
 namespace dtact::bench {
 
@@ -31,7 +31,7 @@ struct LensMap {
 
 using Image = std::vector<std::uint8_t>;  ///< kFrameWidth × kFrameHeight grey.
 
-/// The untouched image without noise, Q8.
+/// The reference image without noise, Q8.
 [[nodiscard]] std::vector<std::uint16_t> make_reference_q8();
 
 /// A ball's press whose changed area (contact and bulge) has `radius_px` in the frame; 0:

@@ -19,17 +19,17 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kPatience{60};
+constexpr std::chrono::seconds kTimeout{60};
 
 /// "VmRSS:    1234 kB" of /proc/PID/status.
 std::int64_t kib_of(const std::string& line) { return std::stoll(line.substr(line.find(':') + 1)); }
 
-bool wait_for(const std::function<bool()>& condition) {
-  for (const auto end = Clock::now() + kPatience; Clock::now() < end;) {
-    if (condition()) return true;
+bool wait_for(const std::function<bool()>& flag) {
+  for (const auto end = Clock::now() + kTimeout; Clock::now() < end;) {
+    if (flag()) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
-  return condition();
+  return flag();
 }
 
 }  // namespace

@@ -95,7 +95,7 @@ bool depth_flows_at(client::Client& client, double mm_per_px) {
   });
 }
 
-bool is_told(client::Client& client, const std::string& name) {
+bool is_reported(client::Client& client, const std::string& name) {
   return read_until(client, [&name](const Item& item) {
     const auto* event = std::get_if<v1::Event>(&item);
     return event != nullptr && event->calibration().name() == name;
@@ -146,7 +146,7 @@ TEST_F(TwoCalibrations, SwitchAtOnceAndStaySoAfterARestart) {
   ASSERT_TRUE(depth_flows_at(watcher, kOther));
   std::string output;
   ASSERT_EQ(activate("configured", &output), 0) << output;
-  EXPECT_TRUE(is_told(watcher, "calibration"));
+  EXPECT_TRUE(is_reported(watcher, "calibration"));
   EXPECT_TRUE(depth_flows_at(watcher, kConfigured));
   sensor_.restart();
   EXPECT_TRUE(depth_flows_again_at(kConfigured));
@@ -169,7 +169,7 @@ TEST_F(TwoCalibrations, ADamagedOneIsRefusedAndChangesNothing) {
   EXPECT_THAT(list(), AllOf(HasSubstr("* configured"), HasSubstr("cannot be read: ")));
 }
 
-TEST_F(TwoCalibrations, ADaemonWhoseUploadedOneIsDamagedStartsAndCanBeMended) {
+TEST_F(TwoCalibrations, ADaemonWhoseUploadedOneIsDamagedStartsAndCanBeFixed) {
   const auto file = sensor_.folder.path() / "state/calibrations/1/other/calibration.toml";
   base::write_file_atomically(file, "version = 1\n");
   sensor_.restart();

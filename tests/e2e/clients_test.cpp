@@ -22,8 +22,8 @@ base::UniqueFd raw_connection(std::uint16_t port) {
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   EXPECT_EQ(::connect(fd.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-  const timeval patience{20, 0};
-  ::setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  const timeval timeout{20, 0};
+  ::setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
   return fd;
 }
 
@@ -145,7 +145,7 @@ TEST(Clients, MalformedAndOversizedMessagesEndOnlyTheirConnection) {
   EXPECT_EQ(count_frames(client, 30), 30);
 }
 
-TEST(Clients, NewestLightWinsAndEveryClientIsTold) {
+TEST(Clients, NewestLightWinsAndEveryClientIsReported) {
   const Sensor sensor;
   client::Client one = sensor.connect("one");
   client::Client two = sensor.connect("two");

@@ -37,15 +37,15 @@ inline DepthError depth_error(const v1::Frame& frame, const hal::sim::Truth& tru
     for (std::size_t x = 0; x < kCropWidth; ++x) {
       const std::size_t at = (y + kCropRow) * width + x + kCropColumn;
       const float depth = mm[y * kCropWidth + x];
-      const bool touched = contact[at] != 0;
-      if (touched) ++error.inside_pixels;
+      const bool in_contact = contact[at] != 0;
+      if (in_contact) ++error.inside_pixels;
       if (std::isnan(depth)) {
-        if (touched) ++error.untrusted;
+        if (in_contact) ++error.untrusted;
         continue;
       }
       const double difference = std::abs(static_cast<double>(depth) - indentation[at]);
-      (touched ? inside : outside) += difference;
-      if (!touched) ++outside_pixels;
+      (in_contact ? inside : outside) += difference;
+      if (!in_contact) ++outside_pixels;
     }
   }
   error.inside_mm = inside / (error.inside_pixels - error.untrusted);

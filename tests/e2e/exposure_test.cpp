@@ -46,7 +46,7 @@ TEST(Exposure, ThatFollowsThePictureIsNamedThoughTheCameraCallsItLocked) {
   int frames = 0;
   ASSERT_TRUE(read_until(client, [&](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
-    return frame != nullptr && has(frame->health(), v1::HEALTH_EXPOSURE_FOLLOWS) && ++frames == 2;
+    return frame != nullptr && has(frame->health(), v1::HEALTH_EXPOSURE_UNLOCKED) && ++frames == 2;
   }));
   const v1::Status status = client.status();
   EXPECT_TRUE(status.camera().controls(0).locked());

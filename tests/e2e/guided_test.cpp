@@ -105,8 +105,8 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
   client.subscribe();
   const hal::sim::Truth truth(hal::sim::at_mode(hal::sim::default_scene(), 800, 600, kFps));
   std::vector<double> inside;
-  double worst_untouched = 0;
-  int untouched = 0;
+  double worst_no_contact = 0;
+  int no_contact = 0;
   std::uint64_t judged = 0;
   ASSERT_TRUE(read_until(
       client,
@@ -123,10 +123,10 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
         if (error.inside_pixels > 5000) {
           inside.push_back(error.inside_mm);
         } else if (error.inside_pixels == 0) {
-          worst_untouched = std::max(worst_untouched, error.outside_mm);
-          ++untouched;
+          worst_no_contact = std::max(worst_no_contact, error.outside_mm);
+          ++no_contact;
         }
-        return inside.size() >= 10 && untouched >= 5;
+        return inside.size() >= 10 && no_contact >= 5;
       },
       std::chrono::seconds(120)));
   const double worst = *std::max_element(inside.begin(), inside.end());
@@ -135,9 +135,9 @@ TEST(Guided, FromNothingToACalibrationThatMeasuresAnotherBall) {
       "ball of 5 mm, simulated sensor, guided calibration with 6 presses of a 4 mm ball: mean "
       "absolute error inside the true contact %.4f mm (median of %zu frames), worst frame %.4f mm; "
       "untouched %.4f mm at most (%d frames)\n",
-      inside[inside.size() / 2], inside.size(), worst, worst_untouched, untouched);
+      inside[inside.size() / 2], inside.size(), worst, worst_no_contact, no_contact);
   EXPECT_LE(worst, 0.05);
-  EXPECT_LE(worst_untouched, 0.01);
+  EXPECT_LE(worst_no_contact, 0.01);
 }
 
 TEST(Guided, QuitRetakeAndGoOn) {

@@ -57,8 +57,8 @@ base::UniqueFd knock() {
   address.sin_family = AF_INET;
   address.sin_port = htons(Hostile::daemon->port());
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  const timeval patience{60, 0};
-  ::setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  const timeval timeout{60, 0};
+  ::setsockopt(fd.get(), SOL_SOCKET, SO_RCVTIMEO, &timeout, sizeof timeout);
   if (::connect(fd.get(), reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) fd.reset();
   return fd;
 }
@@ -155,7 +155,7 @@ TEST_F(Hostile, ThousandsAtOnce) {
     if (peers.back()) send_all(peers.back(), bytes);
   }
   int served = 0;
-  int told = 0;
+  int reported = 0;
   for (const auto& peer : peers) {
     const auto answer = first_answer(peer);
     if (!answer) continue;
@@ -163,12 +163,13 @@ TEST_F(Hostile, ThousandsAtOnce) {
       ++served;
     } else {
       EXPECT_EQ(answer->error().code(), v1::ERROR_BUSY) << answer->error().message();
-      ++told;
+      ++reported;
     }
   }
   EXPECT_GT(served, 0);
-  EXPECT_EQ(served + told, 4000) << "some were refused without a word";
-  std::printf("of 4000 at once %d were served and %d of the others told why not\n", served, told);
+  EXPECT_EQ(served + reported, 4000) << "some were refused without a word";
+  std::printf("of 4000 at once %d were served and %d of the others told why not\n", served,
+              reported);
   peers.clear();
   daemon->end("4000 connections at once");
 }

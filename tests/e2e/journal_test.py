@@ -81,8 +81,8 @@ def test(daemon, ctl, folder):
 
         # A condition, by its name.
         trouble = journal.until(lambda entry: "DTACT_CONDITION" in entry)
-        expect(trouble, PRIORITY="4", DTACT_CONDITION="camera_trouble", DTACT_SENSOR="left")
-        assert trouble["MESSAGE"].startswith("camera_trouble: The camera gives no usable frames."), trouble
+        expect(trouble, PRIORITY="4", DTACT_CONDITION="camera_fault", DTACT_SENSOR="left")
+        assert trouble["MESSAGE"].startswith("camera_fault: The camera gives no usable frames."), trouble
 
         # A client, by its address.
         subprocess.run([ctl, "--port", port, "status"], check=True, stdout=subprocess.DEVNULL)

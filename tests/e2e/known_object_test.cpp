@@ -141,7 +141,7 @@ TEST(KnownObject, IsFoundAndFollowedByTheProgram) {
 
 TEST(KnownObject, SaysWhatIsWrongWithItsFile) {
   const TempFolder folder;
-  const auto told = [&folder](const std::string& text, const std::string& unit = "mm") {
+  const auto reported = [&folder](const std::string& text, const std::string& unit = "mm") {
     const std::filesystem::path file = folder.path() / "object.stl";
     base::write_file_atomically(file, text);
     std::string output;
@@ -153,9 +153,9 @@ TEST(KnownObject, SaysWhatIsWrongWithItsFile) {
     return output;
   };
   std::string text = stl_of_a_ball(kRadiusMm);
-  EXPECT_THAT(told(text, "m"), testing::HasSubstr("is its unit another one?"));
+  EXPECT_THAT(reported(text, "m"), testing::HasSubstr("is its unit another one?"));
   text.resize(text.size() / 2);
-  EXPECT_THAT(told(text), testing::HasSubstr("line "));
+  EXPECT_THAT(reported(text), testing::HasSubstr("line "));
 }
 
 TEST(KnownObject, IsDoubtedWhenItIsLarge) {

@@ -66,7 +66,7 @@ TEST(Metrics, AreServedWhereConfigured) {
       get_metrics(port),
       AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), HasSubstr("dtactd_state{state=\"serving\"} 1\n"),
             HasSubstr("dtactd_clients 1\n"), HasSubstr("dtactd_reference_age_seconds "),
-            HasSubstr("dtactd_camera_condition{condition=\"streaming\"} 1\n"),
+            HasSubstr("dtactd_camera_state{state=\"streaming\"} 1\n"),
             HasSubstr("dtactd_stage_duration_seconds_bucket{stage=\"encode\",le=\"+Inf\"} "),
             Not(HasSubstr("dtactd_frames_total 0\n"))));
   EXPECT_EQ(sensor.daemon->stop(SIGTERM), 0);

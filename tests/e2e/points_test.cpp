@@ -16,7 +16,7 @@
 namespace dtact::e2e {
 namespace {
 
-TEST(Points, OfTheContactWhileSomethingTouches) {
+TEST(Points, OfTheContactDuringContact) {
   const TempFolder folder;
   const Press press(folder);
   const Sensor sensor(press.file);
@@ -33,7 +33,7 @@ TEST(Points, OfTheContactWhileSomethingTouches) {
         const auto* frame = std::get_if<v1::Frame>(&item);
         if (frame == nullptr) return false;
         EXPECT_FALSE(frame->has_depth());
-        EXPECT_TRUE(frame->contact().touching() || !frame->has_cloud());
+        EXPECT_TRUE(frame->contact().in_contact() || !frame->has_cloud());
         if (!frame->has_cloud()) return false;
         const v1::PointCloud& cloud = frame->cloud();
         EXPECT_EQ(cloud.data().size(), 12 * std::size_t{cloud.width()} * cloud.height());

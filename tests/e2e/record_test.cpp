@@ -61,12 +61,12 @@ class Record : public testing::Test {
   }
   [[nodiscard]] static std::map<std::uint64_t, v1::Frame> frames_of(const mcap::Reader& reader) {
     std::map<std::uint64_t, v1::Frame> frames;
-    recording::Takers takers;
-    takers.frame = [&](const v1::Frame& frame, std::uint64_t) {
+    recording::RecordingHandlers handlers;
+    handlers.frame = [&](const v1::Frame& frame, std::uint64_t) {
       frames[frame.sequence()] = frame;
       return true;
     };
-    recording::read_recording(reader, takers);
+    recording::read_recording(reader, handlers);
     return frames;
   }
 
@@ -97,15 +97,15 @@ TEST_F(Record, SigtermFinishesTheFile) {
   EXPECT_EQ(attached("calibration.toml"),
             base::read_file(calibration_folder() / "calibration.toml"));
   EXPECT_EQ(attached("reference.png"), base::read_file(calibration_folder() / "reference.png"));
-  EXPECT_EQ(attached("untouched.png").substr(0, 4), "\x89PNG");
+  EXPECT_EQ(attached("current_reference.png").substr(0, 4), "\x89PNG");
   int statuses = 0;
-  recording::Takers takers;
-  takers.status = [&](const v1::Status& status, std::uint64_t) {
+  recording::RecordingHandlers handlers;
+  handlers.status = [&](const v1::Status& status, std::uint64_t) {
     ++statuses;
     EXPECT_EQ(status.camera().backend(), "sim");
     return true;
   };
-  recording::read_recording(reader, takers);
+  recording::read_recording(reader, handlers);
   EXPECT_EQ(statuses, 1);
 }
 
@@ -219,7 +219,7 @@ TEST_F(Record, TheSameCalibrationMakesTheSameDepthAnew) {
 }
 
 TEST_F(Record, WithoutJpegsDepthCannotBeMadeAnew) {
-  // A recording has the untouched image where there is one when it begins.
+  // A recording has the reference image where there is one when it begins.
   client::Client client = sensor.connect();
   client.subscribe();
   ASSERT_TRUE(read_until(client, [](const Item& i) {
@@ -244,8 +244,8 @@ TEST_F(Record, WithoutJpegsDepthCannotBeMadeAnew) {
   EXPECT_THAT(said, HasSubstr("no frame of it holds a JPEG"));
 }
 
-// Recorded before there was a calibration; nothing touches in this scene.
-TEST(RecordUncalibrated, GetsItsDepthFromFramesThatWereUntouched) {
+// Recorded before there was a calibration; there is no contact in this scene.
+TEST(RecordUncalibrated, GetsItsDepthFromFramesThatWereWithoutContact) {
   const Sensor sensor(scene_file("nothing.toml"), false);
   const TempFolder folder;
   const std::string file = folder.path() / "a.mcap";
@@ -264,21 +264,21 @@ TEST(RecordUncalibrated, GetsItsDepthFromFramesThatWereUntouched) {
                                               "-o",
                                               anew};
   EXPECT_EQ(run_program(reprocess, &said), 1);
-  EXPECT_THAT(said, HasSubstr("say so by --untouched-frames 32"));
+  EXPECT_THAT(said, HasSubstr("say so by --reference-frames 32"));
   auto with = reprocess;
-  with.insert(with.end(), {"--untouched-frames", "16", "--force"});
+  with.insert(with.end(), {"--reference-frames", "16", "--force"});
   ASSERT_EQ(run_program(with, &said), 0) << said;
   const mcap::Reader reader(anew);
   std::size_t maps = 0;
-  recording::Takers takers;
-  takers.frame = [&](const v1::Frame& frame, std::uint64_t) {
+  recording::RecordingHandlers handlers;
+  handlers.frame = [&](const v1::Frame& frame, std::uint64_t) {
     if (!frame.has_depth()) return true;
     ++maps;
-    EXPECT_FALSE(frame.contact().touching());
+    EXPECT_FALSE(frame.contact().in_contact());
     EXPECT_FALSE(has(frame.health(), v1::HEALTH_UNCALIBRATED));
     return true;
   };
-  recording::read_recording(reader, takers);
+  recording::read_recording(reader, handlers);
   EXPECT_GE(maps, 16U);
 }
 

@@ -1,4 +1,4 @@
-// The untouched image: at start, on command, and under a changed light.
+// The reference image: at start, on command, and under a changed light.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,11 +31,11 @@ std::filesystem::path write_scene(const TempFolder& folder) {
   return file;
 }
 
-/// Waits for a frame with depth in which something touches, or nothing.
-bool wait_contact(client::Client& client, bool touching) {
+/// Waits for a frame with depth in which there is contact, or nothing.
+bool wait_contact(client::Client& client, bool in_contact) {
   return read_until(client, [&](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
-    return frame != nullptr && frame->has_depth() && frame->contact().touching() == touching;
+    return frame != nullptr && frame->has_depth() && frame->contact().in_contact() == in_contact;
   });
 }
 
@@ -136,7 +136,7 @@ TEST(Reference, RezeroIsRefusedUnderContactUnlessForced) {
   EXPECT_TRUE(wait_contact(client, false)) << "the pressed image is zero now";
 }
 
-TEST(Reference, RezeroUntouchedTakesANewReference) {
+TEST(Reference, RezeroWithoutContactTakesANewReference) {
   const Sensor sensor(scene_file("nothing.toml"));
   client::Client client = sensor.connect();
   client.subscribe();
@@ -145,7 +145,7 @@ TEST(Reference, RezeroUntouchedTakesANewReference) {
   EXPECT_TRUE(wait_reference(client));
 }
 
-TEST(Reference, TouchedAtStartServesWithTheLastGoodOneAndSaysSo) {
+TEST(Reference, InContactAtStartServesWithTheLastGoodOneAndSaysSo) {
   Sensor sensor(scene_file("nothing.toml"));
   {
     client::Client client = sensor.connect();
@@ -154,20 +154,20 @@ TEST(Reference, TouchedAtStartServesWithTheLastGoodOneAndSaysSo) {
   }
   sensor.arguments.insert(
       sensor.arguments.end(),
-      {"--set", "camera.sim.scene=" + scene_file("touched_at_start.toml").string()});
+      {"--set", "camera.sim.scene=" + scene_file("contact_at_start.toml").string()});
   sensor.restart();
 
   client::Client client = sensor.connect();
   client.subscribe();
   ASSERT_TRUE(read_until(client, [&](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
-    return frame != nullptr && frame->has_depth() && frame->contact().touching();
+    return frame != nullptr && frame->has_depth() && frame->contact().in_contact();
   }));
   EXPECT_TRUE(has(client.status().health(), v1::HEALTH_REFERENCE_RESTORED));
   // The press is read in millimetres all the same: 1 mm deep.
   ASSERT_TRUE(read_until(client, [&](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
-    if (frame == nullptr || !frame->has_depth() || !frame->contact().touching()) return false;
+    if (frame == nullptr || !frame->has_depth() || !frame->contact().in_contact()) return false;
     EXPECT_NEAR(frame->contact().deepest_mm(), 1.0, 0.1);
     return true;
   }));
@@ -183,13 +183,13 @@ TEST(Reference, TouchedAtStartServesWithTheLastGoodOneAndSaysSo) {
   }));
 }
 
-TEST(Reference, TouchedAtTheVeryFirstStartIsNotTakenForUntouched) {
-  const Sensor sensor(scene_file("touched_at_start.toml"));
+TEST(Reference, InContactAtTheVeryFirstStartIsNotTakenForAReference) {
+  const Sensor sensor(scene_file("contact_at_start.toml"));
   client::Client client = sensor.connect();
   client.subscribe();
   EXPECT_TRUE(read_until(client, [&](const Item& item) {
     const auto* frame = std::get_if<v1::Frame>(&item);
-    return frame != nullptr && frame->has_depth() && frame->contact().touching() &&
+    return frame != nullptr && frame->has_depth() && frame->contact().in_contact() &&
            has(frame->health(), v1::HEALTH_REFERENCE_STALE);
   }));
 }

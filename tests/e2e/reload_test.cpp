@@ -121,7 +121,7 @@ TEST_F(Reload, AMistakeLeavesEverythingAsItWas) {
   const auto one = connect(old_, kOldToken);
   const auto two = connect(old_, kOldToken);
   EXPECT_EQ(two->server().rights(), v1::RIGHTS_CONTROL);
-  // Mended, all is well again.
+  // Fixed, all is well again.
   write("tokens", std::string("control ") + kOldToken + "\n");
   EXPECT_THAT(reload(), Not(HasSubstr("stays")));
   EXPECT_THROW((void)connect(old_, kOldToken), client::EndedByDaemon);  // max_clients = 1
@@ -147,8 +147,8 @@ TEST_F(Reload, SaysThatNewCredentialsNeedARestart) {
 }
 
 /// Runs dtactd to its end, which is a failure. Returns what it says to the service manager first.
-std::optional<std::string> told_by_failing(std::vector<std::string> arguments,
-                                           std::string& output) {
+std::optional<std::string> reported_by_failing(std::vector<std::string> arguments,
+                                               std::string& output) {
   const TempFolder folder;
   const fakes::NotifySocket manager(folder.path() / "notify");
   ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
@@ -159,17 +159,18 @@ std::optional<std::string> told_by_failing(std::vector<std::string> arguments,
 }
 
 // systemd takes messages of the main process alone, and complains of others.
-TEST(Check, TellsTheServiceManagerNothing) {
+TEST(Check, ReportsTheServiceManagerNothing) {
   std::string output;
-  EXPECT_EQ(told_by_failing({"--check-config", "--set", "camera.width=1"}, output), std::nullopt);
+  EXPECT_EQ(reported_by_failing({"--check-config", "--set", "camera.width=1"}, output),
+            std::nullopt);
   EXPECT_THAT(output, HasSubstr("camera.width"));
 }
 
 // What systemctl status shows of a daemon that cannot start.
 TEST(Start, NamesTheCheckOfAConfigurationWithAMistake) {
   std::string output;
-  const auto status = told_by_failing({"--set", "camera.width=1"}, output);
-  EXPECT_THAT(output, HasSubstr("once it is mended, check it: dtactd --check-config"));
+  const auto status = reported_by_failing({"--set", "camera.width=1"}, output);
+  EXPECT_THAT(output, HasSubstr("once it is fixed, check it: dtactd --check-config"));
   EXPECT_THAT(status.value_or(""),
               AllOf(StartsWith("STATUS=--set: camera.width"), EndsWith("dtactd --check-config")));
 }
@@ -222,7 +223,7 @@ TEST_F(CheckOfFiles, FindsAKeyOfAnotherCertificate) {
 
 TEST(Check, LooksAtTheCalibration) {
   std::string output;
-  EXPECT_EQ(told_by_failing({"--check-config", "--set", "calibration=/no/such"}, output),
+  EXPECT_EQ(reported_by_failing({"--check-config", "--set", "calibration=/no/such"}, output),
             std::nullopt);
   EXPECT_THAT(output, HasSubstr("calibration = \"/no/such\": No such file or directory"));
 }
@@ -239,9 +240,9 @@ TEST_F(CheckOfFiles, LooksAtCredentialsWhereThereAreAny) {
 
 TEST(Credentials, OneThatIsMissingNamesWhereToPutIt) {
   std::string output;
-  const auto status = told_by_failing({"--set", "net.tokens=credential:tokens", "--set",
-                                       "camera.backend=null", "--set", "ring.backend=null"},
-                                      output);
+  const auto status = reported_by_failing({"--set", "net.tokens=credential:tokens", "--set",
+                                           "camera.backend=null", "--set", "ring.backend=null"},
+                                          output);
   EXPECT_THAT(output, AllOf(HasSubstr("/etc/credstore/dtactd.tokens"),
                             HasSubstr("what else this machine lacks: dtactd --doctor")));
   // What systemctl status shows of a daemon that cannot start.

@@ -78,8 +78,8 @@ bool read_until(client::Client& client, const std::function<bool(const Item&)>& 
   return false;
 }
 
-bool has(const google::protobuf::RepeatedField<int>& health, v1::Health condition) {
-  return std::ranges::find(health, condition) != health.end();
+bool has(const google::protobuf::RepeatedField<int>& health, v1::Health flag) {
+  return std::ranges::find(health, flag) != health.end();
 }
 
 }  // namespace dtact::e2e

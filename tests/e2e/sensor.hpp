@@ -50,6 +50,6 @@ using client::Item;
 bool read_until(client::Client& client, const std::function<bool(const Item&)>& done,
                 std::chrono::seconds patience = std::chrono::seconds(30));
 
-bool has(const google::protobuf::RepeatedField<int>& health, v1::Health condition);
+bool has(const google::protobuf::RepeatedField<int>& health, v1::Health flag);
 
 }  // namespace dtact::e2e

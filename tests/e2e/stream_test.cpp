@@ -24,7 +24,7 @@ TEST(Stream, SixHundredFramesOfTheRightDepth) {
   int pressed = 0;
   std::uint64_t last = 0;
   std::vector<double> inside;
-  double worst_untouched = 0;
+  double worst_no_contact = 0;
   ASSERT_TRUE(read_until(
       client,
       [&](const Item& item) {
@@ -44,7 +44,7 @@ TEST(Stream, SixHundredFramesOfTheRightDepth) {
             inside.push_back(error.inside_mm);
             EXPECT_LT(error.untrusted, error.inside_pixels / 100);
           } else if (error.inside_pixels == 0) {
-            worst_untouched = std::max(worst_untouched, error.outside_mm);
+            worst_no_contact = std::max(worst_no_contact, error.outside_mm);
           }
         }
         return frames == 600;
@@ -58,9 +58,9 @@ TEST(Stream, SixHundredFramesOfTheRightDepth) {
   std::printf(
       "ball of 5 mm, simulated sensor: mean absolute error inside the true contact "
       "%.4f mm (median of %d frames), worst frame %.4f mm; untouched %.4f mm\n",
-      inside[inside.size() / 2], pressed, worst, worst_untouched);
+      inside[inside.size() / 2], pressed, worst, worst_no_contact);
   EXPECT_LE(worst, 0.03);
-  EXPECT_LE(worst_untouched, 0.01);
+  EXPECT_LE(worst_no_contact, 0.01);
 }
 
 TEST(Stream, NullCameraReachesAClientAsConstantGrey) {

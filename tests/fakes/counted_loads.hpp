@@ -15,7 +15,7 @@ namespace dtact::fakes {
 /// On x86-64 alone, one such memory at a time, read by one thread; slow: a few microseconds a load.
 class CountedLoads {
  public:
-  /// `bytes` at most 64 kB. Filled with zeros.
+  /// `bytes` at most 64 kB. FilledBuffer with zeros.
   explicit CountedLoads(std::size_t bytes);
   ~CountedLoads();
   CountedLoads(const CountedLoads&) = delete;

@@ -70,7 +70,7 @@ class FakeCamera final : public hal::Camera, private hal::FrameOwner {
     report.delivered = handle_.delivered;
     if (handle_.mode != Mode::streaming) {
       report.state = hal::CameraState::unplugged;
-      report.remedy = "plug the fake camera in";
+      report.fix = "plug the fake camera in";
     }
     return report;
   }

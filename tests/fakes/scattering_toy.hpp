@@ -7,7 +7,7 @@
 
 namespace dtact::fakes {
 
-/// The toy sensor with a layer that scatters, and lists that say the same of sharpened levels and
+/// The toy sensor with a gel that scatters, and lists that say the same of sharpened levels and
 /// are uncertain by `sharpened_um`.
 inline std::shared_ptr<calibration::Calibration> scattering_toy_calibration(double sharpened_um) {
   auto calibration = toy_calibration();
@@ -15,7 +15,7 @@ inline std::shared_ptr<calibration::Calibration> scattering_toy_calibration(doub
   model.scattering = recon::Scattering{.narrow_mm = 0.8, .wide_mm = 2.4, .narrow_weight = 0.7};
   for (const int steps : {1, 2}) {
     model.sharpened.push_back({.steps = steps,
-                               .list = model.list,
+                               .lut = model.lut,
                                .uncertainty = {{.depth_mm = 0.5, .error_um = sharpened_um}}});
   }
   calibration->model = std::make_shared<const recon::Model>(std::move(model));

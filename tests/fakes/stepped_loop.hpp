@@ -36,7 +36,7 @@ class SteppedLoop {
     if (calibration) active = activated(calibration);
     loop.emplace(pipeline::CaptureParts{camera, *light, exchange, clock}, config, std::move(active),
                  unusable);
-    loop->untouched().start();
+    loop->tracker().start();
   }
   [[nodiscard]] std::unique_ptr<pipeline::ActiveCalibration> activated(
       const std::shared_ptr<const calibration::Calibration>& calibration) {
@@ -53,7 +53,7 @@ class SteppedLoop {
 
   /// One turn of the loop; true if it published a frame.
   bool step() {
-    loop->untouched().settle();  // what it finds would else come a frame sooner or later
+    loop->tracker().settle();  // what it finds would else come a frame sooner or later
     loop->step();
     pipeline::Event event;
     while (exchange.events.pop(event)) events.push_back(event);

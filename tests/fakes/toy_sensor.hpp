@@ -21,7 +21,7 @@ struct ToyScene {
   double press_mm = 0;  ///< Indentation in the middle of the press.
   double x_px = 80;     ///< Its place.
   double y_px = 60;
-  double marks = 0;    ///< Height of the layer's marks, grey levels.
+  double marks = 0;    ///< Height of the gel's marks, grey levels.
   int marks_px = 0;    ///< How far to the right they lie of where they were at calibration.
   double covered = 0;  ///< Share of its light that the left quarter loses.
 };
@@ -45,11 +45,11 @@ inline double toy_mark(int x, int y) {
 inline double toy_grey(const ToyScene& scene, int x, int y) {
   const double u = (x - 80) / 80.0;
   const double v = (y - 60) / 80.0;
-  const double untouched = 150 * (1 - 0.2 * (u * u + v * v));
+  const double undeformed = 150 * (1 - 0.2 * (u * u + v * v));
   const double r = std::hypot(x - scene.x_px, y - scene.y_px);
   const double spot = std::exp(-(r / 12) * (r / 12));
   const double ring = std::exp(-((r - 24) / 6) * ((r - 24) / 6));
-  const double pressed = untouched - scene.press_mm * (31.25 * spot - 8 * ring);
+  const double pressed = undeformed - scene.press_mm * (31.25 * spot - 8 * ring);
   const double mark = scene.marks == 0 ? 0 : scene.marks * toy_mark(x - scene.marks_px, y);
   const double left = x < kToyWidth / 4 ? 1 - scene.covered : 1;
   return (pressed + mark) * left * scene.light * (1 + scene.tilt * u);
@@ -93,20 +93,20 @@ inline std::vector<std::uint16_t> toy_reference_q8(const ToyScene& scene = {}) {
 
 /// Its calibration, made under full white light: the whole frame but eight pixels on each side, or
 /// the left `width` pixels of that.
-inline std::shared_ptr<calibration::Calibration> toy_calibration(const ToyScene& untouched = {},
+inline std::shared_ptr<calibration::Calibration> toy_calibration(const ToyScene& undeformed = {},
                                                                  int width = kToyWidth - 16) {
   auto model = std::make_shared<recon::Model>();
   model->rectify = recon::make_crop_table(kToyWidth, kToyHeight, 8, 8, width, 104);
   model->mm_per_px = kToyMmPerPx;
   model->smoothing_px = 1;
-  model->list.first_q6 = -40 * 64;
-  model->list.covered_from_q6 = -40 * 64;
-  model->list.covered_to_q6 = 70 * 64;
+  model->lut.first_q6 = -40 * 64;
+  model->lut.covered_from_q6 = -40 * 64;
+  model->lut.covered_to_q6 = 70 * 64;
   // 1/31.25 mm a grey level: half a micrometre an entry.
   for (int q6 = -40 * 64; q6 <= 110 * 64; ++q6) {
-    model->list.um.push_back(static_cast<std::int16_t>(q6 / 2));
+    model->lut.um.push_back(static_cast<std::int16_t>(q6 / 2));
   }
-  model->reference_q8 = toy_reference_q8(untouched);
+  model->reference_q8 = toy_reference_q8(undeformed);
   auto made = std::make_shared<calibration::Calibration>();
   made->name = "toy";
   made->crop_col = 8;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::size_t kHead = 5;
 /// Larger maps are decoded and no more, so that an input takes milliseconds.
-constexpr std::size_t kMostPixels = 100'000;
+constexpr std::size_t kMaxPixels = 100'000;
 
 void encode_again(v1::DepthEncoding sent, std::string_view bytes,
                   const std::vector<std::int16_t>& map, std::size_t width) {
@@ -44,6 +44,6 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   std::vector<std::int16_t> map;
   if (!wire::decode_depth(encoding, bytes, width, height, map)) return 0;
   fuzz::require(map.size() == width * height, "a depth map has as many values as pixels");
-  if (map.size() <= fuzz::kMostPixels) fuzz::encode_again(encoding, bytes, map, width);
+  if (map.size() <= fuzz::kMaxPixels) fuzz::encode_again(encoding, bytes, map, width);
   return 0;
 }

@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kLongest = 65536;  // bytes of a mutated input
 /// No input of that length may ask for more.
-constexpr rlim_t kMostMemory = rlim_t{2} << 30U;
+constexpr rlim_t kMaxMemory = rlim_t{2} << 30U;
 
 std::vector<std::string> read_corpus(const fs::path& path) {
   if (!fs::is_directory(path)) return {base::read_file(path)};
@@ -57,9 +57,9 @@ class Mutator {
  private:
   // Of this engine, unlike of the library's distributions, every platform gives the same numbers.
   std::size_t below(std::size_t limit) { return static_cast<std::size_t>(random_() % limit); }
-  template <typename List>
-  const typename List::value_type& pick(const List& list) {
-    return list[below(list.size())];
+  template <typename Lut>
+  const typename Lut::value_type& pick(const Lut& lut) {
+    return lut[below(lut.size())];
   }
 
   void mutate(std::string& input) {
@@ -147,7 +147,7 @@ class Mutator {
 
 void limit_memory() {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  const rlimit limit{kMostMemory, kMostMemory};
+  const rlimit limit{kMaxMemory, kMaxMemory};
   ::setrlimit(RLIMIT_AS, &limit);
 #endif
 }

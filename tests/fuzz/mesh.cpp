@@ -18,7 +18,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
       }
     }
     const perceive::ObjectModel object = perceive::make_object(mesh, 1e-3, "object");
-    fuzz::require(object.surfels.size() <= perceive::kMostSurfels, "surfels are limited");
+    fuzz::require(object.surfels.size() <= perceive::kMaxSurfels, "surfels are limited");
   } catch (const std::runtime_error& e) {
     fuzz::require_sentence(e.what());
   }

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostFrames = 4;
+constexpr std::size_t kMaxFrames = 4;
 
 /// The folder that every input is laid out in.
 class Folder {
@@ -41,7 +41,7 @@ class Folder {
       write("a.mcap", input);
       return path_ / "a.mcap";
     }
-    const auto parts = split(input, "\n--\n", 1 + kMostFrames);
+    const auto parts = split(input, "\n--\n", 1 + kMaxFrames);
     if (!parts.front().empty()) write("timestamps.csv", parts.front());
     for (std::size_t i = 1; i < parts.size(); ++i) {
       if (parts[i].starts_with("\x89PNG")) {

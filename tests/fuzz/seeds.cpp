@@ -119,7 +119,7 @@ v1::ServerMessage frame(v1::DepthEncoding encoding) {
   frame.add_health(v1::HEALTH_LIGHT_UNSETTLED);
   frame.mutable_light()->set_brightness(128);
   frame.mutable_light()->add_leds()->set_r(255);
-  frame.mutable_contact()->set_touching(true);
+  frame.mutable_contact()->set_in_contact(true);
   frame.mutable_times()->set_decode_ns(300'000);
   const std::vector<std::int16_t> depth = {0, 10, -5, INT16_MIN, 1000, 16383};
   auto& map = *frame.mutable_depth();
@@ -173,7 +173,7 @@ void add_answers(const Corpus& corpus) {
   message.mutable_reply()->mutable_calibrations()->add_calibrations()->set_damage("png");
   corpus.add("answers", "calibrations", message.SerializeAsString());
   message.mutable_event()->mutable_state()->set_state(v1::STATE_CAMERA_LOST);
-  message.mutable_event()->mutable_state()->add_health(v1::HEALTH_CAMERA_TROUBLE);
+  message.mutable_event()->mutable_state()->add_health(v1::HEALTH_CAMERA_FAULT);
   corpus.add("answers", "event_state", message.SerializeAsString());
   message.mutable_event()->mutable_contact()->mutable_contact()->set_x_mm(1.5);
   corpus.add("answers", "event_contact", message.SerializeAsString());

@@ -222,7 +222,7 @@ class Contents(unittest.TestCase):
         self.assertIn("node_modules/three", bundled)
         for name, licence in bundled.items():
             self.assertIn(f"{name}/*", licences)
-            # As Debian calls them; those of one kind that differ in their words are told apart at the end.
+            # As Debian calls them; those of one kind that differ in their words are distinguished at the end.
             wanted = licence.strip("()").replace("MIT", "Expat").split(" AND ")
             for one, found in zip(wanted, licences[f"{name}/*"], strict=True):
                 self.assertRegex(found, f"(?i)^{one}(-|$)", name)

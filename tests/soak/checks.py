@@ -12,46 +12,46 @@ from record import Record, Rest, Seen
 # ------------------------------------------------------------ limits
 
 #: Of both, at every rest: then the same three clients are connected, and nothing is under way.
-MOST_DESCRIPTORS_MORE = 0
-MOST_THREADS_MORE = 0
+MAX_DESCRIPTORS_MORE = 0
+MAX_THREADS_MORE = 0
 #: Rests before the figures count: by then every kind of client has come once, and the allocator has
 #: its arenas. In a run that has time for it, every kind of episode as well.
 WARM_UP_RESTS = 3
 LONG_WARM_UP_RESTS = 1 + len(plan.KINDS)
 #: Fewer say nothing of memory, which sanitizers hold back for a while as well.
-LEAST_RESTS_FOR_MEMORY = 8
+MIN_RESTS_FOR_MEMORY = 8
 #: From the median of the first rests after that to the median of the last. glibc gives back what is
 #: free at a heap's end only above 4 MB (M_TRIM_THRESHOLD in daemon/app/daemon.cpp), and each peak of
 #: what clients have waiting raises what it keeps; half as much again is more than that.
-MOST_RESIDENT_KIB_MORE = 6 * 1024
+MAX_RESIDENT_KIB_MORE = 6 * 1024
 #: A daemon that runs for a year and grows by this has grown by 4.4 GB: what is asked is none at all, and
 #: this is what two hours can tell from the wandering of single rests by Theil and Sen's slope. It is asked
 #: of the resident memory but for what the allocator keeps for later, which grows to the largest peak of
 #: the load and no further (in half an hour, while the blocks in use stay the same): a slope says nothing
 #: of something with an end, and that end is in the limit above.
-MOST_TAKEN_KIB_PER_HOUR = 512
+MAX_TAKEN_KIB_PER_HOUR = 512
 #: Of the blocks in use as the allocator counts them, which is where a leak shows whatever the pages
 #: of the heap do.
-MOST_HEAP_KIB_MORE, MOST_HEAP_KIB_PER_HOUR = 1024, 128
+MAX_HEAP_KIB_MORE, MAX_HEAP_KIB_PER_HOUR = 1024, 128
 #: Slopes, and latency at the end against the beginning, are judged from so long a run on.
-LEAST_S_FOR_DRIFT = 1800
+MIN_S_FOR_DRIFT = 1800
 #: 22 calibrations of two files (the store keeps 20 besides the current one and the one before), with
 #: the reference and the link.
-MOST_STATE_FILES = 60
-MOST_STATE_KIB = 22 * 800
+MAX_STATE_FILES = 60
+MAX_STATE_KIB = 22 * 800
 #: Medians over a fifth of the run, at its end against its beginning. Half as much again and a
 #: millisecond is what another program on the same cores does.
-MOST_LATENCY_RATIO, MOST_LATENCY_MS_MORE = 1.5, 1.0
+MAX_LATENCY_RATIO, MAX_LATENCY_MS_MORE = 1.5, 1.0
 #: Mean absolute error of one frame, millimetres, while nothing speaks against its depth. Inside the
 #: contact the ball reads as in tests/e2e/stream_test.cpp; edges of nuts and cylinders are
-#: blurred by the layer (README, where methods fail).
-MOST_ERROR_MM = {"A": 0.05, "B": 0.15, "untouched": 0.01}
+#: blurred by the gel (README, where methods fail).
+MAX_ERROR_MM = {"A": 0.05, "B": 0.15, "untouched": 0.01}
 #: Outside of a contact there are the bulge and the contact's own blurred edge.
-MOST_OUTSIDE_MM = {"A": 0.03, "B": 0.03, "untouched": 0.01}
+MAX_OUTSIDE_MM = {"A": 0.03, "B": 0.03, "untouched": 0.01}
 #: Of the pixels inside the contact, not to be believed.
-MOST_UNTRUSTED = 0.05
+MAX_UNTRUSTED = 0.05
 #: The median over the last fifth against the first: the depth must not wander.
-MOST_ERROR_MM_MORE = 0.005
+MAX_ERROR_MM_MORE = 0.005
 
 
 # ------------------------------------------------------------ what of it is a fault
@@ -84,7 +84,7 @@ def ends(values: list[float]) -> tuple[float, float]:
 
 
 def verdicts(record: Record) -> list[Verdict]:
-    long = record.seconds >= LEAST_S_FOR_DRIFT
+    long = record.seconds >= MIN_S_FOR_DRIFT
     return [*_held(record.rests, long), *_latency(record.seen, long), _frames(record),
             _conditions(record.seen), _camera(record), *_depth(record.seen, long), _answers(record),
             _log(record.log), _end(record.ended)]
@@ -97,7 +97,7 @@ def _held(rests: list[Rest], long: bool) -> list[Verdict]:
     warm = rests[min(warm_up, len(rests) - 2):]
     base = warm[0]
     made = []
-    for name, most in (("descriptors", MOST_DESCRIPTORS_MORE), ("threads", MOST_THREADS_MORE)):
+    for name, most in (("descriptors", MAX_DESCRIPTORS_MORE), ("threads", MAX_THREADS_MORE)):
         counts = [getattr(rest.held, name) for rest in warm]
         faults = []
         for rest in warm:
@@ -110,28 +110,28 @@ def _held(rests: list[Rest], long: bool) -> list[Verdict]:
         made.append(Verdict(f"{name} at rest", f"{min(counts)} to {max(counts)}",
                             "the same each time", tuple(faults[:3])))
 
-    enough = len(rests) >= LEAST_RESTS_FOR_MEMORY
-    for name, key, most in (("resident memory", "resident_kib", MOST_RESIDENT_KIB_MORE),
-                            ("memory in use", "heap_kib", MOST_HEAP_KIB_MORE)):
+    enough = len(rests) >= MIN_RESTS_FOR_MEMORY
+    for name, key, most in (("resident memory", "resident_kib", MAX_RESIDENT_KIB_MORE),
+                            ("memory in use", "heap_kib", MAX_HEAP_KIB_MORE)):
         first, last = ends([float(getattr(rest.held, key)) for rest in warm])
         faults = [f"{name} grew from {first:.0f} to {last:.0f} kB"
                   ] if enough and last - first > most else []
         made.append(Verdict(f"{name}, beginning to end", f"{last - first:+.0f} kB", f"{most} kB",
                             tuple(faults), enough))
-    for name, key, most_rate in (
-            ("resident memory but for what is kept", "taken_kib", MOST_TAKEN_KIB_PER_HOUR),
-            ("memory in use", "heap_kib", MOST_HEAP_KIB_PER_HOUR)):
+    for name, key, max_rate in (
+            ("resident memory but for what is kept", "taken_kib", MAX_TAKEN_KIB_PER_HOUR),
+            ("memory in use", "heap_kib", MAX_HEAP_KIB_PER_HOUR)):
         rate = 3600 * slope([(rest.at_s, float(getattr(rest.held, key))) for rest in warm])
-        faults = [f"{name} grows by {rate:.0f} kB an hour"] if long and rate > most_rate else []
-        made.append(Verdict(f"{name}, slope", f"{rate:+.0f} kB/h", f"{most_rate} kB/h",
+        faults = [f"{name} grows by {rate:.0f} kB an hour"] if long and rate > max_rate else []
+        made.append(Verdict(f"{name}, slope", f"{rate:+.0f} kB/h", f"{max_rate} kB/h",
                             tuple(faults), long))
 
     files = max(rest.held.state_files for rest in rests)
     size = max(rest.held.state_kib for rest in rests)
     faults = [f"the state folder has {files} files of {size} kB"
-              ] if files > MOST_STATE_FILES or size > MOST_STATE_KIB else []
+              ] if files > MAX_STATE_FILES or size > MAX_STATE_KIB else []
     made.append(Verdict("state folder", f"{files} files, {size} kB",
-                        f"{MOST_STATE_FILES} files, {MOST_STATE_KIB} kB", tuple(faults)))
+                        f"{MAX_STATE_FILES} files, {MAX_STATE_KIB} kB", tuple(faults)))
     return made
 
 
@@ -148,7 +148,7 @@ def _latency(seen: list[Seen], long: bool) -> list[Verdict]:
         if not medians:
             continue
         first, last = ends(medians)
-        limit = MOST_LATENCY_RATIO * first + MOST_LATENCY_MS_MORE
+        limit = MAX_LATENCY_RATIO * first + MAX_LATENCY_MS_MORE
         faults = [f"{name}: the median went from {first:.2f} to {last:.2f} ms"
                   ] if long and last > limit else []
         made.append(Verdict(f"latency, {name}, median at the beginning and the end",
@@ -192,7 +192,7 @@ def _conditions(seen: list[Seen]) -> Verdict:
 
 
 def _camera(record: Record) -> Verdict:
-    """Of frames_lost and camera_trouble, which a busy machine raises as well: that they are told of what
+    """Of frames_lost and camera_fault, which a busy machine raises as well: that they are told of what
     was scripted, and of nothing that did not happen. The daemon's times on both sides, so that it does
     not matter how late the frames were."""
     faults = []
@@ -208,11 +208,11 @@ def _camera(record: Record) -> Verdict:
                 unseen += 1
                 continue
             span = (struck.before.taken, struck.after.published)
-            if "camera_trouble" in s.episode.must:
+            if "camera_fault" in s.episode.must:
                 judged += 1
-                if not any(span[0] < at < span[1] and "camera_trouble" in health
+                if not any(span[0] < at < span[1] and "camera_fault" in health
                            for at, health in record.states):
-                    faults.append(f"{what}: camera_trouble was not told meanwhile")
+                    faults.append(f"{what}: camera_fault was not told meanwhile")
             elif span[1] - span[0] < plan.LOST_NS:
                 judged += 1
                 if "frames_lost" not in struck.after.health:
@@ -224,7 +224,7 @@ def _camera(record: Record) -> Verdict:
                           "second before")
         if any(begin < frame.taken and frame.published < end
                for frame in s.cleared for begin, end in trouble):
-            faults.append(f"{where}: camera_trouble went on while frames came")
+            faults.append(f"{where}: camera_fault went on while frames came")
     if unseen > max(1, len(record.seen) // 10):
         faults.append(f"no frame came soon before or after {unseen} faults of the camera")
     return Verdict("what the camera swallows", f"{judged} faults, {unseen} with no frame near",
@@ -232,14 +232,14 @@ def _camera(record: Record) -> Verdict:
 
 
 def _trouble(states: list[tuple[int, tuple[str, ...]]]) -> list[tuple[float, float]]:
-    """From when to when the daemon told camera_trouble."""
+    """From when to when the daemon told camera_fault."""
     ends = [float(at) for at, _ in states[1:]] + [math.inf]
-    return [(at, end) for (at, health), end in zip(states, ends) if "camera_trouble" in health]
+    return [(at, end) for (at, health), end in zip(states, ends) if "camera_fault" in health]
 
 
 def _depth(seen: list[Seen], long: bool) -> list[Verdict]:
     made = []
-    for place, most in MOST_ERROR_MM.items():
+    for place, most in MAX_ERROR_MM.items():
         of = [(s, *d[1:]) for s in seen for d in s.depths if d[0] == place]
         if not of:
             made.append(Verdict(f"depth, {place}", "no frame", "one at least",
@@ -251,11 +251,11 @@ def _depth(seen: list[Seen], long: bool) -> list[Verdict]:
                   f"inside, {outside:.4f} outside, {100 * untrusted:.0f} % untrusted, and no condition "
                   "said so"
                   for s, inside, outside, untrusted in of
-                  if inside > most or outside > MOST_OUTSIDE_MM[place] or untrusted > MOST_UNTRUSTED]
+                  if inside > most or outside > MAX_OUTSIDE_MM[place] or untrusted > MAX_UNTRUSTED]
         if len(faults) > 5:
             faults = faults[:5] + [f"and {len(faults) - 5} frames more of {place}"]
         first, last = ends(errors)
-        if long and last - first > MOST_ERROR_MM_MORE:
+        if long and last - first > MAX_ERROR_MM_MORE:
             faults.append(f"depth of {place} wandered: {first:.4f} mm wrong, then {last:.4f}")
         made.append(Verdict(
             f"depth, {place}: mean absolute error, median and worst of {len(of)} frames",

@@ -46,12 +46,12 @@ def frame(sequence, health=(), late_ns=0):
     return (sequence, taken, taken, taken + 1_000_000, taken + 3_000_000 + late_ns, health)
 
 
-def struck(kind, condition, *, came=(), told=(), late_ns=0, states=()):
-    """The camera swallows the frames 1000 to 1003; 1004 tells `told`. `states`: since when, ns, and the
+def struck(kind, condition, *, came=(), reported=(), late_ns=0, states=()):
+    """The camera swallows the frames 1000 to 1003; 1004 tells `reported`. `states`: since when, ns, and the
     conditions of the daemon's events."""
     episodes = [plan.Episode(0, "quiet"),
                 plan.Episode(1, kind, [(kind, 1000, 4)], must=frozenset({condition}))]
-    frames = [frame(n, told if n == 1004 else ()) for n in range(2 * plan.EPISODE)
+    frames = [frame(n, reported if n == 1004 else ()) for n in range(2 * plan.EPISODE)
               if n not in range(1000, 1004) or n in came]
     late = [(n, taken, ready, published + late_ns, received + late_ns, health)
             for n, taken, ready, published, received, health in frames if n == 1004]
@@ -199,8 +199,8 @@ class Checks(unittest.TestCase):
         record.seen[0].conditions |= {"frames_lost", "not_realtime", "camera_slow"}
         self.finds(record)
 
-    def test_lost_frames_are_told_by_the_frame_behind_them(self):
-        self.finds(struck("drop", "frames_lost", told=("frames_lost",)))
+    def test_lost_frames_are_reported_by_the_frame_behind_them(self):
+        self.finds(struck("drop", "frames_lost", reported=("frames_lost",)))
         # That the machine loses frames by itself proves nothing.
         record = struck("drop", "frames_lost")
         record.seen[1].conditions.add("frames_lost")
@@ -209,39 +209,39 @@ class Checks(unittest.TestCase):
         record = struck("drop", "frames_lost", late_ns=plan.LOST_NS)
         record.seen[1].conditions.add("frames_lost")
         self.finds(record)
-        self.finds(struck("drop", "frames_lost", told=("frames_lost",), came=[1002]), "1 of them came")
+        self.finds(struck("drop", "frames_lost", reported=("frames_lost",), came=[1002]), "1 of them came")
 
-    def test_lost_frames_are_told_for_a_second(self):
+    def test_lost_frames_are_reported_for_a_second(self):
         def steady(seconds):  # from frame 1000 on; before it ten are missing
             frames = [frame(n) for n in range(990)]
             for n in range(1000, 2 * plan.EPISODE):
-                told = n * PERIOD - frame(1000)[3] < seconds * 1e9
-                frames.append(frame(n, ("frames_lost",) if told else ()))
+                reported = n * PERIOD - frame(1000)[3] < seconds * 1e9
+                frames.append(frame(n, ("frames_lost",) if reported else ()))
             return run_of([plan.Episode(i, "quiet") for i in range(2)], frames)
 
         self.finds(steady(1))
         self.finds(steady(1.1), "episode 1 (quiet): 6 frames tell frames_lost, and none was lost")
 
-    def test_camera_trouble_is_told_while_the_camera_is_away(self):
+    def test_camera_trouble_is_reported_while_the_camera_is_away(self):
         def stall(*states):
-            return struck("stall", "camera_trouble", states=[(0, ()), *states])
+            return struck("stall", "camera_fault", states=[(0, ()), *states])
 
-        trouble = ("camera_trouble",)
+        trouble = ("camera_fault",)
         away, back = (1002 * PERIOD, trouble), (1004 * PERIOD + 1, ())
         self.finds(stall(away, back))
-        self.finds(stall(), "camera_trouble was never told", "camera_trouble was not told meanwhile")
+        self.finds(stall(), "camera_fault was never told", "camera_fault was not told meanwhile")
         # A busy machine raises it at any time.
         self.finds(stall((970 * PERIOD, trouble), (971 * PERIOD + 1, ())), "not told meanwhile")
         # Frames end it, of which the episode's last seconds are looked at.
-        self.finds(stall(away), "camera_trouble went on while frames came")
+        self.finds(stall(away), "camera_fault went on while frames came")
         last = 2 * plan.EPISODE - 30
         begins = (last * PERIOD + 2 * MS, trouble)
         self.finds(stall(away, back, begins, ((last + 1) * PERIOD + 1, ())))
         self.finds(stall(away, back, begins, ((last + 2) * PERIOD, ())),
-                   "camera_trouble went on while frames came")
+                   "camera_fault went on while frames came")
 
     def test_no_frame_near_the_cameras_faults(self):
-        record = struck("drop", "frames_lost", told=("frames_lost",))
+        record = struck("drop", "frames_lost", reported=("frames_lost",))
         record.seen[1].struck = [Struck("drop", 1000, 4)] * 2
         self.finds(record, "no frame came soon before or after 2 faults")
 
@@ -252,7 +252,7 @@ class Checks(unittest.TestCase):
         record = healthy()
         record.take("depth", 240, ("reference_stale",), "A", 0.5, 0.002, 0.0, 0.02)
         self.finds(record)
-        self.assertEqual(record.seen[0].told, 1)
+        self.assertEqual(record.seen[0].reported, 1)
         record = healthy(["quiet"] * 10)
         for seen in record.seen[8:]:
             seen.depths = [("A", 0.026, 0.002, 0.0)] + seen.depths[1:]

@@ -22,7 +22,7 @@ import dtact
 import plan
 
 #: Nothing that a client waits for takes so long, however busy the machine.
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 CROP = (slice(10, 590), slice(110, 690))  # of the picture, in the depth map: calibrate()'s --crop
 VISITORS = 10
 
@@ -51,7 +51,7 @@ def honest(address, queue, stop):
     """Takes every frame and notes its times."""
     def work():
         seen = []
-        with dtact.connect(address, program="soak honest", timeout=PATIENCE_S,
+        with dtact.connect(address, program="soak honest", timeout=TIMEOUT_S,
                            kept_frames=1000) as s:
             s.subscribe(dtact.Subscription(depth="int16", decimation=4, summary=True))
             for f in s.frames():
@@ -70,7 +70,7 @@ def honest(address, queue, stop):
 def judge(address, queue, stop, episodes, truths, per_second):
     """Compares whole depth maps with the truth wherever that is known."""
     def work():
-        with dtact.connect(address, program="soak judge", timeout=PATIENCE_S) as s:
+        with dtact.connect(address, program="soak judge", timeout=TIMEOUT_S) as s:
             s.subscribe(dtact.Subscription(depth="int16", depth_hz=per_second, events=False))
             for f in s.frames():
                 if stop.is_set():
@@ -127,7 +127,7 @@ def visitors(address, queue, stop, opened, inside, seed):
 def visit(address, rng, index, opened):
     """Comes, wants something, asks something, and goes in one of the ways in which clients go."""
     answered = 0
-    s = dtact.connect(address, program=f"soak visitor {index}", timeout=PATIENCE_S)
+    s = dtact.connect(address, program=f"soak visitor {index}", timeout=TIMEOUT_S)
     try:
         for _ in range(rng.randint(1, 3)):
             s.subscribe(subscription(rng))

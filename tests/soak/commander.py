@@ -4,14 +4,14 @@ from __future__ import annotations
 import time
 
 import dtact
-from clients import PATIENCE_S
+from clients import TIMEOUT_S
 
 
 class Commander:
     """`note(text)`: what must not happen. `answers`: how many requests were answered."""
 
     def __init__(self, address, calibration, note):
-        self._client = dtact.connect(address, program="soak commander", timeout=PATIENCE_S)
+        self._client = dtact.connect(address, program="soak commander", timeout=TIMEOUT_S)
         self._client.subscribe(dtact.Subscription(depth=None, summary=True, summary_hz=30))
         self._files = dtact.CalibrationFiles.read(calibration)
         self._note = note
@@ -65,11 +65,11 @@ class Commander:
     def rezero_refused(self, step):
         try:
             self._client.rezero()
-        except dtact.Touched:
+        except dtact.InContact:
             return
         self.listen(0.1)
         if self.in_time(step):
-            self._note(f"a re-zero at frame {step.sequence} was not refused although something touches")
+            self._note(f"a re-zero at frame {step.sequence} was not refused although in contact")
 
     def upload(self, _step):
         if self._client.upload_calibration(self._files) is None:

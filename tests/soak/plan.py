@@ -20,7 +20,7 @@ EPISODE = EPISODE_S * FPS
 # Seconds of the episode. Held a little longer than they are judged.
 HOLD_A, HOLD_B = (3.0, 5.0), (8.5, 10.5)
 EDGE_S = 0.2
-#: While nothing has touched for long enough that the layer is flat and the contact told as lost.
+#: While nothing has touched for long enough that the gel is flat and the contact told as lost.
 UNTOUCHED = (1.5, 2.4)
 VISITORS_LEAVE, REST = 13.0, 13.5
 #: By now whatever happened in the episode has been cleared.
@@ -28,13 +28,13 @@ CLEARED = (14.5, 16.0)
 
 #: What a busy machine raises by itself: frames that the simulated camera could not make in time, and
 #: threads that did not get their turn or no real-time scheduling. Counted, and no fault; frames_lost and
-#: camera_trouble are held against the frames that came (checks.py).
-MACHINE = frozenset({"frames_lost", "camera_slow", "camera_trouble", "not_realtime"})
+#: camera_fault are held against the frames that came (checks.py).
+MACHINE = frozenset({"frames_lost", "camera_slow", "camera_fault", "not_realtime"})
 #: Faults under which frames do not come.
 SWALLOWING = frozenset({"unplug", "stall", "hang", "drop", "truncate"})
 #: The daemon tells of lost frames for so long.
 LOST_NS = 1_000_000_000
-# A camera that comes back, and light that changes, are followed by a new untouched image.
+# A camera that comes back, and light that changes, are followed by a new reference image.
 BEGUN_ANEW = frozenset({"starting", "light_unsettled", "reference_stale", "reference_restored"})
 
 
@@ -91,24 +91,24 @@ _TOUCHED = 3.3  # A is held
 _UNDO, _UNDONE = 6.0, 7.5  # untouched again
 
 
-def _camera(kind, condition, *, touched=False, frames=(20, 100), may=BEGUN_ANEW):
+def _camera(kind, condition, *, in_contact=False, frames=(20, 100), may=BEGUN_ANEW):
     def make(episode, rng):
-        at = episode.at((_TOUCHED if touched else _EARLY) + rng.uniform(0, 0.4))
+        at = episode.at((_TOUCHED if in_contact else _EARLY) + rng.uniform(0, 0.4))
         episode.faults.append((kind, at, rng.randint(*frames)))
         episode.must = frozenset({condition})
         episode.may = may
     return make
 
 
-def _light(*, touched=False, dark=False):
+def _light(*, in_contact=False, dark=False):
     def make(episode, rng):
-        at = episode.at(_TOUCHED if touched else _EARLY)
+        at = episode.at(_TOUCHED if in_contact else _EARLY)
         level = 0 if dark else rng.randint(110, 235)
-        until = episode.at(HOLD_A[1] if touched else 1.4 if dark else UNTOUCHED[1])
+        until = episode.at(HOLD_A[1] if in_contact else 1.4 if dark else UNTOUCHED[1])
         undo, undone = (1.5, UNTOUCHED[1]) if dark else (_UNDO, _UNDONE)
         episode.steps = [Step(at, "light", until, level),
                          Step(episode.at(undo), "light", episode.at(undone), 255)]
-        episode.must = frozenset({"light_unsettled"} | ({"reference_stale"} if touched else set()))
+        episode.must = frozenset({"light_unsettled"} | ({"reference_stale"} if in_contact else set()))
         episode.may = BEGUN_ANEW | {"image_dark"}
         episode.events = frozenset({"light", "reference"})
     return make
@@ -119,7 +119,7 @@ def _rezero(episode, _rng):
     episode.events = frozenset({"reference"})
 
 
-def _rezero_touched(episode, _rng):
+def _rezero_in_contact(episode, _rng):
     episode.steps = [Step(episode.at(_TOUCHED), "rezero_refused", episode.at(HOLD_A[1]))]
 
 
@@ -129,13 +129,13 @@ def _rezero_forced(episode, _rng):
                      Step(episode.at(_UNDO), "rezero", episode.at(_UNDONE), True)]
     episode.events = frozenset({"reference"})
     episode.blind = (episode.at(_TOUCHED - 0.1), episode.at(HOLD_B[0]))
-    episode.may = BEGUN_ANEW | {"light_drifted", "beyond_calibration", "camera_moved",
-                                "exposure_follows"}
+    episode.may = BEGUN_ANEW | {"light_drifted", "beyond_calibration", "camera_shifted",
+                                "exposure_unlocked"}
 
 
-def _calibration(*, touched=False):
+def _calibration(*, in_contact=False):
     def make(episode, _rng):
-        at = (_TOUCHED, HOLD_B[0] + 0.3) if touched else (_EARLY, _UNDO)
+        at = (_TOUCHED, HOLD_B[0] + 0.3) if in_contact else (_EARLY, _UNDO)
         episode.steps = [Step(episode.at(at[0]), "upload", episode.at(REST)),
                          Step(episode.at(at[1]), "activate", episode.at(REST), 0)]
         episode.events = frozenset({"calibration"})
@@ -152,29 +152,29 @@ def _quiet(_episode, _rng):
 
 KINDS = {
     "quiet": _quiet,
-    "unplug": _camera("unplug", "camera_trouble"),
-    "unplug_touched": _camera("unplug", "camera_trouble", touched=True, frames=(20, 60)),
-    "unplug_long": _camera("unplug", "camera_trouble", frames=(300, 330)),
-    "stall": _camera("stall", "camera_trouble"),
-    "stall_touched": _camera("stall", "camera_trouble", touched=True, frames=(20, 60)),
+    "unplug": _camera("unplug", "camera_fault"),
+    "unplug_in_contact": _camera("unplug", "camera_fault", in_contact=True, frames=(20, 60)),
+    "unplug_long": _camera("unplug", "camera_fault", frames=(300, 330)),
+    "stall": _camera("stall", "camera_fault"),
+    "stall_in_contact": _camera("stall", "camera_fault", in_contact=True, frames=(20, 60)),
     # Shorter than LOST_NS: the frame behind it has to tell.
     "hang": _camera("hang", "frames_lost", frames=(20, 45)),
-    "drop": _camera("drop", "frames_lost", touched=True, frames=(1, 5)),
-    "truncate": _camera("truncate", "frames_lost", touched=True, frames=(1, 5)),
-    "repeat": _camera("repeat", "image_repeated", touched=True, frames=(10, 40)),
+    "drop": _camera("drop", "frames_lost", in_contact=True, frames=(1, 5)),
+    "truncate": _camera("truncate", "frames_lost", in_contact=True, frames=(1, 5)),
+    "repeat": _camera("repeat", "image_repeated", in_contact=True, frames=(10, 40)),
     "torn": _camera("torn", "image_repeated", frames=(10, 40)),
     "light": _light(),
-    "light_touched": _light(touched=True),
+    "light_in_contact": _light(in_contact=True),
     "dark": _light(dark=True),
     "rezero": _rezero,
-    "rezero_touched": _rezero_touched,
+    "rezero_in_contact": _rezero_in_contact,
     "rezero_forced": _rezero_forced,
     "calibration": _calibration(),
-    "calibration_touched": _calibration(touched=True),
+    "calibration_in_contact": _calibration(in_contact=True),
     "calibration_broken": _calibration_broken,
 }
 #: For a run that has time for two.
-SHORT = ["unplug_touched", "light"]
+SHORT = ["unplug_in_contact", "light"]
 
 
 def episodes(seed: int, count: int, kinds: list[str] | None = None) -> list[Episode]:

@@ -55,7 +55,7 @@ class Seen:
     daemon_ms: list[float] = field(default_factory=list)
     #: Of frames against which nothing speaks: place, inside, outside, untrusted.
     depths: list[tuple[str, float, float, float]] = field(default_factory=list)
-    told: int = 0  #: judged frames that said themselves what speaks against them
+    reported: int = 0  #: judged frames that said themselves what speaks against them
 
 
 @dataclass
@@ -134,7 +134,7 @@ class Record:
         if seen is None:
             return
         if set(health) - plan.MACHINE:
-            seen.told += 1
+            seen.reported += 1
         else:
             seen.depths.append((place, inside, outside, untrusted))
 

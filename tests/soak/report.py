@@ -6,7 +6,7 @@ import pathlib
 import statistics
 
 import plan
-from checks import MOST_ERROR_MM, Verdict
+from checks import MAX_ERROR_MM, Verdict
 from record import Record
 
 
@@ -31,9 +31,9 @@ def write(folder: pathlib.Path, record: Record, verdicts: list[Verdict], words: 
     for kind in plan.KINDS:
         of = [s for s in record.seen if s.episode.kind == kind]
         if of:
-            told = sorted(set().union(*(s.conditions for s in of)))
+            reported = sorted(set().union(*(s.conditions for s in of)))
             rate = statistics.mean(s.frames for s in of) / plan.EPISODE_S
-            lines.append(f"| {kind} | {len(of)} | {rate:.1f} | {', '.join(told)} |")
+            lines.append(f"| {kind} | {len(of)} | {rate:.1f} | {', '.join(reported)} |")
     (folder / "report.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -42,7 +42,7 @@ def _csv(file, record):
     with open(file, "w", newline="", encoding="utf-8") as out:
         table = csv.writer(out)
         table.writerow(["episode", "kind", "frames", "client_p50_ms", "client_p99_ms", "daemon_p50_ms",
-                        "daemon_p99_ms", "error_A_mm", "error_B_mm", "error_untouched_mm",
+                        "daemon_p99_ms", "error_A_mm", "error_B_mm", "error_no_contact_mm",
                         "descriptors", "threads", "resident_kib", "anonymous_kib", "heap_kib",
                         "kept_kib", "cpu_s", "state_kib", "log_kib", "load", "rest_late_s",
                         "answer_s", "late", "conditions"])
@@ -50,7 +50,7 @@ def _csv(file, record):
             rest = rests.get(s.episode.index)
             held = rest.held if rest else None
             errors = [[d[2 if place == "untouched" else 1] for d in s.depths if d[0] == place]
-                      for place in MOST_ERROR_MM]
+                      for place in MAX_ERROR_MM]
             worst = [f"{max(of):.4f}" if of else "" for of in errors]
             table.writerow([s.episode.index, s.episode.kind, s.frames,
                             *(f"{_quantile(values, share):.3f}"
@@ -95,7 +95,7 @@ def _plots(folder, record):
     latency.set_ylabel("latency, ms")
     frames.plot(minutes, [s.frames / plan.EPISODE_S for s in seen], "o-", ms=3)
     frames.set_ylabel("frames a second")
-    for place, most in MOST_ERROR_MM.items():
+    for place, most in MAX_ERROR_MM.items():
         which = 2 if place == "untouched" else 1
         points = [(m, d[which]) for m, s in zip(minutes, seen) for d in s.depths if d[0] == place]
         line, = depth.plot([p[0] for p in points], [p[1] for p in points], ".", ms=4, label=place)

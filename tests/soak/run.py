@@ -90,8 +90,8 @@ class Soak:
                 moved, at = time.monotonic(), self.commander.sequence
             if not self.daemon.alive():
                 raise RuntimeError("the daemon has ended")
-            if time.monotonic() - moved > clients.PATIENCE_S:
-                raise RuntimeError(f"no frame and no event came for {clients.PATIENCE_S:.0f} s after "
+            if time.monotonic() - moved > clients.TIMEOUT_S:
+                raise RuntimeError(f"no frame and no event came for {clients.TIMEOUT_S:.0f} s after "
                                    f"frame {at}")
 
     def reached(self, sequence):
@@ -112,7 +112,7 @@ class Soak:
         self.wait(self.reached(episode.at(plan.VISITORS_LEAVE)))
         self._open.clear()
         self.wait(self.reached(episode.at(plan.REST)))
-        until = time.monotonic() + clients.PATIENCE_S
+        until = time.monotonic() + clients.TIMEOUT_S
         self.wait(lambda: self._inside.value == 0 or time.monotonic() > until)
         # Whoever was reset is noticed by the daemon a moment later.
         self.wait(lambda: len(self.commander.status().message.clients) == RESIDENTS
@@ -141,7 +141,7 @@ class Soak:
     def finish(self):
         self._open.clear()
         self._stop.set()
-        until = time.monotonic() + clients.PATIENCE_S
+        until = time.monotonic() + clients.TIMEOUT_S
         while any(process.is_alive() for process in self._processes) and time.monotonic() < until:
             self.drain()
             time.sleep(0.05)

@@ -80,11 +80,11 @@ export async function until(what, condition, timeoutMs = 60_000) {
 /** Pauses the page and says which frame it shows. */
 export async function pause(pane) {
   await pane.getByRole("button", { name: "Pause" }).click();
-  const told = await until(
+  const reported = await until(
     () => pane.locator(".steps").textContent(),
     (text) => /frame \d+/.test(text),
   );
-  return Number(/frame (\d+)/.exec(told)[1]);
+  return Number(/frame (\d+)/.exec(reported)[1]);
 }
 
 export async function resume(pane) {

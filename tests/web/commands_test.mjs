@@ -21,10 +21,10 @@ after(async () => {
   await stopAll();
 });
 
-test("a re-zero while something touches is refused in words, and offered anyway", async () => {
+test("a re-zero during contact is refused in words, and offered anyway", async () => {
   await until(
-    () => fact(pane, "touching").textContent(),
-    (text) => text === "touching",
+    () => fact(pane, "inContact").textContent(),
+    (text) => text === "inContact",
   );
   await pane.getByRole("button", { name: "Re-zero", exact: true }).click();
   const answer = pane.getByLabel("Light", { exact: true }).locator(".answer");
@@ -68,8 +68,8 @@ test("slider, scheme and colour change the simulated light", async () => {
 
 test("depth is made as the panel says, and its worth and time are on the chart", async () => {
   const panel = pane.getByLabel("Speed and accuracy");
-  const told = () => panel.locator("[data-fact=worth]").textContent();
-  await until(told, (text) => /^full: [\d.]+ ms, ± \d+ µm$/.test(text));
+  const reported = () => panel.locator("[data-fact=worth]").textContent();
+  await until(reported, (text) => /^full: [\d.]+ ms, ± \d+ µm$/.test(text));
   await panel.locator("summary").click();
   await panel.getByRole("radio", { name: "Quarter" }).click();
   await until(
@@ -81,20 +81,20 @@ test("depth is made as the panel says, and its worth and time are on the chart",
     () => fact(pane, "map").textContent(),
     (text) => text === "125 × 100, quarter",
   );
-  await until(told, (text) => text.startsWith("quarter: "));
+  await until(reported, (text) => text.startsWith("quarter: "));
   // Which way is the faster here is the machine's to say; the chart orders them by what it tells.
   const dots = await panel.locator("circle").evaluateAll((circles) =>
     circles.map((circle) => ({
       right: Number(circle.getAttribute("cx")),
       seen: circle.classList.contains("seen"),
-      told: circle.textContent,
+      reported: circle.textContent,
     })),
   );
-  const seen = dots.filter((dot) => dot.seen).map(({ told }) => told.split(":")[0]);
+  const seen = dots.filter((dot) => dot.seen).map(({ reported }) => reported.split(":")[0]);
   assert.deepEqual(seen, ["full", "quarter"]);
   const ms = dots
     .sort((a, b) => a.right - b.right)
-    .map(({ told }) => Number(/([\d.]+) ms/.exec(told)[1]));
+    .map(({ reported }) => Number(/([\d.]+) ms/.exec(reported)[1]));
   assert.deepEqual(
     ms,
     [...ms].sort((a, b) => a - b),
@@ -122,7 +122,7 @@ test("depth is made as the panel says, and its worth and time are on the chart",
   await until(
     () => panel.locator(".answer").textContent(),
     (text) =>
-      text.startsWith("reconstruction.sharpen is 2, but the calibration has no list for levels"),
+      text.startsWith("reconstruction.sharpen is 2, but the calibration has no LUT for levels"),
     10_000,
   );
   assert.equal(status(left).reconstruction.sharpen, "off");

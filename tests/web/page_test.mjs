@@ -149,13 +149,13 @@ test("the cursor tells the frame's value, by mouse and by keyboard", async () =>
   const box = await marks.boundingBox();
   await view.page.mouse.move(box.x + 0.645 * box.width, box.y + 0.379 * box.height);
   const readout = pane.locator("output.readout");
-  const told = async () => {
+  const reported = async () => {
     const text = (await readout.textContent()).replaceAll("−", "-");
     const [, um, row, column, x, y] =
       /^(-?\d+) µm · row (\d+), column (\d+) · x (-?[\d.]+) mm, y (-?[\d.]+) mm/.exec(text) ?? [];
     return { um: Number(um), row: Number(row), column: Number(column), x: Number(x), y: Number(y) };
   };
-  const mouse = await told();
+  const mouse = await reported();
   assert.equal(mouse.column, Math.floor(0.645 * MAP.width));
   assert.equal(mouse.row, Math.floor(0.379 * MAP.height));
   assert.equal(mouse.um, frame.um(mouse.row, mouse.column));
@@ -165,7 +165,7 @@ test("the cursor tells the frame's value, by mouse and by keyboard", async () =>
   await marks.focus();
   await view.page.keyboard.press("ArrowRight");
   await view.page.keyboard.press("Shift+ArrowDown");
-  const keys = await told();
+  const keys = await reported();
   assert.equal(keys.column, mouse.column + 1);
   assert.equal(keys.row, mouse.row + 10);
   assert.equal(keys.um, frame.um(keys.row, keys.column));
@@ -494,8 +494,8 @@ test("a browser without WebGL 2 is told so", async () => {
       };
     },
   });
-  const told = withoutWebGl.page.getByRole("alert").first();
-  await told.waitFor();
-  assert.match(await told.textContent(), /no WebGL 2.*Switch on hardware acceleration/);
+  const reported = withoutWebGl.page.getByRole("alert").first();
+  await reported.waitFor();
+  assert.match(await reported.textContent(), /no WebGL 2.*Switch on hardware acceleration/);
   await withoutWebGl.close();
 });

@@ -20,7 +20,7 @@ test("picture, numbers, profile and plots on one screen", async () => {
         (mm) => Math.abs(mm - deepest) < 0.06,
       );
       await until(
-        () => pane.locator('[data-fact="touching"]').textContent(),
+        () => pane.locator('[data-fact="inContact"]').textContent(),
         (text) => text === "nothing touches",
       );
     }

@@ -65,16 +65,16 @@ test("a page that was there first takes a later dtact-perceive for what it is", 
   );
 });
 
-test("points are drawn while something touches, and none else", async () => {
+test("points are drawn during contact, and none else", async () => {
   await until(
     () => fact(pane, "points").textContent(),
     (text) => /^\d+ points/.test(text),
   );
-  const told = await until(
+  const reported = await until(
     () => numberOf(pane, "points"),
     (points) => points > 500,
   );
-  assert.ok(told < MAP.width * MAP.height);
+  assert.ok(reported < MAP.width * MAP.height);
   const lit = await until(drawn, ({ pixels }) => pixels > 500);
   assert.ok(lit.colours > 20, `${lit.colours} shades of a ball`);
   await view.page.screenshot({ path: path.join(work, "points.png") });

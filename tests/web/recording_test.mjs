@@ -108,8 +108,8 @@ test("what is recorded is what the daemon sent", async () => {
   assert.match(path.basename(file), /^left-\d{4}-\d\d-\d\dT\d{6}Z\.mcap$/);
   const frames = framesOf(file);
   assert.ok(frames.length > 20, `${frames.length} frames`);
-  const told = await fact(pane, "recording").textContent();
-  assert.ok(told.includes(`: ${frames.length} frames, `), told);
+  const reported = await fact(pane, "recording").textContent();
+  assert.ok(reported.includes(`: ${frames.length} frames, `), reported);
   assert.deepEqual(
     sequencesOf(file, "/camera/jpeg"),
     frames.map(({ sequence }) => sequence),

@@ -8,8 +8,8 @@
 #include <memory>
 #include <stdexcept>
 
-#include "clients/calibrate/fit/list_fit.hpp"
-#include "clients/calibrate/fit/list_worth.hpp"
+#include "clients/calibrate/fit/lut_fit.hpp"
+#include "clients/calibrate/fit/lut_uncertainty.hpp"
 #include "clients/calibrate/fit/published.hpp"
 #include "daemon/calibration/calibration.hpp"
 
@@ -76,20 +76,20 @@ Crop seen(const std::optional<recon::Lens>& lens, int width, int height, double 
 
 /// Size of the press's own plane, per mm.
 double lean_of(const SettledPress& press) {
-  const PressGain gain = fit_press_gain(sure_samples(press.map, press.contact),
-                                        press.contact.ball_radius_mm, GainOrder::plane);
+  const PressAsymmetry gain = fit_asymmetry(sure_samples(press.map, press.contact),
+                                            press.contact.ball_radius_mm, AsymmetryOrder::plane);
   return std::hypot(gain.factors[0], gain.factors[1]);
 }
 
-ChosenPressGain press_gain_of(const SettledPress& press) {
-  return choose_press_gain(sure_samples(press.map, press.contact), press.contact.ball_radius_mm);
+ChosenAsymmetry press_asymmetry_of(const SettledPress& press) {
+  return choose_asymmetry(sure_samples(press.map, press.contact), press.contact.ball_radius_mm);
 }
 
 /// Chooses the press's own gain and, where it may, the model's; `settled` becomes the press under
 /// it.
 PressChoices choose(const BallPress& press, recon::Model& model, SettledPress& settled) {
-  PressChoices chosen{press_gain_of(settled), {}, {}, press.depth_mm};
-  const recon::SpatialGain& given = press.gain;
+  PressChoices chosen{press_asymmetry_of(settled), {}, {}, press.depth_mm};
+  const recon::FlatFieldGain& given = press.gain;
   if (!press.may_share_light || given.shape != recon::GainShape::none ||
       !given.polynomial.empty()) {
     return chosen;
@@ -109,15 +109,15 @@ PressChoices choose(const BallPress& press, recon::Model& model, SettledPress& s
                     under.contact.col, under.contact.row);
     return chosen;
   }
-  const ChosenPressGain gain = press_gain_of(under);
+  const ChosenAsymmetry gain = press_asymmetry_of(under);
   chosen.light = {false, lean_of(settled), lean_of(under)};
   if (!(chosen.light->plain_per_mm > kLeans &&
         chosen.light->shared_per_mm < kLeftByTheLight * chosen.light->plain_per_mm &&
-        gain.left_out_mm[0] <= chosen.press_gain.left_out_mm[0])) {
+        gain.left_out_mm[0] <= chosen.press_asymmetry.left_out_mm[0])) {
     return chosen;
   }
   chosen.light->shared = true;
-  chosen.press_gain = gain;
+  chosen.press_asymmetry = gain;
   model = std::move(shared);
   settled = std::move(under);
   return chosen;
@@ -183,7 +183,7 @@ Calibration empty_calibration(const image::Grey16& reference_q8, const std::opti
   return calibration;
 }
 
-bool reaches_corners(const recon::SpatialGain& gain, double width_mm, double height_mm) noexcept {
+bool reaches_corners(const recon::FlatFieldGain& gain, double width_mm, double height_mm) noexcept {
   return std::ranges::all_of(std::array{-0.5, 0.5}, [&](double right) {
     return std::ranges::all_of(std::array{-0.5, 0.5}, [&](double down) {
       const double factor = gain.polynomial_at(right * width_mm, down * height_mm);
@@ -192,10 +192,10 @@ bool reaches_corners(const recon::SpatialGain& gain, double width_mm, double hei
   });
 }
 
-recon::SpatialGain gain_on_map(const recon::SpatialGain& gain, const Calibration& calibration) {
+recon::FlatFieldGain gain_on_map(const recon::FlatFieldGain& gain, const Calibration& calibration) {
   const recon::Model& model = *calibration.model;
   const recon::RectifyTable& map = model.rectify;
-  recon::SpatialGain on_map = gain;
+  recon::FlatFieldGain on_map = gain;
   if (calibration.lens) {
     const recon::Point centre = surface_point(
         *calibration.lens,
@@ -209,7 +209,7 @@ recon::SpatialGain gain_on_map(const recon::SpatialGain& gain, const Calibration
   return on_map;
 }
 
-std::string gain_left_out(const recon::SpatialGain& gain, const Calibration& calibration) {
+std::string gain_left_out(const recon::FlatFieldGain& gain, const Calibration& calibration) {
   if (gain.polynomial.empty() || !gain_on_map(gain, calibration).polynomial.empty()) return {};
   return "gain: the lens file's is not used: extended to the corners of the map, where no pin was, "
          "it would halve or double darkening; give the --crop that the board covered to use it";
@@ -219,7 +219,7 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
                     std::span<const image::Grey8> frames, double ball_radius_mm) {
   SettledPress press;
   press.reference_q8.assign(reference_q8.begin(), reference_q8.end());
-  press.map = smoothed_difference(model, press.reference_q8, frames);
+  press.map = smoothed_darkening(model, press.reference_q8, frames);
   press.contact = find_contact(press.map, ball_radius_mm);
   press.drift_levels = far_field_drift(press.map, press.contact);
   if (press.drift_levels != 0) {
@@ -227,7 +227,7 @@ SettledPress settle(const recon::Model& model, std::span<const std::uint16_t> re
     for (std::uint16_t& value : press.reference_q8) {
       value = static_cast<std::uint16_t>(std::clamp(value - drift_q8, 0, 255 * 256));
     }
-    press.map = smoothed_difference(model, press.reference_q8, frames);
+    press.map = smoothed_darkening(model, press.reference_q8, frames);
     press.contact = find_contact(press.map, ball_radius_mm);
   }
   return press;
@@ -251,8 +251,8 @@ std::string PressChoices::describe() const {
         100 * light->plain_per_mm, 100 * light->shared_per_mm,
         light->shared ? "the share is used" : "as it is");
   }
-  text += press_gain.describe();
-  if (depth_mm) text += fmt::format("\nlist: at the measured depth of {:g} mm", *depth_mm);
+  text += press_asymmetry.describe();
+  if (depth_mm) text += fmt::format("\nLUT: at the measured depth of {:g} mm", *depth_mm);
   return text;
 }
 
@@ -262,7 +262,7 @@ Calibration build(const BallPress& press, PressChoices* choices) {
       empty_calibration(press.reference_q8, press.crop, press.mm_per_px, press.lens);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   model->method = press.method;
-  if (press.method == recon::Method::list) model->gain = gain_on_map(press.gain, calibration);
+  if (press.method == recon::Method::lut) model->gain = gain_on_map(press.gain, calibration);
 
   SettledPress settled =
       settle(*model, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
@@ -272,15 +272,16 @@ Calibration build(const BallPress& press, PressChoices* choices) {
                  "the reference is white at the contact; lower the exposure or the light");
   refuse_clipped(ball, settled.contact, press.mm_per_px, 0,
                  "the ball's image is black at the contact; raise the exposure or the light");
-  if (press.method == recon::Method::list) {
+  if (press.method == recon::Method::lut) {
     const PressChoices chosen = choose(press, *model, settled);
-    const LevelledPress level = levelled(settled.map, settled.contact, chosen.press_gain.gain);
-    model->list = fit_list(level.map, level.contact, {}, press.depth_mm);
+    const SymmetricPress level =
+        without_asymmetry(settled.map, settled.contact, chosen.press_asymmetry.gain);
+    model->lut = fit_lut(level.map, level.contact, {}, press.depth_mm);
     if (choices != nullptr) *choices = chosen;
-    model->uncertainty = uncertainty_by_zero(model->list, std::span(&settled, 1), press.depth_mm);
+    model->uncertainty = uncertainty_of_zero(model->lut, std::span(&settled, 1), press.depth_mm);
   } else {
-    model->list = fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
-    model->uncertainty = uncertainty_by_zero(model->list, std::span(&settled, 1));
+    model->lut = fit_published(reference, ball, press.ball_radius_mm, press.mm_per_px);
+    model->uncertainty = uncertainty_of_zero(model->lut, std::span(&settled, 1));
   }
   calibration.model = std::move(model);
   return calibration;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "clients/calibrate/fit/contact.hpp"
-#include "clients/calibrate/fit/press_gain.hpp"
+#include "clients/calibrate/fit/press_asymmetry.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/files/png.hpp"
 
@@ -17,7 +17,7 @@ namespace dtact::calibration {
 struct SettledPress {
   Contact contact;
   double drift_levels = 0;
-  DifferenceMap map;                        ///< Smoothed, drift taken off.
+  DarkeningMap map;                         ///< Smoothed, drift taken off.
   std::vector<std::uint16_t> reference_q8;  ///< The reference moved by the drift.
 };
 
@@ -50,8 +50,8 @@ struct BallPress {
   std::optional<Crop> crop;
   /// Places in millimetres of the lens's surface; without a lens from the map's centre. The
   /// published method has none.
-  recon::SpatialGain gain = {};
-  recon::Method method = recon::Method::list;
+  recon::FlatFieldGain gain = {};
+  recon::Method method = recon::Method::lut;
   /// Where `gain` says nothing, the press may: whether darkening is a share of the light.
   bool may_share_light = false;
   /// Of the ball's lowest point, where it was measured. The published method has no use for it.
@@ -60,7 +60,7 @@ struct BallPress {
 
 /// What one press chose, and why.
 struct PressChoices {
-  ChosenPressGain press_gain;
+  ChosenAsymmetry press_asymmetry;
   /// Whether the calibration takes darkening as a share of the light, and by how much the press
   /// leans (the size of its own plane, per mm) without and with.
   struct Light {
@@ -81,7 +81,7 @@ struct PressChoices {
 /// and below 100 mm and the scale 0.001 to 1 mm a pixel.
 void check_sizes(double ball_radius_mm, double mm_per_px);
 
-/// A calibration without a list: frame, crop (none: all that the frame shows), scale, lens,
+/// A calibration without a LUT: frame, crop (none: all that the frame shows), scale, lens,
 /// smoothing, reference. Throws std::invalid_argument when the crop leaves the frame.
 [[nodiscard]] Calibration empty_calibration(const image::Grey16& reference_q8,
                                             const std::optional<Crop>& crop, double mm_per_px,
@@ -90,18 +90,18 @@ void check_sizes(double ball_radius_mm, double mm_per_px);
 /// Whether a gain, of places from the middle of a map of this size, stays between half and twice
 /// of its middle at the map's corners. It is fitted where presses or pins are and used everywhere:
 /// what halves or doubles at a corner was not seen but extended there.
-[[nodiscard]] bool reaches_corners(const recon::SpatialGain& gain, double width_mm,
+[[nodiscard]] bool reaches_corners(const recon::FlatFieldGain& gain, double width_mm,
                                    double height_mm) noexcept;
 
 /// A lens file's gain, whose places are millimetres of the lens's surface, with places from the
 /// middle of the calibration's map, as recon::Model has it. Without a lens they are that already.
 /// Without its polynomial where that was extended too far (reaches_corners()).
 /// Throws std::invalid_argument when the gain is not above zero there.
-[[nodiscard]] recon::SpatialGain gain_on_map(const recon::SpatialGain& gain,
-                                             const Calibration& calibration);
+[[nodiscard]] recon::FlatFieldGain gain_on_map(const recon::FlatFieldGain& gain,
+                                               const Calibration& calibration);
 
 /// A sentence on a polynomial that gain_on_map() leaves out; empty: it does not.
-[[nodiscard]] std::string gain_left_out(const recon::SpatialGain& gain,
+[[nodiscard]] std::string gain_left_out(const recon::FlatFieldGain& gain,
                                         const Calibration& calibration);
 
 /// The depth map's part of the reference, the nearest pixels, to whole grey levels.
@@ -112,19 +112,19 @@ void check_sizes(double ball_radius_mm, double mm_per_px);
                                           const std::vector<image::Grey8>& frames);
 
 /// The smoothing's standard deviation, millimetres. Light scatters sideways by about 0.3 mm in the
-/// layer, so that smoothing by 0.1 mm widens an edge by 5 % and takes a frame's noise of one grey
+/// gel, so that smoothing by 0.1 mm widens an edge by 5 % and takes a frame's noise of one grey
 /// level (32 µm) to 0.14 (5 µm) at 0.05 mm a pixel. On the real ball presses the error of the half
 /// that was not fitted falls by less than 1 µm a pixel from there on.
 inline constexpr double kSmoothingMm = 0.1;
 
-/// Builds a calibration from images alone, with what it is worth (uncertainty_by_zero()). `origin`
-/// is left for the caller to fill. The list is fitted to the press without its own gain
-/// (choose_press_gain()), and put to zero by its measured depth where there is one; `choices` says
+/// Builds a calibration from images alone, with its uncertainty (uncertainty_of_zero()). `origin`
+/// is left for the caller to fill. The LUT is fitted to the press without its own gain
+/// (choose_asymmetry()), and zeroed by its measured depth where there is one; `choices` says
 /// what was chosen.
 ///
 /// The share of the light is taken where the press leans by more than 0.4 % a millimetre, half of
 /// that at most under the share, and sectors that are left out lose nothing by it. A light that
-/// falls to one side and a layer that is thicker there look alike in one press, but the light shows
+/// falls to one side and a gel that is thicker there look alike in one press, but the light shows
 /// in the reference, too, and is right far from the press as well. A press that is lost under the
 /// share, to a dark part of the map whose few grey levels are a great share, is read as it is.
 ///

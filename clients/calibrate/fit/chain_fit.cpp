@@ -15,9 +15,9 @@ namespace {
 constexpr double kKnotLevels = 2;  // grey levels from knot to knot
 /// Weight of a bend of one millimetre between three knots, against all pixels off by a millimetre.
 /// Presses of one ball cannot choose it: light scattered in from beyond the contact depends on how
-/// wide the contact is, a chain answers with bends that the layer has not, and lists from the
+/// wide the contact is, a chain answers with bends that the gel has not, and LUTs from the
 /// freest to a straight line fit presses that were left out within 1 to 4 µm while they differ by
-/// 50 µm (simulated layers of 1.5, 2 and 3 mm). Left to leave-one-out the freest wins, and a 5 mm
+/// 50 µm (simulated gels of 1.5, 2 and 3 mm). Left to leave-one-out the freest wins, and a 5 mm
 /// ball reads 0.027, 0.029 and 0.059 mm off on the three; with this weight 0.031, 0.014 and 0.035,
 /// with a third of it 0.026, 0.020 and 0.040, with a straight line 0.057, 0.022 and 0.029.
 constexpr double kStraight = 0.3;
@@ -28,7 +28,7 @@ constexpr double kNearOne = 2.5e-5;
 /// Weight of a measured depth, in pixels.
 constexpr double kMeasured = 1e5;
 
-/// Slope of a list at a darkening, millimetres a grey level.
+/// Slope of a LUT at a darkening, millimetres a grey level.
 double slope_at(const std::vector<Knot>& knots, double level) {
   const double low = std::max(0.0, level - kKnotLevels);
   const double high = std::min(knots.back().level, low + 2 * kKnotLevels);
@@ -45,7 +45,7 @@ double deepest_level(const std::vector<SagProfile>& presses, const std::vector<d
   return deepest;
 }
 
-/// What is shown of the list, as intervals of indentation, and what is not in between.
+/// What is shown of the LUT, as intervals of indentation, and what is not in between.
 std::vector<ChainFit::Gap> gaps_of(const std::vector<SagProfile>& presses, const ChainFit& fit) {
   std::vector<ChainFit::Gap> shown;
   for (const SagProfile& press : presses) {
@@ -148,8 +148,8 @@ SagProfile within(const PressRings& press, double reach) {
 }  // namespace
 
 double gain_at(const std::vector<double>& gain, const std::vector<double>& place) {
-  constexpr double kLeast = 0.1;
-  return std::max(kLeast, std::inner_product(gain.begin(), gain.end(), place.begin(), 1.0));
+  constexpr double kMin = 0.1;
+  return std::max(kMin, std::inner_product(gain.begin(), gain.end(), place.begin(), 1.0));
 }
 
 ChainFit fit_chain(const std::vector<SagProfile>& presses) {
@@ -211,7 +211,7 @@ PressChain chain_presses(const std::vector<PressRings>& presses) {
   return chain;
 }
 
-double MetPress::mean_error_mm() const {
+double LeftOutResidual::mean_error_mm() const {
   double sum = 0;
   double weight = 0;
   for (const Ring& ring : rings) {
@@ -221,41 +221,41 @@ double MetPress::mean_error_mm() const {
   return weight > 0 ? sum / weight : std::numeric_limits<double>::quiet_NaN();
 }
 
-MetPress meet(const PressRings& press, const ChainFit& list) {
-  const double gain = gain_at(list.gain, press.all.place);
-  MetPress met;
+LeftOutResidual residual_of(const PressRings& press, const ChainFit& lut) {
+  const double gain = gain_at(lut.gain, press.all.place);
+  LeftOutResidual residuals;
   double reach = kSureOfSeen * press.seen_mm;
   for (int round = 0; round < kChainRounds; ++round) {
-    met.rings.clear();
+    residuals.rings.clear();
     double depth_mm = 0;
     double weight = 0;
     for (const auto& ring : within(press, reach).rings) {
       const double level = gain * ring.level;
       // Beyond what the others show nothing is claimed.
-      if (level > list.knots.back().level) continue;
-      const double read = interpolate(list.knots, std::max(0.0, level));
-      met.rings.push_back({-ring.sag_mm, read + ring.sag_mm, ring.weight});
+      if (level > lut.knots.back().level) continue;
+      const double read = interpolate(lut.knots, std::max(0.0, level));
+      residuals.rings.push_back({-ring.sag_mm, read + ring.sag_mm, ring.weight});
       depth_mm += ring.weight * (read + ring.sag_mm);
       weight += ring.weight;
     }
-    if (weight == 0) return met;
+    if (weight == 0) return residuals;
     depth_mm = press.all.depth_mm.value_or(depth_mm / weight);
-    for (MetPress::Ring& ring : met.rings) {
+    for (LeftOutResidual::Ring& ring : residuals.rings) {
       ring.depth_mm += depth_mm;
       ring.error_mm -= depth_mm;
     }
     reach = reach_mm(press, depth_mm);
   }
-  return met;
+  return residuals;
 }
 
-LeftOut leave_each_out(const std::vector<PressRings>& presses) {
-  LeftOut out;
+LeaveOneOut leave_one_out(const std::vector<PressRings>& presses) {
+  LeaveOneOut out;
   for (std::size_t left = 0; left < presses.size(); ++left) {
     std::vector<PressRings> others = presses;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(left));
     out.without.push_back(chain_presses(others).fit);
-    out.met.push_back(meet(presses[left], out.without.back()));
+    out.residuals.push_back(residual_of(presses[left], out.without.back()));
   }
   return out;
 }

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "clients/calibrate/fit/list_fit.hpp"
+#include "clients/calibrate/fit/lut_fit.hpp"
 
 namespace dtact::calibration {
 
@@ -22,11 +22,11 @@ struct SagProfile {
   std::vector<double> place = {};
 };
 
-/// One list for all presses, and how deep each of them was.
+/// One LUT for all presses, and how deep each of them was.
 struct ChainFit {
   std::vector<Knot> knots;       ///< Rising; the first at a darkening above zero.
   std::vector<double> depth_mm;  ///< Of each press's lowest point.
-  std::vector<double> gain;      ///< As recon::SpatialGain::polynomial.
+  std::vector<double> gain;      ///< As recon::FlatFieldGain::polynomial.
   /// Indentations that no press shows between two that are shown (or zero), millimetres.
   struct Gap {
     double from_mm = 0;
@@ -35,7 +35,7 @@ struct ChainFit {
   std::vector<Gap> gaps;
 };
 
-/// The list M, linear between knots two grey levels apart with M(0) = 0, and a depth g for each
+/// The LUT M, linear between knots two grey levels apart with M(0) = 0, and a depth g for each
 /// press, so that M(level) = g − sag holds in the rings of all: one linear least-squares solve. No
 /// circle is needed: inside one press only the slope of M is seen, presses of several depths chain
 /// from zero upward, and a press of known depth ties the chain to it. M is kept
@@ -51,12 +51,12 @@ struct ChainFit {
 /// 1 + gain · place, above zero.
 [[nodiscard]] double gain_at(const std::vector<double>& gain, const std::vector<double>& place);
 
-/// A gap below this is bridged by the list's straightness, millimetres.
+/// A gap below this is bridged by the LUT's straightness, millimetres.
 inline constexpr double kBridgedMm = 0.15;
-/// From zero to the shallowest ring the list is a line to the origin: no darkening is no depth.
+/// From zero to the shallowest ring the LUT is a line to the origin: no darkening is no depth.
 inline constexpr double kBridgedFromZeroMm = 0.4;
 
-/// The layer's contact with a ball is narrower than the circle in which the ball cuts the untouched
+/// The gel's contact with a ball is narrower than the circle in which the ball cuts the untouched
 /// surface: 3.04 mm against 3.12 for a 4 mm ball 1.5 mm deep (solved for 2 to 2.5 mm thickness).
 inline constexpr double kContactOfCut = 0.97;
 
@@ -85,28 +85,28 @@ struct PressChain {
 };
 [[nodiscard]] PressChain chain_presses(const std::vector<PressRings>& presses);
 
-/// A press under a list that it had no part in, as a user's press meets it. Free is one number: the
+/// A press under a LUT that it had no part in, as a user's press meets it. Free is one number: the
 /// depth of its lowest point, which nobody measured (where somebody did, nothing is). What is
-/// judged is the known shape: how the indentation that the list reads follows the sphere inside the
-/// sure contact. That sees slope and bends of the list and the gain at the press's place; an offset
-/// that the list has at all depths it cannot see.
-struct MetPress {
+/// judged is the known shape: how the indentation that the LUT reads follows the sphere inside the
+/// sure contact. That sees slope and bends of the LUT and the gain at the press's place; an offset
+/// that the LUT has at all depths it cannot see.
+struct LeftOutResidual {
   struct Ring {
     double depth_mm = 0;
-    double error_mm = 0;  ///< List minus sphere.
+    double error_mm = 0;  ///< LUT minus sphere.
     double weight = 0;    ///< Pixels.
   };
-  std::vector<Ring> rings;  ///< Those within the list.
+  std::vector<Ring> rings;  ///< Those within the LUT.
   /// Mean of the errors' sizes; NaN without rings.
   [[nodiscard]] double mean_error_mm() const;
 };
-[[nodiscard]] MetPress meet(const PressRings& press, const ChainFit& list);
+[[nodiscard]] LeftOutResidual residual_of(const PressRings& press, const ChainFit& lut);
 
 /// Every press in turn under the chain of all the others.
-struct LeftOut {
-  std::vector<MetPress> met;      ///< In the presses' order.
-  std::vector<ChainFit> without;  ///< The chains that met them.
+struct LeaveOneOut {
+  std::vector<LeftOutResidual> residuals;  ///< In the presses' order.
+  std::vector<ChainFit> without;           ///< The chains that met them.
 };
-[[nodiscard]] LeftOut leave_each_out(const std::vector<PressRings>& presses);
+[[nodiscard]] LeaveOneOut leave_one_out(const std::vector<PressRings>& presses);
 
 }  // namespace dtact::calibration

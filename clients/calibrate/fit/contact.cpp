@@ -12,20 +12,19 @@
 namespace dtact::calibration {
 namespace {
 
-constexpr double kLeastPeak = 8;   // grey levels, about 0.25 mm: a list from less is noise
+constexpr double kMinPeak = 8;     // grey levels, about 0.25 mm: a LUT from less is noise
 constexpr double kEdgeLevels = 3;  // the contact's edge, as the published circle detection has it
-constexpr double kMostOfBall = 0.85;
+constexpr double kMaxOfBall = 0.85;
 constexpr double kPatch = 0.3;  // of the peak: on the flank, where neither noise nor ring reach
 constexpr int kTile = 40;       // pixels
 
-std::size_t index(const DifferenceMap& map, int x, int y) {
+std::size_t index(const DarkeningMap& map, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(map.width) +
          static_cast<std::size_t>(x);
 }
 
 /// Pixels connected to `seed` over sides whose level exceeds `threshold`.
-std::vector<std::size_t> patch_around(const DifferenceMap& map, std::size_t seed,
-                                      double threshold) {
+std::vector<std::size_t> patch_around(const DarkeningMap& map, std::size_t seed, double threshold) {
   std::vector<bool> seen(map.levels.size());
   std::vector<std::size_t> patch{seed};
   seen[seed] = true;
@@ -76,11 +75,11 @@ double sag_mm(double ball_radius_mm, double r) noexcept {
   return ball_radius_mm - std::sqrt(std::max(0.0, ball_radius_mm * ball_radius_mm - r * r));
 }
 
-double distance_mm(const DifferenceMap& map, const Contact& contact, int x, int y) {
+double distance_mm(const DarkeningMap& map, const Contact& contact, int x, int y) {
   return std::hypot(x - contact.col, y - contact.row) * map.mm_per_px;
 }
 
-RadialProfile radial_profile(const DifferenceMap& map, const Contact& contact, double reach_mm) {
+RadialProfile radial_profile(const DarkeningMap& map, const Contact& contact, double reach_mm) {
   // Two pixels a ring: the finest that leaves no ring empty, up to the middle one.
   RadialProfile profile{2 * map.mm_per_px, {}, {}};
   const auto rings = static_cast<std::size_t>(std::ceil(reach_mm / profile.step_mm));
@@ -103,7 +102,7 @@ RadialProfile radial_profile(const DifferenceMap& map, const Contact& contact, d
   return profile;
 }
 
-Contact find_contact(const DifferenceMap& map, double ball_radius_mm) {
+Contact find_contact(const DarkeningMap& map, double ball_radius_mm) {
   std::size_t seed = 0;
   float peak = -std::numeric_limits<float>::infinity();
   for (std::size_t i = 0; i < map.levels.size(); ++i) {
@@ -112,11 +111,11 @@ Contact find_contact(const DifferenceMap& map, double ball_radius_mm) {
       seed = i;
     }
   }
-  if (!(peak >= kLeastPeak)) {
+  if (!(peak >= kMinPeak)) {
     throw NoContact(fmt::format(
         "no contact found: nowhere is the frame darker than the reference by {} grey levels (the "
         "most is {:.1f}); press deeper, and check that reference and frame are not exchanged",
-        kLeastPeak, peak));
+        kMinPeak, peak));
   }
   Contact contact;
   contact.ball_radius_mm = ball_radius_mm;
@@ -133,7 +132,7 @@ Contact find_contact(const DifferenceMap& map, double ball_radius_mm) {
   contact.col /= weight;
   contact.row /= weight;
 
-  const double limit = kMostOfBall * ball_radius_mm;
+  const double limit = kMaxOfBall * ball_radius_mm;
   contact.radius_mm = contact_radius(radial_profile(map, contact, limit + 1), limit);
   const double pixels = contact.radius_mm / map.mm_per_px;
   if (contact.col < pixels || contact.row < pixels || contact.col > map.width - 1 - pixels ||
@@ -147,7 +146,7 @@ Contact find_contact(const DifferenceMap& map, double ball_radius_mm) {
   return contact;
 }
 
-double far_field_drift(const DifferenceMap& map, const Contact& contact) {
+double far_field_drift(const DarkeningMap& map, const Contact& contact) {
   std::vector<double> tiles;
   int left = 0;
   int above = 0;

@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
 
 namespace dtact::calibration {
 
@@ -34,9 +34,9 @@ inline constexpr double kFarField = 2.25;
 [[nodiscard]] double sag_mm(double ball_radius_mm, double r) noexcept;
 
 /// Distance of a pixel from the contact's centre, millimetres.
-[[nodiscard]] double distance_mm(const DifferenceMap& map, const Contact& contact, int x, int y);
+[[nodiscard]] double distance_mm(const DarkeningMap& map, const Contact& contact, int x, int y);
 
-[[nodiscard]] RadialProfile radial_profile(const DifferenceMap& map, const Contact& contact,
+[[nodiscard]] RadialProfile radial_profile(const DarkeningMap& map, const Contact& contact,
                                            double reach_mm);
 
 /// Nothing is dark enough to be a contact.
@@ -50,12 +50,12 @@ class NoContact : public std::runtime_error {
 /// about it falls to 3 grey levels, at most 0.85 of the ball's radius (further out the sphere is so
 /// steep that a pixel spans 0.1 mm of depth). Throws saying what to do: NoContact when nothing
 /// touches (less than 8 grey levels), std::runtime_error when the contact leaves the map.
-[[nodiscard]] Contact find_contact(const DifferenceMap& map, double ball_radius_mm);
+[[nodiscard]] Contact find_contact(const DarkeningMap& map, double ball_radius_mm);
 
 /// How much darker the untouched surroundings became between reference and frame, grey levels: the
 /// median over tiles of the far field. 0 unless it is sure, that is: at least 0.5 levels, twice the
 /// spread of the tiles, and the far field shows in at least eight tiles on both sides of the
 /// contact. (The faint outskirts of the bulge are uneven and fail this; a drifted lamp passes.)
-[[nodiscard]] double far_field_drift(const DifferenceMap& map, const Contact& contact);
+[[nodiscard]] double far_field_drift(const DarkeningMap& map, const Contact& contact);
 
 }  // namespace dtact::calibration

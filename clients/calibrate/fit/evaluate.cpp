@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "clients/calibrate/fit/difference.hpp"
-#include "clients/calibrate/fit/list_fit.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
+#include "clients/calibrate/fit/lut_fit.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -37,7 +37,7 @@ Spread spread_of(std::vector<double> errors) {
 
 /// Calls `visit(x, y, sphere_mm)` for each pixel in the contact.
 template <typename Visit>
-void for_contact(const DifferenceMap& map, const Contact& contact, const Visit& visit) {
+void for_contact(const DarkeningMap& map, const Contact& contact, const Visit& visit) {
   const double r2 = contact.ball_radius_mm * contact.ball_radius_mm;
   const double edge = std::sqrt(r2 - contact.radius_mm * contact.radius_mm);
   for (int y = 0; y < map.height; ++y) {
@@ -48,19 +48,19 @@ void for_contact(const DifferenceMap& map, const Contact& contact, const Visit& 
   }
 }
 
-/// Of a list from the pixels `fitted` on the others.
-double left_out_error(const LevelledPress& press, const PixelFilter& fitted) {
-  const recon::DepthList list = fit_list(press.map, press.contact, fitted);
+/// Of a LUT from the pixels `fitted` on the others.
+double left_out_error(const SymmetricPress& press, const PixelFilter& fitted) {
+  const recon::DepthLut lut = fit_lut(press.map, press.contact, fitted);
   std::vector<double> errors;
   for_contact(press.map, press.contact, [&](int x, int y, double sphere) {
     const double level = press.map.at(x, y);
     if (fitted(x, y) || std::isnan(level)) return;
-    errors.push_back(look_up_mm(list, level) - sphere);
+    errors.push_back(lut_mm(lut, level) - sphere);
   });
   return spread_of(std::move(errors)).mean;
 }
 
-double half_error(const LevelledPress& press, double angle) {
+double half_error(const SymmetricPress& press, double angle) {
   const double dx = std::cos(angle);
   const double dy = std::sin(angle);
   return left_out_error(press, [&](int x, int y) {
@@ -75,15 +75,16 @@ double sector_error(const SettledPress& press, double turned, bool even) {
   const PixelFilter fitted = [&](int x, int y) {
     return in_even_sector(x - contact.col, y - contact.row, kSector, turned) == even;
   };
-  const ChosenPressGain chosen = choose_press_gain(sure_samples(press.map, contact, fitted),
-                                                   contact.ball_radius_mm, kSector / 2);
-  return left_out_error(levelled(press.map, contact, chosen.gain), fitted);
+  const ChosenAsymmetry chosen = choose_asymmetry(sure_samples(press.map, contact, fitted),
+                                                  contact.ball_radius_mm, kSector / 2);
+  return left_out_error(without_asymmetry(press.map, contact, chosen.gain), fitted);
 }
 
 void leave_out(const SettledPress& press, Evaluation& result) {
   const Contact& contact = press.contact;
-  result.press_gain = choose_press_gain(sure_samples(press.map, contact), contact.ball_radius_mm);
-  const LevelledPress level = levelled(press.map, contact, result.press_gain.gain);
+  result.press_asymmetry =
+      choose_asymmetry(sure_samples(press.map, contact), contact.ball_radius_mm);
+  const SymmetricPress level = without_asymmetry(press.map, contact, result.press_asymmetry.gain);
   double sum = 0;
   double worst = 0;
   for (int i = 0; i < kHalves; ++i) {
@@ -155,9 +156,9 @@ Evaluation read(const recon::Model& model, const SettledPress& press,
 
 constexpr int kLevels = 20;  // of a light press, about 0.6 mm: over these the slope is taken
 
-double depth_um(const recon::DepthList& list, int q6) {
-  const int last = static_cast<int>(list.um.size()) - 1;
-  return list.um[static_cast<std::size_t>(std::clamp(q6 - list.first_q6, 0, last))];
+double depth_um(const recon::DepthLut& lut, int q6) {
+  const int last = static_cast<int>(lut.um.size()) - 1;
+  return lut.um[static_cast<std::size_t>(std::clamp(q6 - lut.first_q6, 0, last))];
 }
 
 /// Where a press's contact is and the mean light there; nothing where there is none.
@@ -203,14 +204,14 @@ Evaluation evaluate(const Calibration& calibration, std::span<const std::uint16_
   const recon::Model& model = *calibration.model;
   const SettledPress press = settle(model, reference_q8, frames, ball_radius_mm);
   Evaluation result = read(model, press, frames);
-  if (model.method == recon::Method::list) leave_out(press, result);
+  if (model.method == recon::Method::lut) leave_out(press, result);
   return result;
 }
 
 std::string dim_part_of(const Calibration& made, const BallPresses& set) {
-  constexpr double kLeastPart = 0.005;  // of the map
+  constexpr double kMinPart = 0.005;  // of the map
   const recon::Model& model = *made.model;
-  if (set.gain_told || model.gain.shape != recon::GainShape::none ||
+  if (set.gain_specified || model.gain.shape != recon::GainShape::none ||
       !model.gain.polynomial.empty()) {
     return {};
   }
@@ -234,7 +235,7 @@ std::string dim_part_of(const Calibration& made, const BallPresses& set) {
       }
     }
   }
-  if (dim < kLeastPart * all) return {};
+  if (dim < kMinPart * all) return {};
   return fmt::format(
       "light: {:.0f} % of the map, from {:.1f} mm beside the ball on, has less than half of the "
       "light that the ball was pressed in; where darkening is a share of the light depth reads too "
@@ -242,11 +243,11 @@ std::string dim_part_of(const Calibration& made, const BallPresses& set) {
       std::max(1.0, 100 * dim / all), nearest_mm);
 }
 
-std::vector<std::string> doubts_about(const recon::DepthList& list) {
+std::vector<std::string> doubts_about(const recon::DepthLut& lut) {
   const int at_q6 =
-      std::clamp(list.covered_to_q6, recon::kEntriesPerLevel, kLevels * recon::kEntriesPerLevel);
-  const double slope = depth_um(list, at_q6) * recon::kEntriesPerLevel / at_q6;
-  if (slope >= kLeastSlopeUm && slope <= kMostSlopeUm) return {};
+      std::clamp(lut.covered_to_q6, recon::kEntriesPerLevel, kLevels * recon::kEntriesPerLevel);
+  const double slope = depth_um(lut, at_q6) * recon::kEntriesPerLevel / at_q6;
+  if (slope >= kMinSlopeUm && slope <= kMaxSlopeUm) return {};
   return {fmt::format(
       "a grey level is {:.1f} um of depth; sensors of this family have 20 to 80: check the scale "
       "(--mm-per-px, --lens) and the ball's radius (--radius-mm)",
@@ -258,16 +259,16 @@ std::vector<std::string> doubts_about(const Evaluation& press) {
   const double ball = press.contact.ball_radius_mm;
   const double edge = press.contact.radius_mm;
   const double sphere_mm = ball - std::sqrt(ball * ball - edge * edge);
-  if (std::abs(press.offset_mm) > kMostOffsetMm) {
+  if (std::abs(press.offset_mm) > kMaxOffsetMm) {
     doubts.push_back(fmt::format(
-        "list and sphere disagree by {:.2f} mm where healthy presses do by less than {}: check the "
+        "LUT and sphere disagree by {:.2f} mm where healthy presses do by less than {}: check the "
         "scale (--mm-per-px, --lens), the ball's radius (--radius-mm), the place of the map "
         "(--centre, --crop), the press's depth where one was measured, that the light did not "
         "change since the reference, and that the press is no deeper than half of the ball's "
         "radius",
-        press.offset_mm, kMostOffsetMm));
+        press.offset_mm, kMaxOffsetMm));
   }
-  if (press.mae_mm > std::max(kLeastShapeMm, kMostShape * sphere_mm)) {
+  if (press.mae_mm > std::max(kMinShapeMm, kMaxShape * sphere_mm)) {
     doubts.push_back(fmt::format(
         "the press has not the shape of a ball: it is {:.2f} mm off a sphere of {} mm radius, "
         "{:.0f} "
@@ -276,13 +277,13 @@ std::vector<std::string> doubts_about(const Evaluation& press) {
         press.mae_mm, ball, 100 * press.mae_mm / sphere_mm));
   }
   const double unseen = static_cast<double>(press.unseen) / static_cast<double>(press.pixels);
-  if (unseen > kMostUnseen) {
+  if (unseen > kMaxUnseen) {
     doubts.push_back(fmt::format(
         "{:.0f} % of the contact is too dark to be seen; press where the light is, or check the "
         "place of the map (--centre, --crop)",
         100 * unseen));
   }
-  if (press.dim > kMostDim) {
+  if (press.dim > kMaxDim) {
     doubts.push_back(
         fmt::format("{:.0f} % of the contact and the ring about it has less than half of the light "
                     "that the rest "
@@ -293,7 +294,7 @@ std::vector<std::string> doubts_about(const Evaluation& press) {
 }
 
 std::vector<std::string> doubts_about(const Calibration& made, const BallPress& press) {
-  std::vector<std::string> doubts = doubts_about(made.model->list);
+  std::vector<std::string> doubts = doubts_about(made.model->lut);
   const Evaluation read =
       read_ball(made, press.reference_q8.pixels, press.frames, press.ball_radius_mm);
   std::ranges::move(doubts_about(read), std::back_inserter(doubts));
@@ -301,7 +302,7 @@ std::vector<std::string> doubts_about(const Calibration& made, const BallPress& 
 }
 
 std::vector<std::string> doubts_about(const Calibration& made, const BallPresses& set) {
-  std::vector<std::string> doubts = doubts_about(made.model->list);
+  std::vector<std::string> doubts = doubts_about(made.model->lut);
   for (const BallPresses::Press& press : set.presses) {
     try {
       const Evaluation read =

@@ -8,7 +8,7 @@
 
 #include "clients/calibrate/fit/contact.hpp"
 #include "clients/calibrate/fit/evaluate.hpp"
-#include "clients/calibrate/fit/press_gain.hpp"
+#include "clients/calibrate/fit/press_asymmetry.hpp"
 #include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "hal/files/png.hpp"
@@ -25,8 +25,8 @@ struct Evaluation {
   double raw_mae_mm = 0;    ///< Mean absolute error with it.
   /// The press's own gain and what chose it. It is taken off in the two below and in nothing above.
   /// They are empty for the published method.
-  ChosenPressGain press_gain;
-  /// List fitted on one half of the disc, tested on the other (its offset removed), the ball's
+  ChosenAsymmetry press_asymmetry;
+  /// LUT fitted on one half of the disc, tested on the other (its offset removed), the ball's
   /// middle and the press's gain being those of the whole disc: mean and worst of eight halves.
   std::optional<double> half_mae_mm;
   std::optional<double> half_worst_mm;
@@ -35,7 +35,7 @@ struct Evaluation {
   std::optional<double> sector_mae_mm;
   std::size_t pixels = 0;     ///< In the contact.
   std::size_t untrusted = 0;  ///< Of them, marked.
-  std::size_t unseen = 0;     ///< Of them, too dark or masked, whatever the list says.
+  std::size_t unseen = 0;     ///< Of them, too dark or masked, whatever the LUT says.
   /// Share of the contact and of the ring about it (half a radius wide) that has less than half of
   /// their median light.
   double dim = 0;
@@ -54,24 +54,24 @@ struct Evaluation {
 
 /// What speaks against a calibration, a sentence each that says what to check; empty: nothing.
 ///
-/// A list is made to fit its press, so a wrong scale or a wrong radius fits, too; what gives it
+/// A LUT is made to fit its press, so a wrong scale or a wrong radius fits, too; what gives it
 /// away is the sphere itself, set to zero at the contact's edge, and what is known of the family:
 ///
-/// - Where the sphere is (Evaluation::offset_mm): list minus sphere, the median over the contact.
+/// - Where the sphere is (Evaluation::offset_mm): LUT minus sphere, the median over the contact.
 ///   +0.03 to +0.06 mm on sensor_a, -0.11 to -0.06 on sensor_b, -0.03 to +0.18 in the simulator
-///   (layers of 1 to 3 mm, balls of 3 to 6 mm, presses of 0.35 mm to half of the ball's radius).
-///   kMostOffsetMm is 0.22. On sensor_a a scale that is 5 % too large makes 0.24 to 0.27, 8 % 0.40
+///   (gels of 1 to 3 mm, balls of 3 to 6 mm, presses of 0.35 mm to half of the ball's radius).
+///   kMaxOffsetMm is 0.22. On sensor_a a scale that is 5 % too large makes 0.24 to 0.27, 8 % 0.40
 ///   to 0.43, 15 % 0.75, a radius of 3.5 mm for 4 makes 0.61. The light that changed on one side by
 ///   a fifth of the darkening makes 0.35.
 /// - Its shape (Evaluation::mae_mm): the mean distance from the offset, as a share of how deep the
 ///   sphere is. At most 0.01 on sensor_a and in the simulator, 0.06 on sensor_b, whose ring is
-///   lopsided. kMostShape is 0.09. With half of the contact in the dark it is 0.10 to 0.22.
+///   lopsided. kMaxShape is 0.09. With half of the contact in the dark it is 0.10 to 0.22.
 /// - How much of the contact is too dark to be seen: none, or up to a quarter in such a press.
-/// - How evenly it is lit: darkening is a share of the light, and a list of one press takes it as
+/// - How evenly it is lit: darkening is a share of the light, and a LUT of one press takes it as
 /// it
 ///   is. Refused is a press with a tenth of it and its ring under less than half of its light; on
 ///   sensor_a and sensor_b none is, nor with corners at a quarter of the light.
-/// - The list's slope: real sensors have 31 to 64 micrometres a grey level, simulated layers of 1
+/// - The LUT's slope: real sensors have 31 to 64 micrometres a grey level, simulated gels of 1
 /// to
 ///   3 mm 15 to 65. Refused are those beyond 12 to 120: a scale or a radius that is a decimal point
 ///   off.
@@ -79,14 +79,14 @@ struct Evaluation {
 /// What it cannot see: scale and radius of a shallow press, of which the image shows only their
 /// quotient r² / R (on a press of 1.3 mm of a 4 mm ball 15 % of the scale move the offset by 0.04
 /// mm), and a scale that is too small.
-[[nodiscard]] std::vector<std::string> doubts_about(const recon::DepthList& list);
+[[nodiscard]] std::vector<std::string> doubts_about(const recon::DepthLut& lut);
 /// `press`: as the calibration reads it.
 [[nodiscard]] std::vector<std::string> doubts_about(const Evaluation& press);
 
-/// The list and the press that it was made from.
+/// The LUT and the press that it was made from.
 [[nodiscard]] std::vector<std::string> doubts_about(const Calibration& made,
                                                     const BallPress& press);
-/// The list and every press that shows a contact, by name.
+/// The LUT and every press that shows a contact, by name.
 [[nodiscard]] std::vector<std::string> doubts_about(const Calibration& made,
                                                     const BallPresses& set);
 
@@ -97,12 +97,12 @@ struct Evaluation {
 /// even light do not show it.
 [[nodiscard]] std::string dim_part_of(const Calibration& made, const BallPresses& set);
 
-inline constexpr double kMostOffsetMm = 0.22;
-inline constexpr double kMostShape = 0.09;     ///< Of the sphere's depth.
-inline constexpr double kLeastShapeMm = 0.05;  ///< What a light press may be off in any case.
-inline constexpr double kMostUnseen = 0.02;    ///< Of the contact.
-inline constexpr double kMostDim = 0.1;        ///< Of the contact and its ring.
-inline constexpr double kLeastSlopeUm = 12;    ///< A grey level.
-inline constexpr double kMostSlopeUm = 120;    ///< A grey level.
+inline constexpr double kMaxOffsetMm = 0.22;
+inline constexpr double kMaxShape = 0.09;    ///< Of the sphere's depth.
+inline constexpr double kMinShapeMm = 0.05;  ///< What a light press may be off in any case.
+inline constexpr double kMaxUnseen = 0.02;   ///< Of the contact.
+inline constexpr double kMaxDim = 0.1;       ///< Of the contact and its ring.
+inline constexpr double kMinSlopeUm = 12;    ///< A grey level.
+inline constexpr double kMaxSlopeUm = 120;   ///< A grey level.
 
 }  // namespace dtact::calibration

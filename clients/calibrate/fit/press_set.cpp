@@ -11,13 +11,13 @@
 #include <utility>
 
 #include "clients/calibrate/fit/chain_fit.hpp"
-#include "clients/calibrate/fit/list_worth.hpp"
+#include "clients/calibrate/fit/lut_uncertainty.hpp"
 
 namespace dtact::calibration {
 namespace {
 
-/// Presses of one ball agree among themselves within a micrometre or two however the layer scatters
-/// light; a ball of another radius is off by more: 0.012 to 0.036 mm on depths about 0.8 in layers
+/// Presses of one ball agree among themselves within a micrometre or two however the gel scatters
+/// light; a ball of another radius is off by more: 0.012 to 0.036 mm on depths about 0.8 in gels
 /// of 1.5 to 3 mm (simulator). The share that covers them.
 constexpr double kOtherShape = 0.05;
 
@@ -77,7 +77,7 @@ struct Trial {
   recon::GainShape shape = recon::GainShape::none;
   std::vector<PressRings> rings;
   ChainFit fit;  ///< Of all presses.
-  LeftOut left_out;
+  LeaveOneOut left_out;
   std::vector<double> errors_mm;  ///< Of each press left out; NaN: nothing to say.
 };
 
@@ -98,8 +98,9 @@ Trial try_gain(const std::vector<SettledPress>& presses, const BallPresses& set,
     trial.rings.push_back(rings_of(presses[p], set.presses[p].depth_mm, terms));
   }
   trial.fit = chain_presses(trial.rings).fit;
-  trial.left_out = leave_each_out(trial.rings);
-  for (const MetPress& met : trial.left_out.met) trial.errors_mm.push_back(met.mean_error_mm());
+  trial.left_out = leave_one_out(trial.rings);
+  for (const LeftOutResidual& residuals : trial.left_out.residuals)
+    trial.errors_mm.push_back(residuals.mean_error_mm());
   return trial;
 }
 
@@ -148,11 +149,11 @@ std::size_t simplest(const std::vector<Trial>& trials, std::vector<PressReport::
   return chosen;
 }
 
-/// The darkening at which the first of some lists that reaches so far reads a depth.
-double level_at(const std::vector<ChainFit>& lists, double depth_mm) {
-  for (const ChainFit& list : lists) {
+/// The darkening at which the first of some LUTs that reaches so far reads a depth.
+double level_at(const std::vector<ChainFit>& luts, double depth_mm) {
+  for (const ChainFit& lut : luts) {
     Knot below;
-    for (const Knot& knot : list.knots) {
+    for (const Knot& knot : lut.knots) {
       if (knot.depth_mm >= depth_mm && knot.depth_mm > below.depth_mm) {
         return std::lerp(below.level, knot.level,
                          (depth_mm - below.depth_mm) / (knot.depth_mm - below.depth_mm));
@@ -160,20 +161,20 @@ double level_at(const std::vector<ChainFit>& lists, double depth_mm) {
       below = knot;
     }
   }
-  return lists.front().knots.back().level;
+  return luts.front().knots.back().level;
 }
 
-/// How much the list at a depth moves with the presses that make it: the jackknife's standard error
+/// How much the LUT at a depth moves with the presses that make it: the jackknife's standard error
 /// (Efron and Tibshirani 1993, section 11.2), millimetres.
-double jackknife_mm(const LeftOut& left_out, double depth_mm) {
+double jackknife_mm(const LeaveOneOut& left_out, double depth_mm) {
   double n = 0;
   double sum = 0;
   double squares = 0;
   // Levels differ from press to press by the gain; at the mean place it is about one.
   const double level = level_at(left_out.without, depth_mm);
-  for (const ChainFit& list : left_out.without) {
-    if (level > list.knots.back().level) continue;
-    const double read = interpolate(list.knots, level);
+  for (const ChainFit& lut : left_out.without) {
+    if (level > lut.knots.back().level) continue;
+    const double read = interpolate(lut.knots, level);
     n += 1;
     sum += read;
     squares += read * read;
@@ -182,29 +183,29 @@ double jackknife_mm(const LeftOut& left_out, double depth_mm) {
   return std::sqrt(std::max(0.0, (n - 1) / n * (squares - sum * sum / n)));
 }
 
-/// What the ring's scattered light may make of the list, the mean over the presses: presses of one
+/// What the ring's scattered light may make of the LUT, the mean over the presses: presses of one
 /// ball agree whatever it does.
-double ring_doubt_mm(const Trial& trial) {
+double ring_uncertainty_mm(const Trial& trial) {
   const Knot& deepest = trial.fit.knots.back();
   double sum = 0;
   for (const SettledPress& press : *trial.presses) {
-    sum += ring_doubt_mm(press, deepest.depth_mm / deepest.level);
+    sum += ring_uncertainty_mm(press, deepest.depth_mm / deepest.level);
   }
   return sum / static_cast<double>(trial.presses->size());
 }
 
-/// At each indentation bin: how far left-out presses are from the known shape, how much the list
+/// At each indentation bin: how far left-out presses are from the known shape, how much the LUT
 /// moves with the presses that make it, what another shape would read otherwise, and what the ring
 /// may have done.
-std::vector<recon::Model::Uncertainty> uncertainty_of(const LeftOut& left_out, double ring_mm) {
+std::vector<recon::Model::Uncertainty> uncertainty_of(const LeaveOneOut& left_out, double ring_mm) {
   struct Bin {
     double depth = 0;
     double error = 0;
     double weight = 0;
   };
   std::vector<Bin> bins;
-  for (const MetPress& met : left_out.met) {
-    for (const MetPress::Ring& ring : met.rings) {
+  for (const LeftOutResidual& residuals : left_out.residuals) {
+    for (const LeftOutResidual::Ring& ring : residuals.rings) {
       const auto bin = static_cast<std::size_t>(std::max(0.0, ring.depth_mm) / kDepthBinMm);
       if (bin >= bins.size()) bins.resize(bin + 1);
       bins[bin].depth += ring.depth_mm * ring.weight;
@@ -228,12 +229,13 @@ std::vector<recon::Model::Uncertainty> uncertainty_of(const LeftOut& left_out, d
 
 void refuse_gaps(const ChainFit& chain, const BallPresses& set,
                  const std::vector<std::string>& left_out) {
-  const bool tied = std::ranges::any_of(set.presses, [](const auto& p) { return !!p.depth_mm; });
-  if (chain.gaps.empty() || tied) return;
+  const bool constrained =
+      std::ranges::any_of(set.presses, [](const auto& p) { return !!p.depth_mm; });
+  if (chain.gaps.empty() || constrained) return;
   const ChainFit::Gap& gap = chain.gaps.front();
   const double g = std::min(gap.to_mm, set.ball_radius_mm);
   throw std::runtime_error(fmt::format(
-      "no press shows indentations from {:.2f} to {:.2f} mm, so the list cannot be chained there: "
+      "no press shows indentations from {:.2f} to {:.2f} mm, so the LUT cannot be chained there: "
       "press the ball about {:.2f} mm deep (a contact {:.1f} mm wide) and add that press{}",
       gap.from_mm, gap.to_mm, g, 2 * kContactOfCut * std::sqrt(g * (2 * set.ball_radius_mm - g)),
       name_left_out(left_out)));
@@ -295,8 +297,8 @@ Calibration build(const BallPresses& presses, PressReport* report) {
   const std::size_t before = last >= 4 ? last - 4 : 0;
   const double beyond =
       (knots[last].depth_mm - knots[before].depth_mm) / (knots[last].level - knots[before].level);
-  model->list = make_list(knots, knots.front().depth_mm / knots.front().level, beyond, profile);
-  model->uncertainty = uncertainty_of(chosen.left_out, ring_doubt_mm(chosen));
+  model->lut = make_lut(knots, knots.front().depth_mm / knots.front().level, beyond, profile);
+  model->uncertainty = uncertainty_of(chosen.left_out, ring_uncertainty_mm(chosen));
   calibration.model = std::move(model);
   if (report != nullptr) {
     for (std::size_t p = 0; p < set.presses.size(); ++p) {

@@ -23,7 +23,7 @@ struct BallPresses {
   std::optional<recon::Lens> lens;  ///< None: the frame as it is.
   /// The gain that goes with it is a board's answer: where it is none, darkening is no share of the
   /// light either.
-  bool gain_told = false;
+  bool gain_specified = false;
 };
 
 /// What build() found out on the way.
@@ -34,11 +34,11 @@ struct PressReport {
   };
   std::vector<Depth> presses;         ///< Those that were used.
   std::vector<std::string> left_out;  ///< The others: name and reason.
-  /// What the list of one press chose (PressChoices), or why several did not try the share of the
+  /// What the LUT of one press chose (PressChoices), or why several did not try the share of the
   /// light; else empty.
   std::string note;
-  /// A gain that was tried: how far each press is from the known sphere under the list of all
-  /// others (meet()), the mean over the presses.
+  /// A gain that was tried: how far each press is from the known sphere under the LUT of all
+  /// others (residual_of()), the mean over the presses.
   struct Gain {
     std::string name;              ///< "none", "share of the light, plane", ...
     double error_mm = 0;           ///< Mean absolute error.
@@ -48,19 +48,19 @@ struct PressReport {
   std::vector<Gain> gains;  ///< From the simplest on.
 };
 
-/// Ours. The list follows from the known sphere alone (chain_presses()): in the inner three fifths
+/// Ours. The LUT follows from the known sphere alone (chain_presses()): in the inner three fifths
 /// of each contact, whose radius follows from the fitted depth, not from a circle in the image.
 ///
 /// How darkening differs from place to place is told by the gain, as simple as the presses allow:
 /// none, a share of the light at its place, either with a plane, either with a quadratic. Each is
-/// judged by how well it predicts presses that list and gain were made without (leave_each_out());
+/// judged by how well it predicts presses that LUT and gain were made without (leave_one_out());
 /// taken is the simplest within one standard error of the best. The share is not tried where it
 /// finds a press elsewhere than it is.
 ///
-/// What the list says of its own uncertainty is that error of the chosen one, how much the list
+/// What the LUT says of its own uncertainty is that error of the chosen one, how much the LUT
 /// moves with the presses that make it, 5 % of the depth for objects of another shape, and what the
-/// bright ring's light may do (ring_doubt_mm()), added in squares. `origin` is left for the caller
-/// to fill.
+/// bright ring's light may do (ring_uncertainty_mm()), added in squares. `origin` is left for the
+/// caller to fill.
 ///
 /// A press without a contact that can be used (too light, beyond the map) is left out. Throws
 /// std::runtime_error when fewer than two remain, naming those left out, and when the presses leave
@@ -74,8 +74,8 @@ struct PressReport {
 /// each press's published circle, zero on the circle; each pixel gets a slope, by least squares
 /// over the presses whose circle holds it; a line is fitted through the slopes against the
 /// distance. What is brighter than untouched is 0, and the two 7×7 Gaussian filters that follow
-/// become one smoothing of the difference: everything in between is linear. What it is worth is
-/// said as for one press (uncertainty_by_zero()).
+/// become one smoothing of the difference: everything in between is linear. Its uncertainty is
+/// said as for one press (uncertainty_of_zero()).
 [[nodiscard]] Calibration build_regression(const BallPresses& set, double centre_x_mm = 0,
                                            double centre_y_mm = 0);
 

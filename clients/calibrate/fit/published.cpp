@@ -127,8 +127,8 @@ Circle published_circle(const image::Grey8& reference, const image::Grey8& ball)
   return {std::trunc(found.col), std::trunc(found.row), std::trunc(found.radius)};
 }
 
-recon::DepthList fit_published(const image::Grey8& reference, const image::Grey8& ball,
-                               double ball_radius_mm, double mm_per_px) {
+recon::DepthLut fit_published(const image::Grey8& reference, const image::Grey8& ball,
+                              double ball_radius_mm, double mm_per_px) {
   const std::vector<int> levels = darkening(reference, ball);
   const auto [col, row, radius] = published_circle(reference, ball);
   if (radius < 1) {
@@ -162,7 +162,7 @@ recon::DepthList fit_published(const image::Grey8& reference, const image::Grey8
   depth.resize(static_cast<std::size_t>(count.rend() - last));
   fill_gaps(depth, count);
 
-  recon::DepthList list;
+  recon::DepthLut lut;
   const double zero = depth[std::min<std::size_t>(kThresholdLevel, depth.size() - 1)];
   constexpr int kStep = recon::kEntriesPerLevel;
   const int last_level = static_cast<int>(depth.size()) - 1;
@@ -170,10 +170,10 @@ recon::DepthList fit_published(const image::Grey8& reference, const image::Grey8
     const int level = (q6 + kStep / 2) / kStep;
     const double mm =
         level <= kThresholdLevel ? 0 : std::max(0.0, depth[static_cast<std::size_t>(level)] - zero);
-    list.um.push_back(static_cast<std::int16_t>(std::min(16383L, std::lround(1000 * mm))));
+    lut.um.push_back(static_cast<std::int16_t>(std::min(16383L, std::lround(1000 * mm))));
   }
-  list.covered_to_q6 = last_level * kStep;
-  return list;
+  lut.covered_to_q6 = last_level * kStep;
+  return lut;
 }
 
 }  // namespace dtact::calibration

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "daemon/recon/list.hpp"
+#include "daemon/recon/depth_lut.hpp"
 #include "hal/files/png.hpp"
 
 namespace dtact::calibration {
@@ -27,21 +27,20 @@ struct Pixel {
 /// pixels; radius 0 when there is none. `reference`, `ball`: the depth map's part of the images.
 [[nodiscard]] Circle published_circle(const image::Grey8& reference, const image::Grey8& ball);
 
-/// The single-image list as it was published, with its weaknesses, to compare with:
+/// The single-image LUT as it was published, with its weaknesses, to compare with:
 ///
 /// - The difference is unsigned: what is brighter than the reference counts as 0.
-/// - The contact is published_circle(); the indentation at its edge is put to zero.
+/// - The contact is published_circle(); the indentation at its edge is zeroed.
 /// - An entry is the mean depth of the circle's pixels with that whole difference. Where none has
 ///   it, the entry is interpolated. (The authors average three colour channels and keep the third
 ///   of the pixels whose mean is whole; luma is whole everywhere.)
 /// - At run time the entry at the threshold of 2 grey levels is subtracted from all and nothing is
-///   below zero; both are done here once for the list. The list has 64 equal entries for each
+///   below zero; both are done here once for the LUT. The LUT has 64 equal entries for each
 ///   level.
 ///
 /// `reference`, `ball`: the depth map's part of the images. Throws std::runtime_error when nothing
 /// is darker than the threshold or the ball is smaller than the circle.
-[[nodiscard]] recon::DepthList fit_published(const image::Grey8& reference,
-                                             const image::Grey8& ball, double ball_radius_mm,
-                                             double mm_per_px);
+[[nodiscard]] recon::DepthLut fit_published(const image::Grey8& reference, const image::Grey8& ball,
+                                            double ball_radius_mm, double mm_per_px);
 
 }  // namespace dtact::calibration

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/calibrate/fit/list_worth.hpp"
+#include "clients/calibrate/fit/lut_uncertainty.hpp"
 #include "clients/calibrate/fit/press_set.hpp"
 #include "clients/calibrate/fit/published.hpp"
 
@@ -17,7 +17,7 @@ namespace {
 /// Standard deviation of the Gaussian that two 7×7 filters (σ = 1.4 each, OpenCV's choice for that
 /// size) amount to, pixels.
 constexpr double kTwoFilters = 1.98;
-constexpr int kLastLevel = 250;  // of the list: a line has no end of its own
+constexpr int kLastLevel = 250;  // of the LUT: a line has no end of its own
 
 /// slope = k · distance + b, least squares.
 struct Line {
@@ -128,13 +128,13 @@ Calibration build_regression(const BallPresses& set, double centre_x_mm, double 
                  .per_mm = k / b};
   model->smoothing_px = kTwoFilters;
   // Levels that became deeper by the gain look up further on; brighter than untouched is nothing.
-  model->list.first_q6 = 0;
+  model->lut.first_q6 = 0;
   for (int q6 = 0; q6 <= kLastLevel * recon::kEntriesPerLevel; ++q6) {
-    model->list.um.push_back(static_cast<std::int16_t>(
+    model->lut.um.push_back(static_cast<std::int16_t>(
         std::min(16383L, std::lround(1000 * b * q6 / recon::kEntriesPerLevel))));
   }
-  model->list.covered_to_q6 = kLastLevel * recon::kEntriesPerLevel;
-  model->uncertainty = uncertainty_by_zero(model->list, settle_all(*model, set));
+  model->lut.covered_to_q6 = kLastLevel * recon::kEntriesPerLevel;
+  model->uncertainty = uncertainty_of_zero(model->lut, settle_all(*model, set));
   calibration.model = std::move(model);
   return calibration;
 }

@@ -91,7 +91,7 @@ void run(const Options& options, cli::Context& context) {
   calibration::Calibration calibration = calibration::load(options.calibration);
   const std::vector<Pair> pairs = measured(options, calibration);
   std::optional<double> thickness_mm = options.thickness_mm;
-  if (!thickness_mm && calibration.layer) thickness_mm = calibration.layer->thickness_mm.value;
+  if (!thickness_mm && calibration.gel) thickness_mm = calibration.gel->thickness_mm.value;
   const Fit fit = fit_force(pairs, thickness_mm);
   auto model = std::make_shared<recon::Model>(*calibration.model);
   model->force = fit.model;
@@ -126,7 +126,7 @@ void add_force(CLI::App& app, cli::Context& context) {
   force->add_flag("--grams", options->grams, "Readings are in grams, as kitchen scales show them");
   force
       ->add_option("--reference", options->reference,
-                   "Untouched surface of the PNG files, in the same light: PNG files, or a folder "
+                   "Undeformed surface of the PNG files, in the same light: PNG files, or a folder "
                    "of them (averaged); left out: the calibration's")
       ->type_name("FILE");
   force

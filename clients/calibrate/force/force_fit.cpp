@@ -15,7 +15,7 @@ namespace {
 constexpr double kMaxError = 0.25;
 constexpr double kMinModulus = 0.02;  // MPa
 constexpr double kMaxModulus = 2;
-constexpr float kTouchingMm = 0.05F;
+constexpr float kContactMm = 0.05F;
 constexpr double kZeroMm = 0.03;
 constexpr double kThicknessMm = 2;
 constexpr double kThicknessSpread = 0.35;
@@ -35,9 +35,9 @@ void check(const std::vector<Pair>& pairs) {
           "resolution",
           pair.name, pairs.front().name));
     }
-    if (std::ranges::none_of(pair.contact.mm(), [](float mm) { return mm > kTouchingMm; })) {
+    if (std::ranges::none_of(pair.contact.mm(), [](float mm) { return mm > kContactMm; })) {
       throw std::invalid_argument(
-          fmt::format("{}: nothing touches in it: take the pair out, or the picture while the "
+          fmt::format("{}: there is no contact in it: take the pair out, or the picture while the "
                       "scale shows the load",
                       pair.name));
     }
@@ -60,9 +60,9 @@ void check(const std::vector<Pair>& pairs) {
 class Readings {
  public:
   Readings(const std::vector<Pair>& pairs, double thickness_mm) : pairs_(pairs) {
-    recon::LayerResponse response(thickness_mm, pairs.front().contact);
+    recon::GelResponse response(thickness_mm, pairs.front().contact);
     for (const Pair& pair : pairs) {
-      const recon::LayerResponse::Answer answer = response.answer(pair.contact);
+      const recon::GelResponse::Answer answer = response.answer(pair.contact);
       rows_.emplace_back(answer.mm2, answer.mm);
     }
   }

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Pixels darker than the list reaches that noise may leave, as the daemon allows them.
+/// Pixels darker than the LUT reaches that noise may leave, as the daemon allows them.
 constexpr int kBeyondPixels = 64;
 constexpr std::string_view kRecording = ".mcap";
 
@@ -50,15 +50,15 @@ std::string_view trimmed(std::string_view text) {
 bool same_sharpening(const recon::Model& a, const recon::Model& b) {
   return a.scattering == b.scattering &&
          std::ranges::equal(a.sharpened, b.sharpened, [](const auto& one, const auto& other) {
-           return one.steps == other.steps && one.list.first_q6 == other.list.first_q6 &&
-                  one.list.um == other.list.um;
+           return one.steps == other.steps && one.lut.first_q6 == other.lut.first_q6 &&
+                  one.lut.um == other.lut.um;
          });
 }
 
 // Depth by both calibrations is the same; what either says of force does not matter.
 bool same_depth(const recon::Model& a, const recon::Model& b) {
   return a.method == b.method && a.mm_per_px == b.mm_per_px && a.smoothing_px == b.smoothing_px &&
-         a.list.first_q6 == b.list.first_q6 && a.list.um == b.list.um &&
+         a.lut.first_q6 == b.lut.first_q6 && a.lut.um == b.lut.um &&
          a.rectify.width == b.rectify.width && a.rectify.height == b.rectify.height &&
          a.reference_q8 == b.reference_q8 && a.gain.polynomial == b.gain.polynomial &&
          same_sharpening(a, b);
@@ -208,10 +208,10 @@ Pair ContactReader::measure_recording(const std::string& path, std::uint64_t fir
   MeanMap mean;
   v1::DepthMap map;
   std::uint64_t at = 0;
-  recording::Takers takers;
-  takers.frame = [&](const v1::Frame& frame, std::uint64_t) {
+  recording::RecordingHandlers handlers;
+  handlers.frame = [&](const v1::Frame& frame, std::uint64_t) {
     if (const std::uint64_t index = at++; index < first) return true;
-    if (!frame.contact().touching() || !frame.has_depth()) return at < end;
+    if (!frame.contact().in_contact() || !frame.has_depth()) return at < end;
     if (std::ranges::find(frame.health(), v1::HEALTH_BEYOND_CALIBRATION) != frame.health().end()) {
       fail_beyond(fmt::format("{}:{}", path, at - 1));
     }
@@ -219,10 +219,10 @@ Pair ContactReader::measure_recording(const std::string& path, std::uint64_t fir
     mean.add(client::values_of(map));
     return at < end;
   };
-  recording::read_recording(file, takers);
+  recording::read_recording(file, handlers);
   if (map.data().empty()) {
     throw std::runtime_error(fmt::format(
-        "{}: nothing touches in its frames, or they have no depth: take the pair out, or "
+        "{}: there is no contact in its frames, or they have no depth: take the pair out, or "
         "record while the scale shows the load",
         path));
   }

@@ -29,7 +29,7 @@ struct Reading {
 /// The contacts of frames, averaged over each reading's frames.
 class ContactReader {
  public:
-  /// Pictures are measured against `reference_q8`, the untouched image in their light.
+  /// Pictures are measured against `reference_q8`, the reference image in their light.
   ContactReader(const calibration::Calibration& calibration,
                 std::span<const std::uint16_t> reference_q8)
       : calibration_(calibration), reference_q8_(reference_q8) {}

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "clients/calibrate/guided/fitness.hpp"
+#include "clients/calibrate/guided/sensor_checks.hpp"
 #include "clients/cpp/maps.hpp"
 #include "clients/cpp/names.hpp"
 
@@ -30,10 +30,10 @@ constexpr int kBrighterFrames = 5;
 constexpr int kMisses = 20;
 
 /// Ends a wait by the frames' times; where none come, by how often that was.
-class Patience {
+class Timeout {
  public:
-  explicit Patience(double seconds) : seconds_(seconds) {}
-  bool over(const Look* look) {
+  explicit Timeout(double seconds) : seconds_(seconds) {}
+  bool over(const ObservedFrame* look) {
     if (look == nullptr) {
       without_s_ += std::chrono::duration<double>(kFrameWait).count();
     } else {
@@ -76,10 +76,10 @@ double noise_of(const std::vector<image::Grey8>& frames) {
 }  // namespace
 
 Capture::Capture(Sensor& sensor, Console& console, const CellGrid& grid, const Rules& rules,
-                 std::function<void(const Look&, const std::string&)> shown)
+                 std::function<void(const ObservedFrame&, const std::string&)> shown)
     : sensor_(sensor), console_(console), grid_(grid), rules_(rules), shown_(std::move(shown)) {}
 
-const Look* Capture::next() {
+const ObservedFrame* Capture::next() {
   if (console_.interrupted()) throw Ended{Ended::Why::interrupt};
   auto frame = sensor_.next(kFrameWait);
   if (!frame || !frame->has_luma() || passing_trouble(frame->health())) return nullptr;
@@ -88,11 +88,11 @@ const Look* Capture::next() {
         "the light is another than when the reference was taken: set it back with dtactctl led, or "
         "begin again in another --folder");
   }
-  look_.image = {static_cast<int>(frame->luma().width()), static_cast<int>(frame->luma().height()),
-                 client::pixels_of(frame->luma())};
-  look_.time_ns = frame->monotonic_ns();
-  look_.cells = grid_.of(look_.image.pixels, look_.image.width);
-  return &look_;
+  observed_.image = {static_cast<int>(frame->luma().width()),
+                     static_cast<int>(frame->luma().height()), client::pixels_of(frame->luma())};
+  observed_.time_ns = frame->monotonic_ns();
+  observed_.cells = grid_.of(observed_.image.pixels, observed_.image.width);
+  return &observed_;
 }
 
 std::string Capture::trouble() {
@@ -110,10 +110,10 @@ bool Capture::line_typed() {
   return typed.kind == Typed::Kind::line;
 }
 
-Still Capture::hold(int count, bool forcible, const Objection& objection) {
+SteadyFrames Capture::hold(int count, bool forcible, const Objection& objection) {
   Steadiness steadiness(kStill);
-  Patience patience(rules_.patience_s);
-  Still still;
+  Timeout timeout(rules_.timeout_s);
+  SteadyFrames still;
   std::vector<CellMeans> cells;
   std::string why;
   bool force = false;
@@ -124,10 +124,10 @@ Still Capture::hold(int count, bool forcible, const Objection& objection) {
     cells.clear();
   };
   for (;;) {
-    const Look* look = next();
-    if (patience.over(look)) {
-      throw NotTaken(fmt::format("not taken within {:g} s: {}", rules_.patience_s,
-                                 look == nullptr ? trouble() : why));
+    const ObservedFrame* look = next();
+    if (timeout.over(look)) {
+      throw CaptureTimeout(fmt::format("not taken within {:g} s: {}", rules_.timeout_s,
+                                       look == nullptr ? trouble() : why));
     }
     force = (line_typed() && forcible) || force;
     if (look == nullptr) {
@@ -170,18 +170,18 @@ Still Capture::hold(int count, bool forcible, const Objection& objection) {
   }
 }
 
-Still Capture::untouched(int count) {
-  return hold(count, false, [](const Look&) { return std::string(); });
+SteadyFrames Capture::reference(int count) {
+  return hold(count, false, [](const ObservedFrame&) { return std::string(); });
 }
 
-Still Capture::press(int count, const CellMeans& untouched, const CellMeans& last) {
+SteadyFrames Capture::press(int count, const CellMeans& reference, const CellMeans& last) {
   int brighter = 0;
-  return hold(count, true, [&](const Look& look) -> std::string {
-    const Seen seen = compare(untouched, look.cells);
-    brighter = reference_was_touched(seen) ? brighter + 1 : 0;
-    if (brighter == kBrighterFrames) throw ReferenceTouched{};
+  return hold(count, true, [&](const ObservedFrame& look) -> std::string {
+    const ContactEvidence seen = compare(reference, look.cells);
+    brighter = reference_in_contact(seen) ? brighter + 1 : 0;
+    if (brighter == kBrighterFrames) throw ReferenceInContact{};
     if (brighter > 0) return "brighter than the reference somewhere";
-    if (seen.darkest < kTouchLevels) return "nothing touches the surface";
+    if (seen.darkest < kContactLevels) return "there is no contact the surface";
     if (!last.empty() && largest_change(last, look.cells) < kSamePress) {
       return "this press is taken already, press elsewhere";
     }

@@ -13,7 +13,7 @@
 namespace dtact::ctl::guided {
 
 /// Frames of a surface that held still.
-struct Still {
+struct SteadyFrames {
   std::vector<image::Grey8> frames;
   CellMeans cells;          ///< Mean of all.
   double drift_levels = 0;  ///< The largest change of a cell from the first half to the last.
@@ -27,16 +27,16 @@ struct Ended {
 };
 
 /// Frames could not be taken in time; the sentence says why.
-class NotTaken : public std::runtime_error {
+class CaptureTimeout : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Something touched when the reference was taken: the surface is brighter there now.
-struct ReferenceTouched {};
+/// There was contact when the reference was taken: the surface is brighter there now.
+struct ReferenceInContact {};
 
 /// A frame and its cells.
-struct Look {
+struct ObservedFrame {
   image::Grey8 image;
   std::int64_t time_ns = 0;  ///< Its capture, of the daemon's clock.
   CellMeans cells;
@@ -47,31 +47,31 @@ struct Look {
 class Capture {
  public:
   struct Rules {
-    double patience_s = 60;  ///< Of the frames' times, until NotTaken.
+    double timeout_s = 60;  ///< Of the frames' times, until CaptureTimeout.
   };
   /// `shown` is called with each usable frame and a few words about it.
   Capture(Sensor& sensor, Console& console, const CellGrid& grid, const Rules& rules,
-          std::function<void(const Look&, const std::string&)> shown);
+          std::function<void(const ObservedFrame&, const std::string&)> shown);
 
   /// Frames have to come under this light from now on (r, g, b of each LED after brightness).
   void expect_light(std::vector<std::uint8_t> leds) { leds_ = std::move(leds); }
 
   /// The next usable frame; null when none came in 100 ms. Throws Ended on Ctrl-C,
   /// std::runtime_error when the light is another.
-  [[nodiscard]] const Look* next();
+  [[nodiscard]] const ObservedFrame* next();
 
-  /// Waits for `count` frames in a row that hold still. Throws NotTaken, Ended and as next().
-  [[nodiscard]] Still untouched(int count);
+  /// Waits for `count` frames in a row that hold still. Throws CaptureTimeout, Ended and as next().
+  [[nodiscard]] SteadyFrames reference(int count);
   /// The same where something presses the surface that was untouched, and elsewhere or otherwise
   /// than in `last` (empty: none). A line typed meanwhile takes the press as it is. Throws
-  /// ReferenceTouched too.
-  [[nodiscard]] Still press(int count, const CellMeans& untouched, const CellMeans& last);
+  /// ReferenceInContact too.
+  [[nodiscard]] SteadyFrames press(int count, const CellMeans& reference, const CellMeans& last);
 
  private:
   /// What speaks against a frame; empty: nothing.
-  using Objection = std::function<std::string(const Look&)>;
+  using Objection = std::function<std::string(const ObservedFrame&)>;
   /// `forcible`: a line typed meanwhile takes what there is.
-  [[nodiscard]] Still hold(int count, bool forcible, const Objection& objection);
+  [[nodiscard]] SteadyFrames hold(int count, bool forcible, const Objection& objection);
   [[nodiscard]] std::string trouble();
   /// A line was typed by a person who waits. Throws Ended.
   [[nodiscard]] bool line_typed();
@@ -80,9 +80,9 @@ class Capture {
   Console& console_;
   const CellGrid& grid_;
   Rules rules_;
-  std::function<void(const Look&, const std::string&)> shown_;
+  std::function<void(const ObservedFrame&, const std::string&)> shown_;
   std::vector<std::uint8_t> leds_;
-  Look look_;
+  ObservedFrame observed_;
 };
 
 }  // namespace dtact::ctl::guided

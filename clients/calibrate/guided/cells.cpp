@@ -8,8 +8,8 @@ namespace dtact::ctl::guided {
 namespace {
 
 constexpr int kCellsAcross = 48;
-constexpr int kLeastPx = 12;
-constexpr int kLeastCells = 8;
+constexpr int kMinPx = 12;
+constexpr int kMinCells = 8;
 /// Grey levels that a surface without any contact does not reach.
 constexpr double kBrighter = 8;
 
@@ -17,8 +17,8 @@ constexpr double kBrighter = 8;
 
 CellGrid::CellGrid(const recon::FrameRegion& region)
     : region_(region),
-      cell_(std::max(kLeastPx, std::min(region.width, region.height) / kCellsAcross)) {
-  if (std::min(region.width, region.height) < kLeastCells * kLeastPx) {
+      cell_(std::max(kMinPx, std::min(region.width, region.height) / kCellsAcross)) {
+  if (std::min(region.width, region.height) < kMinCells * kMinPx) {
     throw std::invalid_argument(
         "the depth map is smaller than 96 pixels, too little to see a press in: give a larger "
         "--crop");
@@ -55,13 +55,13 @@ CellMeans CellGrid::of(const std::vector<std::uint16_t>& luma_q8, int width) con
   return means(luma_q8, width, 1.0 / 256);
 }
 
-Seen compare(const CellMeans& untouched, const CellMeans& now) {
-  std::vector<float> darker(untouched.size());
-  std::ranges::transform(untouched, now, darker.begin(), std::minus<>());
+ContactEvidence compare(const CellMeans& reference, const CellMeans& now) {
+  std::vector<float> darker(reference.size());
+  std::ranges::transform(reference, now, darker.begin(), std::minus<>());
   std::vector<float> sorted = darker;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
   std::ranges::nth_element(sorted, middle);
-  Seen seen;
+  ContactEvidence seen;
   seen.light = *middle;
   const auto [least, most] = std::ranges::minmax(darker);
   seen.darkest = most - seen.light;
@@ -71,7 +71,7 @@ Seen compare(const CellMeans& untouched, const CellMeans& now) {
   return seen;
 }
 
-bool reference_was_touched(const Seen& seen) {
+bool reference_in_contact(const ContactEvidence& seen) {
   return seen.brightest > std::max(kBrighter, seen.darkest);
 }
 

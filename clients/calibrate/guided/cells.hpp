@@ -34,8 +34,8 @@ class CellGrid {
   int cell_ = 1;
 };
 
-/// What a frame shows against the untouched surface, grey levels.
-struct Seen {
+/// What a frame shows against the undeformed surface, grey levels.
+struct ContactEvidence {
   double darkest = 0;     ///< Of a cell, less the light's change.
   double brightest = 0;   ///< The same the other way.
   double light = 0;       ///< By how much most cells became darker: the light changed.
@@ -44,13 +44,13 @@ struct Seen {
 /// The edge of a contact, as find_contact() has it.
 inline constexpr double kEdgeLevels = 3;
 /// The faintest darkening that counts as touch, grey levels (about 0.12 mm). A cell's noise is 0.1.
-inline constexpr double kTouchLevels = 4;
+inline constexpr double kContactLevels = 4;
 
-[[nodiscard]] Seen compare(const CellMeans& untouched, const CellMeans& now);
-/// Something touched when the reference was taken and does not now: the surface is brighter there.
+[[nodiscard]] ContactEvidence compare(const CellMeans& reference, const CellMeans& now);
+/// There was contact when the reference was taken and does not now: the surface is brighter there.
 /// The bulge round a contact is brighter too, but by less than the contact is darker (0.35 and 0.71
 /// of it on two real sensors).
-[[nodiscard]] bool reference_was_touched(const Seen& seen);
+[[nodiscard]] bool reference_in_contact(const ContactEvidence& seen);
 /// The largest difference of two cells at one place, grey levels.
 [[nodiscard]] double largest_change(const CellMeans& a, const CellMeans& b);
 

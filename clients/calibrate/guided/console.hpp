@@ -11,7 +11,7 @@
 namespace dtact::ctl::guided {
 
 /// A press that was taken, on the depth map.
-struct TakenPress {
+struct CapturedPress {
   std::string name;
   double col = 0;  ///< Of the contact's middle, pixels.
   double row = 0;
@@ -65,9 +65,9 @@ struct Scene {
   double mm_per_px = 0;                   ///< Of the picture.
   std::string words;                      ///< About the picture.
   Prompt prompt;
-  std::vector<TakenPress> presses;
-  double covered_mm = 0;   ///< How deep the list of these presses reaches; 0: there is none.
-  int presses_wanted = 0;  ///< After so many the calibration is made.
+  std::vector<CapturedPress> presses;
+  double covered_mm = 0;     ///< How deep the LUT of these presses reaches; 0: there is none.
+  int presses_required = 0;  ///< After so many the calibration is made.
 };
 
 /// Where the session speaks with its user; the tests play one.

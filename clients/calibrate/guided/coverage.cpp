@@ -12,13 +12,13 @@
 namespace dtact::ctl::guided {
 namespace {
 
-/// The layer's contact is narrower than the circle in which the ball cuts the untouched surface.
+/// The gel's contact is narrower than the circle in which the ball cuts the undeformed surface.
 constexpr double kContactOfCut = 0.97;
 constexpr double kFirstOfRadius = 0.3;
 
-std::vector<TakenPress> contacts_of(const PressImages& images,
-                                    const calibration::Calibration& empty) {
-  std::vector<TakenPress> taken;
+std::vector<CapturedPress> contacts_of(const PressImages& images,
+                                       const calibration::Calibration& empty) {
+  std::vector<CapturedPress> taken;
   for (const auto& press : images.set.presses) {
     try {
       const calibration::SettledPress settled = calibration::settle(
@@ -43,7 +43,7 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty,
   } else {
     try {
       coverage.made = std::make_shared<const calibration::Calibration>(
-          build_list(images, ListMethod::alone, &coverage.report));
+          build_lut(images, FitMethod::alone, &coverage.report));
       coverage.doubts = calibration::doubts_about(*coverage.made, images.set);
       if (!coverage.doubts.empty() && !force) {
         coverage.made = nullptr;
@@ -56,7 +56,7 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty,
   coverage.presses = contacts_of(images, empty);
   if (!coverage.made) return coverage;
   // As fitted; what was left out does not count.
-  std::erase_if(coverage.presses, [&](TakenPress& press) {
+  std::erase_if(coverage.presses, [&](CapturedPress& press) {
     const auto used = std::ranges::find(coverage.report.presses, press.name,
                                         &calibration::PressReport::Depth::name);
     if (used == coverage.report.presses.end()) return true;
@@ -71,8 +71,8 @@ std::string doubted(const std::vector<std::string>& doubts) {
 }
 
 double covered_mm(const calibration::Calibration& made) {
-  const recon::DepthList& list = made.model->list;
-  return 0.001 * list.um[static_cast<std::size_t>(list.covered_to_q6 - list.first_q6)];
+  const recon::DepthLut& lut = made.model->lut;
+  return 0.001 * lut.um[static_cast<std::size_t>(lut.covered_to_q6 - lut.first_q6)];
 }
 
 double contact_width_mm(double depth_mm, double ball_radius_mm) {

@@ -10,25 +10,25 @@
 namespace dtact::ctl::guided {
 
 /// What the presses so far come to by themselves, which is quick to say: what they lack for that is
-/// worth pressing however the list is made in the end.
+/// worth pressing however the LUT is made in the end.
 struct Coverage {
-  /// Null where they determine no list, or one that is doubted.
+  /// Null where they determine no LUT, or one that is doubted.
   std::shared_ptr<const calibration::Calibration> made;
-  calibration::PressReport report;  ///< Of `made`.
-  std::string missing;              ///< Where they do not: why, and what to press.
-  std::vector<std::string> doubts;  ///< What speaks against a list, a sentence each.
-  std::vector<TakenPress> presses;  ///< Those that show a contact.
+  calibration::PressReport report;     ///< Of `made`.
+  std::string missing;                 ///< Where they do not: why, and what to press.
+  std::vector<std::string> doubts;     ///< What speaks against a LUT, a sentence each.
+  std::vector<CapturedPress> presses;  ///< Those that show a contact.
 };
 
-/// `empty`: the map and the reference of these images, without a list. `force`: a list is made
+/// `empty`: the map and the reference of these images, without a LUT. `force`: a LUT is made
 /// although it is doubted.
 [[nodiscard]] Coverage cover(const PressImages& images, const calibration::Calibration& empty,
                              bool force);
 
-/// Why a doubted list is not made: the doubts, and what takes it anyhow.
+/// Why a doubted LUT is not made: the doubts, and what takes it anyhow.
 [[nodiscard]] std::string doubted(const std::vector<std::string>& doubts);
 
-/// How deep the covered list reaches, millimetres.
+/// How deep the covered LUT reaches, millimetres.
 [[nodiscard]] double covered_mm(const calibration::Calibration& made);
 
 /// Width of the contact of a ball pressed `depth_mm` deep, millimetres.

@@ -16,16 +16,16 @@ constexpr std::int64_t kSecond = 1'000'000'000;
 
 }  // namespace
 
-void LiveView::use(const calibration::Calibration& empty, CellMeans untouched, double cell_mm) {
+void LiveView::use(const calibration::Calibration& empty, CellMeans reference, double cell_mm) {
   model_ = empty.model;
   scene_.mm_per_px = model_->mm_per_px;
-  untouched_.reset();
-  if (!untouched.empty()) {
-    untouched_ = calibration::rectified_reference(
+  reference_.reset();
+  if (!reference.empty()) {
+    reference_ = calibration::rectified_reference(
         model_->rectify, image::Grey16{model_->rectify.frame_width, model_->rectify.frame_height,
                                        model_->reference_q8});
   }
-  untouched_cells_ = std::move(untouched);
+  reference_cells_ = std::move(reference);
   cell_mm_ = cell_mm;
 }
 
@@ -35,26 +35,26 @@ void LiveView::set_prompt(const Prompt& prompt) {
   console_.live(scene_);
 }
 
-void LiveView::set_presses(std::vector<TakenPress> presses, double covered_mm) {
+void LiveView::set_presses(std::vector<CapturedPress> presses, double covered_mm) {
   scene_.presses = std::move(presses);
   scene_.covered_mm = covered_mm;
 }
 
 image::Grey8 LiveView::picture(const image::Grey8& frame) const {
   const image::Grey8 map = calibration::rectified_mean(model_->rectify, {frame});
-  return untouched_ ? darkening_picture(*untouched_, map) : map;
+  return reference_ ? darkening_picture(*reference_, map) : map;
 }
 
-std::string LiveView::words_on(const Look& look, const std::string& words) const {
-  if (untouched_cells_.empty()) return words;
-  const Seen seen = compare(untouched_cells_, look.cells);
-  if (seen.darkest < kTouchLevels) return "untouched; " + words;
+std::string LiveView::words_on(const ObservedFrame& look, const std::string& words) const {
+  if (reference_cells_.empty()) return words;
+  const ContactEvidence seen = compare(reference_cells_, look.cells);
+  if (seen.darkest < kContactLevels) return "untouched; " + words;
   const double width_mm = 2 * cell_mm_ * std::sqrt(seen.dark_cells / std::numbers::pi);
   return fmt::format("contact {:.1f} mm wide, darkest {:.0f} grey levels; {}", width_mm,
                      seen.darkest, words);
 }
 
-void LiveView::show(const Look& look, const std::string& words) {
+void LiveView::show(const ObservedFrame& look, const std::string& words) {
   if (!console_.interactive()) return;
   const std::int64_t now_ns = look.time_ns;
   if (now_ns - drawn_ns_ < kSecond / 4) return;
@@ -70,10 +70,10 @@ void LiveView::show(const Look& look, const std::string& words) {
 }
 
 void LiveView::still(const image::Grey8& frame, const std::optional<calibration::Contact>& contact,
-                     bool touched) {
+                     bool in_contact) {
   const image::Grey8 shown = picture(frame);
   folder_.save_preview(annotated(shown, model_->mm_per_px, contact));
-  if (touched) console_.keep(shown);
+  if (in_contact) console_.keep(shown);
 }
 
 }  // namespace dtact::ctl::guided

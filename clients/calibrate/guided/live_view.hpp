@@ -16,37 +16,37 @@ namespace dtact::ctl::guided {
 /// folder.
 class LiveView {
  public:
-  /// `presses_wanted`: after so many the calibration is made.
-  LiveView(Console& console, WorkFolder& folder, int presses_wanted)
+  /// `presses_required`: after so many the calibration is made.
+  LiveView(Console& console, WorkFolder& folder, int presses_required)
       : console_(console), folder_(folder) {
-    scene_.presses_wanted = presses_wanted;
+    scene_.presses_required = presses_required;
   }
 
   /// The depth map's place and, once there is a reference, its image and cells (empty before).
   /// `cell_mm`: side of a look's cells.
-  void use(const calibration::Calibration& empty, CellMeans untouched, double cell_mm);
+  void use(const calibration::Calibration& empty, CellMeans reference, double cell_mm);
   /// What is asked under the live picture, drawn at once, even while no frame comes.
   void set_prompt(const Prompt& prompt);
-  /// What has been taken, and how deep its list reaches (0: there is none).
-  void set_presses(std::vector<TakenPress> presses, double covered_mm);
+  /// What has been taken, and how deep its LUT reaches (0: there is none).
+  void set_presses(std::vector<CapturedPress> presses, double covered_mm);
 
   /// Draws at most four times a second of the frames' time, and saves once a second; only where a
   /// person watches.
-  void show(const Look& look, const std::string& words);
+  void show(const ObservedFrame& look, const std::string& words);
   /// Saves one frame, with the contact where it is known, and draws it to stay where something
   /// touches.
   void still(const image::Grey8& frame, const std::optional<calibration::Contact>& contact,
-             bool touched = true);
+             bool in_contact = true);
 
  private:
   [[nodiscard]] image::Grey8 picture(const image::Grey8& frame) const;
-  [[nodiscard]] std::string words_on(const Look& look, const std::string& words) const;
+  [[nodiscard]] std::string words_on(const ObservedFrame& look, const std::string& words) const;
 
   Console& console_;
   WorkFolder& folder_;
   std::shared_ptr<const recon::Model> model_;
-  std::optional<image::Grey8> untouched_;
-  CellMeans untouched_cells_;
+  std::optional<image::Grey8> reference_;
+  CellMeans reference_cells_;
   Scene scene_;  ///< Without the picture.
   double cell_mm_ = 0;
   std::int64_t drawn_ns_ = 0;

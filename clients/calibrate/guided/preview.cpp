@@ -12,7 +12,7 @@
 namespace dtact::ctl::guided {
 namespace {
 
-constexpr int kUntouchedGrey = 200;
+constexpr int kReferenceGrey = 200;
 constexpr int kShadesPerLevel = 4;
 const cv::Scalar kMark(230, 90, 0);
 constexpr int kMargin = 12;
@@ -38,13 +38,13 @@ int grey_at(const image::Grey8& picture, int columns, int rows, int column, int 
 
 }  // namespace
 
-image::Grey8 darkening_picture(const image::Grey8& untouched, const image::Grey8& frame) {
+image::Grey8 darkening_picture(const image::Grey8& reference, const image::Grey8& frame) {
   image::Grey8 picture{frame.width, frame.height, {}};
   picture.pixels.resize(frame.pixels.size());
-  std::ranges::transform(untouched.pixels, frame.pixels, picture.pixels.begin(),
+  std::ranges::transform(reference.pixels, frame.pixels, picture.pixels.begin(),
                          [](std::uint8_t before, std::uint8_t now) {
                            return static_cast<std::uint8_t>(std::clamp(
-                               kUntouchedGrey - kShadesPerLevel * (before - now), 0, 255));
+                               kReferenceGrey - kShadesPerLevel * (before - now), 0, 255));
                          });
   return picture;
 }

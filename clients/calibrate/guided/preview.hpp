@@ -9,10 +9,10 @@
 
 namespace dtact::ctl::guided {
 
-/// How a frame differs from the untouched surface, as a picture: light grey where nothing touches,
-/// four shades darker for each grey level of darkening, lighter where the layer bulges. Both images
+/// How a frame differs from the undeformed surface, as a picture: light grey outside the contact,
+/// four shades darker for each grey level of darkening, lighter where the gel bulges. Both images
 /// are the depth map's part, of one size.
-[[nodiscard]] image::Grey8 darkening_picture(const image::Grey8& untouched,
+[[nodiscard]] image::Grey8 darkening_picture(const image::Grey8& reference,
                                              const image::Grey8& frame);
 
 /// The picture with the contact's circle and width where there is one, and a scale bar.

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "clients/calibrate/fit/evaluate.hpp"
-#include "clients/calibrate/guided/fitness.hpp"
+#include "clients/calibrate/guided/sensor_checks.hpp"
 #include "daemon/calibration/text.hpp"
 #include "hal/base/atomic_file.hpp"
 
@@ -54,7 +54,7 @@ Outcome Session::guide() {
   if (folder_.has_reference()) {
     resume();
   } else {
-    console_.say("\nStep 1 of 3: the untouched surface");
+    console_.say("\nStep 1 of 3: the undeformed surface");
     reference_step();
   }
   console_.say(
@@ -95,8 +95,8 @@ void Session::prepare_map(const v1::Status& status) {
   cell_mm_ = grid_.cell_px() * (map.lens ? recon::central_mm_per_px(*map.lens) : map.mm_per_px);
   view_.use(empty_, {}, cell_mm_);
   capture_ = std::make_unique<Capture>(
-      sensor_, console_, grid_, Capture::Rules{plan_.patience_s},
-      [this](const Look& look, const std::string& words) { view_.show(look, words); });
+      sensor_, console_, grid_, Capture::Rules{plan_.timeout_s},
+      [this](const ObservedFrame& look, const std::string& words) { view_.show(look, words); });
 }
 
 void Session::load() {
@@ -109,8 +109,8 @@ void Session::load() {
 void Session::resume() {
   load();
   require_same_sensor();
-  untouched_ = grid_.of(images_.set.reference_q8.pixels, images_.set.reference_q8.width);
-  view_.use(empty_, untouched_, cell_mm_);
+  reference_ = grid_.of(images_.set.reference_q8.pixels, images_.set.reference_q8.width);
+  view_.use(empty_, reference_, cell_mm_);
   console_.say(
       fmt::format("{}: the reference and {} press(es) are there; camera and light are "
                   "still the same",
@@ -120,9 +120,9 @@ void Session::resume() {
 }
 
 v1::Status Session::steady_status() {
-  constexpr int kPatience = 50;  // frames, or five seconds without one
+  constexpr int kTimeout = 50;  // frames, or five seconds without one
   v1::Status status = sensor_.status();
-  for (int i = 0; i < kPatience && !unfit(status).empty(); ++i) {
+  for (int i = 0; i < kTimeout && !unfit(status).empty(); ++i) {
     (void)sensor_.next(std::chrono::milliseconds(100));
     status = sensor_.status();
   }
@@ -163,7 +163,7 @@ std::string Session::ask(const Prompt& prompt) {
       case Typed::Kind::nothing:
         break;
     }
-    if (const Look* look = capture_->next()) view_.show(*look, "live");
+    if (const ObservedFrame* look = capture_->next()) view_.show(*look, "live");
   }
 }
 
@@ -172,23 +172,23 @@ void Session::reference_step() {
   for (;;) {
     (void)ask({"Take your hands off: nothing may touch the surface.", {{"", "take"}, kQuit}});
     try {
-      const Still still = capture_->untouched(plan_.reference_frames);
+      const SteadyFrames still = capture_->reference(plan_.reference_frames);
       const std::string fault = fault_of(still, empty_.model->rectify);
-      if (!fault.empty()) throw NotTaken("not taken: " + fault);
+      if (!fault.empty()) throw CaptureTimeout("not taken: " + fault);
       const v1::Status status = steady_status();
       const std::string wrong = unfit(status);
-      if (!wrong.empty()) throw NotTaken("not taken: " + wrong);
+      if (!wrong.empty()) throw CaptureTimeout("not taken: " + wrong);
       folder_.save_reference(still.frames, origin_of(status));
       console_.say(
           fmt::format("reference taken: {} frames, steady within {:.2f} grey levels, noise {:.1f}",
                       still.frames.size(), still.drift_levels, still.noise_levels));
       load();
       capture_->expect_light(images_.origin.leds);
-      untouched_ = still.cells;
-      view_.use(empty_, untouched_, cell_mm_);
+      reference_ = still.cells;
+      view_.use(empty_, reference_, cell_mm_);
       view_.still(still.frames.back(), std::nullopt, false);
       return;
-    } catch (const NotTaken& e) {
+    } catch (const CaptureTimeout& e) {
       if (!console_.interactive()) throw;
       console_.say(e.what());
     }
@@ -205,7 +205,7 @@ Prompt Session::press_prompt() const {
   } else {
     std::vector<double> depths;
     depths.reserve(coverage_.presses.size());
-    for (const TakenPress& press : coverage_.presses) depths.push_back(press.depth_mm);
+    for (const CapturedPress& press : coverage_.presses) depths.push_back(press.depth_mm);
     const double depth = next_depth_mm(std::move(depths), plan_.ball_radius_mm);
     text += fmt::format("about {:.1f} mm deep (contact {:.1f} mm wide)", depth,
                         contact_width_mm(depth, plan_.ball_radius_mm));
@@ -229,7 +229,7 @@ void Session::press_steps() {
       } else if (line == "r") {
         take_press(folder_.presses().back());
       } else if (line == "p") {
-        if (const Look* look = capture_->next()) {
+        if (const ObservedFrame* look = capture_->next()) {
           view_.still(look->image, std::nullopt);
         }
         console_.say("preview: " + folder_.at("preview.png"));
@@ -239,12 +239,12 @@ void Session::press_steps() {
       } else {
         console_.say("\"" + line + "\" means nothing here");
       }
-    } catch (const NotTaken& e) {
+    } catch (const CaptureTimeout& e) {
       if (!console_.interactive()) throw;
       console_.say(e.what());
-    } catch (const ReferenceTouched&) {
+    } catch (const ReferenceInContact&) {
       console_.say(
-          "the surface is brighter than the reference: something touched when that was taken. It "
+          "the surface is brighter than the reference: there was contact when that was taken. It "
           "has to be taken again");
       reference_step();
       judge();
@@ -255,13 +255,13 @@ void Session::press_steps() {
 void Session::take_press(const std::string& name) {
   require_same_sensor();
   const std::string waiting =
-      fmt::format("waiting up to {:g} s for a press that holds still", plan_.patience_s);
+      fmt::format("waiting up to {:g} s for a press that holds still", plan_.timeout_s);
   if (console_.interactive()) {
     view_.set_prompt({waiting, {{"", "take it as it is"}, kQuit}});
   } else {
     console_.say(waiting);
   }
-  const Still still = capture_->press(plan_.press_frames, untouched_, last_);
+  const SteadyFrames still = capture_->press(plan_.press_frames, reference_, last_);
   view_.set_prompt({});
   last_ = still.cells;
   calibration::Contact contact;
@@ -295,7 +295,7 @@ void Session::judge() {
   coverage_ = cover(images_, empty_, plan_.force);
   view_.set_presses(coverage_.presses, coverage_.made ? covered_mm(*coverage_.made) : 0);
   if (!coverage_.made) {
-    if (!images_.set.presses.empty()) console_.say("not yet a list: " + coverage_.missing);
+    if (!images_.set.presses.empty()) console_.say("not yet a LUT: " + coverage_.missing);
     return;
   }
   for (const std::string& press : coverage_.report.left_out) console_.say("left out: " + press);
@@ -305,21 +305,21 @@ void Session::judge() {
   for (const auto& press : coverage_.report.presses) {
     depths.push_back(fmt::format("{:.2f}", press.depth_mm));
   }
-  console_.say(fmt::format("the list covers 0 to {:.2f} mm; presses of {} mm",
+  console_.say(fmt::format("the LUT covers 0 to {:.2f} mm; presses of {} mm",
                            covered_mm(*coverage_.made), fmt::join(depths, ", ")));
 }
 
 bool Session::make() {
   if (made_) return *made_;
-  made_ = plan_.method == ListMethod::alone && coverage_.made != nullptr;
-  if (plan_.method == ListMethod::alone || images_.set.presses.size() < 2) return *made_;
-  // What the presses lack by themselves, as a lighter one that is too faint to be seen, a layer may
-  // make up for; and a list may be doubted only with the layer.
+  made_ = plan_.method == FitMethod::alone && coverage_.made != nullptr;
+  if (plan_.method == FitMethod::alone || images_.set.presses.size() < 2) return *made_;
+  // What the presses lack by themselves, as a lighter one that is too faint to be seen, a gel may
+  // make up for; and a LUT may be doubted only with the gel.
   std::string missing;
   try {
     calibration::PressReport report;
-    auto list = std::make_shared<const calibration::Calibration>(
-        build_list(images_, plan_.method, &report));
+    auto list =
+        std::make_shared<const calibration::Calibration>(build_lut(images_, plan_.method, &report));
     const std::vector<std::string> doubts = calibration::doubts_about(*list, images_.set);
     if (doubts.empty() || plan_.force) {
       for (const std::string& doubt : doubts) {
@@ -333,14 +333,14 @@ bool Session::make() {
   } catch (const std::exception& e) {
     missing = e.what();
   }
-  if (missing != coverage_.missing) console_.say("not yet a list: " + missing);
+  if (missing != coverage_.missing) console_.say("not yet a LUT: " + missing);
   coverage_.missing = missing;
   return false;
 }
 
 Outcome Session::finish() {
   calibration::save(*coverage_.made, folder_.path() / kCalibration);
-  console_.say(report_text(coverage_.report) + list_text(*coverage_.made->model) + "saved in " +
+  console_.say(report_text(coverage_.report) + lut_text(*coverage_.made->model) + "saved in " +
                folder_.at(kCalibration));
   const std::string line =
       ask({fmt::format("Upload it to the daemon as {}?", folder_.calibration_name()),
@@ -367,7 +367,7 @@ void Session::upload() {
   }
   console_.say(
       fmt::format("the daemon uses calibration {} from now on; take the ball away, so that "
-                  "it sees the untouched surface",
+                  "it sees the undeformed surface",
                   status.calibration().name()));
 }
 

@@ -21,9 +21,9 @@ struct Plan {
   int presses = 6;  ///< After so many the calibration is made, where they suffice.
   int reference_frames = 32;
   int press_frames = 16;
-  double patience_s = 60;  ///< For each take.
-  bool force = false;      ///< A doubtful list is taken, too.
-  ListMethod method = ListMethod::automatic;
+  double timeout_s = 60;  ///< For each take.
+  bool force = false;     ///< A doubtful LUT is taken, too.
+  FitMethod method = FitMethod::automatic;
   std::string again;  ///< The command line that goes on with the work folder, for a shell.
 };
 
@@ -33,15 +33,15 @@ enum class Outcome {
   unfinished,  ///< The user or the input ended the session before there was one.
 };
 
-/// The guided calibration: reference, presses, list, upload; each saved in the work folder as soon
+/// The guided calibration: reference, presses, LUT, upload; each saved in the work folder as soon
 /// as it is taken, so that the session can end anywhere and another one goes on.
 class Session {
  public:
   /// Throws std::runtime_error when the work folder cannot be made.
   Session(Sensor& sensor, Console& console, Plan plan);
 
-  /// Throws std::runtime_error with a remedy when the daemon is not fit, a take fails where nobody
-  /// is there to mend it, or camera or light changed since the work folder was begun;
+  /// Throws std::runtime_error with a fix when the daemon is not fit, a take fails where nobody
+  /// is there to fix it, or camera or light changed since the work folder was begun;
   /// client::Error as the sensor does.
   [[nodiscard]] Outcome run();
 
@@ -59,7 +59,7 @@ class Session {
   [[nodiscard]] std::string ask(const Prompt& prompt);
 
   void reference_step();
-  /// Until there is a list and the user, or the number of presses, says that it is enough.
+  /// Until there is a LUT and the user, or the number of presses, says that it is enough.
   void press_steps();
   [[nodiscard]] Prompt press_prompt() const;
   void take_press(const std::string& name);
@@ -79,8 +79,8 @@ class Session {
   double cell_mm_ = 0;
   std::unique_ptr<Capture> capture_;
   PressImages images_;
-  calibration::Calibration empty_;  ///< The map and the reference, without a list.
-  CellMeans untouched_;
+  calibration::Calibration empty_;  ///< The map and the reference, without a LUT.
+  CellMeans reference_;
   CellMeans last_;  ///< The press taken last.
   Coverage coverage_;
   std::optional<bool> made_;  ///< What make() came to.

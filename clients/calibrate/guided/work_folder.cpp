@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostFrames = 100;
+constexpr std::size_t kMaxFrames = 100;
 
 std::string frame_name(std::size_t number) { return fmt::format("{:02}.png", number); }
 
@@ -26,7 +26,7 @@ void save(const fs::path& folder, const std::vector<image::Grey8>& frames,
     files.emplace_back(frame_name(files.size() - more.size()), image::encode_png(frame));
   }
   std::vector<std::string> known{calibration::kSensorName};
-  for (std::size_t i = 0; i < kMostFrames; ++i) known.push_back(frame_name(i));
+  for (std::size_t i = 0; i < kMaxFrames; ++i) known.push_back(frame_name(i));
   base::write_folder_atomically(folder, files, known, "a folder of taken images");
 }
 

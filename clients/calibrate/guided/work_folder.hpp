@@ -12,7 +12,7 @@ namespace dtact::ctl::guided {
 /// What a session has taken, so that another one can go on and `dtact-calibrate depth` can read
 /// it:
 ///
-///     FOLDER/reference/00.png … sensor.toml     the untouched surface, camera and light
+///     FOLDER/reference/00.png … sensor.toml     the undeformed surface, camera and light
 ///     FOLDER/press-01/00.png …                  each press
 ///     FOLDER/ball.toml                          the radius of the ball that made them
 ///     FOLDER/calibration/                       what was made of them
@@ -36,7 +36,7 @@ class WorkFolder {
   /// `name`: next_press(), or one that is there and is replaced.
   void save_press(const std::string& name, const std::vector<image::Grey8>& frames);
   /// Notes the radius of the presses' ball; one already noted must be the same as long as there are
-  /// presses. Throws std::runtime_error naming both and the remedy.
+  /// presses. Throws std::runtime_error naming both and the fix.
   void require_ball(double radius_mm) const;
   void save_preview(const image::Rgb8& picture);
 

@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "clients/calibrate/lens/point_fit.hpp"
-#include "daemon/recon/spatial_gain.hpp"
+#include "daemon/recon/flat_field_gain.hpp"
 
 namespace dtact::ctl {
 
 /// What the pins of a board, all of one length, tell of how much the same dent darkens from place
 /// to place.
 struct PinGain {
-  recon::SpatialGain gain;  ///< Places in millimetres of the marks.
+  recon::FlatFieldGain gain;  ///< Places in millimetres of the marks.
   /// RMS of the relative error with which the others predict each pin's darkening, with no gain,
   /// with the share of the light, with a quadratic.
   std::vector<double> left_out_of_each;
@@ -25,7 +25,7 @@ struct PinGain {
 };
 
 /// Chooses the gain: none; the share of the light (a lens that darkens towards its corners, an
-/// uneven ring); a quadratic of the place (a layer thicker in the middle). A later one is taken
+/// uneven ring); a quadratic of the place (a gel thicker in the middle). A later one is taken
 /// only when the pins that are left out are clearly better predicted (clearly_lower()). A plane is
 /// no choice: it is always taken off, since a board pressed in aslant looks the same.
 ///

@@ -221,10 +221,11 @@ PinPress find_pins(const cv::Mat1f& reference, const cv::Mat1f& frame, const Boa
     if (better) best = std::move(settled);
   }
   if (best.lattice == nullptr || 2 * best.missing.size() > best.lattice->places.size()) {
-    throw std::runtime_error(fmt::format(
-        "board: no lattice of {}x{} pins found; check that the images are an untouched surface and "
-        "the same with the board pressed in, and the numbers of rows and columns",
-        board.rows, board.cols));
+    throw std::runtime_error(
+        fmt::format("board: no lattice of {}x{} pins found; check that the images are an "
+                    "undeformed surface and "
+                    "the same with the board pressed in, and the numbers of rows and columns",
+                    board.rows, board.cols));
   }
   const int pins = board.rows * board.cols;
   if (kMayMiss * static_cast<int>(best.missing.size()) > pins) refuse(best.missing, pins);

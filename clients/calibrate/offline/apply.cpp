@@ -5,7 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
 #include "clients/calibrate/offline/drawing.hpp"
 #include "clients/calibrate/offline/images.hpp"
 #include "clients/calibrate/offline/offline.hpp"
@@ -62,7 +62,7 @@ void add_apply(CLI::App& app) {
       ->required();
   apply
       ->add_option("--reference", options->reference,
-                   "Untouched surface: PNG files, or a folder of them (averaged)")
+                   "Undeformed surface: PNG files, or a folder of them (averaged)")
       ->type_name("FILE")
       ->required();
   apply->add_option("--frame", options->frame, "The image: a PNG file")

@@ -30,7 +30,7 @@ struct Made {
   std::vector<std::string> doubts;
 };
 
-/// By the paper's list of one press.
+/// By the paper's LUT of one press.
 Made make_published(const DepthOptions& options) {
   const ImageSet reference = load_images(options.reference, "--reference");
   const ImageSet ball = load_images(options.ball, "--ball");
@@ -54,7 +54,7 @@ Made make_published(const DepthOptions& options) {
 }
 
 /// From one press or several.
-Made make_list(const DepthOptions& options) {
+Made make_lut(const DepthOptions& options) {
   PressImages images = begin_presses(options.reference, options.radius_mm, options.map);
   if (!options.ball.empty()) add_press(images, options.ball, "--ball");
   for (const std::string& press : options.presses) add_press(images, press);
@@ -67,7 +67,7 @@ Made make_list(const DepthOptions& options) {
     return {std::move(made), std::move(doubts)};
   }
   calibration::PressReport report;
-  calibration::Calibration made = build_list(images, list_method(options.method), &report);
+  calibration::Calibration made = build_lut(images, fit_method(options.method), &report);
   fmt::print("{}", report_text(report));
   std::vector<std::string> doubts = calibration::doubts_about(made, images.set);
   return {std::move(made), std::move(doubts)};
@@ -87,7 +87,7 @@ void check(const DepthOptions& options) {
 void run(const DepthOptions& options) {
   check(options);
   const auto [made, doubts] =
-      options.method == "published" ? make_published(options) : make_list(options);
+      options.method == "published" ? make_published(options) : make_lut(options);
   if (!doubts.empty() && !options.force) {
     throw std::runtime_error(fmt::format("{}; nothing was written (--force writes it as it is)",
                                          fmt::join(doubts, "; ")));
@@ -97,8 +97,8 @@ void run(const DepthOptions& options) {
   const recon::RectifyTable& map = made.model->rectify;
   fmt::print("{}: method {}, {}x{} at column {}, row {}\n", options.output, options.method,
              map.width, map.height, made.crop_col, made.crop_row);
-  if (made.layer) fmt::print("{}", layer_text(*made.layer));
-  fmt::print("{}", list_text(*made.model));
+  if (made.gel) fmt::print("{}", gel_text(*made.gel));
+  fmt::print("{}", lut_text(*made.model));
 }
 
 }  // namespace
@@ -108,9 +108,10 @@ void add_calibrate(CLI::App& app) {
       "depth", "Make a calibration from images: the press of a ball, or several presses");
   const auto options = std::make_shared<DepthOptions>();
   depth
-      ->add_option("--reference", options->reference,
-                   "Untouched surface: PNG files, or a folder of them (averaged); camera and light "
-                   "are recorded from the folder's sensor.toml where there is one")
+      ->add_option(
+          "--reference", options->reference,
+          "Undeformed surface: PNG files, or a folder of them (averaged); camera and light "
+          "are recorded from the folder's sensor.toml where there is one")
       ->type_name("FILE")
       ->required();
   depth
@@ -130,9 +131,9 @@ void add_calibrate(CLI::App& app) {
   depth
       ->add_option(
           "--method", options->method,
-          "auto (default): a layer is fitted to the whole image of the presses; where it explains "
-          "all but noise, its list, else what the presses show, at the layer's depths where all "
-          "parts of the picture agree on them; model: the layer's list anyhow; list: from the "
+          "auto (default): a gel is fitted to the whole image of the presses; where it explains "
+          "all but noise, its LUT, else what the presses show, at the gel's depths where all "
+          "parts of the picture agree on them; model: the gel's LUT anyhow; LUT: from the "
           "known sphere alone; to compare with: published (one press), regression (several)")
       ->check(CLI::IsMember({"auto", "list", "model", "published", "regression"}));
   depth
@@ -147,7 +148,7 @@ void add_calibrate(CLI::App& app) {
       ->type_name("FOLDER")
       ->required();
   depth->add_flag("--force", options->force,
-                  "Write the calibration although list and ball disagree: a wrong scale or radius, "
+                  "Write the calibration although LUT and ball disagree: a wrong scale or radius, "
                   "another light, a contact that is cut off");
   depth->callback([options] { run(*options); });
 }

@@ -43,9 +43,9 @@ std::pair<int, int> pair_of(const std::string& text, const char* option) {
 }
 
 void write(const LensOptions& options, const ImageSet& images, const ChosenLens& chosen,
-           const std::optional<recon::SpatialGain>& gain, const std::vector<std::string>& what) {
+           const std::optional<recon::FlatFieldGain>& gain, const std::vector<std::string>& what) {
   calibration::LensFile file{images.width(), images.height(),
-                             chosen.lens,    gain.value_or(recon::SpatialGain{}),
+                             chosen.lens,    gain.value_or(recon::FlatFieldGain{}),
                              what,           gain.has_value()};
   recon::check(file.lens, file.frame_width, file.frame_height);
   file.notes.push_back(
@@ -64,11 +64,11 @@ void run_board(const LensOptions& options) {
   const ImageSet pressed = load_images(options.board, "--board");
   require_same_size(reference, "--board-reference", pressed, "--board");
   const auto [rows, cols] = pair_of(options.pins, "--pins");
-  const cv::Mat1f untouched = mean_levels(reference);
+  const cv::Mat1f reference_image = mean_levels(reference);
   const cv::Mat1f frame = mean_levels(pressed);
-  const PinPress press = find_pins(untouched, frame, {rows, cols, options.pitch_mm});
+  const PinPress press = find_pins(reference_image, frame, {rows, cols, options.pitch_mm});
   const PinGain gain =
-      choose_gain(untouched, frame, press.marks,
+      choose_gain(reference_image, frame, press.marks,
                   calibration::kSmoothingMm / recon::central_mm_per_px(press.lens.lens));
   std::string what =
       fmt::format("{}x{} pins, {} mm apart", press.rows, press.cols, options.pitch_mm);
@@ -110,7 +110,7 @@ void add_calibrate_lens(CLI::App& app) {
   const auto options = std::make_shared<LensOptions>();
   CLI::Option* reference =
       lens->add_option("--board-reference", options->reference,
-                       "Untouched surface: PNG files, or a folder of them (averaged)")
+                       "Undeformed surface: PNG files, or a folder of them (averaged)")
           ->type_name("FILE");
   CLI::Option* board = lens->add_option("--board", options->board,
                                         "The board of pins pressed in: PNG files, or a folder")

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/evaluate.hpp"
-#include "clients/calibrate/fit/model/layered_build.hpp"
+#include "clients/calibrate/fit/model/auto_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
 #include "daemon/calibration/sensor_files.hpp"
 
@@ -64,7 +64,7 @@ void add_map_options(CLI::App& command, MapOptions& options) {
   command
       .add_option("--lens", options.lens,
                   "Lens file of calibrate lens, or a calibration folder: rectifies the map; a "
-                  "list of one press takes its gain as well, several presses tell their own")
+                  "LUT of one press takes its gain as well, several presses tell their own")
       ->type_name("FILE");
   command
       .add_option("--centre", options.centre,
@@ -87,7 +87,7 @@ MapChoice choose_map(const MapOptions& options, int frame_width, int frame_heigh
     const calibration::LensFile file = lens_for(options.lens, frame_width, frame_height);
     map.lens = file.lens;
     map.gain = file.gain;
-    map.gain_told = file.gain_told;
+    map.gain_specified = file.gain_specified;
     if (map.mm_per_px == 0) map.mm_per_px = recon::central_mm_per_px(*map.lens);
   } else if (map.mm_per_px == 0) {
     throw std::runtime_error("--mm-per-px or --lens is required: one of them says the scale");
@@ -97,18 +97,18 @@ MapChoice choose_map(const MapOptions& options, int frame_width, int frame_heigh
 
 PressImages begin_presses(const std::vector<std::string>& reference, double ball_radius_mm,
                           const MapOptions& map) {
-  const ImageSet untouched = load_images(reference, "--reference");
-  const MapChoice choice = choose_map(map, untouched.width(), untouched.height());
-  PressImages images{.set = {.reference_q8 = untouched.mean_q8(),
+  const ImageSet reference_image = load_images(reference, "--reference");
+  const MapChoice choice = choose_map(map, reference_image.width(), reference_image.height());
+  PressImages images{.set = {.reference_q8 = reference_image.mean_q8(),
                              .presses = {},
                              .ball_radius_mm = ball_radius_mm,
                              .mm_per_px = choice.mm_per_px,
                              .crop = choice.crop,
                              .lens = choice.lens,
-                             .gain_told = choice.gain_told},
+                             .gain_specified = choice.gain_specified},
                      .gain = choice.gain,
                      .origin = recorded_origin(reference)};
-  images.origin.sources = untouched.sources;
+  images.origin.sources = reference_image.sources;
   return images;
 }
 
@@ -139,19 +139,19 @@ void add_press(PressImages& images, const std::string& press) {
   images.set.presses.back().depth_mm = depth_mm;
 }
 
-ListMethod list_method(const std::string& name) {
-  if (name == "list") return ListMethod::alone;
-  return name == "model" ? ListMethod::model : ListMethod::automatic;
+FitMethod fit_method(const std::string& name) {
+  if (name == "list") return FitMethod::alone;
+  return name == "model" ? FitMethod::model : FitMethod::automatic;
 }
 
-calibration::Calibration build_list(const PressImages& images, ListMethod method,
-                                    calibration::PressReport* report) {
+calibration::Calibration build_lut(const PressImages& images, FitMethod method,
+                                   calibration::PressReport* report) {
   calibration::PressReport found;
   calibration::Calibration made;
-  if (method == ListMethod::automatic) {
-    made = calibration::build_layered(images.set, images.gain, found);
-  } else if (method == ListMethod::alone) {
-    made = calibration::build_alone(images.set, images.gain, found);
+  if (method == FitMethod::automatic) {
+    made = calibration::build_auto(images.set, images.gain, found);
+  } else if (method == FitMethod::alone) {
+    made = calibration::build_from_sphere(images.set, images.gain, found);
   } else {
     calibration::FittedCalibration fitted = calibration::build_model(images.set, images.gain);
     found.note = fitted.describe_press();
@@ -162,8 +162,8 @@ calibration::Calibration build_list(const PressImages& images, ListMethod method
   const auto add_note = [&found](const std::string& line) {
     if (!line.empty()) found.note += (found.note.empty() ? "" : "\n") + line;
   };
-  // Several presses tell their own gain, but the layer is fitted under the lens file's.
-  if (method != ListMethod::alone || images.set.presses.size() == 1) {
+  // Several presses tell their own gain, but the gel is fitted under the lens file's.
+  if (method != FitMethod::alone || images.set.presses.size() == 1) {
     add_note(calibration::gain_left_out(images.gain, made));
   }
   add_note(calibration::dim_part_of(made, images.set));
@@ -194,43 +194,43 @@ std::string report_text(const calibration::PressReport& report) {
   }
   for (const auto& gain : report.gains) {
     text +=
-        fmt::format("gain {}: a press is {:.4f} mm off the sphere under the list of the others{}\n",
+        fmt::format("gain {}: a press is {:.4f} mm off the sphere under the LUT of the others{}\n",
                     gain.name, gain.error_mm, gain.chosen ? " (used)" : "");
   }
   return text;
 }
 
-std::string list_text(const recon::Model& model) {
-  const recon::DepthList& list = model.list;
+std::string lut_text(const recon::Model& model) {
+  const recon::DepthLut& lut = model.lut;
   const auto at = [&](int q6) {
-    return 0.001 * list.um[static_cast<std::size_t>(q6 - list.first_q6)];
+    return 0.001 * lut.um[static_cast<std::size_t>(q6 - lut.first_q6)];
   };
   std::string text =
-      fmt::format("list: {:.1f} grey levels = {:.3f} mm to {:.1f} grey levels = {:.3f} mm\n",
-                  list.covered_from_q6 / 64.0, at(list.covered_from_q6), list.covered_to_q6 / 64.0,
-                  at(list.covered_to_q6));
+      fmt::format("LUT: {:.1f} grey levels = {:.3f} mm to {:.1f} grey levels = {:.3f} mm\n",
+                  lut.covered_from_q6 / 64.0, at(lut.covered_from_q6), lut.covered_to_q6 / 64.0,
+                  at(lut.covered_to_q6));
   for (const auto& row : model.uncertainty) {
     text += fmt::format("uncertain at {:.2f} mm by {:.1f} um\n", row.depth_mm, row.error_um);
   }
   return text;
 }
 
-std::string layer_text(const calibration::Layer& layer) {
-  const auto with_error = [](const calibration::Layer::Estimate& estimate) {
+std::string gel_text(const calibration::GelEstimate& gel) {
+  const auto with_error = [](const calibration::GelEstimate::Estimate& estimate) {
     return fmt::format("{:.2f} ± {:.2f}", estimate.value, estimate.error);
   };
   std::string text = fmt::format(
-      "layer: {} mm thick; light spreads sideways by {} mm ({:.0f} ± {:.0f} % of it) and {} mm; "
+      "gel: {} mm thick; light spreads sideways by {} mm ({:.0f} ± {:.0f} % of it) and {} mm; "
       "the fit leaves {:.2f} grey levels\n",
-      with_error(layer.thickness_mm), with_error(layer.narrow_mm), 100 * layer.narrow_weight.value,
-      100 * layer.narrow_weight.error, with_error(layer.wide_mm), layer.residual_levels);
+      with_error(gel.thickness_mm), with_error(gel.narrow_mm), 100 * gel.narrow_weight.value,
+      100 * gel.narrow_weight.error, with_error(gel.wide_mm), gel.residual_levels);
   text += "response: of the light is lost a tenth of a millimetre";
-  for (std::size_t i = 0; i < layer.slope.size(); ++i) {
-    const double depth_mm = layer.indentation[i] * layer.thickness_mm.value;
+  for (std::size_t i = 0; i < gel.slope.size(); ++i) {
+    const double depth_mm = gel.indentation[i] * gel.thickness_mm.value;
     const double percent =
-        10 / layer.thickness_mm.value * (layer.indentation[i] < 0 ? layer.bulge_factor : 1);
-    text += fmt::format("{} {:.1f} ± {:.1f} % {}", i == 0 ? "" : ",",
-                        percent * layer.slope[i].value, percent * layer.slope[i].error,
+        10 / gel.thickness_mm.value * (gel.indentation[i] < 0 ? gel.bulge_factor : 1);
+    text += fmt::format("{} {:.1f} ± {:.1f} % {}", i == 0 ? "" : ",", percent * gel.slope[i].value,
+                        percent * gel.slope[i].error,
                         depth_mm == 0  ? "at the surface"
                         : depth_mm < 0 ? fmt::format("on a bulge of {:.2f} mm", -depth_mm)
                                        : fmt::format("at {:.2f} mm", depth_mm));

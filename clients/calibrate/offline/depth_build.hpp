@@ -25,8 +25,8 @@ void add_map_options(CLI::App& command, MapOptions& options);
 /// The same, for a frame of known size.
 struct MapChoice {
   std::optional<recon::Lens> lens;
-  recon::SpatialGain gain;  ///< Of the lens file: what its board's pins ask for.
-  bool gain_told = false;   ///< LensFile::gain_told.
+  recon::FlatFieldGain gain;    ///< Of the lens file: what its board's pins ask for.
+  bool gain_specified = false;  ///< LensFile::gain_specified.
   double mm_per_px = 0;
   std::optional<calibration::Crop> crop;
 };
@@ -38,11 +38,11 @@ struct MapChoice {
 /// Several presses of one ball, and what is recorded of where they come from.
 struct PressImages {
   calibration::BallPresses set;
-  recon::SpatialGain gain;  ///< Of the lens file.
+  recon::FlatFieldGain gain;  ///< Of the lens file.
   calibration::Origin origin;
 };
 
-/// The untouched images and no press yet. Camera and light are recorded from the sensor.toml of a
+/// The reference images and no press yet. Camera and light are recorded from the sensor.toml of a
 /// folder in `reference` that has one. Throws as load_images() and choose_map().
 [[nodiscard]] PressImages begin_presses(const std::vector<std::string>& reference,
                                         double ball_radius_mm, const MapOptions& map);
@@ -51,23 +51,23 @@ struct PressImages {
 /// Throws std::runtime_error naming --press, also where the set has these images already.
 void add_press(PressImages& images, const std::string& press);
 
-/// What the darkening of a ball's presses is turned into a list by.
-enum class ListMethod : std::uint8_t {
-  automatic,  ///< What is best for what the presses show: calibration::build_layered().
-  alone,      ///< The known sphere alone: calibration::build_alone().
-  model       ///< A layer fitted to the presses: calibration::build_model().
+/// What the darkening of a ball's presses is turned into a LUT by.
+enum class FitMethod : std::uint8_t {
+  automatic,  ///< What is best for what the presses show: calibration::build_auto().
+  alone,      ///< The known sphere alone: calibration::build_from_sphere().
+  model       ///< A gel fitted to the presses: calibration::build_model().
 };
 /// By its name on the command line: "auto", "list" or "model".
-[[nodiscard]] ListMethod list_method(const std::string& name);
+[[nodiscard]] FitMethod fit_method(const std::string& name);
 
 /// Adds one press: PNG files or folders. Throws as load_images(), and std::runtime_error naming the
 /// option when they have not the reference's size.
 void add_press(PressImages& images, const std::vector<std::string>& paths, const char* option);
 
 /// The calibration of one press or several, its origin filled in. Throws as
-/// calibration::build_layered() and build_model().
-[[nodiscard]] calibration::Calibration build_list(const PressImages& images, ListMethod method,
-                                                  calibration::PressReport* report);
+/// calibration::build_auto() and build_model().
+[[nodiscard]] calibration::Calibration build_lut(const PressImages& images, FitMethod method,
+                                                 calibration::PressReport* report);
 
 /// Camera and light of the images in these folders, where a sensor.toml says so.
 [[nodiscard]] calibration::Origin recorded_origin(const std::vector<std::string>& paths);
@@ -77,9 +77,9 @@ void add_press(PressImages& images, const std::vector<std::string>& paths, const
 
 /// Each press's depth, those left out, and what decided about the gain; lines.
 [[nodiscard]] std::string report_text(const calibration::PressReport& report);
-/// What the list covers and what it is uncertain by; lines.
-[[nodiscard]] std::string list_text(const recon::Model& model);
-/// The layer in words; lines.
-[[nodiscard]] std::string layer_text(const calibration::Layer& layer);
+/// What the LUT covers and what it is uncertain by; lines.
+[[nodiscard]] std::string lut_text(const recon::Model& model);
+/// The gel in words; lines.
+[[nodiscard]] std::string gel_text(const calibration::GelEstimate& gel);
 
 }  // namespace dtact::ctl

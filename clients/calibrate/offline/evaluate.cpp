@@ -34,9 +34,9 @@ cli::BallReport report_of(const calibration::Evaluation& e) {
   report.set_contact_pixels(e.pixels);
   report.set_untrusted_pixels(e.untrusted);
   if (e.sector_mae_mm) report.set_sector_mae_mm(*e.sector_mae_mm);
-  const auto& gain = e.press_gain.gain;
+  const auto& gain = e.press_asymmetry.gain;
   for (std::size_t i = 0; i < 2 * static_cast<std::size_t>(gain.order); ++i) {
-    report.add_press_gain(gain.factors[i]);
+    report.add_press_asymmetry(gain.factors[i]);
   }
   for (const std::string& doubt : calibration::doubts_about(e)) report.add_doubts(doubt);
   return report;
@@ -55,12 +55,12 @@ void print_text(const calibration::Evaluation& e) {
   fmt::print("mean absolute error: {:.4f} mm, with the offset {:.4f} mm\n", e.mae_mm, e.raw_mae_mm);
   if (e.half_mae_mm) {
     fmt::print(
-        "list from one half of the disc, error on the other: {:.4f} mm, at worst {:.4f} mm "
+        "LUT from one half of the disc, error on the other: {:.4f} mm, at worst {:.4f} mm "
         "of eight halves\n",
         *e.half_mae_mm, e.half_worst_mm.value_or(0));
-    fmt::print("list from every other sector of the disc, error on the rest: {:.4f} mm\n",
+    fmt::print("LUT from every other sector of the disc, error on the rest: {:.4f} mm\n",
                e.sector_mae_mm.value_or(0));
-    fmt::print("{}\n", e.press_gain.describe());
+    fmt::print("{}\n", e.press_asymmetry.describe());
   }
   fmt::print("untrusted: {} of {} pixels in the contact ({:.2f} %)\n", e.untrusted, e.pixels,
              100.0 * static_cast<double>(e.untrusted) / static_cast<double>(e.pixels));
@@ -92,7 +92,7 @@ void add_evaluate(CLI::App& app, const bool& json) {
       ->required();
   evaluate
       ->add_option("--reference", options->reference,
-                   "Untouched surface: PNG files, or a folder of them (averaged)")
+                   "Undeformed surface: PNG files, or a folder of them (averaged)")
       ->type_name("FILE")
       ->required();
   evaluate

@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "clients/calibrate/reprocess/depth_remaker.hpp"
+#include "clients/calibrate/reprocess/depth_reprocessor.hpp"
 #include "clients/common/json.hpp"
 #include "clients/common/reports.pb.h"
 #include "clients/recording/channels.hpp"
@@ -31,7 +31,7 @@ struct Options {
   std::string recording;
   std::string calibration;
   std::string output;
-  int untouched_frames = 0;
+  int reference_frames = 0;
   bool force = false;
 };
 
@@ -61,22 +61,22 @@ class Reprocessor {
         writer_(sink_, {.program = context.target.program}) {}
 
   void run() {
-    if (!recording::find_attachment(file_, recording::kUntouchedPng)) take_first_frames();
-    recording::Takers takers;
-    takers.status = [this](const v1::Status& status, std::uint64_t) {
+    if (!recording::find_attachment(file_, recording::kCurrentReferencePng)) take_first_frames();
+    recording::RecordingHandlers handlers;
+    handlers.status = [this](const v1::Status& status, std::uint64_t) {
       followed_ = status.light_followed();
       return true;
     };
-    takers.frame = [this](const v1::Frame& frame, std::uint64_t time) {
+    handlers.frame = [this](const v1::Frame& frame, std::uint64_t time) {
       take(frame, time);
       return true;
     };
-    takers.event = [this](const v1::Event& event, std::uint64_t) {
+    handlers.event = [this](const v1::Event& event, std::uint64_t) {
       // Contact is judged anew.
       if (!event.has_contact()) writer_.add(event);
       return true;
     };
-    recording::read_recording(file_, takers);
+    recording::read_recording(file_, handlers);
     if (frames_ == 0) throw std::runtime_error(options_.recording + ": holds no frame");
     if (maps_ == 0) {
       throw std::runtime_error(options_.recording +
@@ -86,8 +86,8 @@ class Reprocessor {
     writer_.finish();
   }
 
-  /// DepthRemaker::left_plain().
-  [[nodiscard]] std::uint64_t left_plain() const noexcept { return remaker_.left_plain(); }
+  /// DepthReprocessor::unsharpened().
+  [[nodiscard]] std::uint64_t unsharpened() const noexcept { return remaker_.unsharpened(); }
 
   [[nodiscard]] cli::RecordingReport report() const {
     cli::RecordingReport report;
@@ -114,16 +114,16 @@ class Reprocessor {
 
   /// The mean of the first frames, which the user says are untouched.
   void take_first_frames() {
-    if (options_.untouched_frames == 0) {
+    if (options_.reference_frames == 0) {
       throw std::runtime_error(
-          fmt::format("{} holds no {}: if nothing touched at its beginning, say so by "
-                      "--untouched-frames 32",
-                      options_.recording, recording::kUntouchedPng));
+          fmt::format("{} holds no {}: if there was no contact at its beginning, say so by "
+                      "--reference-frames 32",
+                      options_.recording, recording::kCurrentReferencePng));
     }
     std::vector<std::uint32_t> sums(pixels());
     std::uint32_t count = 0;
-    recording::Takers takers;
-    takers.frame = [&](const v1::Frame& frame, std::uint64_t) {
+    recording::RecordingHandlers handlers;
+    handlers.frame = [&](const v1::Frame& frame, std::uint64_t) {
       if (frame.has_jpeg() && measurable(frame) && decode(frame)) {
         for (int y = 0; y < frame_height(); ++y) {
           const std::uint8_t* row = luma_.row(y);
@@ -132,16 +132,17 @@ class Reprocessor {
         }
         ++count;
       }
-      return count < static_cast<std::uint32_t>(options_.untouched_frames);
+      return count < static_cast<std::uint32_t>(options_.reference_frames);
     };
-    recording::read_recording(file_, takers);
+    recording::read_recording(file_, handlers);
     if (count == 0) throw std::runtime_error(options_.recording + ": none of its frames is whole");
     std::vector<std::uint16_t> mean(sums.size());
     std::ranges::transform(sums, mean.begin(), [count](std::uint32_t sum) {
       return static_cast<std::uint16_t>((sum * 256 + count / 2) / count);
     });
     remaker_.set_reference(mean);
-    untouched_ = image::encode_png(image::Grey16{frame_width(), frame_height(), std::move(mean)});
+    reference_png_ =
+        image::encode_png(image::Grey16{frame_width(), frame_height(), std::move(mean)});
   }
 
   [[nodiscard]] std::size_t pixels() const {
@@ -150,14 +151,15 @@ class Reprocessor {
 
   /// The reference of this time, where it is another than before.
   void follow_reference(std::uint64_t time) {
-    const auto place = recording::find_attachment(file_, recording::kUntouchedPng, time);
+    const auto place = recording::find_attachment(file_, recording::kCurrentReferencePng, time);
     if (!place || place->offset == reference_at_) return;
     const bool first = std::exchange(reference_at_, place->offset) == 0;
-    untouched_ = file_.attachment(*place).data;
-    const image::Grey16 image = image::decode_png_grey16(untouched_, recording::kUntouchedPng);
+    reference_png_ = file_.attachment(*place).data;
+    const image::Grey16 image =
+        image::decode_png_grey16(reference_png_, recording::kCurrentReferencePng);
     if (image.width != frame_width() || image.height != frame_height()) {
       throw std::runtime_error(fmt::format("{}: its {} has another size than the {}x{} of {}",
-                                           options_.recording, recording::kUntouchedPng,
+                                           options_.recording, recording::kCurrentReferencePng,
                                            frame_width(), frame_height(), options_.calibration));
     }
     remaker_.set_reference(image.pixels, first ? 1 + followed_ : 1);
@@ -166,7 +168,7 @@ class Reprocessor {
 
   void take(v1::Frame frame, std::uint64_t time) {
     follow_reference(time);
-    const bool touched = remaker_.touching();
+    const bool was_in_contact = remaker_.in_contact();
     const bool made = frame.has_jpeg() && measurable(frame) && decode(frame);
     if (made) {
       remaker_.remake(luma_.view(), frame);
@@ -181,17 +183,17 @@ class Reprocessor {
       attach("reference.png", "image/png", "reference.png");
     }
     if (attach_due_ || frames_ == 1) {
-      writer_.attach(recording::kUntouchedPng, "image/png", untouched_);
+      writer_.attach(recording::kCurrentReferencePng, "image/png", reference_png_);
       attach_due_ = false;
     }
-    if (made && remaker_.touching() != touched) tell_contact(frame);
+    if (made && remaker_.in_contact() != was_in_contact) write_contact_event(frame);
   }
 
   void attach(const char* name, const char* media_type, const char* file) {
     writer_.attach(name, media_type, base::read_file(fs::path(options_.calibration) / file));
   }
 
-  void tell_contact(const v1::Frame& frame) {
+  void write_contact_event(const v1::Frame& frame) {
     v1::Event event;
     event.set_sequence(frame.sequence());
     event.set_monotonic_ns(frame.monotonic_ns());
@@ -205,12 +207,12 @@ class Reprocessor {
   const Options& options_;
   std::shared_ptr<const calibration::Calibration> calibration_;
   mcap::Reader file_;
-  DepthRemaker remaker_;
+  DepthReprocessor remaker_;
   hal::mjpeg::GreyDecoder decoder_;
   hal::luma::LumaBuffer luma_;
   mcap::FileSink sink_;
   recording::RecordingWriter writer_;
-  std::string untouched_;           // the PNG of the reference in use
+  std::string reference_png_;       // the PNG of the reference in use
   std::uint64_t reference_at_ = 0;  // its place in the file
   double followed_ = 0;
   bool attach_due_ = false;
@@ -240,11 +242,11 @@ void run(const cli::Context& context, const Options& options) {
   }
   context.out << fmt::format("{}: {} frames, depth made anew in {}\n", report.output(),
                              report.frames(), report.maps());
-  if (reprocessor.left_plain() > 0) {
+  if (reprocessor.unsharpened() > 0) {
     context.out << fmt::format(
-        "{} of these were sharpened when they were recorded and are plain now: {} has no list for "
+        "{} of these were sharpened when they were recorded and are plain now: {} has no LUT for "
         "as many steps (dtact-calibrate depth --method model makes them)\n",
-        reprocessor.left_plain(), options.calibration);
+        reprocessor.unsharpened(), options.calibration);
   }
   if (!report.damage().empty()) {
     context.out << fmt::format("the recording is not whole ({}): all before that is in it\n",
@@ -268,9 +270,10 @@ void add_reprocess(CLI::App& app, cli::Context& context) {
       ->type_name("FILE")
       ->required();
   command
-      ->add_option("--untouched-frames", options->untouched_frames,
-                   "Nothing touched in so many frames at the beginning: where the recording holds "
-                   "no untouched image")
+      ->add_option(
+          "--reference-frames", options->reference_frames,
+          "There was no contact in so many frames at the beginning: where the recording holds "
+          "no reference image")
       ->check(CLI::Range(1, 1000));
   command->add_flag("--force", options->force, "Replace the file if it exists");
   cli::add_json_option(*command, context);

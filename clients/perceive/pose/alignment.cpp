@@ -176,8 +176,8 @@ Equations mean_of(const AllEquations& all, double min_core, const Vector3d& upri
   Matrix6 allowed = Matrix6::Identity();
   if (all.core.weight > 0) {
     const Eigen::SelfAdjointEigenSolver<Matrix6> spectrum(all.core.matrix / all.core.weight);
-    const auto hidden = (spectrum.eigenvalues().array() < min_core).count();
-    const Twists unseen = spectrum.eigenvectors().leftCols(hidden);
+    const auto unobservable = (spectrum.eigenvalues().array() < min_core).count();
+    const Twists unseen = spectrum.eigenvectors().leftCols(unobservable);
     const Twists rolls = rolls_of(unseen, upright);
     shown -= unseen * unseen.transpose();
     allowed -= rolls * rolls.transpose();
@@ -189,7 +189,7 @@ Equations mean_of(const AllEquations& all, double min_core, const Vector3d& upri
 }
 
 /// Of the steps that change nothing of what is observed, the one that turns least.
-Twist least_turn(const Twist& step, const std::vector<Twist>& free) {
+Twist min_turn(const Twist& step, const std::vector<Twist>& free) {
   if (free.empty()) return step;
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> turns(3, free.size());
   Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6> twists(6, free.size());
@@ -269,7 +269,7 @@ Alignment align(std::span<const Surfel> surfels, const ContactView& view, const 
     }
     const Matrix6 map = to_origin(result.centre, result.arm);
     result.covariance = map * covariance * map.transpose();
-    step = least_turn(step, free);
+    step = min_turn(step, free);
     apply(step, result);
     if (step.norm() < kConverged) break;
   }

@@ -11,15 +11,15 @@ namespace dtact::perceive {
 
 /// What one frame says of where an object may be, in a few hundred samples of the gel's surface:
 /// where it lies against the object, and where the object can only be further away. All in the
-/// contact's frame: its origin in the middle of the contact, z along the untouched surface's normal
-/// there, towards the object. Metres. It holds on to nothing: another thread may have it.
+/// contact's frame: its origin in the middle of the contact, z along the undeformed surface's
+/// normal there, towards the object. Metres. It holds on to nothing: another thread may have it.
 struct ContactPatch {
   struct Sample {
     Eigen::Vector3d point;
     Eigen::Vector3d normal;
   };
   /// The gel lies against the object: it touches, and does not bend away as where it hangs between
-  /// an edge and the untouched surface (there it is a shoulder, under an object a bowl or flat).
+  /// an edge and the undeformed surface (there it is a shoulder, under an object a bowl or flat).
   std::vector<Sample> core;
   /// Some of all other places: no part of the object is below them.
   std::vector<Sample> beside;

@@ -9,7 +9,7 @@
 namespace dtact::perceive {
 namespace {
 
-/// Three standard deviations of the noise of an untouched map, metres; and what a reference that
+/// Three standard deviations of the noise of a reference map, metres; and what a reference that
 /// has aged may be off by, as a share of the deepest point.
 constexpr double kNoise = 3e-5;
 constexpr double kPressedShare = 0.05;
@@ -68,11 +68,12 @@ std::optional<ContactView::Sample> ContactView::at(const Vector3d& point_m) cons
   double row = (point_m.y() - y0_) / px_;
   Vector3d upright = Vector3d::UnitZ();
   if (table_ != nullptr) {
-    const auto foot = foot_of(*table_, {point_m.x(), point_m.y(), point_m.z()});
-    if (!foot) return std::nullopt;
-    column = foot->column - cloud_.x;
-    row = foot->row - cloud_.y;
-    upright = Vector3d(foot->normal[0], foot->normal[1], foot->normal[2]).normalized();
+    const auto projection = project_to_surface(*table_, {point_m.x(), point_m.y(), point_m.z()});
+    if (!projection) return std::nullopt;
+    column = projection->column - cloud_.x;
+    row = projection->row - cloud_.y;
+    upright =
+        Vector3d(projection->normal[0], projection->normal[1], projection->normal[2]).normalized();
   }
   if (!(column >= 0 && row >= 0 && column < cloud_.width - 1 && row < cloud_.height - 1)) {
     return std::nullopt;

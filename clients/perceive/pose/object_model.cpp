@@ -22,7 +22,7 @@ constexpr double kSamplesPerSurfel = 6;
 /// Rests that are nearer to each other than this cosine (4°) are one; some hundreds are looked for.
 constexpr double kSameRest = 0.9976;
 constexpr int kDropped = 400;
-constexpr std::size_t kMostRests = 100;
+constexpr std::size_t kMaxRests = 100;
 
 Vector3d point_of(const std::array<double, 3>& values, double scale) {
   return scale * Vector3d(values[0], values[1], values[2]);
@@ -30,10 +30,10 @@ Vector3d point_of(const std::array<double, 3>& values, double scale) {
 
 void check_size(const Eigen::AlignedBox3d& box) {
   const double mm = 1e3 * box.diagonal().norm();
-  if (mm >= kLeastObjectMm && mm <= kMostObjectMm) return;
+  if (mm >= kMinObjectMm && mm <= kMaxObjectMm) return;
   throw std::runtime_error(fmt::format(
       "the object is {:.3g} mm across, where {} to {} mm can be felt: is its unit another one?", mm,
-      kLeastObjectMm, kMostObjectMm));
+      kMinObjectMm, kMaxObjectMm));
 }
 
 /// One surfel of a direction (the largest component of its normal, and that one's sign) in each
@@ -182,7 +182,7 @@ std::vector<Vector3d> rests_of(const std::vector<Surfel>& surfels) {
     const Vector3d rest = tumble.fall(direction);
     const bool known = std::ranges::any_of(
         rests, [&](const Vector3d& other) { return other.dot(rest) > kSameRest; });
-    if (!known && rests.size() < kMostRests) rests.push_back(rest);
+    if (!known && rests.size() < kMaxRests) rests.push_back(rest);
   }
   return rests;
 }
@@ -226,7 +226,7 @@ ObjectModel make_object(const Mesh& mesh, double metres_per_unit, std::string na
   model.spacing = kSpacing;
   if (!cloud) {
     const double area = area_of(mesh, metres_per_unit);
-    model.spacing = std::max(kSpacing, std::sqrt(area / static_cast<double>(kMostSurfels)));
+    model.spacing = std::max(kSpacing, std::sqrt(area / static_cast<double>(kMaxSurfels)));
   }
   // A surface that lies across the cells meets more of them than its area says.
   for (;; model.spacing *= 1.2) {
@@ -234,7 +234,7 @@ ObjectModel make_object(const Mesh& mesh, double metres_per_unit, std::string na
                           : sample(mesh, metres_per_unit, model.spacing, box.min());
     // Nor may a cloud's own gaps be holes: two of its points for each that is left.
     const bool sparse = cloud && mesh.points.size() < 2 * model.surfels.size();
-    if (model.surfels.size() <= kMostSurfels && !sparse) break;
+    if (model.surfels.size() <= kMaxSurfels && !sparse) break;
     if (sparse && model.spacing > kCoarse) {
       const double each =
           static_cast<double>(model.surfels.size()) / static_cast<double>(mesh.points.size());

@@ -21,7 +21,7 @@ struct ObjectModel {
 
 /// Samples `mesh`, whose unit is `metres_per_unit`: triangles alike densely whatever their size,
 /// then one surfel of a direction in each cell of a grid. Surfels are 0.15 mm apart, or as far as
-/// kMostSurfels of them or a cloud's own density allow. Throws std::runtime_error with a sentence
+/// kMaxSurfels of them or a cloud's own density allow. Throws std::runtime_error with a sentence
 /// that says what is wrong with the shape: its size in this unit, that its surface looks inwards,
 /// or that a cloud is so sparse that its gaps would be taken for holes.
 [[nodiscard]] ObjectModel make_object(const Mesh& mesh, double metres_per_unit, std::string name);
@@ -29,12 +29,12 @@ struct ObjectModel {
 /// Unit vectors evenly all over the sphere (Fibonacci's lattice): of 1600 the next is 5° away.
 [[nodiscard]] std::vector<Eigen::Vector3d> all_directions(int count);
 
-constexpr std::size_t kMostSurfels = 20'000;
+constexpr std::size_t kMaxSurfels = 20'000;
 /// Metres; surfels further apart fit where the object does not: of a simulated object of balls,
 /// 0.26 mm apart, each place was found, and at 0.37 mm places that were millimetres off.
 constexpr double kCoarse = 3e-4;
 /// Across its bounding box, millimetres.
-constexpr double kLeastObjectMm = 0.5;
-constexpr double kMostObjectMm = 300;
+constexpr double kMinObjectMm = 0.5;
+constexpr double kMaxObjectMm = 300;
 
 }  // namespace dtact::perceive

@@ -13,7 +13,7 @@ namespace {
 using Eigen::Vector3d;
 
 /// Steeper parts of the object are walls, no underside.
-constexpr double kLeastUpright = 0.1;
+constexpr double kMinUpright = 0.1;
 /// A place and its surfel look the same way within this cosine.
 constexpr double kSameWay = 0.7;
 /// What an object inside the gel costs: at most, for each place of the core.
@@ -27,7 +27,7 @@ double inside(double gap, double limit) { return std::clamp((-gap - kAllowed) / 
 
 }  // namespace
 
-Underside::Underside(const ObjectModel& object, const Eigen::Matrix3d& turn, double highest) {
+BottomView::BottomView(const ObjectModel& object, const Eigen::Matrix3d& turn, double highest) {
   const Vector3d up = turn.row(2);
   double lowest = INFINITY;
   for (const Surfel& surfel : object.surfels) lowest = std::min(lowest, up.dot(surfel.point));
@@ -35,7 +35,7 @@ Underside::Underside(const ObjectModel& object, const Eigen::Matrix3d& turn, dou
   from_object_.translation() = Vector3d(0, 0, -lowest);
   Eigen::AlignedBox2d box;
   for (const Surfel& surfel : object.surfels) {
-    if (up.dot(surfel.point) > lowest + highest || up.dot(surfel.normal) < kLeastUpright) continue;
+    if (up.dot(surfel.point) > lowest + highest || up.dot(surfel.normal) < kMinUpright) continue;
     surfels_.push_back({from_object_ * surfel.point, turn * surfel.normal});
     box.extend(surfels_.back().point.head<2>());
   }
@@ -60,8 +60,8 @@ Underside::Underside(const ObjectModel& object, const Eigen::Matrix3d& turn, dou
 }
 
 /// Cells that got no surfel by chance, between others that did, have a neighbour's.
-void Underside::fill_holes() {
-  constexpr int kMost = 5;
+void BottomView::fill_holes() {
+  constexpr int kMax = 5;
   const std::vector<std::int32_t> before = cells_;
   const auto width = static_cast<std::ptrdiff_t>(width_);
   for (std::ptrdiff_t row = 1; row + 1 < height_; ++row) {
@@ -77,12 +77,12 @@ void Underside::fill_holes() {
         ++filled;
         one = held;
       }
-      if (filled >= kMost) cells_[static_cast<std::size_t>(i)] = one;
+      if (filled >= kMax) cells_[static_cast<std::size_t>(i)] = one;
     }
   }
 }
 
-Underside::Low Underside::below(double height) const {
+BottomView::Low BottomView::below(double height) const {
   Low low;
   std::size_t count = 0;
   for (std::size_t i = 0; i < cells_.size(); ++i) {
@@ -100,13 +100,13 @@ Underside::Low Underside::below(double height) const {
   return low;
 }
 
-double score_of(const Underside& underside, const ContactPatch& patch, const Motion& move,
+double score_of(const BottomView& bottom, const ContactPatch& patch, const Motion& move,
                 double limit) {
   double explained = 0;
   double wrong = 0;
   for (const auto& sample : patch.core) {
     const Vector3d point = move * sample.point;
-    const Surfel* surfel = underside.at(point);
+    const Surfel* surfel = bottom.at(point);
     if (surfel == nullptr) continue;
     const double gap = surfel->normal.dot(surfel->point - point);
     const double part = gap / limit;
@@ -117,7 +117,7 @@ double score_of(const Underside& underside, const ContactPatch& patch, const Mot
   }
   for (const auto& sample : patch.beside) {
     const Vector3d point = move * sample.point;
-    const Surfel* surfel = underside.at(point);
+    const Surfel* surfel = bottom.at(point);
     if (surfel == nullptr) continue;
     wrong += patch.beside_weight * inside(surfel->normal.dot(surfel->point - point), limit);
   }
@@ -132,10 +132,10 @@ Motion twisted(const Motion& move, const ContactPatch& patch, const Twist& twist
   return move * back;
 }
 
-Climbed climb(const Underside& underside, const ContactPatch& patch, const Motion& move,
-              double step, double last) {
+ScoredPose hill_climb(const BottomView& bottom, const ContactPatch& patch, const Motion& move,
+                      double step, double last) {
   double limit = std::max(kFineLimit, step / 2);
-  Climbed best{move, score_of(underside, patch, move, limit)};
+  ScoredPose best{move, score_of(bottom, patch, move, limit)};
   while (step > last) {
     bool better = false;
     for (int axis = 0; axis < 6; ++axis) {
@@ -143,7 +143,7 @@ Climbed climb(const Underside& underside, const ContactPatch& patch, const Motio
         Twist twist = Twist::Zero();
         twist[axis] = sign * step;
         const Motion tried = twisted(best.move, patch, twist);
-        const double score = score_of(underside, patch, tried, limit);
+        const double score = score_of(bottom, patch, tried, limit);
         if (score <= best.score) continue;
         best = {tried, score};
         better = true;
@@ -153,13 +153,13 @@ Climbed climb(const Underside& underside, const ContactPatch& patch, const Motio
     if (better) continue;
     step /= 2;
     limit = std::max(kFineLimit, step / 2);
-    best.score = score_of(underside, patch, best.move, limit);
+    best.score = score_of(bottom, patch, best.move, limit);
   }
   return best;
 }
 
-std::vector<Twist> hidden_of(const Underside& underside, const ContactPatch& patch,
-                             const Motion& move) {
+std::vector<Twist> unobservable_twists(const BottomView& bottom, const ContactPatch& patch,
+                                       const Motion& move) {
   constexpr double kShift = 2.5e-4;
   constexpr double kLimit = 1e-4;
   constexpr double kChange = 0.03;
@@ -167,7 +167,7 @@ std::vector<Twist> hidden_of(const Underside& underside, const ContactPatch& pat
   Matrix6 shape = Matrix6::Zero();
   double count = 0;
   for (const auto& sample : patch.core) {
-    const Surfel* surfel = underside.at(move * sample.point);
+    const Surfel* surfel = bottom.at(move * sample.point);
     if (surfel == nullptr) continue;
     const Vector3d normal = move.linear().transpose() * surfel->normal;
     Twist row;
@@ -182,12 +182,10 @@ std::vector<Twist> hidden_of(const Underside& underside, const ContactPatch& pat
     if (shown.eigenvalues()[k] < kSeen) unseen.emplace_back(shown.eigenvectors().col(k));
   }
   // Along these only the outline makes the score fall, nearly as a quadratic form.
-  const double here = score_of(underside, patch, move, kLimit);
+  const double here = score_of(bottom, patch, move, kLimit);
   const auto fall = [&](const Twist& direction) {
-    const double there =
-        score_of(underside, patch, twisted(move, patch, kShift * direction), kLimit);
-    const double back =
-        score_of(underside, patch, twisted(move, patch, -kShift * direction), kLimit);
+    const double there = score_of(bottom, patch, twisted(move, patch, kShift * direction), kLimit);
+    const double back = score_of(bottom, patch, twisted(move, patch, -kShift * direction), kLimit);
     return here - (there + back) / 2;
   };
   const auto size = static_cast<Eigen::Index>(unseen.size());
@@ -204,16 +202,16 @@ std::vector<Twist> hidden_of(const Underside& underside, const ContactPatch& pat
   }
   if (size == 0) return {};
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> outline(form);
-  std::vector<Twist> hidden;
+  std::vector<Twist> unobservable;
   for (Eigen::Index k = 0; k < size; ++k) {
     if (outline.eigenvalues()[k] >= kChange) continue;
     Twist direction = Twist::Zero();
     for (Eigen::Index i = 0; i < size; ++i) {
       direction += outline.eigenvectors()(i, k) * unseen[static_cast<std::size_t>(i)];
     }
-    hidden.push_back(direction);
+    unobservable.push_back(direction);
   }
-  return hidden;
+  return unobservable;
 }
 
 }  // namespace dtact::perceive

@@ -12,11 +12,11 @@ namespace dtact::perceive {
 
 /// The underside of an object that is turned in some way, on a square grid: in each cell its lowest
 /// surfel. The frame of the underside has z up and its lowest point at z = 0.
-class Underside {
+class BottomView {
  public:
   /// `turn`: the object's frame to the underside's, but for the height. What is higher than
   /// `highest` above the lowest point is left out.
-  Underside(const ObjectModel& object, const Eigen::Matrix3d& turn, double highest);
+  BottomView(const ObjectModel& object, const Eigen::Matrix3d& turn, double highest);
 
   /// The object's frame to the underside's.
   [[nodiscard]] const Motion& from_object() const noexcept { return from_object_; }
@@ -53,7 +53,7 @@ class Underside {
 /// How well an object whose underside this is explains a contact: the part of the core that lies on
 /// it, each place weighted by its distance (1 on it, 0 from `limit` on), less the places where the
 /// object would be inside the gel. At most 1. `move`: the contact's frame to the underside's.
-[[nodiscard]] double score_of(const Underside& underside, const ContactPatch& patch,
+[[nodiscard]] double score_of(const BottomView& bottom, const ContactPatch& patch,
                               const Motion& move, double limit);
 
 /// `move` after a twist about the patch's middle, its rotation times the patch's arm.
@@ -61,16 +61,16 @@ class Underside {
 
 /// Climbs to a better score: each of the six directions in turn, with steps that are halved from
 /// `step` on as long as they are longer than `last`, metres.
-struct Climbed {
+struct ScoredPose {
   Motion move = Motion::Identity();
   double score = 0;
 };
-[[nodiscard]] Climbed climb(const Underside& underside, const ContactPatch& patch,
-                            const Motion& move, double step, double last);
+[[nodiscard]] ScoredPose hill_climb(const BottomView& bottom, const ContactPatch& patch,
+                                    const Motion& move, double step, double last);
 
 /// Unit twists about the patch's middle, in the contact's frame, along which the score hardly
 /// changes over a quarter of a millimetre: neither the touched shape shows them nor its outline.
-[[nodiscard]] std::vector<Twist> hidden_of(const Underside& underside, const ContactPatch& patch,
-                                           const Motion& move);
+[[nodiscard]] std::vector<Twist> unobservable_twists(const BottomView& bottom,
+                                                     const ContactPatch& patch, const Motion& move);
 
 }  // namespace dtact::perceive

@@ -93,10 +93,10 @@ class Search {
     for (const Vector3d& down : object_.rests) look(turn_to(-down));
     for (const Vector3d& down : all_directions(kDirections)) look(turn_to(-down));
     keep(kImpressions);
-    climb_all(few_, kFirstStep, kFirstLast);
+    hill_climb_all(few_, kFirstStep, kFirstLast);
     keep_apart();
     if (present) add_present(*present);
-    climb_all(some_, kStep, kLast);
+    hill_climb_all(some_, kStep, kLast);
     keep(candidates_.size());
     if (stop_.stop_requested()) return std::nullopt;
     if (candidates_.empty() || candidates_.front().score < kExplained) return std::nullopt;
@@ -104,15 +104,15 @@ class Search {
   }
 
  private:
-  [[nodiscard]] Underside underside_of(const Matrix3d& turn) const {
+  [[nodiscard]] BottomView bottom_view_of(const Matrix3d& turn) const {
     return {object_, turn, patch_.highest - patch_.lowest + kInTheWay};
   }
-  [[nodiscard]] static Motion place_of(const Underside& underside, const Motion& move) {
-    return move.inverse() * underside.from_object();
+  [[nodiscard]] static Motion place_of(const BottomView& bottom, const Motion& move) {
+    return move.inverse() * bottom.from_object();
   }
 
   /// The contact turned by `angle`, its core's middle on `low`'s.
-  [[nodiscard]] Motion laid(const Underside& underside, const Eigen::Vector2d& low,
+  [[nodiscard]] Motion laid(const BottomView& bottom, const Eigen::Vector2d& low,
                             double angle) const {
     Motion move = Motion::Identity();
     move.linear() = Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
@@ -124,7 +124,7 @@ class Search {
     std::size_t count = 0;
     for (const auto& sample : few_.core) {
       const Vector3d point = move * sample.point;
-      const Surfel* surfel = underside.at(point);
+      const Surfel* surfel = bottom.at(point);
       if (surfel != nullptr && count < gaps.size()) {
         gaps.at(count++) = surfel->point.z() - point.z();
       }
@@ -132,20 +132,20 @@ class Search {
     if (count == 0) return move;
     const auto middle = gaps.begin() + static_cast<std::ptrdiff_t>(count / 2);
     std::nth_element(gaps.begin(), middle, gaps.begin() + static_cast<std::ptrdiff_t>(count));
-    constexpr double kMostGap = 3e-4;
-    move.translation().z() += std::clamp(*middle, -kMostGap, kMostGap);
+    constexpr double kMaxGap = 3e-4;
+    move.translation().z() += std::clamp(*middle, -kMaxGap, kMaxGap);
     return move;
   }
 
   void look(const Matrix3d& turn) {
     if (stop_.stop_requested()) return;
-    const Underside underside = underside_of(turn);
-    const Underside::Low low = underside.below(patch_.highest - patch_.lowest + kLift);
+    const BottomView bottom = bottom_view_of(turn);
+    const BottomView::Low low = bottom.below(patch_.highest - patch_.lowest + kLift);
     if (low.area * kAreaFactor < patch_.area || low.area > kAreaFactor * patch_.area) return;
     std::array<std::pair<double, Motion>, kTurns> turns;
     for (int i = 0; i < kTurns; ++i) {
-      const Motion move = laid(underside, low.middle, 2 * std::numbers::pi * i / kTurns);
-      turns.at(static_cast<std::size_t>(i)) = {score_of(underside, few_, move, kFirstLimit), move};
+      const Motion move = laid(bottom, low.middle, 2 * std::numbers::pi * i / kTurns);
+      turns.at(static_cast<std::size_t>(i)) = {score_of(bottom, few_, move, kFirstLimit), move};
     }
     std::partial_sort(turns.begin(), turns.begin() + kTurnsKept, turns.end(),
                       [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -159,14 +159,14 @@ class Search {
     if (candidates_.size() > most) candidates_.resize(most);
   }
 
-  void climb_all(const ContactPatch& patch, double step, double last) {
+  void hill_climb_all(const ContactPatch& patch, double step, double last) {
     for (Candidate& one : candidates_) {
       if (stop_.stop_requested()) return;
-      const Underside underside = underside_of(one.turn);
-      const Climbed climbed = climb(underside, patch, one.move, step, last);
-      one.move = climbed.move;
-      one.place = place_of(underside, climbed.move);
-      one.score = climbed.score;
+      const BottomView bottom = bottom_view_of(one.turn);
+      const ScoredPose improved = hill_climb(bottom, patch, one.move, step, last);
+      one.move = improved.move;
+      one.place = place_of(bottom, improved.move);
+      one.score = improved.score;
     }
   }
 
@@ -174,7 +174,7 @@ class Search {
     Candidate& one = candidates_.emplace_back();
     one.place = patch_.frame.inverse() * pose;
     one.turn = one.place.linear();
-    one.move = underside_of(one.turn).from_object() * one.place.inverse();
+    one.move = bottom_view_of(one.turn).from_object() * one.place.inverse();
     one.present = true;
   }
 
@@ -204,13 +204,13 @@ class Search {
     const auto present = std::ranges::find(candidates_, true, &Candidate::present);
     const bool stays = present != candidates_.end() && present->score >= most - kAsWell;
     const Candidate& first = stays ? *present : candidates_.front();
-    const Underside underside = underside_of(first.turn);
-    const Climbed climbed = climb(underside, patch_, first.move, kStep, kLast);
-    const std::vector<Twist> hidden = hidden_of(underside, patch_, climbed.move);
+    const BottomView bottom = bottom_view_of(first.turn);
+    const ScoredPose improved = hill_climb(bottom, patch_, first.move, kStep, kLast);
+    const std::vector<Twist> unobservable = unobservable_twists(bottom, patch_, improved.move);
     const auto same = [&](const Candidate& a, const Candidate& b) {
       const Twist twist = between(a, b);
       Twist rest = twist;
-      for (const Twist& one : hidden) rest -= one * one.dot(twist);
+      for (const Twist& one : unobservable) rest -= one * one.dot(twist);
       return near(twist) || near(rest) || rest.norm() < kOnTheWay * twist.norm();
     };
     std::vector<const Candidate*> families{&first};
@@ -221,9 +221,10 @@ class Search {
       if (another) families.push_back(&one);
     }
     Placement found;
-    found.pose = patch_.frame * place_of(underside, climbed.move);
-    found.score = climbed.score;
-    found.covariance = carried(unknown_along(hidden, patch_.middle, patch_.arm), patch_.frame);
+    found.pose = patch_.frame * place_of(bottom, improved.move);
+    found.score = improved.score;
+    found.covariance =
+        carried(unknown_along(unobservable, patch_.middle, patch_.arm), patch_.frame);
     found.alternatives = static_cast<std::uint32_t>(families.size() - 1);
     return found;
   }

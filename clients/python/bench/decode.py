@@ -57,7 +57,7 @@ def received(address: str) -> dict[str, dtact.Frame]:
     with dtact.connect(address) as s:
         for name in ENCODINGS:
             s.subscribe(dtact.Subscription(depth=name))
-            frames[name] = next(f for f in s.frames() if f.contact and f.contact.touching)
+            frames[name] = next(f for f in s.frames() if f.contact and f.contact.in_contact)
     return frames
 
 

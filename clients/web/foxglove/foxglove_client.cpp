@@ -22,25 +22,25 @@ constexpr int kError = 2;
 
 }  // namespace
 
-FoxgloveClient::FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Place> places,
+FoxgloveClient::FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Mount> mounts,
                                net::Rights rights, std::string program,
                                std::function<void(const std::string&)> ended)
     : socket_(std::move(socket)),
-      places_(std::move(places)),
+      mounts_(std::move(mounts)),
       rights_(rights),
       program_(std::move(program)),
       ended_(std::move(ended)) {}
 
 void FoxgloveClient::start() {
   std::vector<std::string> prefixes;
-  prefixes.reserve(places_.size());
-  for (const Place& place : places_) prefixes.push_back(place.prefix);
+  prefixes.reserve(mounts_.size());
+  for (const Mount& place : mounts_) prefixes.push_back(place.prefix);
   send(server_info(program_));
-  tell_channels();
+  advertise_channels();
   send(advertise_services(prefixes));
   update_want();
-  for (const Place& place : places_) {
-    const Source& source = place.station->source();
+  for (const Mount& place : mounts_) {
+    const Source& source = place.sensor->source();
     if (!source.connected()) {
       send(status(kWarning, fmt::format("the daemon of {} is away", source.name())));
     }
@@ -50,16 +50,16 @@ void FoxgloveClient::start() {
 
 /// Those that it does not know yet, and takes back those that are there no more: behind an address
 /// there may be dtactd, and later dtact-perceive.
-void FoxgloveClient::tell_channels() {
+void FoxgloveClient::advertise_channels() {
   std::vector<Channels> come;
   std::vector<Channels> gone;
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    Place& place = places_[i];
-    const Topics served = served_by(place.station->source().daemon());
-    if (served == place.told) continue;
-    come.push_back({i, place.prefix, served & ~place.told});
-    gone.push_back({i, place.prefix, place.told & ~served});
-    place.told = served;
+  for (std::size_t i = 0; i < mounts_.size(); ++i) {
+    Mount& place = mounts_[i];
+    const Topics served = served_by(place.sensor->source().daemon());
+    if (served == place.reported) continue;
+    come.push_back({i, place.prefix, served & ~place.reported});
+    gone.push_back({i, place.prefix, place.reported & ~served});
+    place.reported = served;
   }
   const auto any = [](const Channels& of) { return of.topics.any(); };
   if (std::ranges::any_of(gone, any)) send(unadvertise(gone));
@@ -70,7 +70,7 @@ void FoxgloveClient::close(const std::string& reason) {
   if (std::exchange(closed_, true)) return;
   socket_->close();
   subscriptions_.clear();
-  for (const Place& place : places_) place.station->forget(*this);
+  for (const Mount& place : mounts_) place.sensor->forget(*this);
   ended_(reason);
 }
 
@@ -99,7 +99,7 @@ void FoxgloveClient::take(bool text) {
   const auto operation = parse_operation(message);
   if (!operation) return send(status(kError, "a text that is no operation in JSON"));
   if (operation->name == "subscribe") {
-    for (const Wish& wish : operation->subscribed) subscribe(wish);
+    for (const SubscriptionRequest& request : operation->subscribed) subscribe(request);
   } else if (operation->name == "unsubscribe") {
     for (const std::uint32_t id : operation->ended) subscriptions_.erase(id);
   } else {
@@ -108,14 +108,15 @@ void FoxgloveClient::take(bool text) {
   if (!closed_) update_want();
 }
 
-void FoxgloveClient::subscribe(const Wish& wish) {
-  const std::size_t number = std::size_t{wish.channel} - 1;
-  if (wish.channel == 0 || number / kTopics >= places_.size() ||
-      !places_[number / kTopics].told.test(number % kTopics)) {
-    return send(status(kError, fmt::format("there is no channel {}", wish.channel)));
+void FoxgloveClient::subscribe(const SubscriptionRequest& request) {
+  const std::size_t number = std::size_t{request.channel} - 1;
+  if (request.channel == 0 || number / kTopics >= mounts_.size() ||
+      !mounts_[number / kTopics].reported.test(number % kTopics)) {
+    return send(status(kError, fmt::format("there is no channel {}", request.channel)));
   }
-  if (subscriptions_.contains(wish.subscription)) {
-    return send(status(kError, fmt::format("subscription {} is there already", wish.subscription)));
+  if (subscriptions_.contains(request.subscription)) {
+    return send(
+        status(kError, fmt::format("subscription {} is there already", request.subscription)));
   }
   if (subscriptions_.size() >= kMaxSubscriptions) {
     return send(
@@ -123,18 +124,18 @@ void FoxgloveClient::subscribe(const Wish& wish) {
   }
   Subscription made{number / kTopics, static_cast<Topic>(number % kTopics), nullptr};
   // It comes when it changes: whoever is new has missed it.
-  if (made.topic == Topic::light) made.waiting = places_[made.place].station->light();
-  subscriptions_.emplace(wish.subscription, std::move(made));
+  if (made.topic == Topic::light) made.waiting = mounts_[made.place].sensor->light();
+  subscriptions_.emplace(request.subscription, std::move(made));
   if (!writing_) write_next();
 }
 
 void FoxgloveClient::update_want() {
-  for (std::size_t place = 0; place < places_.size(); ++place) {
+  for (std::size_t place = 0; place < mounts_.size(); ++place) {
     Topics wanted;
     for (const auto& [id, subscription] : subscriptions_) {
       if (subscription.place == place) wanted.set(index(subscription.topic));
     }
-    places_[place].station->want(*this, wanted);
+    mounts_[place].sensor->want(*this, wanted);
   }
 }
 
@@ -143,7 +144,7 @@ void FoxgloveClient::call(const Call& call) {
   const auto fail = [&](std::string_view sentence) {
     send(service_failure(call.service, call.call, sentence));
   };
-  if (call.service == 0 || number / kServices >= places_.size()) {
+  if (call.service == 0 || number / kServices >= mounts_.size()) {
     return fail("there is no such service");
   }
   if (rights_ != net::Rights::control) {
@@ -151,7 +152,7 @@ void FoxgloveClient::call(const Call& call) {
   }
   if (call.encoding != "json") return fail("only requests in JSON are understood");
   try {
-    places_[number / kServices].station->source().request(
+    mounts_[number / kServices].sensor->source().request(
         request_of(static_cast<Service>(number % kServices), call.payload),
         [weak = weak_from_this(), service = call.service, id = call.call](const v1::Reply& reply) {
           const auto self = weak.lock();
@@ -166,10 +167,10 @@ void FoxgloveClient::call(const Call& call) {
   }
 }
 
-void FoxgloveClient::on_message(const Station& station, Topic topic,
+void FoxgloveClient::on_message(const SensorTopics& sensor, Topic topic,
                                 const std::shared_ptr<const Message>& message) {
   for (auto& [id, subscription] : subscriptions_) {
-    if (places_[subscription.place].station.get() != &station || subscription.topic != topic) {
+    if (mounts_[subscription.place].sensor.get() != &sensor || subscription.topic != topic) {
       continue;
     }
     subscription.waiting = message;
@@ -178,7 +179,7 @@ void FoxgloveClient::on_message(const Station& station, Topic topic,
 }
 
 void FoxgloveClient::on_state(bool well, const std::string& sentence) {
-  tell_channels();
+  advertise_channels();
   send(status(well ? kInfo : kWarning, sentence));
 }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "clients/web/foxglove/protocol.hpp"
-#include "clients/web/foxglove/station.hpp"
+#include "clients/web/foxglove/sensor_topics.hpp"
 #include "clients/web/web_socket.hpp"
 #include "daemon/serve/rights.hpp"
 #include "daemon/serve/token_bucket.hpp"
@@ -19,17 +19,17 @@
 namespace dtact::web::foxglove {
 
 /// A sensor, and what stands before its topics.
-struct Place {
-  std::shared_ptr<Station> station;
-  std::string prefix;  ///< "" or "/left"
-  Topics told = {};    ///< The client knows these channels.
+struct Mount {
+  std::shared_ptr<SensorTopics> sensor;
+  std::string prefix;    ///< "" or "/left"
+  Topics reported = {};  ///< The client knows these channels.
 };
 
 /// One client of the Foxglove protocol. On the thread that runs the gateway's `io`.
 ///
 /// Overflow. Of each channel the newest message waits, in place of one before it. Answers and
 /// notices are never dropped: a client that leaves more than kMaxControl of them unread is let go.
-class FoxgloveClient : public Station::Listener,
+class FoxgloveClient : public SensorTopics::Listener,
                        public std::enable_shared_from_this<FoxgloveClient> {
  public:
   static constexpr std::size_t kMaxControl = 256;
@@ -37,13 +37,13 @@ class FoxgloveClient : public Station::Listener,
   static constexpr double kMaxRequestsPerS = 100;
 
   /// `ended` is called once, with the reason; nothing more comes of this client then.
-  FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Place> places, net::Rights rights,
+  FoxgloveClient(std::shared_ptr<WebSocket> socket, std::vector<Mount> mounts, net::Rights rights,
                  std::string program, std::function<void(const std::string&)> ended);
 
   void start();
   void close(const std::string& reason);
 
-  void on_message(const Station& station, Topic topic,
+  void on_message(const SensorTopics& sensor, Topic topic,
                   const std::shared_ptr<const Message>& message) override;
   void on_state(bool well, const std::string& sentence) override;
 
@@ -60,8 +60,8 @@ class FoxgloveClient : public Station::Listener,
 
   void read();
   void take(bool text);
-  void tell_channels();
-  void subscribe(const Wish& wish);
+  void advertise_channels();
+  void subscribe(const SubscriptionRequest& request);
   void update_want();
   void call(const Call& call);
   void send(std::string bytes, bool text = true);
@@ -70,7 +70,7 @@ class FoxgloveClient : public Station::Listener,
   void on_written(const boost::system::error_code& error);
 
   std::shared_ptr<WebSocket> socket_;
-  std::vector<Place> places_;
+  std::vector<Mount> mounts_;
   net::Rights rights_;
   std::string program_;
   std::function<void(const std::string&)> ended_;

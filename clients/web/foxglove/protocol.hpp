@@ -56,14 +56,14 @@ struct Channels {
 
 // Of a client's.
 
-struct Wish {
+struct SubscriptionRequest {
   std::uint32_t subscription = 0;
   std::uint32_t channel = 0;
 };
 struct Operation {
-  std::string name;                       ///< "subscribe"
-  std::vector<Wish> subscribed = {};      ///< Of subscribe.
-  std::vector<std::uint32_t> ended = {};  ///< Subscriptions, of unsubscribe.
+  std::string name;                                  ///< "subscribe"
+  std::vector<SubscriptionRequest> subscribed = {};  ///< Of subscribe.
+  std::vector<std::uint32_t> ended = {};             ///< Subscriptions, of unsubscribe.
 };
 /// Empty when it is no JSON object with an "op"; entries that make no sense are left out.
 [[nodiscard]] std::optional<Operation> parse_operation(const std::string& json);

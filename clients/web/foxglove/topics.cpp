@@ -62,25 +62,25 @@ v1::Subscribe subscription_for(Topics wanted) {
   } else if (wants(Topic::depth)) {
     request.set_depth(v1::DEPTH_INT16);
   }
-  if (request.depth() != v1::DEPTH_NONE) request.set_depth_hz(kMostHz);
+  if (request.depth() != v1::DEPTH_NONE) request.set_depth_hz(kMaxHz);
   if (wants(Topic::luma)) {
     request.set_luma(v1::LUMA_GREY8);
-    request.set_luma_hz(kMostHz);
+    request.set_luma_hz(kMaxHz);
   }
   if (wants(Topic::jpeg)) {
     request.set_jpeg(true);
-    request.set_jpeg_hz(kMostHz);
+    request.set_jpeg_hz(kMaxHz);
   }
   if (wants(Topic::points)) {
     request.set_cloud(v1::CLOUD_FLOAT32);
-    request.set_cloud_hz(kMostHz);
+    request.set_cloud_hz(kMaxHz);
     request.set_contact_box(true);
     request.set_decimation(2);
   }
   if (wants(Topic::frame) || wants(Topic::summary) || wants(Topic::contact) ||
       wants(Topic::light)) {
     request.set_summary(true);
-    request.set_summary_hz(kMostHz);
+    request.set_summary_hz(kMaxHz);
   }
   return request;
 }

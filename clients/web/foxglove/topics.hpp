@@ -41,7 +41,7 @@ struct TopicInfo {
 inline constexpr std::size_t index(Topic topic) { return static_cast<std::size_t>(topic); }
 
 /// Frames a second of each channel, at most.
-inline constexpr double kMostHz = 60;
+inline constexpr double kMaxHz = 60;
 
 /// What a daemon has messages of: dtactd maps and pictures, dtact-perceive points. None: one that
 /// was never there, which is taken for dtactd.

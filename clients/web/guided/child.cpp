@@ -29,11 +29,11 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr std::chrono::seconds kPatience{5};
+constexpr std::chrono::seconds kTimeout{5};
 /// As Child::kSecretFile names it.
 constexpr int kSecret = 3;
 /// Of what is written as errors, so much is kept: the end, which says why.
-constexpr std::size_t kMostErrors = 2000;
+constexpr std::size_t kMaxErrors = 2000;
 
 [[noreturn]] void fail(int error, const std::string& what) {
   throw std::system_error(error, std::generic_category(), what);
@@ -120,7 +120,7 @@ class Spawning {
 }  // namespace
 
 Child::Child(const asio::any_io_executor& executor)
-    : in_(executor), out_(executor), errors_(executor), process_(executor), patience_(executor) {}
+    : in_(executor), out_(executor), errors_(executor), process_(executor), timeout_(executor) {}
 
 Child::~Child() {
   if (pid_ < 0) return;
@@ -174,8 +174,8 @@ void Child::write_next() {
 void Child::end() {
   if (pid_ < 0) return;
   ::kill(pid_, SIGTERM);
-  patience_.expires_after(kPatience);
-  patience_.async_wait([weak = weak_from_this()](const error_code& error) {
+  timeout_.expires_after(kTimeout);
+  timeout_.async_wait([weak = weak_from_this()](const error_code& error) {
     const auto self = weak.lock();
     if (!error && self != nullptr && self->pid_ >= 0) ::kill(self->pid_, SIGKILL);
   });
@@ -202,8 +202,8 @@ void Child::read_errors() {
                           [self = shared_from_this()](const error_code& error, std::size_t size) {
                             if (error) return self->one_over();
                             self->said_.append(self->piece_.data(), size);
-                            if (self->said_.size() > kMostErrors) {
-                              self->said_.erase(0, self->said_.size() - kMostErrors);
+                            if (self->said_.size() > kMaxErrors) {
+                              self->said_.erase(0, self->said_.size() - kMaxErrors);
                             }
                             self->read_errors();
                           });
@@ -214,7 +214,7 @@ void Child::await_exit() {
     if (error) return self->one_over();
     ::waitpid(self->pid_, &self->status_, 0);
     self->pid_ = -1;
-    self->patience_.cancel();
+    self->timeout_.cancel();
     self->one_over();
   });
 }

@@ -60,7 +60,7 @@ class Child : public std::enable_shared_from_this<Child> {
   Stream out_;
   Stream errors_;
   Stream process_;  ///< A pidfd.
-  boost::asio::steady_timer patience_;
+  boost::asio::steady_timer timeout_;
   Handlers handlers_;
   pid_t pid_ = -1;  ///< −1: not there, or waited for.
   int status_ = 0;

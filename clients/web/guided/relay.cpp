@@ -21,7 +21,7 @@ constexpr std::string_view kScene = R"({"scene":)";
 /// How long one that was told why may take to read it.
 constexpr std::chrono::seconds kLinger{10};
 /// Sentences that wait for a page that does not read: a session says a few a minute.
-constexpr std::size_t kMostTexts = 256;
+constexpr std::size_t kMaxTexts = 256;
 
 }  // namespace
 
@@ -69,7 +69,7 @@ void Relay::take(const std::string& message) {
 
 void Relay::tell(std::string text) {
   if (finished_) return;
-  if (texts_.size() >= kMostTexts) return finish("this page has not read for too long");
+  if (texts_.size() >= kMaxTexts) return finish("this page has not read for too long");
   queue(std::move(text));
 }
 

@@ -17,7 +17,7 @@ enum class Verdict : std::uint8_t {
 struct Finding {
   Verdict verdict = Verdict::good;
   std::string what;  ///< What was looked at and what it is.
-  std::string mend;  ///< The command, or the line and the file it belongs to. Empty when good.
+  std::string fix;   ///< The command, or the line and the file it belongs to. Empty when good.
 };
 using Findings = std::vector<Finding>;
 

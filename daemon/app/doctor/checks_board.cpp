@@ -28,7 +28,7 @@ bool has_line(const std::string& text, std::string_view wanted) {
 struct Trouble {
   unsigned bit;  ///< Of what is now; what was since the start is 16 bits above.
   const char* name;
-  const char* mend;
+  const char* fix;
 };
 // As the Raspberry Pi's documentation of vcgencmd says, under get_throttled.
 constexpr std::array<Trouble, 4> kTroubles{{
@@ -81,7 +81,7 @@ Findings check_throttling(const Machine& machine) {
     findings.push_back(
         {now ? Verdict::wrong : Verdict::note,
          fmt::format("{}: {} {}", answer, trouble.name, now ? "now" : "since the board started"),
-         trouble.mend});
+         trouble.fix});
   }
   if (findings.empty()) return {{Verdict::good, answer, ""}};
   return findings;

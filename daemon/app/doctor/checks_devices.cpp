@@ -59,7 +59,7 @@ Finding check_line(const Machine& machine, const std::string& key,
   const std::string what = fmt::format("{}: {}", key, hal::gpiod::describe(line));
   const hal::gpiod::Place place = hal::gpiod::find_line(machine.gpio_chips(), line, key);
   if (!place.why.empty()) {
-    return {Verdict::wrong, fmt::format("{}: {}", what, place.why), place.mend};
+    return {Verdict::wrong, fmt::format("{}: {}", what, place.why), place.fix};
   }
   const std::string holder = machine.gpio_holder(place.chip, place.line);
   if (holder == hal::gpiod::holder_name(hal::gpiod::kConsumer)) {

@@ -19,7 +19,7 @@ Findings check_realtime(const Machine& machine) {
   // The service's limits are its unit's; this user's count for a daemon that the user starts.
   const Verdict bad = machine.has_service() ? Verdict::note : Verdict::wrong;
   const std::string limits = "/etc/security/limits.d/dtactd.conf";
-  const auto mend = [&](const char* what) {
+  const auto fix = [&](const char* what) {
     return fmt::format(
         "echo '{} - {}' | sudo tee -a {}, then log in again (under systemd the unit's "
         "LimitRTPRIO= and LimitMEMLOCK= do this)",
@@ -28,7 +28,7 @@ Findings check_realtime(const Machine& machine) {
   Findings findings;
   const rlim_t priority = machine.limit(RLIMIT_RTPRIO);
   if (priority == 0) {
-    findings.push_back({bad, "RLIMIT_RTPRIO = 0: no real-time scheduling", mend("rtprio 90")});
+    findings.push_back({bad, "RLIMIT_RTPRIO = 0: no real-time scheduling", fix("rtprio 90")});
   } else {
     findings.push_back({Verdict::good,
                         priority == RLIM_INFINITY ? "RLIMIT_RTPRIO is unlimited"
@@ -41,7 +41,7 @@ Findings check_realtime(const Machine& machine) {
   if (memory < kEnough) {
     findings.push_back(
         {bad, fmt::format("RLIMIT_MEMLOCK = {} kB: memory cannot be locked", memory / 1024),
-         mend("memlock unlimited")});
+         fix("memlock unlimited")});
   } else {
     findings.push_back({Verdict::good, "RLIMIT_MEMLOCK suffices", ""});
   }

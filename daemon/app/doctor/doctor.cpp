@@ -34,8 +34,8 @@ std::vector<Subject> examine(const Machine& machine, const hal::Config& config) 
           {"governor", check_governor(machine)}};
 }
 
-/// Returns how many are wrong. With `mends`, the command stands under each.
-int print(const std::vector<Subject>& subjects, bool mends, std::ostream& out) {
+/// Returns how many are wrong. With `with_fixes`, the command stands under each.
+int print(const std::vector<Subject>& subjects, bool with_fixes, std::ostream& out) {
   int wrong = 0;
   for (const Subject& subject : subjects) {
     for (const Finding& finding : subject.findings) {
@@ -44,8 +44,8 @@ int print(const std::vector<Subject>& subjects, bool mends, std::ostream& out) {
                                                                : "WRONG";
       wrong += finding.verdict == Verdict::wrong ? 1 : 0;
       out << fmt::format("{:<12} {:<6} {}\n", subject.name, verdict, finding.what);
-      if (mends && !finding.mend.empty()) {
-        out << fmt::format("{:<12} {:<6} {}\n", "", "mend:", finding.mend);
+      if (with_fixes && !finding.fix.empty()) {
+        out << fmt::format("{:<12} {:<6} {}\n", "", "fix:", finding.fix);
       }
     }
   }

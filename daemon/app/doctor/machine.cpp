@@ -131,7 +131,7 @@ Machine::SpiRate Machine::spi_rate(const std::string& device, std::uint32_t aske
     hal::ws2812::Spidev port(below_root(device), asked_hz);
     const auto rate = hal::ws2812::measure_rate(port, base::system_clock());
     if (rate.error != 0) {
-      return {0, "a transfer failed: " + hal::ws2812::spi_remedy(rate.error)};
+      return {0, "a transfer failed: " + hal::ws2812::spi_fix(rate.error)};
     }
     return {rate.hz, {}};
   } catch (const std::runtime_error& e) {

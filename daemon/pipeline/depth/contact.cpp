@@ -16,8 +16,8 @@ std::int16_t micrometres(double mm) noexcept {
 
 recon::SumRules ContactDetector::sum_rules() const noexcept {
   recon::SumRules rules;
-  rules.made_um = micrometres(rules_.made_mm);
-  rules.lost_um = micrometres(rules_.lost_mm);
+  rules.threshold_um = micrometres(rules_.threshold_mm);
+  rules.release_um = micrometres(rules_.release_mm);
   return rules;
 }
 
@@ -29,7 +29,7 @@ ContactSummary ContactDetector::inspect(const recon::DepthSums& sums, int width,
   const double centre_x = 0.5 * (width - 1);
   const double centre_y = 0.5 * (height - 1);
   ContactSummary summary;
-  summary.touching = touching_;
+  summary.in_contact = in_contact_;
   summary.area_mm2 = static_cast<double>(sums.made) * px_mm2;
   if (sums.um > 0) {
     const auto weight = static_cast<double>(sums.um);
@@ -46,10 +46,10 @@ ContactSummary ContactDetector::inspect(const recon::DepthSums& sums, int width,
 }
 
 void ContactDetector::decide(double made_mm2, double lost_mm2) noexcept {
-  const bool other = touching_ ? lost_mm2 < rules_.area_mm2 : made_mm2 >= rules_.area_mm2;
+  const bool other = in_contact_ ? lost_mm2 < rules_.area_mm2 : made_mm2 >= rules_.area_mm2;
   agreeing_ = other ? agreeing_ + 1 : 0;
   if (agreeing_ >= rules_.debounce_frames) {
-    touching_ = !touching_;
+    in_contact_ = !in_contact_;
     agreeing_ = 0;
   }
 }

@@ -6,9 +6,9 @@
 
 namespace dtact::pipeline {
 
-/// Sees contact in a depth map, with hysteresis: made when the area deeper than `made_mm` reaches
-/// `area_mm2`, lost when the area deeper than `lost_mm` falls below it, each for `debounce_frames`
-/// frames in a row. Untrusted pixels count for nothing.
+/// Sees contact in a depth map, with hysteresis: made when the area deeper than `threshold_mm`
+/// reaches `area_mm2`, lost when the area deeper than `release_mm` falls below it, each for
+/// `debounce_frames` frames in a row. Untrusted pixels count for nothing.
 class ContactDetector {
  public:
   explicit ContactDetector(const ContactRules& rules) : rules_(rules) {}
@@ -18,17 +18,17 @@ class ContactDetector {
 
   /// What one depth map of `width` × `height` pixels, `mm_per_px` millimetres each, added up to by
   /// sum_rules(). The summary is in millimetres in the surface frame: origin at the map's centre, x
-  /// right, y down. Area, centroid and volume are those of the pixels deeper than `made_mm`.
+  /// right, y down. Area, centroid and volume are those of the pixels deeper than `threshold_mm`.
   [[nodiscard]] ContactSummary inspect(const recon::DepthSums& sums, int width, int height,
                                        double mm_per_px) noexcept;
 
-  [[nodiscard]] bool touching() const noexcept { return touching_; }
+  [[nodiscard]] bool in_contact() const noexcept { return in_contact_; }
 
  private:
   void decide(double made_mm2, double lost_mm2) noexcept;
 
   ContactRules rules_;
-  bool touching_ = false;
+  bool in_contact_ = false;
   int agreeing_ = 0;  // frames in a row that speak for the other state
 };
 

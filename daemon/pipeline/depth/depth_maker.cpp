@@ -10,7 +10,7 @@ DepthMaker::DepthMaker(const PipelineConfig& config, base::Clock& clock)
 
 void DepthMaker::use(Resolutions* maps, std::uint64_t generation) noexcept {
   maps_ = maps;
-  if (maps_ != nullptr) chooser_ = RungChooser(maps_->max_error_um());
+  if (maps_ != nullptr) chooser_ = ResolutionChooser(maps_->max_error_um());
   generation_ = generation;
 }
 
@@ -27,7 +27,7 @@ void DepthMaker::skip(DepthFrame& out, ContactAbsence why) noexcept {
   out.contact = {};
 }
 
-void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched, bool judged,
+void DepthMaker::make(const hal::LumaView& luma, const ReferenceTracker& tracker, bool judged,
                       DepthFrame& out) noexcept {
   Resolution& resolution = maps_->in_use();
   recon::Reconstructor& reconstructor = resolution.reconstructor;
@@ -44,15 +44,16 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   // Within the capacity reserved at start, so this allocates nothing.
   out.depth_um.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
   // What another calibration or rung drew in this buffer says nothing about this one's map.
-  const bool another = out.drawn_generation != generation_ || out.drawn_rung != maps_->rung();
+  const bool another =
+      out.drawn_generation != generation_ || out.drawn_resolution != maps_->resolution_index();
   if (another || resolution.coarse) out.drawn.rest = 0;
   out.drawn_generation = generation_;
-  out.drawn_rung = maps_->rung();
-  resolution.readers.mark(untouched.active(), resolution.tiles);
+  out.drawn_resolution = maps_->resolution_index();
+  resolution.readers.mark(tracker.active(), resolution.tiles);
   recon::SumRules rules = contact_.sum_rules();
   if (judged || chooses() || resolution.force) {
     rules.bend_reach = bend_reach(model.mm_per_px);
-    rules.bend_from_um = rules.made_um;
+    rules.bend_from_um = rules.threshold_um;
   }
   recon::DepthSums sums(rules);
   recon::StepTimes steps;
@@ -67,13 +68,13 @@ void DepthMaker::make(const hal::LumaView& luma, const UntouchedImage& untouched
   const std::int64_t began_ns = clock_.monotonic_ns();
   out.times.rectify_ns = steps.rectify_ns;
   out.times.smooth_ns = steps.smooth_ns;
-  out.times.list_ns = steps.list_ns + began_ns - made_ns;
-  out.contact_um = rules.made_um;
+  out.times.lut_ns = steps.lut_ns + began_ns - made_ns;
+  out.contact_um = rules.threshold_um;
   out.contact_absence = ContactAbsence::none;
   out.contact = contact_.inspect(sums, model.rectify.width, model.rectify.height, model.mm_per_px);
   const int beyond = reconstructor.beyond_pixels();
   beyond_ = beyond * out.made_decimation * out.made_decimation > config_.beyond_pixels;
-  judge(untouched.trust(), bend_um(sums, model.mm_per_px) * rim_factor(sums.made, beyond), out);
+  judge(tracker.trust(), bend_um(sums, model.mm_per_px) * rim_factor(sums.made, beyond), out);
   add_force(resolution, resolution.coarse ? resolution.coarse->depth_um : out.depth_um, beyond_,
             out.uncertainty_um, out.contact);
   out.times.inspect_ns = steps.sums_ns + clock_.monotonic_ns() - began_ns;
@@ -88,12 +89,12 @@ void DepthMaker::judge(const Trust& trust, double bend, DepthFrame& out) noexcep
   };
   out.uncertainty_um = expected_um(out.made_decimation, out.sharpen_steps);
   if (!chooses()) return;
-  std::array<double, Resolutions::kMostRungs> expected{};
-  std::size_t rungs = 0;
-  for (const Resolution& each : maps_->rungs()) {
-    expected[rungs++] = expected_um(each.decimation(), each.steps());
+  std::array<double, Resolutions::kMaxResolutions> expected{};
+  std::size_t resolutions = 0;
+  for (const Resolution& each : maps_->resolutions()) {
+    expected[resolutions++] = expected_um(each.decimation(), each.steps());
   }
-  maps_->use(chooser_.next(std::span(expected).first(rungs)));
+  maps_->use(chooser_.next(std::span(expected).first(resolutions)));
 }
 
 }  // namespace dtact::pipeline

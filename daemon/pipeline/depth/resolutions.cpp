@@ -19,7 +19,7 @@ void require_sharpening(const recon::Model& model, int steps) {
   if (found != model.sharpened.end()) return;
   throw std::invalid_argument(
       "reconstruction.sharpen is " + std::to_string(steps) +
-      ", but the calibration has no list for levels sharpened so often: calibrate with --method "
+      ", but the calibration has no LUT for levels sharpened so often: calibrate with --method "
       "model, or set reconstruction.sharpen to \"auto\" or \"off\"");
 }
 
@@ -52,7 +52,7 @@ void add_force(Resolution& resolution, std::span<const std::int16_t> depth_um, b
     contact.force_absence = recon::ForceAbsence::uncalibrated;
   } else if (beyond) {
     contact.force_absence = recon::ForceAbsence::beyond_calibration;
-  } else if (!contact.touching) {
+  } else if (!contact.in_contact) {
     contact.force = resolution.force->none();
   } else {
     const auto read = resolution.force->read(depth_um, resolution.tiles, uncertainty_um / 1000);
@@ -131,7 +131,7 @@ void Resolutions::set_light(double factor) noexcept {
   for (Resolution& each : all_) each.reconstructor.set_light(factor);
 }
 
-double Resolutions::list_um(double depth_mm, int steps) const noexcept {
+double Resolutions::lut_um(double depth_mm, int steps) const noexcept {
   const auto of_steps =
       std::ranges::find(model_->sharpened, steps, &recon::Model::Sharpened::steps);
   const auto& rows =
@@ -140,7 +140,7 @@ double Resolutions::list_um(double depth_mm, int steps) const noexcept {
     // The radial gain is the published regression's alone.
     const bool published = model_->method == recon::Method::published ||
                            model_->gain.shape == recon::GainShape::radial;
-    return published ? kUnstatedPublishedUm : kUnstatedListUm;
+    return published ? kDefaultPublishedUncertaintyUm : kDefaultLutUncertaintyUm;
   }
   const auto above =
       std::ranges::lower_bound(rows, depth_mm, {}, &recon::Model::Uncertainty::depth_mm);
@@ -152,20 +152,20 @@ double Resolutions::list_um(double depth_mm, int steps) const noexcept {
 }
 
 double Resolutions::contact_um(double deepest_mm, int steps, const Trust& trust) const noexcept {
-  double um = list_um(0.5 * deepest_mm, steps);
+  double um = lut_um(0.5 * deepest_mm, steps);
   if (trust.stale) um = std::hypot(um, kStaleReferenceUm);
   um = std::hypot(um, light_um(trust.light_left));
   return std::hypot(um, light_um(trust.light_unseen));
 }
 
 double Resolutions::light_um(double share) const noexcept {
-  const recon::DepthList& list = model_->list;
-  // The list's slope over the darkening of a light press; 20 grey levels are about 0.6 mm.
+  const recon::DepthLut& lut = model_->lut;
+  // The LUT's slope over the darkening of a light press; 20 grey levels are about 0.6 mm.
   constexpr int kLevels = 20;
   const auto at = [&](int level) {
-    const int last = static_cast<int>(list.um.size()) - 1;
-    const int i = std::clamp(level * recon::kEntriesPerLevel - list.first_q6, 0, last);
-    return static_cast<double>(list.um[static_cast<std::size_t>(i)]);
+    const int last = static_cast<int>(lut.um.size()) - 1;
+    const int i = std::clamp(level * recon::kEntriesPerLevel - lut.first_q6, 0, last);
+    return static_cast<double>(lut.um[static_cast<std::size_t>(i)]);
   };
   return std::abs(share) * mean_grey_ * (at(kLevels) - at(0)) / kLevels;
 }

@@ -9,7 +9,7 @@
 
 #include "daemon/pipeline/depth_frame.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
-#include "daemon/pipeline/untouched/untouched_image.hpp"
+#include "daemon/pipeline/reference/reference_tracker.hpp"
 #include "daemon/recon/force.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
@@ -55,10 +55,10 @@ struct MapShape {
 /// cheapest to the most accurate. Made on the network's side, used on the capture thread.
 class Resolutions {
  public:
-  static constexpr std::size_t kMostRungs = 3;
+  static constexpr std::size_t kMaxResolutions = 3;
 
   /// Throws std::invalid_argument, saying what to do, where the rules ask for steps of sharpening
-  /// that the model has no list for.
+  /// that the model has no LUT for.
   Resolutions(const std::shared_ptr<const recon::Model>& model, const recon::CellLattice& lattice,
               const ReconstructionRules& rules);
 
@@ -66,9 +66,9 @@ class Resolutions {
   [[nodiscard]] double max_error_um() const noexcept { return max_error_um_; }
   /// The one that works on the next frame.
   [[nodiscard]] Resolution& in_use() noexcept { return all_[in_use_]; }
-  [[nodiscard]] std::size_t rung() const noexcept { return in_use_; }
-  [[nodiscard]] std::span<const Resolution> rungs() const noexcept { return all_; }
-  void use(std::size_t rung) noexcept { in_use_ = rung; }
+  [[nodiscard]] std::size_t resolution_index() const noexcept { return in_use_; }
+  [[nodiscard]] std::span<const Resolution> resolutions() const noexcept { return all_; }
+  void use(std::size_t resolution_index) noexcept { in_use_ = resolution_index; }
   /// The rung of that resolution and so many steps, if there is one.
   [[nodiscard]] std::optional<std::size_t> find(int decimation, int steps) const noexcept;
 
@@ -79,10 +79,11 @@ class Resolutions {
   /// The light is the reference's times `factor`.
   void set_light(double factor) noexcept;
 
-  /// What the list for so many steps is uncertain by at an indentation, micrometres: as the
-  /// calibration says, else kUnstatedListUm or, of a published method, kUnstatedPublishedUm.
-  [[nodiscard]] double list_um(double depth_mm, int steps) const noexcept;
-  /// The same with what the untouched image is trusted to, in squares: of a contact that is
+  /// What the LUT for so many steps is uncertain by at an indentation, micrometres: as the
+  /// calibration says, else kDefaultLutUncertaintyUm or, of a published method,
+  /// kDefaultPublishedUncertaintyUm.
+  [[nodiscard]] double lut_um(double depth_mm, int steps) const noexcept;
+  /// The same with what the reference image is trusted to, in squares: of a contact that is
   /// `deepest_mm` deep, half of which is about its mean.
   [[nodiscard]] double contact_um(double deepest_mm, int steps, const Trust& trust) const noexcept;
 

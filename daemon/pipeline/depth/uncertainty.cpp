@@ -49,38 +49,38 @@ double rim_factor(std::int64_t made, std::int64_t beyond) noexcept {
   return std::sqrt(1 + static_cast<double>(beyond) / static_cast<double>(made));
 }
 
-double uncertainty_um(double list_um, double bend_um) noexcept {
-  return std::hypot(list_um, kBlurPerBend * bend_um);
+double uncertainty_um(double lut_um, double bend_um) noexcept {
+  return std::hypot(lut_um, kBlurPerBend * bend_um);
 }
 
-double uncertainty_at_um(double list_um, double bend_um, int decimation, int steps) noexcept {
+double uncertainty_at_um(double lut_um, double bend_um, int decimation, int steps) noexcept {
   const double left = kSharpened[static_cast<std::size_t>(steps)].left;
-  return uncertainty_um(list_um, left * bend_um) + added(decimation) * bend_um;
+  return uncertainty_um(lut_um, left * bend_um) + added(decimation) * bend_um;
 }
 
 double plain_bend_um(double bend_um, int steps) noexcept {
   return bend_um / kSharpened[static_cast<std::size_t>(steps)].bend;
 }
 
-std::size_t RungChooser::next(std::span<const double> expected_um) noexcept {
-  const std::size_t before = rung_;
+std::size_t ResolutionChooser::next(std::span<const double> expected_um) noexcept {
+  const std::size_t before = index_;
   const auto outside = [this](double um) { return um > max_error_um_; };
-  if (outside(expected_um[rung_])) {
-    const auto inside = std::find_if_not(expected_um.begin() + static_cast<std::ptrdiff_t>(rung_),
+  if (outside(expected_um[index_])) {
+    const auto inside = std::find_if_not(expected_um.begin() + static_cast<std::ptrdiff_t>(index_),
                                          expected_um.end(), outside);
     // The last of the least.
     const auto least = std::min_element(expected_um.rbegin(), expected_um.rend()).base() - 1;
-    rung_ = static_cast<std::size_t>((inside == expected_um.end() ? least : inside) -
-                                     expected_um.begin());
+    index_ = static_cast<std::size_t>((inside == expected_um.end() ? least : inside) -
+                                      expected_um.begin());
   }
   const bool roomy =
-      rung_ == before && rung_ > 0 && expected_um[rung_ - 1] <= kMargin * max_error_um_;
+      index_ == before && index_ > 0 && expected_um[index_ - 1] <= kMargin * max_error_um_;
   patient_ = roomy ? patient_ + 1 : 0;
   if (patient_ >= kPatience) {
-    --rung_;
+    --index_;
     patient_ = 0;
   }
-  return rung_;
+  return index_;
 }
 
 }  // namespace dtact::pipeline

@@ -26,31 +26,31 @@ inline constexpr double kBendMm = 0.166;
 /// (tests/accuracy/whole).
 [[nodiscard]] double rim_factor(std::int64_t made, std::int64_t beyond) noexcept;
 
-/// What a list is taken to be uncertain by where its calibration, an old one, does not say: what
-/// such lists were off by under a ball of 5 mm after a press or thirty of one of 4 mm, micrometres
+/// What a LUT is taken to be uncertain by where its calibration, an old one, does not say: what
+/// such LUTs were off by under a ball of 5 mm after a press or thirty of one of 4 mm, micrometres
 /// (tests/accuracy/table/table.md, against the true indentation, the mean over six lights: ours
 /// from one press 50, the published ones 98 and 118, which are held for one here).
-inline constexpr double kUnstatedListUm = 50;
-inline constexpr double kUnstatedPublishedUm = 118;
+inline constexpr double kDefaultLutUncertaintyUm = 50;
+inline constexpr double kDefaultPublishedUncertaintyUm = 118;
 /// Added, in squares, while a reference that was scaled to another light stands in: under a ball
 /// pressed 1 mm that was 0.02 to 0.03 mm off (simulated sensor).
 inline constexpr double kStaleReferenceUm = 30;
 
-/// Mean absolute error to expect inside the contact, micrometres: what the list is uncertain by
-/// (`list_um`) and what the layer's blur hides of edges and texture, added in squares. The blur is
+/// Mean absolute error to expect inside the contact, micrometres: what the LUT is uncertain by
+/// (`lut_um`) and what the gel's blur hides of edges and texture, added in squares. The blur is
 /// kBlurPerBend × bend: over 15 kinds of objects in the simulator (config/scenes/all_objects.toml,
-/// pressed 0.2 to 1.2 mm, a list taken for 20 um) the true error was 1.0 × the sum at the median
-/// and at most 1.6 × in 95 % of frames. Deep narrow texture is worst (2.3 ×), for what the layer
-/// has blurred away leaves no bend to be seen, and other layers blur otherwise. How honest the sum
+/// pressed 0.2 to 1.2 mm, a LUT taken for 20 um) the true error was 1.0 × the sum at the median
+/// and at most 1.6 × in 95 % of frames. Deep narrow texture is worst (2.3 ×), for what the gel
+/// has blurred away leaves no bend to be seen, and other gels blur otherwise. How honest the sum
 /// is on scenes that had no part in it says tests/accuracy/chart/honesty_test.cpp.
-[[nodiscard]] double uncertainty_um(double list_um, double bend_um) noexcept;
+[[nodiscard]] double uncertainty_um(double lut_um, double bend_um) noexcept;
 inline constexpr double kBlurPerBend = 7.0;
 
 /// The same were the map at 1/decimation (1, 2 or 4) of the calibration's resolution and then read
 /// bilinearly: coarse pixels cut edges once more. In 95 % of the same frames that cost at most
 /// 0.085 × bend at half and 0.31 × bend at quarter resolution. `steps` of sharpening give a part of
 /// the blur back: see plain_bend_um(). `bend_um`: that of a plain map.
-[[nodiscard]] double uncertainty_at_um(double list_um, double bend_um, int decimation,
+[[nodiscard]] double uncertainty_at_um(double lut_um, double bend_um, int decimation,
                                        int steps = 0) noexcept;
 
 /// The bend of a plain map of what bends by `bend_um` in one that was sharpened so often.
@@ -60,9 +60,9 @@ inline constexpr double kBlurPerBend = 7.0;
 /// from one frame for the next: a more accurate one at once, a cheaper one only after kPatience
 /// frames that would all have been well inside (kMargin of the bound). Where none is inside, the
 /// one that is expected to be least wrong, and of several such the last.
-class RungChooser {
+class ResolutionChooser {
  public:
-  explicit RungChooser(double max_error_um) noexcept : max_error_um_(max_error_um) {}
+  explicit ResolutionChooser(double max_error_um) noexcept : max_error_um_(max_error_um) {}
 
   /// `expected_um`: of the frame just done, on each rung. Returns the rung for the next.
   std::size_t next(std::span<const double> expected_um) noexcept;
@@ -72,7 +72,7 @@ class RungChooser {
 
  private:
   double max_error_um_;
-  std::size_t rung_ = 0;
+  std::size_t index_ = 0;
   int patient_ = 0;
 };
 

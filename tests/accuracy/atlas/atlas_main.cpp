@@ -37,7 +37,7 @@ void work(Job& job) {
         "{},{},\"{}\",\"{}\",\"{}\",\"{}\",{},{:.5f},{:.5f},{:.5f},{:.5f},{:.3f},{:.3f},\"{}\"\n",
         job.row->group, job.row->id, job.row->title, job.row->unit, job.row->undecidable,
         job.method->name, job.value, o.inside_mm, o.outside_mm, o.along_mm, o.stated_mm, o.withheld,
-        o.flagged, atlas::conditions_of(o));
+        o.flagged, atlas::health_flags_of(o));
   } catch (...) {
     job.failure = std::current_exception();
   }
@@ -70,17 +70,17 @@ std::string all(std::vector<Job>& jobs, int threads) {
 std::string false_flags() {
   int frames = 0;
   double flagged = 0;
-  std::string conditions;
+  std::string health_flags;
   const auto several =
       std::ranges::find(atlas::methods(), "sphere alone, many presses", &atlas::Method::name);
   for (const atlas::Script& script : atlas::clean_scripts()) {
     const atlas::Outcome o = atlas::run(*several, script);
     frames += o.frames;
     flagged += o.flagged * o.frames;
-    conditions += atlas::conditions_of(o);
+    health_flags += atlas::health_flags_of(o);
   }
   return fmt::format("clean,clean,,,,,{},{:.5f},,,,,,\"{}\"\n", frames, flagged / frames,
-                     conditions);
+                     health_flags);
 }
 
 }  // namespace

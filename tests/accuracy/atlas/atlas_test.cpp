@@ -20,8 +20,8 @@
 namespace dtact::atlas {
 namespace {
 
-// The list from one press alone, whose nominal error (0.036 mm) is about a grey level: the limits
-// of the conditions are set to that. The list from many presses is better, and so leaves twice its
+// The LUT from one press alone, whose nominal error (0.036 mm) is about a grey level: the limits
+// of the conditions are set to that. The LUT from many presses is better, and so leaves twice its
 // nominal error before a light that drifted by less than a grey level can be told; the page has its
 // rows.
 const Method& ours() {
@@ -52,13 +52,13 @@ struct Case {
 
 class Condition : public ::testing::TestWithParam<Case> {};
 
-TEST_P(Condition, IsToldWhereItBreaksAndNotBefore) {
+TEST_P(Condition, IsReportedWhereItBreaksAndNotBefore) {
   const Outcome harmless = at(GetParam().id, GetParam().harmless);
   EXPECT_LT(harmless.error_mm(), 2 * nominal_mm());
-  EXPECT_EQ(harmless.flagged, 0) << conditions_of(harmless);
+  EXPECT_EQ(harmless.flagged, 0) << health_flags_of(harmless);
   const Outcome broken = at(GetParam().id, GetParam().broken);
   EXPECT_FALSE(broken.error_mm() <= 2 * nominal_mm()) << broken.error_mm();
-  EXPECT_TRUE(broken.told());
+  EXPECT_TRUE(broken.reported());
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -89,23 +89,23 @@ TEST(Atlas, FaintLastingPressIsNotAbsorbed) {
   EXPECT_LT(outcome.inside_mm, 0.035);
 }
 
-TEST(Atlas, DriftIsFollowedAndWhatIsNotIsTold) {
+TEST(Atlas, DriftIsFollowedAndWhatIsNotIsReported) {
   const Outcome followed = at("drift", 1);
   EXPECT_LT(followed.error_mm(), 1.2 * nominal_mm());
-  EXPECT_EQ(followed.flagged, 0) << conditions_of(followed);
+  EXPECT_EQ(followed.flagged, 0) << health_flags_of(followed);
   // One grey level and a half.
-  EXPECT_TRUE(at("drift_kept", 1).told());
+  EXPECT_TRUE(at("drift_kept", 1).reported());
 }
 
 TEST(Atlas, AFlatPressOfTheWholeFieldIsNotFollowed) {
   // Half a minute, in which the rate would allow 1 % of the light, or 0.05 mm.
   const Outcome pressed = at("flat", 0.1);
-  EXPECT_TRUE(pressed.told());
+  EXPECT_TRUE(pressed.reported());
   EXPECT_LT(pressed.error_mm(), 0.025);
 }
 
-TEST(Atlas, ReferenceUnderAPressIsToldFromAFifthOfAMillimetreOn) {
-  EXPECT_TRUE(at("touched", 0.2).told());
+TEST(Atlas, ReferenceUnderAPressIsReportedFromAFifthOfAMillimetreOn) {
+  EXPECT_TRUE(at("touched", 0.2).reported());
   EXPECT_LT(at("touched", 0.1).error_mm(), 2 * nominal_mm());
 }
 
@@ -114,7 +114,7 @@ int followed(Script script) {
   script.frames = kPress + 120;
   script.judged = script.frames;
   const Outcome outcome = run(ours(), script);
-  return outcome.conditions.at(static_cast<std::size_t>(pipeline::Health::exposure_follows));
+  return outcome.health_flags.at(static_cast<std::size_t>(pipeline::Health::exposure_unlocked));
 }
 
 /// The left third loses half of its light, which an exposure with a time constant of a fifth of a
@@ -134,7 +134,7 @@ TEST(Atlas, AnExposureThatKeepsTheMeanIsNamed) {
   EXPECT_EQ(followed(covered(0)), 0);
 }
 
-// The layer bulges round a press, by a few levels; light changes while something touches.
+// The gel bulges round a press, by a few levels; light changes during contact.
 TEST(Atlas, NothingElseIsTakenForAnExposureThatFollows) {
   for (const char* id : {"deep", "full_field", "texture", "walls", "bulge", "brightness_up",
                          "exposure_drift", "leak"}) {

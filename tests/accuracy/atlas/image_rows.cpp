@@ -62,7 +62,7 @@ std::vector<Row> image_rows() {
        "standard deviation, pixels",
        {0, 1, 2, 4, 8, 12},
        on_ball([](Shot& shot, int, double blur) { shot.blur_px = blur; }),
-       "the layer blurs by itself, so a lens that blurs as much looks like a blunter object"},
+       "the gel blurs by itself, so a lens that blurs as much looks like a blunter object"},
       {"image",
        "dust",
        "specks of dust since the reference",

@@ -29,9 +29,9 @@ class Run:
         errors = [e for e in (inside, outside) if not math.isnan(e)]
         self.error = max(errors) if errors else math.nan
         self.along = number(line["along_mm"])  # with the truth moved along with the picture
-        self.told = number(line["flagged"]) >= 0.5 or number(line["withheld"]) >= 0.5
+        self.reported = number(line["flagged"]) >= 0.5 or number(line["withheld"]) >= 0.5
         self.stated = number(line["stated_mm"])
-        self.conditions = line["conditions"].replace("_", " ")
+        self.health_flags = line["conditions"].replace("_", " ")
 
 
 def read(path):
@@ -51,7 +51,7 @@ def wrong(runs, nominal):
 
 
 def untold(runs, nominal):
-    return [r for r in wrong(runs, nominal) if not r.told]
+    return [r for r in wrong(runs, nominal) if not r.reported]
 
 
 def silent(runs, nominal):
@@ -65,8 +65,8 @@ def verdict(runs, nominal):
     if not bad:
         return "stays within", "–"
     first = bad[0]
-    said = first.conditions or ("no depth given" if first.told else "no condition")
-    if not first.told:
+    said = first.health_flags or ("no depth given" if first.reported else "no condition")
+    if not first.reported:
         said += f", stated uncertainty {first.stated:.3f} mm"
     if quiet := silent(runs, nominal):
         said += f"; **silent at {', '.join(f'{r.value:g}' for r in quiet)}**"
@@ -76,7 +76,7 @@ def verdict(runs, nominal):
     return f"{first.value:g} ({size})", said
 
 
-def table_of_untold(rows, methods, nominal):
+def table_without_gain(rows, methods, nominal):
     """The worst point of each row that no condition tells, our methods only."""
     lines = ["| condition | method | worst without a condition | error / stated | truth moved along |",
              "| --- | --- | --- | --- | --- |"]
@@ -105,7 +105,7 @@ def draw(group, rows, methods, nominal, folder):
             at = range(len(runs))
             axis.plot(at, [r.error for r in runs], color=colour, lw=1.2, label=method)
             for i, run in zip(at, runs):
-                axis.plot(i, run.error, "o", ms=5, mec=colour, mfc=colour if run.told else "white")
+                axis.plot(i, run.error, "o", ms=5, mec=colour, mfc=colour if run.reported else "white")
                 if math.isnan(run.error):
                     axis.plot(i, 2, "x", ms=5, color=colour)
             axis.axhline(2 * nominal[method], color=colour, lw=0.7, ls=":")
@@ -156,7 +156,7 @@ def main():
     for place, which in (("@SILENT@", silent), ("@UNTOLD@", untold)):
         counts = {m: sum(bool(which(row["runs"][m], nominal[m])) for row in rows.values()) for m in ours}
         text = text.replace(place, ", ".join(f"{counts[m]} of {len(rows)} rows ({m})" for m in ours))
-    text = text.replace("@TABLE@", table_of_untold(rows, ours, nominal))
+    text = text.replace("@TABLE@", table_without_gain(rows, ours, nominal))
     if clean is not None:
         text = text.replace("@CLEAN@", f"{100 * clean.error:.2f} % of {clean.value:.0f}")
     (arguments.folder / "README.md").write_text(text.replace("@ROWS@", "\n".join(parts)), encoding="utf-8")

@@ -29,8 +29,8 @@ class Judge {
   void take(int n, const pipeline::DepthFrame* frame, std::uint32_t health) {
     if (n < script_.frames - script_.judged) return;
     ++outcome_.frames;
-    for (std::size_t i = 0; i < outcome_.conditions.size(); ++i) {
-      outcome_.conditions[i] += static_cast<int>(health >> i & 1U);
+    for (std::size_t i = 0; i < outcome_.health_flags.size(); ++i) {
+      outcome_.health_flags[i] += static_cast<int>(health >> i & 1U);
     }
     flagged_ += health != 0 ? 1 : 0;
     if (frame == nullptr || !frame->has_depth) {
@@ -86,7 +86,7 @@ class Judge {
     return errors;
   }
 
-  /// To the nearest pixel; beyond the crop its edge stands, where nothing touches.
+  /// To the nearest pixel; beyond the crop its edge stands, outside the contact.
   static table::TruePress moved_along(const table::TruePress& truth, const Shot& shot) {
     table::TruePress moved;
     for (int y = 0; y < table::kCrop; ++y) {
@@ -129,7 +129,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
       : script_(script), clock_(clock), spoiler_(script.truth, 5), judge_(script) {}
 
   void attach(pipeline::Exchange& exchange) { exchange_ = &exchange; }
-  void attach(const pipeline::UntouchedImage& untouched) { untouched_ = &untouched; }
+  void attach(const pipeline::ReferenceTracker& tracker) { tracker_ = &tracker; }
   [[nodiscard]] Outcome outcome() { return judge_.outcome(); }
 
   [[nodiscard]] hal::CameraInfo info() const override {
@@ -146,7 +146,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
 
   [[nodiscard]] hal::GrabStatus grab(hal::Frame& out,
                                      std::chrono::nanoseconds /*timeout*/) noexcept override {
-    untouched_->settle();  // what it finds would else come a frame sooner or later
+    tracker_->settle();  // what it finds would else come a frame sooner or later
     harvest();
     const int n = next_++;
     if (n >= script_.frames) {
@@ -189,7 +189,7 @@ class ScriptedCamera final : public hal::Camera, private hal::FrameOwner {
   Spoiler spoiler_;
   Judge judge_;
   pipeline::Exchange* exchange_ = nullptr;
-  const pipeline::UntouchedImage* untouched_ = nullptr;
+  const pipeline::ReferenceTracker* tracker_ = nullptr;
   int next_ = 0;
 };
 
@@ -222,16 +222,16 @@ Outcome run(const Method& method, const Script& script) {
   pipeline::CaptureLoop loop(
       {camera, light, exchange, clock}, config,
       pipeline::activate(method.calibration, camera.info(), config.reconstruction), false);
-  camera.attach(loop.untouched());
-  loop.untouched().start();
+  camera.attach(loop.tracker());
+  loop.tracker().start();
   while (!exchange.stop) loop.step();
   return camera.outcome();
 }
 
-std::string conditions_of(const Outcome& outcome) {
+std::string health_flags_of(const Outcome& outcome) {
   std::string names;
-  for (std::size_t i = 0; i < outcome.conditions.size(); ++i) {
-    if (outcome.conditions[i] * 10 < outcome.frames || outcome.conditions[i] == 0) continue;
+  for (std::size_t i = 0; i < outcome.health_flags.size(); ++i) {
+    if (outcome.health_flags[i] * 10 < outcome.frames || outcome.health_flags[i] == 0) continue;
     std::string name = v1::Health_Name(static_cast<v1::Health>(i + 1)).substr(7);
     std::ranges::transform(name, name.begin(),
                            [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

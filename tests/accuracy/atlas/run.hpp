@@ -25,7 +25,7 @@ struct Script {
   bool follow = true;         ///< The reference follows the light, as configured by default.
   int judged = 12;            ///< The last so many are judged.
   std::optional<int> rezero;  ///< The frame before which a new reference is asked for.
-  bool force = true;  ///< It is taken although something touches, as the darkened field seems to.
+  bool force = true;          ///< It is taken although in contact, as the darkened field seems to.
   std::function<Shot(int)> shot;  ///< Of frame n.
   /// The moment whose indentation is true at frame n, where it is not the one shown.
   std::function<std::uint64_t(int)> moment;
@@ -44,13 +44,13 @@ struct Outcome {
   double withheld = 0;   ///< Share of the frames without depth, or of the contact marked untrusted.
   double flagged = 0;    ///< Share of the frames that carried a condition.
   double stated_mm = 0;  ///< The uncertainty that the frames with depth carried, mean.
-  std::array<int, pipeline::kHealthCount> conditions{};  ///< Frames that carried each.
+  std::array<int, pipeline::kHealthCount> health_flags{};  ///< Frames that carried each.
   int frames = 0;
 
   /// The larger of the two errors; NaN when there was no depth at all.
   [[nodiscard]] double error_mm() const noexcept;
   /// The user was told, or was given nothing: in at least half of the frames.
-  [[nodiscard]] bool told() const noexcept { return flagged >= 0.5 || withheld >= 0.5; }
+  [[nodiscard]] bool reported() const noexcept { return flagged >= 0.5 || withheld >= 0.5; }
 };
 
 /// Runs the loop on this thread: the camera's clock is the only one, so a minute takes seconds and
@@ -58,6 +58,6 @@ struct Outcome {
 [[nodiscard]] Outcome run(const Method& method, const Script& script);
 
 /// Names of the conditions that at least a tenth of the frames carried, comma separated.
-[[nodiscard]] std::string conditions_of(const Outcome& outcome);
+[[nodiscard]] std::string health_flags_of(const Outcome& outcome);
 
 }  // namespace dtact::atlas

@@ -13,13 +13,13 @@ std::function<Script(double)> object(const std::function<Pose(double)>& pose) {
 
 }  // namespace
 
-// NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): the rows' functions are copied from a list
+// NOLINTBEGIN(clang-analyzer-cplusplus.NewDeleteLeaks): the rows' functions are copied from a LUT
 // of temporaries, whose destructors the analyser does not follow
 std::vector<Row> scene_rows() {
   return {
       {"scene",
        "deep",
-       "pressed deeper than the list, and than the layer",
+       "pressed deeper than the LUT, and than the gel",
        "mm",
        {1.0, 1.2, 1.4, 1.5, 1.6, 1.7, 1.79},
        object([](double depth) { return Pose{hal::sim::ball(5), 2, -1, depth}; }),
@@ -37,7 +37,7 @@ std::vector<Row> scene_rows() {
        "pitch, mm",
        {4, 3, 2, 1.5, 1, 0.6},
        object([](double pitch) { return Pose{hal::sim::grating(pitch, 0.4, 6), 0, 0, 0.6}; }),
-       "what the layer's scattering has blurred away is not in the image"},
+       "what the gel's scattering has blurred away is not in the image"},
       {"scene",
        "walls",
        "a cube's steep walls",

@@ -10,7 +10,7 @@
 
 namespace dtact::atlas {
 
-/// An object at rest in the layer.
+/// An object at rest in the gel.
 struct Pose {
   hal::sim::Object object;
   double x_mm = 0;
@@ -19,7 +19,7 @@ struct Pose {
 };
 
 /// Solves each pose by itself; moment_of(i) is a frame at which only poses[i] touches, and frame 0
-/// shows the untouched layer.
+/// shows the undeformed gel.
 [[nodiscard]] std::shared_ptr<const hal::sim::Truth> solve(const std::vector<Pose>& poses);
 [[nodiscard]] std::uint64_t moment_of(std::size_t pose);
 

@@ -21,16 +21,16 @@ namespace {
 /// What a rung of the ladder makes of a frame.
 struct Made {
   double bend_um = 0;
-  double list_um = 0;
+  double lut_um = 0;
   double error_um = 0;  ///< True.
 };
 
 /// One frame of the scripted run, worked by every rung.
 struct Judged {
   std::size_t chosen = 0;  ///< Rung.
-  std::array<Made, pipeline::Resolutions::kMostRungs> by_rung;
+  std::array<Made, pipeline::Resolutions::kMaxResolutions> by_resolution;
 
-  [[nodiscard]] double error_um() const { return by_rung.at(chosen).error_um; }
+  [[nodiscard]] double error_um() const { return by_resolution.at(chosen).error_um; }
 };
 
 calibration::Calibration from_one_press(const image::Grey16& reference) {
@@ -57,7 +57,7 @@ std::vector<Judged> scripted_run(const pipeline::ReconstructionRules& rules,
   cells.set_reference(reference.pixels);
   pipeline::Resolutions& maps = active->maps;
   maps.set_reference(reference.pixels);
-  pipeline::RungChooser chooser(rules.max_error_um);
+  pipeline::ResolutionChooser chooser(rules.max_error_um);
 
   const hal::sim::Scene scene =
       hal::sim::load_scene(DTACT_SOURCE_DIR "/config/scenes/all_objects.toml");
@@ -70,35 +70,37 @@ std::vector<Judged> scripted_run(const pipeline::ReconstructionRules& rules,
     (void)cells.look({luma.data(), kWidth, kHeight, kWidth});
     const Shot shot = truth_of(renderer, sequence);
     Judged judged;
-    judged.chosen = maps.rung();
-    for (std::size_t rung = 0; rung < maps.rungs().size(); ++rung) {
-      maps.use(rung);
+    judged.chosen = maps.resolution_index();
+    for (std::size_t resolution_index = 0; resolution_index < maps.resolutions().size();
+         ++resolution_index) {
+      maps.use(resolution_index);
       pipeline::Resolution& resolution = maps.in_use();
       recon::Reconstructor& reconstructor = resolution.reconstructor;
       recon::DrawnTiles marks;  // one buffer for all
       const recon::TileGrid& grid = reconstructor.grid();
       depth.resize(static_cast<std::size_t>(grid.width) * static_cast<std::size_t>(grid.height));
       const double mm_per_px = reconstructor.model().mm_per_px;
-      recon::DepthSums sums({.made_um = 100,
-                             .lost_um = 50,
+      recon::DepthSums sums({.threshold_um = 100,
+                             .release_um = 50,
                              .bend_reach = pipeline::bend_reach(mm_per_px),
                              .bend_from_um = 100});
       resolution.readers.mark(cells.active(), resolution.tiles);
       reconstructor.run_active(luma.data(), kWidth, resolution.tiles, depth, marks, nullptr, &sums);
-      judged.by_rung.at(rung) = {
+      judged.by_resolution.at(resolution_index) = {
           .bend_um = pipeline::bend_um(sums, mm_per_px),
           // As the capture loop has it: half of the deepest is about the mean over a contact.
-          .list_um =
-              maps.list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)), resolution.steps()),
+          .lut_um =
+              maps.lut_um(0.0005 * std::max<int>(0, std::ranges::max(depth)), resolution.steps()),
           .error_um = 1000 * error_of(depth, resolution.decimation(), shot).mean_absolute_mm};
     }
-    const Made& seen = judged.by_rung.at(judged.chosen);
+    const Made& seen = judged.by_resolution.at(judged.chosen);
     const double plain_um =
-        pipeline::plain_bend_um(seen.bend_um, maps.rungs()[judged.chosen].steps());
+        pipeline::plain_bend_um(seen.bend_um, maps.resolutions()[judged.chosen].steps());
     std::vector<double> expected;
-    for (const pipeline::Resolution& each : maps.rungs()) {
-      expected.push_back(pipeline::uncertainty_at_um(judged.by_rung.at(expected.size()).list_um,
-                                                     plain_um, each.decimation(), each.steps()));
+    for (const pipeline::Resolution& each : maps.resolutions()) {
+      expected.push_back(
+          pipeline::uncertainty_at_um(judged.by_resolution.at(expected.size()).lut_um, plain_um,
+                                      each.decimation(), each.steps()));
     }
     maps.use(chooser.next(expected));
     if (std::ranges::count_if(shot.judged, [](std::uint8_t c) { return c != 0; }) < 300) continue;
@@ -115,14 +117,16 @@ double share(const std::vector<Judged>& run, Predicate predicate) {
 
 /// Shares of frames in which the chosen rung and each one alone are within the bound.
 void print_shares(const char* what, double bound_um, const std::vector<Judged>& run,
-                  std::size_t rungs) {
+                  std::size_t resolutions) {
   std::printf("%s, bound %3.0f um: inside %.1f %%; alone and chosen", what, bound_um,
               100 * share(run, [&](const Judged& j) { return j.error_um() <= bound_um; }));
-  for (std::size_t rung = 0; rung < rungs; ++rung) {
-    std::printf(
-        ", rung %zu: %.1f %%, %.0f %%", rung,
-        100 * share(run, [&](const Judged& j) { return j.by_rung.at(rung).error_um <= bound_um; }),
-        100 * share(run, [&](const Judged& j) { return j.chosen == rung; }));
+  for (std::size_t resolution_index = 0; resolution_index < resolutions; ++resolution_index) {
+    std::printf(", rung %zu: %.1f %%, %.0f %%", resolution_index,
+                100 * share(run,
+                            [&](const Judged& j) {
+                              return j.by_resolution.at(resolution_index).error_um <= bound_um;
+                            }),
+                100 * share(run, [&](const Judged& j) { return j.chosen == resolution_index; }));
   }
   std::printf(" of frames\n");
 }
@@ -136,7 +140,7 @@ TEST(Auto, KeepsTheBoundWhereverFullResolutionDoesAndSavesPixels) {
     ASSERT_GT(run.size(), 150U);
     constexpr std::size_t kFull = 2;
     const double full_inside =
-        share(run, [&](const Judged& j) { return j.by_rung[kFull].error_um <= bound; });
+        share(run, [&](const Judged& j) { return j.by_resolution[kFull].error_um <= bound; });
     const double inside = share(run, [&](const Judged& j) { return j.error_um() <= bound; });
     print_shares("resolution", bound, run, kFull + 1);
     EXPECT_GE(inside, 0.95 * full_inside);
@@ -159,7 +163,7 @@ TEST(Auto, SharpensWhereTheBoundAsksForItAndNotElsewhere) {
   const image::Grey16 reference = make_reference();
   calibration::Calibration calibration = from_one_press(reference);
   calibration.model = std::make_shared<const recon::Model>(
-      with_lists_of_virtual_balls(*calibration.model, reference));
+      with_luts_of_virtual_balls(*calibration.model, reference));
   for (const double bound : {30.0, 60.0, 120.0}) {
     const std::vector<Judged> run =
         scripted_run({.decimation = 0,
@@ -171,27 +175,30 @@ TEST(Auto, SharpensWhereTheBoundAsksForItAndNotElsewhere) {
     if (bound == 30.0) {
       // What daemon/pipeline/depth/uncertainty.cpp rests on.
       for (int steps = 0; steps <= 2; ++steps) {
-        const auto rung = static_cast<std::size_t>(steps);
+        const auto resolution_index = static_cast<std::size_t>(steps);
         const double bends = median(run, [&](const Judged& j) {
-          return j.by_rung[rung].bend_um / std::max(j.by_rung[0].bend_um, 0.1);
+          return j.by_resolution[resolution_index].bend_um /
+                 std::max(j.by_resolution[0].bend_um, 0.1);
         });
         const auto honesty = [&](double left) {
           return median(run, [&](const Judged& j) {
-            const Made& made = j.by_rung[rung];
-            const double plain_um = j.by_rung[0].bend_um;
+            const Made& made = j.by_resolution[resolution_index];
+            const double plain_um = j.by_resolution[0].bend_um;
             return made.error_um /
-                   (std::hypot(made.list_um, pipeline::kBlurPerBend * left * plain_um) +
+                   (std::hypot(made.lut_um, pipeline::kBlurPerBend * left * plain_um) +
                     0.31 * plain_um);
           });
         };
         double left = 0;
         while (left < 2 && honesty(left) > 1) left += 0.01;
         std::printf("%d steps: bends %.2f times as much, %.2f of the blur is left, error %.1f um\n",
-                    steps, bends, left,
-                    median(run, [&](const Judged& j) { return j.by_rung[rung].error_um; }));
+                    steps, bends, left, median(run, [&](const Judged& j) {
+                      return j.by_resolution[resolution_index].error_um;
+                    }));
       }
     }
-    const double two = share(run, [&](const Judged& j) { return j.by_rung[2].error_um <= bound; });
+    const double two =
+        share(run, [&](const Judged& j) { return j.by_resolution[2].error_um <= bound; });
     const double inside = share(run, [&](const Judged& j) { return j.error_um() <= bound; });
     EXPECT_GE(inside, 0.9 * two);
     if (bound == 120.0) {

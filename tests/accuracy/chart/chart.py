@@ -5,7 +5,7 @@ The chart server and the paper's pipeline in Python (tests/bench/paper_pipeline.
 this driver lets them work one setting at a time, in an order that changes with every round. Time is
 CPU time of the one thread, the median over all rounds; instructions are counted by the processor
 where the system allows it; the error is the mean absolute difference from the simulator's
-indentation inside the true contact (everywhere, where nothing touches), no offset removed.
+indentation inside the true contact (everywhere, outside the contact), no offset removed.
 
 Writes chart.csv and chart.svg to --out. Exit code: 0, or 1 when something could not be measured.
 """

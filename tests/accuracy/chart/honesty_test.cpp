@@ -1,8 +1,8 @@
 // Whether depth maps are worth what they state: true error over stated uncertainty. What is stated
 // rests on constants that were taken from simulated scenes: the blur's from all_objects.toml on the
 // built-in sensor (daemon/pipeline/depth/uncertainty.hpp), the zero's from presses on sensors drawn
-// between those fitted to sensor_a and sensor_b (list_worth.hpp), those of the list of several
-// presses from layers of 1.5, 2 and 3 mm (chain_fit.cpp, press_set.cpp). None of the layers,
+// between those fitted to sensor_a and sensor_b (lut_uncertainty.hpp), those of the list of several
+// presses from gels of 1.5, 2 and 3 mm (chain_fit.cpp, press_set.cpp). None of the gels,
 // lights, seeds, balls and objects here had part in any constant; that the list of several presses
 // counts the ring's light, too, was decided here (95 % were within 2.3 without).
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@
 
 #include "clients/calibrate/fit/build.hpp"
 #include "clients/calibrate/fit/evaluate.hpp"
-#include "clients/calibrate/fit/model/layered_build.hpp"
+#include "clients/calibrate/fit/model/auto_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
 #include "clients/calibrate/fit/press_set.hpp"
 #include "daemon/pipeline/active_calibration.hpp"
@@ -60,7 +60,7 @@ Scene fitted_to(const std::string& sensor) {
   Scene scene = hal::sim::default_scene();
   const Scene fitted =
       hal::sim::load_scene(DTACT_SOURCE_DIR "/tests/accuracy/sim/" + sensor + ".toml");
-  scene.layer.thickness_mm = fitted.layer.thickness_mm;
+  scene.gel.thickness_mm = fitted.gel.thickness_mm;
   scene.optics = fitted.optics;
   return scene;
 }
@@ -100,7 +100,7 @@ std::vector<Press> presses_on(const Specimen& specimen) {
 
 /// One after another, at the times that table::first_still_frame() expects.
 std::shared_ptr<const hal::sim::Truth> solve(Scene scene, const std::vector<Press>& presses) {
-  scene.layer.solve_step_mm = 5;
+  scene.gel.solve_step_mm = 5;
   scene.loop_from_s = scene.loop_to_s = 0;
   scene.presses.clear();
   double begin_s = 1;
@@ -135,7 +135,7 @@ calibration::BallPresses first_of(const calibration::BallPresses& set) {
 
 calibration::Calibration layered(const calibration::BallPresses& set) {
   calibration::PressReport report;
-  return calibration::build_layered(set, {}, report);
+  return calibration::build_auto(set, {}, report);
 }
 
 struct Method {
@@ -146,14 +146,14 @@ struct Method {
 };
 constexpr Method kMethods[] = {
     {"sphere alone, one press",
-     [](const calibration::BallPresses& set) { return of_one(set, recon::Method::list); }},
+     [](const calibration::BallPresses& set) { return of_one(set, recon::Method::lut); }},
     {"published",
      [](const calibration::BallPresses& set) { return of_one(set, recon::Method::published); }},
     {"regression",
      [](const calibration::BallPresses& set) { return calibration::build_regression(set); }, true},
     {"sphere alone, several presses",
      [](const calibration::BallPresses& set) { return calibration::build(set); }, true, true},
-    {"layer model of one press",
+    {"gel model of one press",
      [](const calibration::BallPresses& set) {
        return calibration::build_model(first_of(set)).calibration;
      }},
@@ -169,8 +169,8 @@ double ratio(const pipeline::ActiveCalibration& active, const image::Grey8& fram
   luma.resize(luma.size() + recon::kLumaPadding);
   std::vector<std::int16_t> depth(truth.contact.size());
   const recon::TileGrid& grid = reconstructor.grid();
-  recon::DepthSums sums({.made_um = 100,
-                         .lost_um = 50,
+  recon::DepthSums sums({.threshold_um = 100,
+                         .release_um = 50,
                          .bend_reach = pipeline::bend_reach(model.mm_per_px),
                          .bend_from_um = 100});
   recon::DrawnTiles drawn;
@@ -179,9 +179,9 @@ double ratio(const pipeline::ActiveCalibration& active, const image::Grey8& fram
                            depth, drawn, nullptr, &sums);
   const double bend = pipeline::bend_um(sums, model.mm_per_px);
   // As the capture loop has it: half of the deepest is about the mean over a contact.
-  const double list_um = active.maps.list_um(0.0005 * std::max<int>(0, std::ranges::max(depth)), 0);
+  const double lut_um = active.maps.lut_um(0.0005 * std::max<int>(0, std::ranges::max(depth)), 0);
   return 1000 * table::against_indentation(depth, truth).mean_mm() /
-         pipeline::uncertainty_um(list_um, bend);
+         pipeline::uncertainty_um(lut_um, bend);
 }
 
 double share_of(const std::vector<double>& sorted, double share) {
@@ -256,10 +256,10 @@ class Honesty : public testing::Test {
 };
 
 TEST_F(Honesty, OfOnePress) { expect_honest(0); }
-TEST_F(Honesty, OfThePublishedList) { expect_honest(1); }
+TEST_F(Honesty, OfThePublishedLut) { expect_honest(1); }
 TEST_F(Honesty, OfThePublishedRegression) { expect_honest(2); }
 TEST_F(Honesty, OfSeveralPresses) { expect_honest(3); }
-TEST_F(Honesty, OfTheLayerModel) { expect_honest(4); }
+TEST_F(Honesty, OfTheGelModel) { expect_honest(4); }
 TEST_F(Honesty, OfOurs) { expect_honest(5); }
 TEST_F(Honesty, OfOursFromSeveralPresses) { expect_honest(6); }
 

@@ -23,14 +23,14 @@ struct Shot {
   std::string name;                  ///< "ball", "screws", "flat", "nothing".
   std::vector<image::Grey8> frames;  ///< Of the same moment; only the noise differs.
   std::vector<float> truth_mm;       ///< Indentation at every pixel of the crop, row-major.
-  /// Where the error counts: true contact, everywhere when nothing touches. Row-major, crop sized.
+  /// Where the error counts: true contact, everywhere without contact. Row-major, crop sized.
   std::vector<std::uint8_t> judged;
 };
 
 /// What is true of one frame, without frames.
 [[nodiscard]] Shot truth_of(const hal::sim::Renderer& renderer, std::uint64_t sequence);
 
-/// The untouched sensor: the mean of many frames, Q8.
+/// The sensor without contact: the mean of many frames, Q8.
 [[nodiscard]] image::Grey16 make_reference();
 
 /// A ball of 4 mm radius pressed 1.3 mm deep near the centre: what calibrates.

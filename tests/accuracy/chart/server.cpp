@@ -36,14 +36,14 @@ void write_raw(const std::string& file, const std::vector<T>& values) {
 }
 
 /// The published method's list for whole grey levels 0 … 255, millimetres.
-std::vector<float> published_list_mm(const std::vector<Setting>& settings) {
+std::vector<float> published_lut_mm(const std::vector<Setting>& settings) {
   const auto it = std::ranges::find(settings, "published", &Setting::method);
-  const dtact::recon::DepthList& list = it->model->list;
+  const dtact::recon::DepthLut& lut = it->model->lut;
   std::vector<float> mm;
   for (int level = 0; level < 256; ++level) {
-    const int entry = std::clamp(level * dtact::recon::kEntriesPerLevel - list.first_q6, 0,
-                                 static_cast<int>(list.um.size()) - 1);
-    mm.push_back(static_cast<float>(list.um[static_cast<std::size_t>(entry)]) / 1000.0F);
+    const int entry = std::clamp(level * dtact::recon::kEntriesPerLevel - lut.first_q6, 0,
+                                 static_cast<int>(lut.um.size()) - 1);
+    mm.push_back(static_cast<float>(lut.um[static_cast<std::size_t>(entry)]) / 1000.0F);
   }
   return mm;
 }
@@ -68,7 +68,7 @@ struct Lab {
   }
   void export_to(const std::string& folder) const {
     write_raw(folder + "/reference.u16", reference.pixels);
-    write_raw(folder + "/list.f32", published_list_mm(settings));
+    write_raw(folder + "/list.f32", published_lut_mm(settings));
     for (const Shot& shot : shots) {
       std::vector<std::uint8_t> frames;
       for (const auto& frame : shot.frames) {

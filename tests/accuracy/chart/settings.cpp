@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "clients/calibrate/fit/model/layered_build.hpp"
+#include "clients/calibrate/fit/model/auto_build.hpp"
 #include "daemon/recon/model.hpp"
 #include "tests/accuracy/chart/virtual_balls.hpp"
 
@@ -75,11 +75,11 @@ std::vector<Setting> make_settings(const image::Grey16& reference) {
   const calibration::BallPresses presses = several_presses(reference);
   settings.push_back(
       {"regression full", "regression", 1, false, 0, calibration::build_regression(presses).model});
-  const auto list = calibrate(reference, calibration_press, recon::Method::list);
+  const auto lut = calibrate(reference, calibration_press, recon::Method::lut);
   constexpr std::array<const char*, 5> kShare{"", "full", "half", "", "quarter"};
   const auto several = calibration::build(presses).model;
   for (const double smoothing_mm : {0.05, 0.1, 0.2, 0.4}) {
-    recon::Model smoothed = *list;
+    recon::Model smoothed = *lut;
     smoothed.smoothing_px = smoothing_mm / kMmPerPx;
     for (const int decimation : {1, 2, 4}) {
       const auto model =
@@ -93,10 +93,10 @@ std::vector<Setting> make_settings(const image::Grey16& reference) {
     }
   }
   const auto balls = std::make_shared<const recon::Model>(
-      recon::decimate(with_lists_of_virtual_balls(*list, reference), 4));
+      recon::decimate(with_luts_of_virtual_balls(*lut, reference), 4));
   calibration::PressReport report;
   const auto ours =
-      calibration::build_layered(press_set(reference, {calibration_press}), {}, report).model;
+      calibration::build_auto(press_set(reference, {calibration_press}), {}, report).model;
   const auto ours_quarter = std::make_shared<const recon::Model>(recon::decimate(*ours, 4));
   for (const bool tiles : {false, true}) {
     for (const int steps : {0, 1, 2}) {

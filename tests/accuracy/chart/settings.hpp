@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "clients/calibrate/fit/press_set.hpp"
-#include "daemon/pipeline/untouched/cells.hpp"
+#include "daemon/pipeline/reference/cells.hpp"
 #include "daemon/recon/model.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
@@ -25,7 +25,7 @@ struct Setting {
 };
 
 /// All of them, calibrated with make_calibration_press() or, "regression" and "several", with
-/// make_calibration_presses(), "virtual balls" as with_lists_of_virtual_balls() says, and nothing
+/// make_calibration_presses(), "virtual balls" as with_luts_of_virtual_balls() says, and nothing
 /// else. "list" and "several" are of the known sphere alone, "ours" is what dtact-calibrate makes
 /// of the one press unless it is told otherwise.
 [[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference);

@@ -39,11 +39,11 @@ std::vector<Shot> virtual_presses() {
 }
 
 /// Levels themselves in the place of depth: a list that says Q6.
-recon::DepthList levels_list() {
-  recon::DepthList list{
+recon::DepthLut levels_lut() {
+  recon::DepthLut lut{
       .first_q6 = -kReach_q6, .um = {}, .covered_from_q6 = -kReach_q6, .covered_to_q6 = kReach_q6};
-  for (int q6 = -kReach_q6; q6 <= kReach_q6; ++q6) list.um.push_back(static_cast<std::int16_t>(q6));
-  return list;
+  for (int q6 = -kReach_q6; q6 <= kReach_q6; ++q6) lut.um.push_back(static_cast<std::int16_t>(q6));
+  return lut;
 }
 
 /// Level and true indentation of one pixel.
@@ -83,8 +83,8 @@ std::vector<Pair> read_levels(const std::shared_ptr<const recon::Model>& levels,
 }
 
 /// Means over a grey level each, straight lines between them, never falling.
-recon::DepthList list_of(std::vector<Pair> pairs) {
-  constexpr int kLeast = 30;
+recon::DepthLut list_of(std::vector<Pair> pairs) {
+  constexpr int kMin = 30;
   std::ranges::sort(pairs, {}, &Pair::q6);
   std::vector<Pair> nodes;
   for (auto from = pairs.begin(); from != pairs.end();) {
@@ -97,7 +97,7 @@ recon::DepthList list_of(std::vector<Pair> pairs) {
       mean.um += it->um / static_cast<double>(to - from);
     }
     // What lies beside zero is noise, and zero is known.
-    if (to - from >= kLeast && std::abs(mean.q6) > recon::kEntriesPerLevel) nodes.push_back(mean);
+    if (to - from >= kMin && std::abs(mean.q6) > recon::kEntriesPerLevel) nodes.push_back(mean);
     from = to;
   }
   nodes.push_back({});
@@ -105,23 +105,23 @@ recon::DepthList list_of(std::vector<Pair> pairs) {
   for (std::size_t i = 1; i < nodes.size(); ++i) {
     nodes[i].um = std::max(nodes[i].um, nodes[i - 1].um);
   }
-  recon::DepthList list;
-  list.first_q6 = static_cast<int>(std::ceil(nodes.front().q6));
+  recon::DepthLut lut;
+  lut.first_q6 = static_cast<int>(std::ceil(nodes.front().q6));
   const int last = static_cast<int>(std::floor(nodes.back().q6));
   auto right = nodes.begin() + 1;
-  for (int q6 = list.first_q6; q6 <= last; ++q6) {
+  for (int q6 = lut.first_q6; q6 <= last; ++q6) {
     while (right->q6 < q6) ++right;
     const Pair& left = *(right - 1);
     const double um = std::lerp(left.um, right->um, (q6 - left.q6) / (right->q6 - left.q6));
-    list.um.push_back(static_cast<std::int16_t>(std::lround(um)));
+    lut.um.push_back(static_cast<std::int16_t>(std::lround(um)));
   }
-  list.covered_from_q6 = list.first_q6;
-  list.covered_to_q6 = last;
-  return list;
+  lut.covered_from_q6 = lut.first_q6;
+  lut.covered_to_q6 = last;
+  return lut;
 }
 
 /// Mean absolute error of the balls' own pixels, a quarter of a millimetre each.
-std::vector<recon::Model::Uncertainty> uncertainty_of(const recon::DepthList& list,
+std::vector<recon::Model::Uncertainty> uncertainty_of(const recon::DepthLut& lut,
                                                       const std::vector<Pair>& pairs) {
   constexpr double kStep_um = 250;
   std::vector<double> sums;
@@ -133,9 +133,9 @@ std::vector<recon::Model::Uncertainty> uncertainty_of(const recon::DepthList& li
       sums.resize(bin + 1);
       counts.resize(bin + 1);
     }
-    const int at = std::clamp(static_cast<int>(std::lround(pair.q6)) - list.first_q6, 0,
-                              static_cast<int>(list.um.size()) - 1);
-    sums[bin] += std::abs(list.um[static_cast<std::size_t>(at)] - pair.um);
+    const int at = std::clamp(static_cast<int>(std::lround(pair.q6)) - lut.first_q6, 0,
+                              static_cast<int>(lut.um.size()) - 1);
+    sums[bin] += std::abs(lut.um[static_cast<std::size_t>(at)] - pair.um);
     ++counts[bin];
   }
   std::vector<recon::Model::Uncertainty> rows;
@@ -148,27 +148,27 @@ std::vector<recon::Model::Uncertainty> uncertainty_of(const recon::DepthList& li
 
 }  // namespace
 
-recon::Model with_lists_of_virtual_balls(recon::Model model, const image::Grey16& reference) {
+recon::Model with_luts_of_virtual_balls(recon::Model model, const image::Grey16& reference) {
   const hal::sim::OpticsModel& optics = hal::sim::default_scene().optics;
   model.scattering = recon::Scattering{.narrow_mm = optics.narrow_mm,
                                        .wide_mm = optics.wide_mm,
                                        .narrow_weight = optics.narrow_weight};
   recon::Model levels = recon::decimate(model, kDecimation);
-  levels.list = levels_list();
-  levels.sharpened = {{.steps = 1, .list = levels.list, .uncertainty = {}},
-                      {.steps = 2, .list = levels.list, .uncertainty = {}}};
+  levels.lut = levels_lut();
+  levels.sharpened = {{.steps = 1, .lut = levels.lut, .uncertainty = {}},
+                      {.steps = 2, .lut = levels.lut, .uncertainty = {}}};
   const auto shared = std::make_shared<const recon::Model>(std::move(levels));
   const std::vector<Shot> shots = virtual_presses();
   model.sharpened.clear();
   for (const int steps : {0, 1, 2}) {
     const std::vector<Pair> pairs = read_levels(shared, steps, reference, shots);
-    const recon::DepthList list = list_of(pairs);
-    const auto uncertainty = uncertainty_of(list, pairs);
+    const recon::DepthLut lut = list_of(pairs);
+    const auto uncertainty = uncertainty_of(lut, pairs);
     if (steps == 0) {
-      model.list = list;
+      model.lut = lut;
       model.uncertainty = uncertainty;
     } else {
-      model.sharpened.push_back({.steps = steps, .list = list, .uncertainty = uncertainty});
+      model.sharpened.push_back({.steps = steps, .lut = lut, .uncertainty = uncertainty});
     }
   }
   return model;

@@ -10,7 +10,7 @@ namespace dtact::chart {
 /// indentation at every level, as it is read at a quarter of the resolution, zero at zero. What a
 /// perfect fit of the sensor would give and thus a bound for any: none of the objects that are
 /// judged is among the balls' presses, but the optics are.
-[[nodiscard]] recon::Model with_lists_of_virtual_balls(recon::Model model,
-                                                       const image::Grey16& reference);
+[[nodiscard]] recon::Model with_luts_of_virtual_balls(recon::Model model,
+                                                      const image::Grey16& reference);
 
 }  // namespace dtact::chart

@@ -28,7 +28,7 @@ TEST(ForceAccuracy, TheStatedErrorHolds) {
       EXPECT_EQ(press.valid, press.absence == v1::FORCE_ABSENCE_NONE);
       if (!press.valid) continue;
       ratios.push_back(ratio(press));
-      if (press.touching) shares.push_back(ratio(press) * press.uncertainty_n / press.true_n);
+      if (press.in_contact) shares.push_back(ratio(press) * press.uncertainty_n / press.true_n);
     }
   }
   fmt::print(

@@ -26,9 +26,9 @@ namespace {
 namespace fs = std::filesystem;
 namespace sim = hal::sim;
 
-constexpr std::uint64_t kUntouched = 60;  // frames, which the reference takes 45 of
-constexpr std::uint64_t kPeriod = 30;     // frames from one press to the next
-constexpr std::uint64_t kStill = 14;      // the frame after a press's begin that is looked at
+constexpr std::uint64_t kContactFree = 60;  // frames, which the reference takes 45 of
+constexpr std::uint64_t kPeriod = 30;       // frames from one press to the next
+constexpr std::uint64_t kStill = 14;        // the frame after a press's begin that is looked at
 constexpr double kFps = 60;
 
 /// The same draws with every library.
@@ -86,7 +86,7 @@ Drawn draw_object(Draw& draw) {
 
 sim::Scene empty_scene(double thickness_mm) {
   sim::Scene scene = thickness::sensor_of(thickness_mm);
-  scene.layer.solve_step_mm = 5;  // only the presses at rest are looked at
+  scene.gel.solve_step_mm = 5;  // only the presses at rest are looked at
   scene.loop_from_s = scene.loop_to_s = 0;
   scene.presses.clear();
   return scene;
@@ -94,7 +94,7 @@ sim::Scene empty_scene(double thickness_mm) {
 
 /// Presses `object` in within 8 frames as the scene's next press.
 void add_press(sim::Scene& scene, const sim::Object& object, sim::PressKey at) {
-  const double begin = static_cast<double>(kUntouched + kPeriod * scene.presses.size()) / kFps;
+  const double begin = static_cast<double>(kContactFree + kPeriod * scene.presses.size()) / kFps;
   const double depth = at.depth_mm;
   std::vector<sim::PressKey> keys;
   for (const auto& [frames, share] : {std::pair{0, 0.0}, {8, 1.0}, {18, 1.0}, {24, 0.0}}) {
@@ -105,7 +105,7 @@ void add_press(sim::Scene& scene, const sim::Object& object, sim::PressKey at) {
   scene.presses.push_back({object, std::move(keys)});
 }
 
-std::uint64_t frame_of(std::size_t press) { return kUntouched + kPeriod * press + kStill; }
+std::uint64_t frame_of(std::size_t press) { return kContactFree + kPeriod * press + kStill; }
 
 void write(const fs::path& file, const image::Grey8& image) {
   fs::create_directories(file.parent_path());
@@ -204,7 +204,7 @@ Trial try_held_out(double thickness_mm, Calibrating calibrating, std::uint64_t s
     }
     HeldOut& press = trial.presses[i];
     press.true_n = truth->force_n(frame_of(i));
-    press.touching = frame.contact().touching();
+    press.in_contact = frame.contact().in_contact();
     press.valid = frame.contact().has_force_n();
     press.force_n = frame.contact().force_n();
     press.uncertainty_n = frame.contact().force_uncertainty_n();

@@ -25,7 +25,7 @@ struct HeldOut {
   double force_n = 0;
   double uncertainty_n = 0;
   v1::ForceAbsence absence = v1::FORCE_ABSENCE_NONE;
-  bool touching = false;
+  bool in_contact = false;
 };
 
 struct Trial {

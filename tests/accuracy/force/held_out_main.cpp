@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
       without += press.valid ? 0 : 1;
       if (!press.valid) continue;
       ratios.push_back(force::ratio(press));
-      if (press.touching) shares.push_back(std::abs(press.force_n / press.true_n - 1));
+      if (press.in_contact) shares.push_back(std::abs(press.force_n / press.true_n - 1));
     }
   }
   std::filesystem::remove_all(folder);

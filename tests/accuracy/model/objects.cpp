@@ -8,7 +8,7 @@
 #include <numeric>
 #include <span>
 
-#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
 #include "clients/calibrate/fit/model/model_fit.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/accuracy/table/another_law.hpp"
@@ -23,9 +23,9 @@ hal::sim::Scene all_objects(table::Law law = table::Law::built_in) {
   hal::sim::Scene scene = hal::sim::load_scene(DTACT_SOURCE_DIR "/config/scenes/all_objects.toml");
   if (law == table::Law::another) {
     const hal::sim::Scene other = table::another_law();
-    const double solve_step_mm = scene.layer.solve_step_mm;
-    scene.layer = other.layer;
-    scene.layer.solve_step_mm = solve_step_mm;
+    const double solve_step_mm = scene.gel.solve_step_mm;
+    scene.gel = other.gel;
+    scene.gel.solve_step_mm = solve_step_mm;
     scene.optics = other.optics;
   }
   return scene;
@@ -47,12 +47,12 @@ std::uint64_t held(const hal::sim::Scene& scene, const hal::sim::Press& press) {
   return static_cast<std::uint64_t>(std::lround(middle * scene.camera.fps));
 }
 
-void judge(std::uint64_t seed, const hal::sim::Scene& untouched,
+void judge(std::uint64_t seed, const hal::sim::Scene& undeformed,
            const std::shared_ptr<const hal::sim::Truth>& objects,
            std::vector<ObjectErrors>& errors) {
   const table::Configuration& light = table::configurations()[0];
   const table::Trial trial = table::draw(seed, {.test_presses = 0});
-  table::Sensor sensor(table::solve(untouched, trial.all()), light, seed);
+  table::Sensor sensor(table::solve(undeformed, trial.all()), light, seed);
   const table::Material material = table::gather(sensor, trial, light.regression_centre);
   table::Sensor tested(objects, light, seed + 1000);
   const auto& presses = objects->scene().presses;
@@ -72,7 +72,7 @@ void judge(std::uint64_t seed, const hal::sim::Scene& untouched,
       errors[m].in_contact_mm[i].push_back(
           table::against_indentation(reader.read(tested.frame(sequence)), truth).mean_mm());
     }
-    errors[m].untouched_mm.push_back(rms_mm(reader.read(tested.frame(0))));
+    errors[m].no_contact_mm.push_back(rms_mm(reader.read(tested.frame(0))));
   }
 }
 
@@ -94,12 +94,12 @@ std::vector<std::string> object_names() {
 
 std::vector<ObjectErrors> read_objects(int seeds, table::Law law) {
   const auto objects = std::make_shared<const hal::sim::Truth>(all_objects(law));
-  const hal::sim::Scene untouched =
+  const hal::sim::Scene undeformed =
       law == table::Law::built_in ? hal::sim::default_scene() : table::another_law();
   std::vector<ObjectErrors> errors(table::methods().size());
   for (ObjectErrors& each : errors) each.in_contact_mm.resize(objects->scene().presses.size());
   for (int seed = 1; seed <= seeds; ++seed) {
-    judge(static_cast<std::uint64_t>(seed), untouched, objects, errors);
+    judge(static_cast<std::uint64_t>(seed), undeformed, objects, errors);
   }
   return errors;
 }
@@ -123,7 +123,7 @@ std::string to_markdown(const std::vector<ObjectErrors>& errors, int seeds,
   }
   row("mean over all objects", [](const ObjectErrors& each) { return each.mean_mm(); });
   row("untouched, root mean square",
-      [](const ObjectErrors& each) { return mean(each.untouched_mm); });
+      [](const ObjectErrors& each) { return mean(each.no_contact_mm); });
   const auto refused = [](int sum, const ObjectErrors& each) { return sum + each.refused; };
   return out + fmt::format(
                    "\n\nMeans over {} seeds; {} presses were refused by the model. One frame each. "

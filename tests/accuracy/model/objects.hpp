@@ -13,8 +13,8 @@ namespace dtact::model_study {
 struct ObjectErrors {
   /// By object: mean absolute one against the simulator's indentation where the object touches.
   std::vector<std::vector<double>> in_contact_mm;
-  std::vector<double> untouched_mm;  ///< Root mean square of one frame's map.
-  int refused = 0;                   ///< Seeds whose press was not taken.
+  std::vector<double> no_contact_mm;  ///< Root mean square of one frame's map.
+  int refused = 0;                    ///< Seeds whose press was not taken.
 
   [[nodiscard]] double object_mm(std::size_t object) const;  ///< Mean over the seeds.
   [[nodiscard]] double mean_mm() const;                      ///< And over the objects.

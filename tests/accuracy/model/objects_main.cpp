@@ -23,8 +23,8 @@ int main(int argc, char** argv) {
       return dtact::model_study::to_markdown(dtact::model_study::read_objects(seeds, law), seeds,
                                              sensor);
     };
-    const std::string page = page_of(Law::built_in, "layer of 2 mm") + "\n" +
-                             page_of(Law::another, "of another law of layer and light, 2.5 mm");
+    const std::string page = page_of(Law::built_in, "gel of 2 mm") + "\n" +
+                             page_of(Law::another, "of another law of gel and light, 2.5 mm");
     fmt::print("{}", page);
     if (!out.empty()) dtact::base::write_file_atomically(out / "objects.md", page);
     return 0;

@@ -1,4 +1,4 @@
-// What the model makes of a real ball press, beside the free list: the layer, and where the
+// What the model makes of a real ball press, beside the free LUT: the gel, and where the
 // distance from the sphere comes from. With --simulated the same on simulated sensors, where the
 // truth is known too.
 #include <fmt/format.h>
@@ -14,9 +14,9 @@
 #include <utility>
 #include <vector>
 
-#include "clients/calibrate/fit/list_fit.hpp"
-#include "clients/calibrate/fit/model/layered_build.hpp"
-#include "clients/calibrate/fit/model/model_list.hpp"
+#include "clients/calibrate/fit/lut_fit.hpp"
+#include "clients/calibrate/fit/model/auto_build.hpp"
+#include "clients/calibrate/fit/model/model_lut.hpp"
 #include "clients/calibrate/fit/model/radial_transform.hpp"
 #include "tests/accuracy/model/study.hpp"
 #include "tests/accuracy/real/folder_evaluation.hpp"
@@ -26,7 +26,7 @@
 namespace {
 
 using namespace dtact;
-using calibration::LevelledPress;
+using calibration::SymmetricPress;
 using DepthOf = std::function<double(double level)>;
 
 /// Mean distance from the sphere over a contact, the median taken off: of all of it, of its mean on
@@ -46,7 +46,7 @@ double mean_distance(std::vector<double> errors) {
   return sum / static_cast<double>(errors.size());
 }
 
-Distance from_sphere(const LevelledPress& press, const DepthOf& depth_of,
+Distance from_sphere(const SymmetricPress& press, const DepthOf& depth_of,
                      const calibration::PixelFilter& leave_out = {}) {
   constexpr double kRings = 60;
   struct Ring {
@@ -77,17 +77,17 @@ Distance from_sphere(const LevelledPress& press, const DepthOf& depth_of,
   return {mean_distance(errors), mean_distance(along), mean_distance(round)};
 }
 
-/// The indentation that the fitted press itself has where it is so dark: no list could do better.
+/// The indentation that the fitted press itself has where it is so dark: no LUT could do better.
 DepthOf own_press(const calibration::ModelFit& fit, double ball_radius_mm,
                   const calibration::MapOptics& optics) {
   using calibration::RadialTransform;
   const calibration::BallContact contact = calibration::press_ball(
-      ball_radius_mm, fit.presses[0].contact_radius_mm, fit.layer.thickness_mm);
+      ball_radius_mm, fit.presses[0].contact_radius_mm, fit.gel.thickness_mm);
   const Eigen::VectorXd levels =
       optics.light_levels *
       RadialTransform::instance().values(
-          calibration::imagine(fit.layer, contact)
-              .spectrum.cwiseProduct(calibration::scattered(fit.layer.scattering))
+          calibration::predict_press(fit.gel, contact)
+              .spectrum.cwiseProduct(calibration::scattered(fit.gel.scattering))
               .cwiseProduct(calibration::blurred(optics.smoothing_mm)));
   const double offset = fit.presses[0].offset * optics.light_levels;
   return [=](double level) {
@@ -115,10 +115,10 @@ std::array<calibration::PixelFilter, 4> halves_of(const calibration::Contact& co
   return halves;
 }
 
-void look(const LevelledPress& press, const calibration::MapOptics& optics) {
+void look(const SymmetricPress& press, const calibration::MapOptics& optics) {
   const double light = optics.light_levels;
-  const auto by = [](recon::DepthList list) -> DepthOf {
-    return [list = std::move(list)](double level) { return calibration::look_up_mm(list, level); };
+  const auto by = [](recon::DepthLut lut) -> DepthOf {
+    return [lut = std::move(lut)](double level) { return calibration::lut_mm(lut, level); };
   };
   const auto profile = [&](const calibration::PixelFilter& use) {
     return calibration::profile_of(press, light, optics.smoothing_mm, use);
@@ -128,13 +128,12 @@ void look(const LevelledPress& press, const calibration::MapOptics& optics) {
       "    residual {:.3f} levels, {:.3f} mm deep in {:.2f} ± {:.2f}, {:+.2f} levels darker, "
       "widths "
       "{:.2f} {:.2f} weight {:.2f}\n",
-      fit.residual * light, fit.deepest_mm(), fit.layer.thickness_mm,
-      fit.layer.thickness_mm * std::sqrt(fit.covariance(0, 0)), fit.presses[0].offset * light,
-      fit.layer.scattering.narrow_mm, fit.layer.scattering.wide_mm,
-      fit.layer.scattering.narrow_weight);
+      fit.residual * light, fit.deepest_mm(), fit.gel.thickness_mm,
+      fit.gel.thickness_mm * std::sqrt(fit.covariance(0, 0)), fit.presses[0].offset * light,
+      fit.gel.scattering.narrow_mm, fit.gel.scattering.wide_mm, fit.gel.scattering.narrow_weight);
   const double ball = press.contact.ball_radius_mm;
   const auto model = [&](const calibration::ModelFit& made) {
-    return by(calibration::lists_of(made.layer, optics, made.deepest_mm())[0]);
+    return by(calibration::luts_of(made.gel, optics, made.deepest_mm())[0]);
   };
   const auto own = [&](const calibration::ModelFit& made) { return own_press(made, ball, optics); };
   double free_half = 0;
@@ -143,13 +142,13 @@ void look(const LevelledPress& press, const calibration::MapOptics& optics) {
   for (const calibration::PixelFilter& half : halves_of(press.contact)) {
     const auto made = calibration::fit_model(std::vector{profile(half)});
     free_half +=
-        from_sphere(press, by(calibration::fit_list(press.map, press.contact, half)), half).all / 4;
+        from_sphere(press, by(calibration::fit_lut(press.map, press.contact, half)), half).all / 4;
     model_half += from_sphere(press, model(made), half).all / 4;
     own_half += from_sphere(press, own(made), half).all / 4;
   }
-  print("free list", from_sphere(press, by(calibration::fit_list(press.map, press.contact))),
+  print("free LUT", from_sphere(press, by(calibration::fit_lut(press.map, press.contact))),
         free_half);
-  print("model's list", from_sphere(press, model(fit)), model_half);
+  print("model's LUT", from_sphere(press, model(fit)), model_half);
   print("model's own press", from_sphere(press, own(fit)), own_half);
   fmt::print("    depth of the press by parts of its picture: within {:.3f}\n",
              calibration::depth_spread_mm(press, optics, fit));
@@ -165,12 +164,12 @@ void look(const recon::Model& model, const image::Grey16& reference_q8,
   light /= static_cast<double>(reference.pixels.size());
   const calibration::MapOptics optics{light, model.smoothing_px * model.mm_per_px, model.mm_per_px};
   const auto chosen =
-      calibration::choose_press_gain(calibration::sure_samples(press.map, press.contact), 4.0);
+      calibration::choose_asymmetry(calibration::sure_samples(press.map, press.contact), 4.0);
   for (const bool level : {false, true}) {
     fmt::print("  {}\n", level ? "about its middle, its gain taken off" : "about the centroid");
     try {
-      look(calibration::levelled(press.map, press.contact,
-                                 level ? chosen.gain : calibration::PressGain{}),
+      look(calibration::without_asymmetry(press.map, press.contact,
+                                          level ? chosen.gain : calibration::PressAsymmetry{}),
            optics);
     } catch (const std::exception& error) {
       fmt::print("    {}\n", error.what());
@@ -193,11 +192,11 @@ void look(const std::string& folder) {
   }
 }
 
-/// A press at rest near the centre of a simulated sensor, and what the lists make of other balls.
+/// A press at rest near the centre of a simulated sensor, and what the LUTs make of other balls.
 void look(const model_study::Specimen& specimen, std::uint64_t seed) {
   const model_study::Result result = model_study::measure(specimen, seed, 1, 6);
   fmt::print(
-      "{}: a ball of 5 mm is read {:.4f} mm wrong by the free list, {:.4f} by the model's{}\n",
+      "{}: a ball of 5 mm is read {:.4f} mm wrong by the free LUT, {:.4f} by the model's{}\n",
       specimen.name, result.free_mm, result.model_mm, result.refused);
   const table::Trial trial = table::draw(seed, {.calibration_presses = 0, .test_presses = 0});
   const table::Configuration& light = table::configurations()[0];
@@ -221,7 +220,7 @@ std::vector<model_study::Specimen> simulated() {
     const hal::sim::Scene like =
         hal::sim::load_scene(std::string(DTACT_SOURCE_DIR "/tests/accuracy/sim/") + name + ".toml");
     hal::sim::Scene scene = hal::sim::default_scene();
-    scene.layer = like.layer;
+    scene.gel = like.gel;
     scene.optics = like.optics;
     some.push_back({std::string("simulated ") + name, std::move(scene)});
   }

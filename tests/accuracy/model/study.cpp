@@ -7,8 +7,8 @@
 #include <memory>
 #include <stdexcept>
 
-#include "clients/calibrate/fit/difference.hpp"
-#include "clients/calibrate/fit/model/layered_build.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
+#include "clients/calibrate/fit/model/auto_build.hpp"
 #include "tests/accuracy/table/another_law.hpp"
 #include "tests/accuracy/table/judge.hpp"
 #include "tests/accuracy/table/methods.hpp"
@@ -18,11 +18,11 @@
 namespace dtact::model_study {
 namespace {
 
-constexpr double kMost = 0.85;  // of the layer
+constexpr double kMax = 0.85;  // of the gel
 
 Specimen with_optics(std::string name, double thickness_mm, const hal::sim::OpticsModel& optics) {
   hal::sim::Scene scene = hal::sim::default_scene();
-  scene.layer.thickness_mm = thickness_mm;
+  scene.gel.thickness_mm = thickness_mm;
   scene.optics = optics;
   return {std::move(name), std::move(scene)};
 }
@@ -118,7 +118,7 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
   table::Trial trial =
       table::draw(seed, {.calibration_presses = presses > 1 ? presses : 0, .test_presses = tests});
   const auto limit = [&](table::BallPress& press) {
-    press.depth_mm = std::min(press.depth_mm, kMost * specimen.scene.layer.thickness_mm);
+    press.depth_mm = std::min(press.depth_mm, kMax * specimen.scene.gel.thickness_mm);
   };
   limit(trial.centre);
   std::ranges::for_each(trial.many, limit);
@@ -152,7 +152,7 @@ Result measure(const Specimen& specimen, std::uint64_t seed, int presses, int te
   }
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   calibration::PressReport report;
-  Reader by_ours(calibration::build_layered(set, {}, report).model);
+  Reader by_ours(calibration::build_auto(set, {}, report).model);
   result.note = report.note;
   std::unique_ptr<Reader> by_free;
   try {

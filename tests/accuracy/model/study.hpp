@@ -18,8 +18,8 @@ struct Specimen {
   hal::sim::Scene scene;
 };
 
-/// Layers of 1.5, 2, 2.5 and 3 mm, then four other optics, then one of another law of layer and
-/// light, which no layer that is fitted can be.
+/// Gels of 1.5, 2, 2.5 and 3 mm, then four other optics, then one of another law of gel and
+/// light, which no gel that is fitted can be.
 [[nodiscard]] std::vector<Specimen> specimens();
 
 /// What came of one specimen and seed. Errors are mean absolute ones against the simulator's
@@ -31,11 +31,11 @@ struct Result {
   double seconds = 0;  ///< That the calibration took.
   double true_depth_mm = 0;
   double free_mm = std::numeric_limits<double>::quiet_NaN();  ///< Under a 5 mm ball, by the free
-                                                              ///< list of the same images.
+                                                              ///< LUT of the same images.
   double model_mm = 0;                                        ///< By the model's.
   double ours_mm = 0;                                         ///< As it is made by default.
   std::string note;                                           ///< What that says of itself.
-  /// By its lists for one and two steps of the filter, as the daemon applies it.
+  /// By its LUTs for one and two steps of the filter, as the daemon applies it.
   std::array<double, 2> sharpened_mm = {};
   double bias_mm = 0;    ///< Its mean error with its sign.
   double stated_mm = 0;  ///< What it says of itself at the tests' mean depth.

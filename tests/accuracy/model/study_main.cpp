@@ -22,16 +22,16 @@ void print(const std::string& name, std::uint64_t seed, const Result& r) {
   fmt::print("{:8} seed {} ({:.1f} s): sphere alone {:.4f} ours {:.4f}", name, seed, r.seconds,
              r.free_mm, r.ours_mm);
   if (r.fit) {
-    const auto& layer = r.fit->layer;
+    const auto& gel = r.fit->gel;
     fmt::print(
         "  model {:.4f} sharpened {:.4f} {:.4f} bias {:+.4f} stated {:.4f} | residual {:.3f} "
         "levels, {:.3f} mm deep "
-        "(true {:.3f}), layer {:.2f}, widths {:.2f} {:.2f} weight {:.2f}, slopes",
+        "(true {:.3f}), gel {:.2f}, widths {:.2f} {:.2f} weight {:.2f}, slopes",
         r.model_mm, r.sharpened_mm[0], r.sharpened_mm[1], r.bias_mm, r.stated_mm,
-        r.fit->residual * r.light_levels, r.fit->deepest_mm(), r.true_depth_mm, layer.thickness_mm,
-        layer.scattering.narrow_mm, layer.scattering.wide_mm, layer.scattering.narrow_weight);
-    for (const double slope : layer.response.slopes) {
-      fmt::print(" {:.3f}", slope / layer.thickness_mm);
+        r.fit->residual * r.light_levels, r.fit->deepest_mm(), r.true_depth_mm, gel.thickness_mm,
+        gel.scattering.narrow_mm, gel.scattering.wide_mm, gel.scattering.narrow_weight);
+    for (const double slope : gel.response.slopes) {
+      fmt::print(" {:.3f}", slope / gel.thickness_mm);
     }
   }
   fmt::print("{}{}\n", r.refused.empty() ? "" : "  ", r.refused);
@@ -82,7 +82,7 @@ int main(int argc, char** argv) {
     app.add_option("--out", out, "Folder of study.md; without it, only printed");
     CLI11_PARSE(app, argc, argv);
     std::string table =
-        "| sensor | sphere alone | ours | the layer's list | sharpened, one step | two steps |\n"
+        "| sensor | sphere alone | ours | the gel's LUT | sharpened, one step | two steps |\n"
         "| --- | --- | --- | --- | --- | --- |\n";
     const auto all = dtact::model_study::specimens();
     for (std::size_t i = 0; i < all.size(); ++i) {

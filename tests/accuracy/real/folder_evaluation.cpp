@@ -51,10 +51,10 @@ FolderEvaluation evaluate_folder(const fs::path& folder, const Board& board,
   e.no_pins = load_pair(folder, "board", e.board_reference, e.board);
   if (e.no_pins.empty()) {
     try {
-      const cv::Mat1f untouched = mean_levels(e.board_reference);
+      const cv::Mat1f reference_image = mean_levels(e.board_reference);
       const cv::Mat1f frame = mean_levels(e.board);
-      PinPress pins = find_pins(untouched, frame, board);
-      e.gain = choose_gain(untouched, frame, pins.marks,
+      PinPress pins = find_pins(reference_image, frame, board);
+      e.gain = choose_gain(reference_image, frame, pins.marks,
                            calibration::kSmoothingMm / recon::central_mm_per_px(pins.lens.lens));
       e.pins = std::move(pins);
     } catch (const std::runtime_error& error) {
@@ -72,7 +72,7 @@ FolderEvaluation evaluate_folder(const fs::path& folder, const Board& board,
     }
   }
   if (!e.pins || !e.calibration) {
-    e.no_pin_depths = e.pins ? "without a ball there is no list" : "without the pins' places";
+    e.no_pin_depths = e.pins ? "without a ball there is no LUT" : "without the pins' places";
     return e;
   }
   try {
@@ -112,15 +112,15 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
         e.ball->half_mae_mm.value_or(0), e.ball->half_worst_mm.value_or(0),
         e.ball->sector_mae_mm.value_or(0)));
     lines.push_back(
-        "list: of the ball's known sphere alone (--method list), also where a calibration would be "
+        "LUT: of the ball's known sphere alone (--method LUT), also where a calibration would be "
         "refused");
-    lines.push_back(e.ball->press_gain.describe());
+    lines.push_back(e.ball->press_asymmetry.describe());
     if (std::string left_out = calibration::gain_left_out(e.gain.gain, *e.calibration);
         !left_out.empty()) {
       lines.push_back(std::move(left_out));
     }
     for (const auto& doubts : {calibration::doubts_about(*e.ball),
-                               calibration::doubts_about(e.calibration->model->list)}) {
+                               calibration::doubts_about(e.calibration->model->lut)}) {
       for (const std::string& doubt : doubts) {
         lines.push_back("ball: a calibration would be refused: " + doubt);
       }

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
 #include "daemon/recon/lens.hpp"
 
 namespace dtact::ctl {

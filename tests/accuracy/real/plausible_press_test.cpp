@@ -57,7 +57,7 @@ TEST_P(PlausiblePress, NothingIsSaidOfThemThroughTheirLens) {
   fmt::print("{}: offset {:.3f} mm, shape {:.3f} mm\n", GetParam(), e.ball->offset_mm,
              e.ball->mae_mm);
   EXPECT_THAT(calibration::doubts_about(*e.ball), IsEmpty());
-  EXPECT_THAT(calibration::doubts_about(e.calibration->model->list), IsEmpty());
+  EXPECT_THAT(calibration::doubts_about(e.calibration->model->lut), IsEmpty());
 }
 
 TEST_P(PlausiblePress, ADecimalPointOff) {
@@ -99,7 +99,7 @@ TEST(PlausibleDeepPress, AWrongScaleRadiusOrLight) {
   const auto folder = sensor_folder("sensor_a");
   if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
   const PressImages images = load_pair(*folder, "ball");
-  const auto disagree = Contains(HasSubstr("list and sphere disagree"));
+  const auto disagree = Contains(HasSubstr("LUT and sphere disagree"));
   EXPECT_THAT(doubts_of(ball_press(images, 0.0552)), disagree);
   EXPECT_THAT(doubts_of(ball_press(images, 1.05 * 0.0510)), disagree);
   EXPECT_THAT(doubts_of(ball_press(images, 0.0510, 3.5)), disagree);

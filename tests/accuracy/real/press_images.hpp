@@ -6,7 +6,7 @@
 
 namespace dtact {
 
-/// An untouched surface and an object pressed in, a board of pins or a ball: grey levels.
+/// An undeformed surface and an object pressed in, a board of pins or a ball: grey levels.
 struct PressImages {
   cv::Mat1f reference;
   cv::Mat1f frame;

@@ -30,7 +30,7 @@
     EXPECT_LE(rms(e.pins->lens.left_out), 0.06);
     EXPECT_LE(e.ball->half_mae_mm.value_or(1), 0.0095);
     EXPECT_LE(e.ball->sector_mae_mm.value_or(1), 0.0095);
-    EXPECT_EQ(e.ball->press_gain.gain.order, calibration::GainOrder::plane);
+    EXPECT_EQ(e.ball->press_asymmetry.gain.order, calibration::AsymmetryOrder::plane);
     // The goal is 0.05; README.md says what is known about the rest.
     EXPECT_LE(e.pin_depths->spread, 0.065);
     // The published scale of the rectified images; the lens varies by this much over the map.
@@ -45,7 +45,7 @@
     EXPECT_LE(rms(e.pins->lens.left_out), 0.06);
     EXPECT_LE(e.ball->half_mae_mm.value_or(1), 0.04);
     EXPECT_LE(e.ball->sector_mae_mm.value_or(1), 0.045);
-    EXPECT_EQ(e.ball->press_gain.gain.order, calibration::GainOrder::quadratic);
+    EXPECT_EQ(e.ball->press_asymmetry.gain.order, calibration::AsymmetryOrder::quadratic);
     EXPECT_LE(e.pin_depths->spread, 0.05);  // each pin left out of the gain that judges it
   }
 
@@ -104,7 +104,7 @@
 
   // What is judged is not what dtact-calibrate depth makes unless it is asked to.
   TEST(FolderEvaluation, NamesTheMethodThatItJudges) {
-    calibration::BallPress press{.reference_q8 = calibration::Ball{}.untouched_q8(),
+    calibration::BallPress press{.reference_q8 = calibration::Ball{}.reference_image_q8(),
                                  .frames = {calibration::Ball{}.frame()},
                                  .ball_radius_mm = 4,
                                  .mm_per_px = 0.005,
@@ -114,7 +114,7 @@
     e.calibration = calibration::build(press);
     e.ball = calibration::evaluate(*e.calibration, press.reference_q8.pixels, press.frames, 4);
     EXPECT_THAT(lines_of(e),
-                testing::AllOf(testing::Contains(HasSubstr("sphere alone (--method list)")),
+                testing::AllOf(testing::Contains(HasSubstr("sphere alone (--method LUT)")),
                                testing::Contains(HasSubstr("refused: a grey level is 0.3 um"))));
   }
 

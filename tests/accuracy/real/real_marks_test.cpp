@@ -1,5 +1,5 @@
-// Whether a moved camera shows in the faint marks of real layers: two references of one sensor,
-// taken apart, are still; what belongs to the layer in one of them is then moved, its stripes and
+// Whether a moved camera shows in the faint marks of real gels: two references of one sensor,
+// taken apart, are still; what belongs to the gel in one of them is then moved, its stripes and
 // noise's place in the frame are not.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -10,15 +10,15 @@
 #include <tuple>
 #include <vector>
 
-#include "daemon/pipeline/untouched/layer_marks.hpp"
+#include "daemon/pipeline/reference/gel_marks.hpp"
 #include "tests/accuracy/real/press_images.hpp"
 
 namespace dtact {
 namespace {
 
-using pipeline::LayerMarks;
+using pipeline::GelMarks;
 
-LayerMarks marks_of(const cv::Mat1f& image) {
+GelMarks marks_of(const cv::Mat1f& image) {
   std::vector<std::uint16_t> q8;
   q8.reserve(image.total());
   for (const float grey : image) q8.push_back(static_cast<std::uint16_t>(std::lround(256 * grey)));
@@ -26,18 +26,18 @@ LayerMarks marks_of(const cv::Mat1f& image) {
 }
 
 /// The fine detail goes `x` to the right and `y` down; smooth light and vertical stripes stay.
-cv::Mat1f with_layer_moved(const cv::Mat1f& image, double x, double y) {
+cv::Mat1f with_gel_moved(const cv::Mat1f& image, double x, double y) {
   cv::Mat1f smooth;
-  cv::Mat1f layer;
+  cv::Mat1f gel;
   cv::GaussianBlur(image, smooth, {}, 8);
-  cv::subtract(image, smooth, layer);
+  cv::subtract(image, smooth, gel);
   cv::Mat1f sorted;
-  cv::sort(layer, sorted, cv::SORT_EVERY_COLUMN + cv::SORT_ASCENDING);
-  const cv::Mat1f stripes = cv::repeat(sorted.row(layer.rows / 2), layer.rows, 1);
-  cv::subtract(layer, stripes, layer);
+  cv::sort(gel, sorted, cv::SORT_EVERY_COLUMN + cv::SORT_ASCENDING);
+  const cv::Mat1f stripes = cv::repeat(sorted.row(gel.rows / 2), gel.rows, 1);
+  cv::subtract(gel, stripes, gel);
   const cv::Mat1d move = (cv::Mat1d(2, 3) << 1, 0, x, 0, 1, y);
   cv::Mat1f moved;
-  cv::warpAffine(layer, moved, move, layer.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  cv::warpAffine(gel, moved, move, gel.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
   cv::add(moved, smooth, moved);
   cv::add(moved, stripes, moved);
   cv::max(moved, 0, moved);
@@ -53,17 +53,17 @@ TEST_P(RealMarks, AStillSensorsDoNotMoveAndAMovedOnesDo) {
   const auto folder = sensor_folder(sensor);
   if (!folder) GTEST_SKIP() << "the real images are not beside the repository";
   const cv::Mat1f image = load_pair(*folder, second).reference;
-  const LayerMarks then = marks_of(load_pair(*folder, first).reference);
+  const GelMarks then = marks_of(load_pair(*folder, first).reference);
   if (const auto still = then.moved_to(marks_of(image))) {
     ADD_FAILURE() << fmt::format("still, but moved by {}, {}: {:.1f}", still->x, still->y,
                                  still->strength);
   }
   // Half a pixel is what temperature does.
-  EXPECT_FALSE(then.moved_to(marks_of(with_layer_moved(image, 0.4, 0.3))));
+  EXPECT_FALSE(then.moved_to(marks_of(with_gel_moved(image, 0.4, 0.3))));
   for (const auto& [x, y] : {std::pair{2, 1}, {3, -2}, {-5, 4}, {0, 12}}) {
     const auto move =
-        then.moved_to(marks_of(with_layer_moved(image, x, y))).value_or(LayerMarks::Move{});
-    EXPECT_GT(move.strength, LayerMarks::kSure) << x << ", " << y;
+        then.moved_to(marks_of(with_gel_moved(image, x, y))).value_or(GelMarks::Move{});
+    EXPECT_GT(move.strength, GelMarks::kSure) << x << ", " << y;
     EXPECT_NEAR(move.x, x, 1.5);
     EXPECT_NEAR(move.y, y, 1.5);
     fmt::print("{}, {} first, moved by {}, {}: stands out by {:.1f}\n", sensor, first, x, y,

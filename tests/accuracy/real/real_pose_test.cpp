@@ -1,7 +1,7 @@
 // How well motion is found on what real sensors see: the darkening that a ball or a board of pins
-// makes in a real image is moved by computer over the sensor's untouched image, with a frame's
+// makes in a real image is moved by computer over the sensor's reference image, with a frame's
 // noise anew, made depth by the sensor's own calibration, and followed. What a real object's motion
-// does to the layer is not in it.
+// does to the gel is not in it.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
 #include "clients/perceive/frame_maker.hpp"
 #include "proto/dtact.pb.h"
 #include "tests/accuracy/real/ball_press.hpp"
@@ -123,7 +123,7 @@ class RealPose : public testing::TestWithParam<Sensor> {
     }
     v1::Frame frame;
     v1::Contact& contact = *frame.mutable_contact();
-    contact.set_touching(true);
+    contact.set_in_contact(true);
     contact.set_area_mm2(area);
     contact.set_x_mm(x / sum * model.mm_per_px);
     contact.set_y_mm(y / sum * model.mm_per_px);

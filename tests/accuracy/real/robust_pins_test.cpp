@@ -71,7 +71,7 @@ TEST_P(RobustPins, NamesThePinsThatAreMissing) {
   EXPECT_LE(rms(press.lens.left_out), 0.06);
 }
 
-TEST_P(RobustPins, AnUntouchedSurfaceIsNoBoard) {
+TEST_P(RobustPins, AnUndeformedSurfaceIsNoBoard) {
   // Both images of one surface; the second with the noise of another exposure.
   cv::Mat1f frame = board_.reference.clone();
   cv::RNG random(1);

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
 #include "tests/accuracy/real/folder_evaluation.hpp"
 #include "tests/accuracy/real/press_images.hpp"
@@ -115,7 +115,7 @@ Pins read_board(const std::string& name, const FolderEvaluation& e,
   Pins read;
   const auto reference = e.board_reference.mean_q8().pixels;
   const auto frames = e.board.frames();
-  for (int steps = 0; steps <= recon::kMostSharpeningSteps; ++steps) {
+  for (int steps = 0; steps <= recon::kMaxSharpeningSteps; ++steps) {
     const std::vector<float> um =
         calibration::mean_depth_um(*calibration.model, reference, frames, steps);
     read.mean.push_back(look(mean_profile(um, *e.pins, calibration)));
@@ -131,30 +131,30 @@ Pins read_board(const std::string& name, const FolderEvaluation& e,
   return read;
 }
 
-/// By the layer that was fitted to the sensor's own ball.
-Calibration by_layer(const FolderEvaluation& e) {
+/// By the gel that was fitted to the sensor's own ball.
+Calibration by_gel(const FolderEvaluation& e) {
   calibration::BallPresses presses;
   presses.reference_q8 = e.ball_reference.mean_q8();
   presses.presses = {{"ball.png", e.ball_images.frames(), {}}};
   presses.ball_radius_mm = 4;
   presses.lens = e.pins->lens.lens;
-  presses.gain_told = true;
+  presses.gain_specified = true;
   presses.mm_per_px = recon::central_mm_per_px(e.pins->lens.lens);
   const calibration::FittedCalibration made = calibration::build_model(presses, e.gain.gain);
-  const calibration::LayerModel& layer = made.fit.layer;
-  fmt::print("layer {:.2f} mm, scattering {:.2f} and {:.2f} mm, {:.2f} of it narrow\n",
-             layer.thickness_mm, layer.scattering.narrow_mm, layer.scattering.wide_mm,
-             layer.scattering.narrow_weight);
+  const calibration::GelModel& gel = made.fit.gel;
+  fmt::print("gel {:.2f} mm, scattering {:.2f} and {:.2f} mm, {:.2f} of it narrow\n",
+             gel.thickness_mm, gel.scattering.narrow_mm, gel.scattering.wide_mm,
+             gel.scattering.narrow_weight);
   return made.calibration;
 }
 
-/// With the lists and the scattering of another sensor's.
-Calibration by_layer_of(const Calibration& other, const FolderEvaluation& e) {
+/// With the LUTs and the scattering of another sensor's.
+Calibration by_gel_of(const Calibration& other, const FolderEvaluation& e) {
   const recon::Lens& lens = e.pins->lens.lens;
   Calibration made = calibration::empty_calibration(e.board_reference.mean_q8(), std::nullopt,
                                                     recon::central_mm_per_px(lens), lens);
   recon::Model model = *made.model;
-  model.list = other.model->list;
+  model.lut = other.model->lut;
   model.scattering = other.model->scattering;
   model.sharpened = other.model->sharpened;
   model.gain = calibration::gain_on_map(e.gain.gain, made);
@@ -189,7 +189,7 @@ TEST(SharpPins, SensorA) {
   const auto e = evaluated("sensor_a");
   if (!e) GTEST_SKIP() << "the real images are not beside the repository";
   ASSERT_TRUE(e->pins && e->calibration);
-  const Pins read = read_board("sensor_a", *e, by_layer(*e));
+  const Pins read = read_board("sensor_a", *e, by_gel(*e));
   expect_narrower(read, 0.005, 0.015);
   expect_steeper(read);
 }
@@ -199,17 +199,17 @@ TEST(SharpPins, SensorBIsHardlySteeper) {
   const auto e = evaluated("sensor_b");
   if (!e) GTEST_SKIP() << "the real images are not beside the repository";
   ASSERT_TRUE(e->pins && e->calibration);
-  const Pins read = read_board("sensor_b", *e, by_layer(*e));
+  const Pins read = read_board("sensor_b", *e, by_gel(*e));
   expect_narrower(read, 0.005, 0.005);
   EXPECT_GT(read.mean[2].slope, read.mean[0].slope);
 }
 
-TEST(SharpPins, SensorCByTheLayerOfSensorA) {
+TEST(SharpPins, SensorCByTheGelOfSensorA) {
   const auto a = evaluated("sensor_a");
   const auto c = evaluated("sensor_c");
   if (!a || !c) GTEST_SKIP() << "the real images are not beside the repository";
   ASSERT_TRUE(a->pins && a->calibration && c->pins);
-  const Pins read = read_board("sensor_c", *c, by_layer_of(by_layer(*a), *c));
+  const Pins read = read_board("sensor_c", *c, by_gel_of(by_gel(*a), *c));
   expect_narrower(read, 0.005, 0.015);
   expect_steeper(read);
 }

@@ -65,12 +65,12 @@ Plane smoothed(Plane in, Size size, double sigma, double cut = 3) {
   return down;
 }
 
-double look_up(const DepthList& list, double level) {
-  const double place = std::clamp(level * kEntriesPerLevel - list.first_q6, 0.0,
-                                  static_cast<double>(list.um.size()) - 1);
+double look_up(const DepthLut& lut, double level) {
+  const double place = std::clamp(level * kEntriesPerLevel - lut.first_q6, 0.0,
+                                  static_cast<double>(lut.um.size()) - 1);
   const auto low = static_cast<std::size_t>(place);
-  const std::size_t high = std::min(low + 1, list.um.size() - 1);
-  return std::lerp(list.um[low], list.um[high], place - static_cast<double>(low));
+  const std::size_t high = std::min(low + 1, lut.um.size() - 1);
+  return std::lerp(lut.um[low], lut.um[high], place - static_cast<double>(low));
 }
 
 /// x ← x + L − Hx, so often, from x = L on; H is two Gaussians, cut where nothing is left of them.
@@ -106,12 +106,12 @@ std::vector<double> reconstruct_in_double(const Model& model,
   for (std::size_t i = 0; i < level.size(); ++i) level[i] = difference[i] * then[i] / now[i];
   level = sharpened(model, level, size, steps);
   const auto of_steps = std::ranges::find(model.sharpened, steps, &Model::Sharpened::steps);
-  const DepthList& list = steps == 0 ? model.list : of_steps->list;
+  const DepthLut& lut = steps == 0 ? model.lut : of_steps->lut;
   Plane depth(difference.size());
   for (std::size_t i = 0; i < depth.size(); ++i) {
     const bool trusted = then[i] >= 8 && now[i] >= 8 && then[i] < 8 * now[i] &&
-                         level[i] * kEntriesPerLevel <= list.covered_to_q6;
-    depth[i] = trusted ? look_up(list, level[i]) : std::numeric_limits<double>::quiet_NaN();
+                         level[i] * kEntriesPerLevel <= lut.covered_to_q6;
+    depth[i] = trusted ? look_up(lut, level[i]) : std::numeric_limits<double>::quiet_NaN();
   }
   return depth;
 }

@@ -48,15 +48,15 @@ Deviation compare(const Model& model, const std::vector<std::uint16_t>& referenc
   return deviation;
 }
 
-void expect_close(const Deviation& deviation, std::size_t least_trusted, const char* what,
-                  double rms_um = 0.7, double most_um = 5) {
+void expect_close(const Deviation& deviation, std::size_t min_trusted, const char* what,
+                  double rms_um = 0.7, double max_um = 5) {
   fmt::print("{}: RMS {:.3f} um, at most {:.2f} um, {} pixels\n", what, deviation.rms,
              deviation.most, deviation.trusted);
   testing::Test::RecordProperty("rms_um", fmt::format("{:.3f}", deviation.rms));
-  testing::Test::RecordProperty("most_um", fmt::format("{:.2f}", deviation.most));
+  testing::Test::RecordProperty("max_um", fmt::format("{:.2f}", deviation.most));
   EXPECT_LE(deviation.rms, rms_um) << what;
-  EXPECT_LE(deviation.most, most_um) << what;
-  EXPECT_GE(deviation.trusted, least_trusted) << what;
+  EXPECT_LE(deviation.most, max_um) << what;
+  EXPECT_GE(deviation.trusted, min_trusted) << what;
 }
 
 /// A sensor that never was: vignetted light, a dent with a bulge around it, noise of one grey
@@ -70,25 +70,25 @@ struct Synthetic {
   explicit Synthetic(double light) {
     model.mm_per_px = 0.05;
     model.smoothing_px = 2;
-    model.list.first_q6 = -40 * 64;
+    model.lut.first_q6 = -40 * 64;
     // 32 µm a level where it is pressed, a third where it bulges: the real sensors' slopes.
     for (int q6 = -40 * 64; q6 <= 110 * 64; ++q6) {
-      model.list.um.push_back(static_cast<std::int16_t>(q6 < 0 ? q6 / 6 : q6 / 2));
+      model.lut.um.push_back(static_cast<std::int16_t>(q6 < 0 ? q6 / 6 : q6 / 2));
     }
-    model.list.covered_from_q6 = -30 * 64;
-    model.list.covered_to_q6 = 70 * 64;
+    model.lut.covered_from_q6 = -30 * 64;
+    model.lut.covered_to_q6 = 70 * 64;
     std::mt19937 random(1);
     std::normal_distribution<double> noise(0, 1);
     for (int y = 0; y < kHeight; ++y) {
       for (int x = 0; x < kWidth; ++x) {
         const double r = std::hypot(x - 90, y - 80);
-        const double untouched = 170 - 0.004 * (x * x + y * y) / 10;
+        const double undeformed = 170 - 0.004 * (x * x + y * y) / 10;
         const double change =
             60 * std::exp(-r * r / 800) - 20 * std::exp(-(r - 55) * (r - 55) / 200);
         model.reference_q8.push_back(
-            static_cast<std::uint16_t>(std::lround(256 * (untouched + 0.2 * noise(random)))));
+            static_cast<std::uint16_t>(std::lround(256 * (undeformed + 0.2 * noise(random)))));
         luma.push_back(
-            static_cast<std::uint8_t>(std::lround(light * (untouched - change) + noise(random))));
+            static_cast<std::uint8_t>(std::lround(light * (undeformed - change) + noise(random))));
       }
     }
     light_q8 = model.reference_q8;
@@ -98,11 +98,11 @@ struct Synthetic {
   std::vector<std::uint16_t> light_q8;  ///< The reference under the present light.
 };
 
-constexpr std::size_t kMost = 29000;  // of 30000 pixels
+constexpr std::size_t kMax = 29000;  // of 30000 pixels
 
 TEST(FixedPoint, SyntheticIdentity) {
   const Synthetic s(1);
-  expect_close(compare(s.model, s.light_q8, s.luma), kMost, "synthetic");
+  expect_close(compare(s.model, s.light_q8, s.luma), kMax, "synthetic");
 }
 
 TEST(FixedPoint, SyntheticBetweenPixels) {
@@ -113,27 +113,27 @@ TEST(FixedPoint, SyntheticBetweenPixels) {
     e.fx = static_cast<std::uint8_t>(weight(random));
     e.fy = static_cast<std::uint8_t>(weight(random));
   }
-  expect_close(compare(s.model, s.light_q8, s.luma), kMost, "synthetic, between pixels");
+  expect_close(compare(s.model, s.light_q8, s.luma), kMax, "synthetic, between pixels");
 }
 
 TEST(FixedPoint, SyntheticUnderHalfTheLight) {
   const Synthetic s(0.5);
-  expect_close(compare(s.model, s.light_q8, s.luma), kMost, "synthetic, half the light");
+  expect_close(compare(s.model, s.light_q8, s.luma), kMax, "synthetic, half the light");
 }
 
 TEST(FixedPoint, SyntheticWithoutSmoothing) {
   Synthetic s(1);
   s.model.smoothing_px = 0;
-  expect_close(compare(s.model, s.light_q8, s.luma), kMost, "synthetic, no smoothing");
+  expect_close(compare(s.model, s.light_q8, s.luma), kMax, "synthetic, no smoothing");
 }
 
 TEST(FixedPoint, Sharpened) {
   for (const int steps : {1, 2}) {
     Synthetic s(0.8);
-    // As many pixels as quarter resolution has of a layer of 2 mm.
+    // As many pixels as quarter resolution has of a gel of 2 mm.
     s.model.scattering = Scattering{.narrow_mm = 0.061, .wide_mm = 0.37, .narrow_weight = 0.7};
-    s.model.sharpened = {{.steps = steps, .list = s.model.list, .uncertainty = {}}};
-    expect_close(compare(s.model, s.light_q8, s.luma, steps), kMost,
+    s.model.sharpened = {{.steps = steps, .lut = s.model.lut, .uncertainty = {}}};
+    expect_close(compare(s.model, s.light_q8, s.luma, steps), kMax,
                  fmt::format("synthetic, {} steps", steps).c_str(), 1, 12);
   }
 }

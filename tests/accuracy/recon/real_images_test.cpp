@@ -86,12 +86,12 @@ TEST(RealImages, SensorAPublished) {
   if (!press) GTEST_SKIP() << "the real images are not beside the repository";
   press->method = recon::Method::published;
   const Evaluation published = judge(*press, "sensor_a_published");
-  press->method = recon::Method::list;
-  const Evaluation list = judge(*press, "sensor_a");
-  EXPECT_LT(list.mae_mm, published.mae_mm);
+  press->method = recon::Method::lut;
+  const Evaluation lut = judge(*press, "sensor_a");
+  EXPECT_LT(lut.mae_mm, published.mae_mm);
 }
 
-// The hard case: the press is off its axis and the bulge lopsided, so that no list of one variable
+// The hard case: the press is off its axis and the bulge lopsided, so that no LUT of one variable
 // fits. The bound only keeps it from getting worse unnoticed.
 TEST(RealImages, SensorBReported) {
   const std::optional<BallPress> press = real_press("sensor_b", 0.05317);

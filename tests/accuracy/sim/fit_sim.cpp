@@ -1,7 +1,7 @@
 // fit_sim DATA OUT: fits the simulator to the ball presses of the real sensors a and b. DATA holds
 // sensor_a and sensor_b; writes OUT/sim/sensor_a.toml, OUT/sim/sensor_b.toml and the plot
 // OUT/sim_profiles.svg. Twelve parameters each: nine of the press (depth, thickness, response,
-// scattering) by the radial profile, two of the light by the untouched image, one of the noise.
+// scattering) by the radial profile, two of the light by the reference image, one of the noise.
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -35,7 +35,7 @@ fps = {3:.1f}
 mm_per_px = {4:.4f}
 read_noise = {5:.3f}
 
-[layer]
+[gel]
 thickness_mm = {6:.3f}
 
 [optics]
@@ -60,7 +60,7 @@ keys = [
 ]
 )",
       sensor.name, s.camera.width, s.camera.height, s.camera.fps, s.camera.mm_per_px,
-      s.camera.read_noise, s.layer.thickness_mm, s.optics.pressed_slope, s.optics.pressed_curve,
+      s.camera.read_noise, s.gel.thickness_mm, s.optics.pressed_slope, s.optics.pressed_curve,
       s.optics.bulged_slope, s.optics.bulged_curve, s.optics.narrow_mm, s.optics.wide_mm,
       s.optics.narrow_weight, s.light.level, s.light.vignetting, kBallRadius_mm, fit.x_mm, fit.y_mm,
       fit.depth_mm);

@@ -108,14 +108,14 @@ PinProfile simulated_pins(const hal::sim::Scene& sensor, double depth_mm) {
   scene.camera.height = 480;
   scene.camera.mm_per_px = 0.05;
   scene.loop_to_s = 0;
-  scene.layer.grid_mm = 0.1;
-  scene.layer.texture = 0;
+  scene.gel.grid_mm = 0.1;
+  scene.gel.texture = 0;
   scene.presses = {{hal::sim::pin_board(), {{.time_s = 0, .depth_mm = depth_mm}}}};
   hal::sim::Renderer pressed(scene, 1);
   const auto now = pressed.render_clean(0, hal::sim::led_levels({}));
   scene.presses.clear();
-  hal::sim::Renderer untouched(scene, 1);
-  const auto before = untouched.render_clean(0, hal::sim::led_levels({}));
+  hal::sim::Renderer undeformed(scene, 1);
+  const auto before = undeformed.render_clean(0, hal::sim::led_levels({}));
   cv::Mat1d change(scene.camera.height, scene.camera.width);
   std::transform(before.begin(), before.end(), now.begin(), change.begin(),
                  [](int a, int b) { return (a - b) / 64.0; });

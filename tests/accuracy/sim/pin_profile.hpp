@@ -9,7 +9,7 @@
 namespace dtact::accuracy {
 
 /// Mean darkening on rings about the middle nine pins of a pressed board, and between them, grey
-/// levels: what the scattering of a layer shows best.
+/// levels: what the scattering of a gel shows best.
 struct PinProfile {
   static constexpr double kStep_mm = 0.1;
   /// Ring i reaches from i·kStep_mm to (i + 1)·kStep_mm; the pins are 2.5 mm apart.
@@ -26,7 +26,7 @@ struct PinProfile {
 [[nodiscard]] PinProfile simulated_pins(const hal::sim::Scene& scene, double depth_mm);
 
 /// Root mean square of the difference of rings and both places between, when `a` is first moved by
-/// `offset`: the drift between an untouched image and a press.
+/// `offset`: the drift between a reference image and a press.
 [[nodiscard]] double rms_difference(const PinProfile& a, const PinProfile& b, double offset);
 
 }  // namespace dtact::accuracy

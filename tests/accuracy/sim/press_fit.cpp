@@ -37,7 +37,7 @@ sim::Scene scene_for(const Sensor& sensor, const Image& image) {
   return scene;
 }
 
-// Level and vignetting are linear in the untouched image once the LEDs' geometry is given.
+// Level and vignetting are linear in the reference image once the LEDs' geometry is given.
 void fit_light(const Image& reference, sim::Scene& scene) {
   scene.light.level = 160;
   scene.light.vignetting = 0;
@@ -168,7 +168,7 @@ Fit fit_sensor(const Sensor& sensor, const BallPress& real) {
     const double penalty = outside(press[0], 1.4, 0.89 * press[1]) + outside(press[1], 1.8, 2.7);
     if (penalty > 0) return 100 * (1 + penalty);
     sim::Scene scene = fit.scene;
-    scene.layer.thickness_mm = press[1];
+    scene.gel.thickness_mm = press[1];
     scene.presses = {{sim::ball(kBallRadius_mm), {{0, fit.x_mm, fit.y_mm, press[0], 0}}}};
     PressedProfile profile(scene, centre, light);
     const auto cost_of_optics = [&](const std::vector<double>& p) {
@@ -185,7 +185,7 @@ Fit fit_sensor(const Sensor& sensor, const BallPress& real) {
       fit.depth_mm = press[0];
       scene.optics = to_model(optics);
       fit.scene = scene;
-      fmt::print("{}: depth {:.3f} mm, layer {:.3f} mm: {:.3f} grey levels RMS\n", sensor.name,
+      fmt::print("{}: depth {:.3f} mm, gel {:.3f} mm: {:.3f} grey levels RMS\n", sensor.name,
                  press[0], press[1], rms);
     }
     return rms;

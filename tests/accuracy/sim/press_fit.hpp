@@ -17,7 +17,7 @@ struct Fit {
 };
 
 /// Twelve parameters: depth, thickness, four of the response and three of the scattering by the
-/// radial profile; level and vignetting by the untouched image; read noise by its high-pass noise.
+/// radial profile; level and vignetting by the reference image; read noise by its high-pass noise.
 [[nodiscard]] Fit fit_sensor(const Sensor& sensor, const BallPress& real);
 
 }  // namespace dtact::accuracy

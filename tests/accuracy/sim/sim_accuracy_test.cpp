@@ -86,12 +86,12 @@ TEST(SimAccuracy, ParametersArePhysical) {
     EXPECT_LE(scene.optics.narrow_weight, 1) << sensor.name;
     EXPECT_GT(scene.optics.narrow_mm, 0) << sensor.name;
     EXPECT_LT(scene.optics.narrow_mm, scene.optics.wide_mm) << sensor.name;
-    // physics.md: layers are 1 to 3 mm thick.
-    EXPECT_GE(scene.layer.thickness_mm, 1) << sensor.name;
-    EXPECT_LE(scene.layer.thickness_mm, 3) << sensor.name;
+    // physics.md: gels are 1 to 3 mm thick.
+    EXPECT_GE(scene.gel.thickness_mm, 1) << sensor.name;
+    EXPECT_LE(scene.gel.thickness_mm, 3) << sensor.name;
     double last = -1;
-    const int deepest_um = static_cast<int>(900 * scene.layer.thickness_mm);
-    for (int um = -static_cast<int>(200 * scene.layer.thickness_mm); um < deepest_um; um += 10) {
+    const int deepest_um = static_cast<int>(900 * scene.gel.thickness_mm);
+    for (int um = -static_cast<int>(200 * scene.gel.thickness_mm); um < deepest_um; um += 10) {
       const double d = um / 1000.0;
       const double now = sim::response(scene.optics, d);
       ASSERT_GT(now, last) << sensor.name << " at " << d << " mm";

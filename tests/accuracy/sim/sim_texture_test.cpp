@@ -1,4 +1,4 @@
-// The faint texture of the simulated layer against that of sensor_a: what two references of one
+// The faint texture of the simulated gel against that of sensor_a: what two references of one
 // sensor, taken apart, have in common at three widths.
 #include <fmt/format.h>
 #include <gtest/gtest.h>

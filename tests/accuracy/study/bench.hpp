@@ -16,7 +16,7 @@ inline constexpr double kMmPerPx = 1 / 89.0;
 inline constexpr int kWidth = 705;  // the study looks at 700 × 700 pixels about two pillars
 inline constexpr int kHeight = 705;
 
-/// How much darker a frame is than the untouched reference: whole grey levels, where it is brighter
+/// How much darker a frame is than the reference: whole grey levels, where it is brighter
 /// 0, as the study's programs take it.
 struct Darkening {
   int width = 0;
@@ -31,13 +31,13 @@ struct Darkening {
 /// what a zero from a line through forces finds, as long as all of it touches.
 [[nodiscard]] double lowest_of_askew(const hal::sim::Object& object, double degrees);
 
-/// One object pressed into a layer at the image's centre, to one depth after another. `sensor`:
-/// what the layer is; the camera is the study's.
+/// One object pressed into a gel at the image's centre, to one depth after another. `sensor`:
+/// what the gel is; the camera is the study's.
 struct Ladder {
   hal::sim::Object object;
   std::vector<double> depths_mm;  ///< Ascending.
   double deeper_mm = 0;           ///< It is pressed deeper than depths_mm says by as much.
-  /// All of it touches at any depth, so that the layer answers in proportion and one depth is
+  /// All of it touches at any depth, so that the gel answers in proportion and one depth is
   /// solved: an upright flat face.
   bool proportional = false;
 };

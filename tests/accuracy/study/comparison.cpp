@@ -44,30 +44,30 @@ void Comparison::add(const std::string& what, const std::string& study, int digi
   rows_.push_back(std::move(row));
 }
 
-void Comparison::by_layer(const std::string& what, std::span<const figures::Range> study,
-                          int digits, const std::function<Value(const Result&)>& value,
-                          const std::string& remark) {
+void Comparison::by_gel(const std::string& what, std::span<const figures::Range> study, int digits,
+                        const std::function<Value(const Result&)>& value,
+                        const std::string& remark) {
   for (std::size_t i = 0; i < study.size(); ++i) {
-    const double layer = figures::kLayers_mm[i];
+    const double gel = figures::kGelThicknesses_mm[i];
     add(
-        fmt::format("{}, layer of {} mm", what, layer),
+        fmt::format("{}, gel of {} mm", what, gel),
         fmt::format("{:.{}f} ({:.{}f} … {:.{}f})", study[i].median, digits, study[i].least, digits,
                     study[i].greatest, digits),
         digits,
         [&](const std::string& law) {
-          const Result* const result = find(law, layer);
+          const Result* const result = find(law, gel);
           return result == nullptr ? std::nullopt : value(*result);
         },
         [&](Value v) { return within(v, study[i]); }, remark);
   }
 }
 
-Value Comparison::over_layers(const std::string& law,
-                              const std::function<Value(const Result&)>& value) const {
+Value Comparison::over_gels(const std::string& law,
+                            const std::function<Value(const Result&)>& value) const {
   double sum = 0;
   int count = 0;
-  for (const double layer : figures::kLayers_mm) {
-    const Result* const result = find(law, layer);
+  for (const double gel : figures::kGelThicknesses_mm) {
+    const Result* const result = find(law, gel);
     const Value v = result == nullptr ? std::nullopt : value(*result);
     if (!v) continue;
     sum += *v;

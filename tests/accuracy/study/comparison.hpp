@@ -20,7 +20,7 @@ using Value = std::optional<double>;
 [[nodiscard]] bool within(Value value, const figures::Spread& spread);
 
 /// Rows as they are made, by whoever knows a subject of the study: it knows which results belong to
-/// which law and layer. `results` must outlive it.
+/// which law and gel. `results` must outlive it.
 class Comparison {
  public:
   explicit Comparison(const std::vector<Result>& results);
@@ -29,18 +29,18 @@ class Comparison {
   [[nodiscard]] const std::vector<std::string>& laws() const noexcept { return laws_; }
   /// Null where there is none.
   [[nodiscard]] const Result* find(const std::string& law, double thickness_mm) const;
-  /// Mean over the layers.
-  [[nodiscard]] Value over_layers(const std::string& law,
-                                  const std::function<Value(const Result&)>& value) const;
+  /// Mean over the gels.
+  [[nodiscard]] Value over_gels(const std::string& law,
+                                const std::function<Value(const Result&)>& value) const;
 
   void add(Row row) { rows_.push_back(std::move(row)); }
   /// A row whose figure is `value` of a law.
   void add(const std::string& what, const std::string& study, int digits,
            const std::function<Value(const std::string&)>& value,
            const std::function<bool(Value)>& agrees, const std::string& remark);
-  /// One row a layer.
-  void by_layer(const std::string& what, std::span<const figures::Range> study, int digits,
-                const std::function<Value(const Result&)>& value, const std::string& remark);
+  /// One row a gel.
+  void by_gel(const std::string& what, std::span<const figures::Range> study, int digits,
+              const std::function<Value(const Result&)>& value, const std::string& remark);
 
   [[nodiscard]] std::vector<Row> take() { return std::move(rows_); }
 

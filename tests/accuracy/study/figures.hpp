@@ -2,12 +2,12 @@
 
 #include <array>
 
-/// What the study reports of 17 real sensors with layers of 1, 2 and 3 mm: the public repository
+/// What the study reports of 17 real sensors with gels of 1, 2 and 3 mm: the public repository
 /// hqhan03/VBTS_test, docs/shape_reconstruction.md, docs/spatial_resolution.md and result/, figures
 /// only. Nothing in the simulator or in a method is tuned on them.
 namespace dtact::study::figures {
 
-inline constexpr std::array<double, 3> kLayers_mm = {1, 2, 3};
+inline constexpr std::array<double, 3> kGelThicknesses_mm = {1, 2, 3};
 
 /// Median, least and greatest of the units.
 struct Range {
@@ -16,7 +16,7 @@ struct Range {
   double greatest = 0;
 };
 
-/// By layer. Widths and sides: units with a scale of their own, error against 4.00 mm at 0.4 mm and
+/// By gel. Widths and sides: units with a scale of their own, error against 4.00 mm at 0.4 mm and
 /// deeper.
 inline constexpr std::array<Range, 3> kUmPerLevel = {{{53.5, 40, 64}, {38, 31, 46}, {55, 40, 64}}};
 inline constexpr std::array<Range, 3> kCylinderWidth_mm = {
@@ -41,9 +41,9 @@ inline constexpr Range kBiasUncorrected_mm = {-0.107, -0.170, -0.045};
 /// How deep below the surface F ∝ d^1.5 puts a ball's first touch.
 inline constexpr Spread kBallZero_mm = {0.155, 0.029};
 
-/// Of the spacings 1.25, 1.5, 1.75 and 2 mm, how many a unit resolves, by layer: mean over units.
+/// Of the spacings 1.25, 1.5, 1.75 and 2 mm, how many a unit resolves, by gel: mean over units.
 inline constexpr std::array<Range, 3> kResolvedOfFour = {{{1.83, 0, 3}, {3.0, 2, 4}, {0.67, 0, 2}}};
-/// The weaker peak over the stronger, by layer: median over a unit's presses; how far the study's
+/// The weaker peak over the stronger, by gel: median over a unit's presses; how far the study's
 /// pillars lean.
 inline constexpr std::array<Range, 3> kSymmetry = {
     {{0.73, 0.53, 0.84}, {0.89, 0.74, 0.91}, {0.64, 0.57, 0.74}}};
@@ -63,12 +63,12 @@ struct DipByDepth {
 inline constexpr std::array<DipByDepth, 4> kNearestDips = {
     {{0.1, 0.391, 2.99}, {0.2, 0.178, 4.44}, {0.3, 0.121, 7.96}, {0.6, 0.044, 16.0}}};
 /// On 3 × 3 pixels averaged, where noise no longer makes dips, of units whose weaker peak counts:
-/// result/extra/data/resolution_sweep_9DTact_pair*.csv at 640 pixels. One to three units a layer:
+/// result/extra/data/resolution_sweep_9DTact_pair*.csv at 640 pixels. One to three units a gel:
 /// at least 0.05 either way, which one reading of a dip scatters by.
 struct AveragedDips {
   double spacing_mm = 0;
   double depth_mm = 0;
-  std::array<Range, 3> by_layer;
+  std::array<Range, 3> by_gel;
 };
 inline constexpr std::array<AveragedDips, 2> kAveragedDips = {
     {{2.0, 0.3, {{{0.56, 0.51, 0.59}, {0.49, 0.44, 0.54}, {0.34, 0.29, 0.39}}}},

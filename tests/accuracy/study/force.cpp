@@ -5,18 +5,18 @@
 #include <cstddef>
 #include <opencv2/core.hpp>
 
-#include "hal/sim/layer.hpp"
+#include "hal/sim/elastic_layer.hpp"
 
 namespace dtact::study {
 
-std::vector<double> force_over_modulus(const hal::sim::LayerModel& layer,
+std::vector<double> force_over_modulus(const hal::sim::GelModel& gel,
                                        const hal::sim::Object& object,
                                        std::span<const double> depths_mm) {
   constexpr double kSpacing_mm = 0.1;
   constexpr double kMargin = 4;  // thicknesses on either side: there the bulge is a thousandth
   const int side = cv::getOptimalDFTSize(static_cast<int>(
-      std::ceil(2 * (object.reach_mm + kMargin * layer.thickness_mm) / kSpacing_mm)));
-  const hal::sim::Layer solver(side, side, kSpacing_mm, layer.thickness_mm, layer.poisson);
+      std::ceil(2 * (object.reach_mm + kMargin * gel.thickness_mm) / kSpacing_mm)));
+  const hal::sim::ElasticLayer solver(side, side, kSpacing_mm, gel.thickness_mm, gel.poisson);
   std::vector<double> forces;
   cv::Mat1d pressure;
   const int middle = side / 2;

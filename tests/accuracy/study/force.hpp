@@ -9,7 +9,7 @@
 namespace dtact::study {
 
 /// The force that holds an object at each depth, over Young's modulus: N / MPa = mm².
-[[nodiscard]] std::vector<double> force_over_modulus(const hal::sim::LayerModel& layer,
+[[nodiscard]] std::vector<double> force_over_modulus(const hal::sim::GelModel& gel,
                                                      const hal::sim::Object& object,
                                                      std::span<const double> depths_mm);
 

@@ -22,12 +22,12 @@ Value dip(const Result& result, double spacing_mm, double tilt_deg, double depth
   return std::nullopt;
 }
 
-/// Median over layers and the depths 0.1, 0.2 and 0.3 mm.
+/// Median over gels and the depths 0.1, 0.2 and 0.3 mm.
 Value shallow_dip(const Comparison& comparison, const std::string& law, double spacing_mm,
                   double tilt_deg) {
   std::vector<double> dips;
-  for (const double layer : figures::kLayers_mm) {
-    const Result* const r = comparison.find(law, layer);
+  for (const double gel : figures::kGelThicknesses_mm) {
+    const Result* const r = comparison.find(law, gel);
     for (const double depth : {0.1, 0.2, 0.3}) {
       if (r == nullptr) continue;
       const Value v =
@@ -44,10 +44,10 @@ std::string leaning(double tilt_deg) {
 
 constexpr const char* kUprightRemark =
     "Upright pillars stay apart too well. The study's own lean (see the weaker peak over the "
-    "stronger), and the rows for 1 and 2 degrees lie on either side of it. On a bonded layer of "
+    "stronger), and the rows for 1 and 2 degrees lie on either side of it. On a bonded gel of "
     "1 "
-    "mm the ground between them also bulges until it is brighter than the untouched image, which "
-    "the study's layers do not: see Young's modulus.";
+    "mm the ground between them also bulges until it is brighter than the reference image, which "
+    "the study's gels do not: see Young's modulus.";
 constexpr const char* kLeaningRemark =
     "By the weaker peak over the stronger, units of 2 mm lean by about 1 degree, the others by 2 "
     "and more; and they scatter farther than sensor_a.";
@@ -59,7 +59,7 @@ constexpr const char* kSymmetryRemark =
 
 void add_pillars(Comparison& comparison) {
   for (const double tilt : {1.0, 2.0}) {
-    comparison.by_layer(
+    comparison.by_gel(
         fmt::format("pillars {}: weaker peak over stronger", leaning(tilt)), figures::kSymmetry, 2,
         [&](const Result& r) {
           std::vector<double> ratios;
@@ -71,7 +71,7 @@ void add_pillars(Comparison& comparison) {
         kSymmetryRemark);
   }
   for (const double tilt : {0.0, 1.0, 2.0}) {
-    comparison.by_layer(
+    comparison.by_gel(
         fmt::format("pillars {}: spacings resolved of four", leaning(tilt)),
         figures::kResolvedOfFour, 1,
         [&](const Result& r) -> Value {
@@ -103,7 +103,7 @@ void add_pillars(Comparison& comparison) {
       };
     };
     comparison.add(
-        fmt::format("pillars 1.10 mm apart, {} mm deep, layer of 2 mm: dip", study.depth_mm),
+        fmt::format("pillars 1.10 mm apart, {} mm deep, gel of 2 mm: dip", study.depth_mm),
         fmt::format("{:.2f}", study.dip), 2,
         on_2mm([](const PillarPress& p) { return p.seen.dip; }),
         [&](Value v) { return v && std::abs(*v - study.dip) <= 0.1; },
@@ -116,10 +116,10 @@ void add_pillars(Comparison& comparison) {
         "More than a quarter off: units differ by two in grey levels a millimetre.");
   }
   for (const auto& study : figures::kAveragedDips) {
-    comparison.by_layer(
+    comparison.by_gel(
         fmt::format("upright pillars {:.2f} mm apart, {} mm deep, noise averaged away: dip",
                     study.spacing_mm, study.depth_mm),
-        study.by_layer, 2,
+        study.by_gel, 2,
         [&](const Result& r) {
           const Value peak = dip(r, study.spacing_mm, 0, study.depth_mm, [](const PillarPress& p) {
             return p.averaged.value_or(Pillars{}).peak;
@@ -131,7 +131,7 @@ void add_pillars(Comparison& comparison) {
         "Neither lean nor noise does that where the peaks are high: these units scatter farther "
         "than sensor_a, whose light the built-in simulator has. On 1 mm see Young's modulus, "
         "too: "
-        "a layer that is squeezed less bulges less between the pillars.");
+        "a gel that is squeezed less bulges less between the pillars.");
   }
 }
 

@@ -125,10 +125,10 @@ std::vector<Bin> profile_along_axis(const Darkening& image) {
 
 }  // namespace
 
-StudyList make_list(std::span<const KnownPress> presses, double ball_radius_mm) {
+StudyLut make_lut(std::span<const KnownPress> presses, double ball_radius_mm) {
   std::array<double, 256> sums{};
   std::array<double, 256> counts{};
-  StudyList list;
+  StudyLut lut;
   const double r2 = ball_radius_mm * ball_radius_mm;
   for (const KnownPress& press : presses) {
     const double edge = ball_radius_mm - press.depth_mm;  // √(R² − (2Rd − d²))
@@ -145,7 +145,7 @@ StudyList make_list(std::span<const KnownPress> presses, double ball_radius_mm) 
     const auto percentile =
         inside.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(inside.size() - 1));
     std::ranges::nth_element(inside, percentile);
-    list.deepest_level = std::max(list.deepest_level, *percentile);
+    lut.deepest_level = std::max(lut.deepest_level, *percentile);
   }
   std::size_t top = 0;
   for (std::size_t level = 0; level < counts.size(); ++level) {
@@ -156,29 +156,29 @@ StudyList make_list(std::span<const KnownPress> presses, double ball_radius_mm) 
   }
   for (std::size_t level = 0; level <= top; ++level) {
     if (counts[level] > 0) {
-      list.depth_mm.push_back(sums[level] / counts[level]);
+      lut.depth_mm.push_back(sums[level] / counts[level]);
       continue;
     }
     std::size_t next = level;
     while (counts[next] == 0) ++next;
     const double after = sums[next] / counts[next];
-    const double before = list.depth_mm.empty() ? after : list.depth_mm.back();
-    list.depth_mm.push_back(std::lerp(before, after, 1.0 / static_cast<double>(next - level + 1)));
+    const double before = lut.depth_mm.empty() ? after : lut.depth_mm.back();
+    lut.depth_mm.push_back(std::lerp(before, after, 1.0 / static_cast<double>(next - level + 1)));
   }
-  return list;
+  return lut;
 }
 
-FlatReading read_flat(const Darkening& image, const StudyList& list) {
+FlatReading read_flat(const Darkening& image, const StudyLut& lut) {
   cv::Mat1f levels(image.height, image.width);
   std::ranges::copy(image.levels, levels.begin());
   const cv::Size kernel(kKernel, kKernel);
   cv::GaussianBlur(levels, levels, kernel, 0);
-  const int top = static_cast<int>(list.depth_mm.size()) - 1;
+  const int top = static_cast<int>(lut.depth_mm.size()) - 1;
   constexpr float kHair = 1e-3F;  // the blur of an even 20 is 19.9999
   cv::Mat1f depth(levels.size());
   std::transform(levels.begin(), levels.end(), depth.begin(), [&](float level) {
     const auto at = static_cast<std::size_t>(std::clamp(static_cast<int>(level + kHair), 0, top));
-    return static_cast<float>(list.depth_mm[at] - list.depth_mm[kThresholdLevel]);
+    return static_cast<float>(lut.depth_mm[at] - lut.depth_mm[kThresholdLevel]);
   });
   cv::GaussianBlur(depth, depth, kernel, 0);
   cv::GaussianBlur(depth, depth, kernel, 0);

@@ -15,24 +15,24 @@ struct KnownPress {
   double depth_mm = 0;
 };
 
-/// The published list as the study makes it: the mean height above the edge of a geometric contact
+/// The published LUT as the study makes it: the mean height above the edge of a geometric contact
 /// circle of radius √(2Rd − d²), for each whole grey level, over all presses.
-struct StudyList {
+struct StudyLut {
   std::vector<double> depth_mm;  ///< By grey level.
   int deepest_level = 0;         ///< 99th percentile within the contact of the darkest press.
 };
 /// Throws std::runtime_error when the presses show fewer than four grey levels.
-[[nodiscard]] StudyList make_list(std::span<const KnownPress> presses, double ball_radius_mm);
+[[nodiscard]] StudyLut make_lut(std::span<const KnownPress> presses, double ball_radius_mm);
 
-/// A depth map read by the list and what a flat object's is judged by.
+/// A depth map read by the LUT and what a flat object's is judged by.
 struct FlatReading {
   double depth_mm = 0;     ///< Median within 1 mm of the centre.
   double diameter_mm = 0;  ///< Of a circle as large as what is at least half as deep.
   double side_mm = 0;      ///< Mean of that patch's width and height.
 };
-/// The published reading: levels smoothed (Gaussian, 7 × 7), the list less its entry at 2 grey
+/// The published reading: levels smoothed (Gaussian, 7 × 7), the LUT less its entry at 2 grey
 /// levels, smoothed twice more.
-[[nodiscard]] FlatReading read_flat(const Darkening& image, const StudyList& list);
+[[nodiscard]] FlatReading read_flat(const Darkening& image, const StudyLut& lut);
 
 /// Two pillars, `spacing_mm` between their centres.
 struct Pillars {

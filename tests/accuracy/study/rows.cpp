@@ -19,31 +19,33 @@ namespace {
 using figures::Spread;
 
 /// Linear between rungs.
-double between(std::span<const Rung> rungs, double depth_mm,
+double between(std::span<const Rung> resolutions, double depth_mm,
                const std::function<double(const Rung&)>& value) {
   std::size_t i = 1;
-  while (i + 1 < rungs.size() && rungs[i].depth_mm < depth_mm) ++i;
-  const Rung& a = rungs[i - 1];
-  const Rung& b = rungs[i];
+  while (i + 1 < resolutions.size() && resolutions[i].depth_mm < depth_mm) ++i;
+  const Rung& a = resolutions[i - 1];
+  const Rung& b = resolutions[i];
   return std::lerp(value(a), value(b), (depth_mm - a.depth_mm) / (b.depth_mm - a.depth_mm));
 }
 
 Value deep_mean(const Result& result, const std::function<double(const Rung&)>& value) {
   double sum = 0;
   int count = 0;
-  for (const Rung& rung : result.rungs) {
-    if (rung.depth_mm < 0.35) continue;  // where the study judges sizes
-    sum += value(rung);
+  for (const Rung& resolution_index : result.resolutions) {
+    if (resolution_index.depth_mm < 0.35) continue;  // where the study judges sizes
+    sum += value(resolution_index);
     ++count;
   }
   return count > 0 ? Value(sum / count) : std::nullopt;
 }
 
 void add_shapes(Comparison& comparison) {
-  comparison.by_layer(
+  comparison.by_gel(
       "micrometres a grey level", figures::kUmPerLevel, 0,
-      [](const Result& r) { return r.rungs.empty() ? std::nullopt : Value(1000 * r.mm_per_level); },
-      "The simulator's block does not give way, so that a press takes twice the share of a layer "
+      [](const Result& r) {
+        return r.resolutions.empty() ? std::nullopt : Value(1000 * r.mm_per_level);
+      },
+      "The simulator's block does not yield, so that a press takes twice the share of a gel "
       "of "
       "1 mm. The study's units of 1 mm darken like those of 3 mm, and are as soft under a flat "
       "face "
@@ -51,17 +53,18 @@ void add_shapes(Comparison& comparison) {
   for (std::size_t i = 0; i < figures::kBias_mm.size(); ++i) {
     const Spread& study = figures::kBias_mm[i];
     comparison.add(
-        fmt::format("flat cylinder at {} mm by the published list, less its depth, mm",
+        fmt::format("flat cylinder at {} mm by the published LUT, less its depth, mm",
                     kDepths_mm[i]),
         fmt::format("{:+.3f} ± {:.3f}", study.median, study.sd), 3,
         [&](const std::string& law) {
-          return comparison.over_layers(law, [&](const Result& r) {
-            return r.rungs.empty() ? std::nullopt
-                                   : Value(r.rungs[i].cylinder.depth_mm - r.rungs[i].depth_mm);
+          return comparison.over_gels(law, [&](const Result& r) {
+            return r.resolutions.empty()
+                       ? std::nullopt
+                       : Value(r.resolutions[i].cylinder.depth_mm - r.resolutions[i].depth_mm);
           });
         },
         [&](Value v) { return within(v, study); },
-        "The list of a ball reads a flat face by the light that reaches its middle from beyond "
+        "The LUT of a ball reads a flat face by the light that reaches its middle from beyond "
         "the contact: with the depth the simulator's bias moves more than the study's.");
   }
   comparison.add(
@@ -70,50 +73,53 @@ void add_shapes(Comparison& comparison) {
                   figures::kBiasUncorrected_mm.least, figures::kBiasUncorrected_mm.greatest),
       3,
       [&](const std::string& law) {
-        return comparison.over_layers(law, [&](const Result& r) -> Value {
-          if (r.rungs.empty()) return std::nullopt;
+        return comparison.over_gels(law, [&](const Result& r) -> Value {
+          if (r.resolutions.empty()) return std::nullopt;
           double sum = 0;
-          for (const Rung& rung : r.rungs) {
-            sum += rung.cylinder_uncorrected.depth_mm - rung.depth_mm;
+          for (const Rung& resolution_index : r.resolutions) {
+            sum += resolution_index.cylinder_uncorrected.depth_mm - resolution_index.depth_mm;
           }
-          return sum / static_cast<double>(r.rungs.size());
+          return sum / static_cast<double>(r.resolutions.size());
         });
       },
       [](Value v) { return within(v, figures::kBiasUncorrected_mm); },
-      "A list whose presses are each called 0.155 mm too shallow loses more in the simulator.");
-  comparison.by_layer(
+      "A LUT whose presses are each called 0.155 mm too shallow loses more in the simulator.");
+  comparison.by_gel(
       "width of the flat cylinder at half depth, less 4.00 mm", figures::kCylinderWidth_mm, 2,
       [](const Result& r) {
-        return deep_mean(r, [](const Rung& rung) { return rung.cylinder.diameter_mm - 4; });
+        return deep_mean(r, [](const Rung& resolution_index) {
+          return resolution_index.cylinder.diameter_mm - 4;
+        });
       },
-      "The wide scattering of a thick layer smears edges evenly: half of the depth stays where "
+      "The wide scattering of a thick gel smears edges evenly: half of the depth stays where "
       "the edge is. The study's units of 3 mm, whose scale it trusts least, read the dent "
       "wider.");
-  comparison.by_layer(
+  comparison.by_gel(
       "side of the cube at half depth, less 4.00 mm", figures::kCubeSide_mm, 2,
       [](const Result& r) {
-        return deep_mean(r, [](const Rung& rung) { return rung.cube.side_mm - 4; });
+        return deep_mean(
+            r, [](const Rung& resolution_index) { return resolution_index.cube.side_mm - 4; });
       },
       "The study's cube reads half a millimetre wider than its cylinder of the same width on the "
       "same units; here both are as wide as they are. It fits a rectangle about the dent's "
       "outline, which leans as the probe does.");
-  for (const double layer : figures::kLayers_mm) {
-    const Result* const result = comparison.find(comparison.laws().front(), layer);
-    if (result == nullptr || result->rungs.empty()) continue;
+  for (const double gel : figures::kGelThicknesses_mm) {
+    const Result* const result = comparison.find(comparison.laws().front(), gel);
+    if (result == nullptr || result->resolutions.empty()) continue;
     const auto& study = figures::kBallZero_mm;
     comparison.add(
-        fmt::format("where F ∝ d^1.5 puts a ball's zero, mm too deep, layer of {} mm", layer),
+        fmt::format("where F ∝ d^1.5 puts a ball's zero, mm too deep, gel of {} mm", gel),
         fmt::format("{:.3f} ± {:.3f}", study.median, study.sd), 3,
         [&](const std::string& law) -> Value {
           if (law != comparison.laws().front()) return std::nullopt;
           const std::vector<double> depths = {0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45};
           return hertz_zero_mm(
-              depths, force_over_modulus({.thickness_mm = layer}, hal::sim::ball(2), depths));
+              depths, force_over_modulus({.thickness_mm = gel}, hal::sim::ball(2), depths));
         },
         [&](Value v) { return within(v, study); },
-        "A bonded layer answers a ball more steeply than a half-space, which by itself puts the "
-        "zero too deep by this much. The rest is not the layer's: the study's own forces grow "
-        "with the power 1.25 to 1.6 of the depth, below what a linear bonded layer can show.");
+        "A bonded gel answers a ball more steeply than a half-space, which by itself puts the "
+        "zero too deep by this much. The rest is not the gel's: the study's own forces grow "
+        "with the power 1.25 to 1.6 of the depth, below what a linear bonded gel can show.");
   }
 }
 
@@ -138,7 +144,7 @@ void add_forces(Comparison& comparison) {
             "one value", std::vector<std::string>(comparison.laws().size(), "–"),
             greatest <= 1.25 * least,
             study.ball ? "The force of a real ball grows more slowly with the depth than a linear "
-                         "bonded layer's; a zero that is less than 0.155 mm off on this unit, or "
+                         "bonded gel's; a zero that is less than 0.155 mm off on this unit, or "
                          "a block that gives way, would do that."
                        : "The force of a flat face is linear in depth here by construction."};
     row.simulated.front() = fmt::format("{:.3f} … {:.3f}", least, greatest);
@@ -152,9 +158,10 @@ void add_patch(Comparison& comparison, const std::string& what,
     const auto value = [&](double Patch::* member) {
       return [&comparison, &point, which, member](const std::string& law) -> Value {
         const Result* const r = comparison.find(law, 2);
-        if (r == nullptr || r->rungs.empty()) return std::nullopt;
-        return between(r->rungs, point.depth_mm,
-                       [&](const Rung& rung) { return rung.*which.*member; });
+        if (r == nullptr || r->resolutions.empty()) return std::nullopt;
+        return between(r->resolutions, point.depth_mm, [&](const Rung& resolution_index) {
+          return resolution_index.*which.*member;
+        });
       };
     };
     comparison.add(

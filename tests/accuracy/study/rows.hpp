@@ -17,7 +17,7 @@ struct Row {
   std::string remark;                  ///< Why it does not, as far as it is known.
 };
 
-/// `results`: of the layers of 1, 2 and 3 mm, each with the same laws; at least one.
+/// `results`: of the gels of 1, 2 and 3 mm, each with the same laws; at least one.
 [[nodiscard]] std::vector<Row> compare(const std::vector<Result>& results);
 
 /// One table; remarks only where a row disagrees.

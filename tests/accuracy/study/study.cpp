@@ -20,12 +20,12 @@ constexpr double kBallRadius_mm = 2;
 constexpr double kPillarRadius_mm = 0.5;
 constexpr int kShrink = 3;  // the study's 640 of 1920 pixels
 
-/// Presses by layer: what is solved once serves all optics.
+/// Presses by gel: what is solved once serves all optics.
 class Presses {
  public:
   std::vector<Darkening> photographed(const hal::sim::Scene& sensor, const std::string& what,
                                       const Ladder& ladder, int shrink = 1) {
-    auto& truth = solved_[{sensor.layer.thickness_mm, sensor.layer.poisson, what}];
+    auto& truth = solved_[{sensor.gel.thickness_mm, sensor.gel.poisson, what}];
     if (!truth) truth = press(sensor, ladder);
     return photograph(truth, sensor, ladder.depths_mm, shrink);
   }
@@ -34,12 +34,12 @@ class Presses {
   std::map<std::tuple<double, double, std::string>, std::shared_ptr<const hal::sim::Truth>> solved_;
 };
 
-StudyList list_of(const std::vector<Darkening>& balls, double zero_mm) {
+StudyLut list_of(const std::vector<Darkening>& balls, double zero_mm) {
   std::vector<KnownPress> presses;
   for (std::size_t i = 0; i < balls.size(); ++i) {
     presses.push_back({&balls[i], kDepths_mm[i] + zero_mm});
   }
-  return make_list(presses, kBallRadius_mm);
+  return make_lut(presses, kBallRadius_mm);
 }
 
 void measure_shapes(const Specimen& specimen, Presses& presses, Result& result) {
@@ -54,16 +54,16 @@ void measure_shapes(const Specimen& specimen, Presses& presses, Result& result) 
   // Where noise speckles what is hardly darker than the threshold, the radius would be the noise's.
   const auto smooth_balls = presses.photographed(sensor, "ball", ball, kShrink);
   const auto smooth_cylinders = presses.photographed(sensor, "cylinder", cylinder, kShrink);
-  const StudyList list = list_of(balls, kBallZero_mm);
-  const StudyList uncorrected = list_of(balls, 0);
-  result.mm_per_level = (kDepths_mm.back() + kBallZero_mm) / list.deepest_level;
+  const StudyLut lut = list_of(balls, kBallZero_mm);
+  const StudyLut uncorrected = list_of(balls, 0);
+  result.mm_per_level = (kDepths_mm.back() + kBallZero_mm) / lut.deepest_level;
   for (std::size_t i = 0; i < kDepths_mm.size(); ++i) {
-    result.rungs.push_back({.depth_mm = kDepths_mm[i],
-                            .cylinder = read_flat(cylinders[i], list),
-                            .cylinder_uncorrected = read_flat(cylinders[i], uncorrected),
-                            .cube = read_flat(cubes[i], list),
-                            .ball_patch = patch_above(smooth_balls[i], kThreshold),
-                            .cylinder_patch = patch_above(smooth_cylinders[i], kThreshold)});
+    result.resolutions.push_back({.depth_mm = kDepths_mm[i],
+                                  .cylinder = read_flat(cylinders[i], lut),
+                                  .cylinder_uncorrected = read_flat(cylinders[i], uncorrected),
+                                  .cube = read_flat(cubes[i], lut),
+                                  .ball_patch = patch_above(smooth_balls[i], kThreshold),
+                                  .cylinder_patch = patch_above(smooth_cylinders[i], kThreshold)});
   }
 }
 
@@ -108,8 +108,8 @@ std::vector<Specimen> specimens(double thickness_mm) {
   kept.optics.narrow_mm = built_in.narrow_mm;
   kept.optics.wide_mm = built_in.wide_mm;
   const auto scaled_to = [&](hal::sim::Scene sensor) {
-    const double scale = thickness_mm / sensor.layer.thickness_mm;
-    sensor.layer.thickness_mm = thickness_mm;
+    const double scale = thickness_mm / sensor.gel.thickness_mm;
+    sensor.gel.thickness_mm = thickness_mm;
     sensor.optics.narrow_mm *= scale;
     sensor.optics.wide_mm *= scale;
     return sensor;
@@ -138,8 +138,8 @@ std::vector<Result> measure(const std::vector<Specimen>& specimens, const Protoc
   std::vector<Result> results;
   for (const Specimen& specimen : specimens) {
     Result result{.law = specimen.law,
-                  .thickness_mm = specimen.sensor.layer.thickness_mm,
-                  .rungs = {},
+                  .thickness_mm = specimen.sensor.gel.thickness_mm,
+                  .resolutions = {},
                   .pillars = {}};
     if (protocol.shapes) measure_shapes(specimen, presses, result);
     measure_upright(specimen, protocol, presses, result);
@@ -158,18 +158,19 @@ std::string to_csv(const std::vector<Result>& results) {
       fmt::format_to(to, "{},{},{},{},{},{:.4f}\n", r.thickness_mm, r.law, object, where, what,
                      value);
     };
-    if (!r.rungs.empty()) row("ball", ",,", "mm a grey level", r.mm_per_level);
-    for (const Rung& rung : r.rungs) {
-      const std::string where = fmt::format(",,{}", rung.depth_mm);
-      row("cylinder", where, "depth (mm)", rung.cylinder.depth_mm);
-      row("cylinder", where, "depth by the uncorrected list (mm)",
-          rung.cylinder_uncorrected.depth_mm);
-      row("cylinder", where, "width at half depth (mm)", rung.cylinder.diameter_mm);
-      row("cube", where, "side at half depth (mm)", rung.cube.side_mm);
-      row("cylinder", where, "radius above 5 levels (mm)", rung.cylinder_patch.radius_mm);
-      row("cylinder", where, "mean above 5 levels", rung.cylinder_patch.mean);
-      row("ball", where, "radius above 5 levels (mm)", rung.ball_patch.radius_mm);
-      row("ball", where, "mean above 5 levels", rung.ball_patch.mean);
+    if (!r.resolutions.empty()) row("ball", ",,", "mm a grey level", r.mm_per_level);
+    for (const Rung& resolution_index : r.resolutions) {
+      const std::string where = fmt::format(",,{}", resolution_index.depth_mm);
+      row("cylinder", where, "depth (mm)", resolution_index.cylinder.depth_mm);
+      row("cylinder", where, "depth by the uncorrected LUT (mm)",
+          resolution_index.cylinder_uncorrected.depth_mm);
+      row("cylinder", where, "width at half depth (mm)", resolution_index.cylinder.diameter_mm);
+      row("cube", where, "side at half depth (mm)", resolution_index.cube.side_mm);
+      row("cylinder", where, "radius above 5 levels (mm)",
+          resolution_index.cylinder_patch.radius_mm);
+      row("cylinder", where, "mean above 5 levels", resolution_index.cylinder_patch.mean);
+      row("ball", where, "radius above 5 levels (mm)", resolution_index.ball_patch.radius_mm);
+      row("ball", where, "mean above 5 levels", resolution_index.ball_patch.mean);
     }
     for (const PillarPress& p : r.pillars) {
       const std::string where = fmt::format("{},{},{}", p.spacing_mm, p.tilt_deg, p.depth_mm);

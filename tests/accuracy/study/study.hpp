@@ -20,11 +20,11 @@ inline constexpr int kThreshold = 5;
 
 /// A simulated sensor that goes through the study.
 struct Specimen {
-  std::string law;  ///< Of layer and light.
+  std::string law;  ///< Of gel and light.
   hal::sim::Scene sensor;
 };
 
-/// The built-in sensor on layers of that thickness: light and widths scaled with it
+/// The built-in sensor on gels of that thickness: light and widths scaled with it
 /// (thickness::sensor_of), and with the widths it has on 2 mm; one that scatters as sensor_c; and
 /// the other law.
 [[nodiscard]] std::vector<Specimen> specimens(double thickness_mm);
@@ -33,7 +33,7 @@ struct Specimen {
 struct Rung {
   double depth_mm = 0;  ///< The ball is kBallZero_mm deeper.
   FlatReading cylinder;
-  FlatReading cylinder_uncorrected;  ///< By a list that does not know of the ball's zero.
+  FlatReading cylinder_uncorrected;  ///< By a LUT that does not know of the ball's zero.
   FlatReading cube;
   Patch ball_patch;
   Patch cylinder_patch;
@@ -63,14 +63,14 @@ struct Result {
   std::string law;
   double thickness_mm = 0;
   double mm_per_level = 0;  ///< Depth of the deepest ball over its darkest grey level.
-  std::vector<Rung> rungs;
+  std::vector<Rung> resolutions;
   std::vector<PillarPress> pillars;
 
   /// Of the spacings 1.25, 1.5, 1.75 and 2 mm those that are resolved at 0.1, 0.2 or 0.3 mm.
   [[nodiscard]] int resolved_of_four(double tilt_deg) const;
 };
 
-/// Specimens on the same layer share its presses: results come in their order.
+/// Specimens on the same gel share its presses: results come in their order.
 [[nodiscard]] std::vector<Result> measure(const std::vector<Specimen>& specimens,
                                           const Protocol& protocol = {});
 

@@ -23,15 +23,16 @@ int main(int argc, char** argv) {
     using namespace dtact::study;
     std::vector<Result> results;
     std::vector<std::string> laws;
-    for (const double layer : figures::kLayers_mm) {
-      const std::vector<Specimen> all = specimens(layer);
+    for (const double gel : figures::kGelThicknesses_mm) {
+      const std::vector<Specimen> all = specimens(gel);
       // The other law has contacts of its own; it is pressed upright alone.
       for (auto& result : measure({all[0], all[1], all[2]})) results.push_back(std::move(result));
       for (auto& result : measure({all[3]}, {.tilts_deg = {}}))
         results.push_back(std::move(result));
-      fmt::print(stderr, "layer of {} mm done\n", layer);
+      fmt::print(stderr, "gel of {} mm done\n", gel);
     }
-    for (const Specimen& specimen : specimens(figures::kLayers_mm[1])) laws.push_back(specimen.law);
+    for (const Specimen& specimen : specimens(figures::kGelThicknesses_mm[1]))
+      laws.push_back(specimen.law);
     const std::string markdown = to_markdown(compare(results), laws);
     fmt::print("{}", markdown);
     if (!out.empty()) {

@@ -54,18 +54,18 @@ TEST(Reading, WhatIsTooFaintIsNotResolved) {
 }
 
 // Darkening of 40 grey levels a millimetre of the ball's height above its contact's edge.
-TEST(Reading, AListOfAPerfectBallReadsAFlatDisc) {
+TEST(Reading, ALutOfAPerfectBallReadsAFlatDisc) {
   const auto ball = image_of([](double x, double y) {
     return 40 * std::max(std::sqrt(std::max(4 - x * x - y * y, 0.0)) - 1.4, 0.0);
   });
   const std::vector<KnownPress> presses = {{&ball, 0.6}};
-  const StudyList list = make_list(presses, 2);
-  EXPECT_GE(list.deepest_level, 23);
-  EXPECT_NEAR(list.depth_mm.at(20), 0.5, 0.002);
+  const StudyLut lut = make_lut(presses, 2);
+  EXPECT_GE(lut.deepest_level, 23);
+  EXPECT_NEAR(lut.depth_mm.at(20), 0.5, 0.002);
   const auto flat =
       image_of([](double x, double y) { return std::hypot(x, y) < 1.5 ? 20.0 : 0.0; });
-  const FlatReading reading = read_flat(flat, list);
-  EXPECT_NEAR(reading.depth_mm, 0.45, 0.005);  // less the list's 0.05 at the threshold
+  const FlatReading reading = read_flat(flat, lut);
+  EXPECT_NEAR(reading.depth_mm, 0.45, 0.005);  // less the LUT's 0.05 at the threshold
   EXPECT_NEAR(reading.diameter_mm, 3.0, 0.06);
   EXPECT_NEAR(reading.side_mm, 3.0, 0.06);
 }
@@ -85,14 +85,14 @@ TEST(Force, HertzsLawFindsItsOwnZero) {
   EXPECT_NEAR(hertz_zero_mm(depths, forces), 0.1, 1e-9);
 }
 
-// A flat face on a linear layer: twice the depth, twice the force. And a ball on a layer is stiffer
+// A flat face on a linear gel: twice the depth, twice the force. And a ball on a gel is stiffer
 // than on a half-space of the same modulus, 16/9 √(R d³) for ν = 0.5 (Hertz).
 TEST(Force, IsLinearForAFlatFaceAndAboveHertzForABall) {
-  const hal::sim::LayerModel layer{.thickness_mm = 2};
+  const hal::sim::GelModel gel{.thickness_mm = 2};
   const std::array<double, 2> depths = {0.1, 0.2};
-  const auto flat = force_over_modulus(layer, hal::sim::disc(1), depths);
+  const auto flat = force_over_modulus(gel, hal::sim::disc(1), depths);
   EXPECT_NEAR(flat[1] / flat[0], 2, 0.001);
-  const auto ball = force_over_modulus(layer, hal::sim::ball(2), depths);
+  const auto ball = force_over_modulus(gel, hal::sim::ball(2), depths);
   EXPECT_GT(ball[1], 16.0 / 9 * std::sqrt(2 * std::pow(0.2, 3)));
 }
 
@@ -105,8 +105,8 @@ TEST(Bench, AskewIsDeeperOnTheRight) {
   EXPECT_GT(leaning.height_mm(0, 0), 100);
 }
 
-// A small part of the study. On the built-in sensor pillars 2 mm apart are told apart, 1.1 mm not;
-// leaning ones have a weaker side, and merge first where they are shallow.
+// A small part of the study. On the built-in sensor pillars 2 mm apart are distinguished, 1.1 mm
+// not; leaning ones have a weaker side, and merge first where they are shallow.
 TEST(Study, PillarsOnTwoMillimetres) {
   const Protocol protocol{.shapes = false,
                           .spacings_mm = {1.10, 2.00},
@@ -133,7 +133,7 @@ TEST(Study, PillarsOnTwoMillimetres) {
 }
 
 TEST(Study, EveryRowThatDisagreesSaysWhy) {
-  const Result nothing{.law = "law", .thickness_mm = 2, .rungs = {}, .pillars = {}};
+  const Result nothing{.law = "law", .thickness_mm = 2, .resolutions = {}, .pillars = {}};
   for (const Row& row : compare({nothing})) EXPECT_FALSE(row.remark.empty()) << row.what;
   const std::vector<Row> rows = {{"a", "1", {"1.1"}, true, "never shown"},
                                  {"b", "2", {"9"}, false, "because"}};

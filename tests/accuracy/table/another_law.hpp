@@ -4,7 +4,7 @@
 
 namespace dtact::table {
 
-/// The sensor of another_law.toml with the built-in camera and light, nothing touching: for one row
+/// The sensor of another_law.toml with the built-in camera and light, no contact: for one row
 /// of every table. Throws std::runtime_error when the file cannot be read.
 [[nodiscard]] hal::sim::Scene another_law();
 

@@ -52,7 +52,7 @@ struct Configuration {
 [[nodiscard]] hal::sim::Scene lit(hal::sim::Scene base, const Configuration& configuration);
 [[nodiscard]] hal::Light light_of(const Configuration& configuration);
 
-/// Standard deviation of the untouched image without noise over the crop, grey levels.
+/// Standard deviation of the reference image without noise over the crop, grey levels.
 [[nodiscard]] double reference_deviation(const Configuration& configuration);
 
 }  // namespace dtact::table

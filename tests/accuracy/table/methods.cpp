@@ -4,7 +4,7 @@
 #include <string>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "clients/calibrate/fit/model/layered_build.hpp"
+#include "clients/calibrate/fit/model/auto_build.hpp"
 #include "clients/calibrate/fit/model/model_build.hpp"
 
 namespace dtact::table {
@@ -50,7 +50,7 @@ calibration::BallPresses centre_press(const Material& material) {
   return set;
 }
 
-std::shared_ptr<const recon::Model> layer_model(const Material& material) {
+std::shared_ptr<const recon::Model> gel_model(const Material& material) {
   return calibration::build_model(centre_press(material)).calibration.model;
 }
 
@@ -67,7 +67,7 @@ constexpr std::array<Method, 7> kMethods = {{
     {"sphere alone, many presses", [](const Material& material) { return alone_many(material); }},
     {"ours, one press", ours_single},
     {"ours, many presses", ours_many},
-    {"ours, layer model of one press, sharpened", layer_model, 2},
+    {"ours, gel model of one press, sharpened", gel_model, 2},
 }};
 
 }  // namespace
@@ -85,7 +85,7 @@ Material gather(Sensor& sensor, const Trial& trial, const RegressionCentre& cent
 }
 
 std::shared_ptr<const recon::Model> alone_single(const Material& material) {
-  return from_one(material, recon::Method::list);
+  return from_one(material, recon::Method::lut);
 }
 
 std::shared_ptr<const recon::Model> alone_many(const Material& material,
@@ -95,12 +95,12 @@ std::shared_ptr<const recon::Model> alone_many(const Material& material,
 
 std::shared_ptr<const recon::Model> ours_single(const Material& material) {
   calibration::PressReport report;
-  return calibration::build_layered(centre_press(material), {}, report).model;
+  return calibration::build_auto(centre_press(material), {}, report).model;
 }
 
 std::shared_ptr<const recon::Model> ours_many(const Material& material) {
   calibration::PressReport report;
-  return calibration::build_layered(many_presses(material), {}, report).model;
+  return calibration::build_auto(many_presses(material), {}, report).model;
 }
 
 std::span<const Method> methods() { return kMethods; }

@@ -23,7 +23,7 @@ struct Material {
 };
 
 /// "We average images within a small time window": so many of each press, and of the untouched
-/// layer.
+/// gel.
 inline constexpr std::size_t kPressFrames = 8;
 inline constexpr std::size_t kReferenceFrames = 32;
 

@@ -24,7 +24,7 @@ class Sensor {
   [[nodiscard]] image::Grey8 frame(std::uint64_t sequence);
   /// `count` frames of press `index`, at most kStillFrames.
   [[nodiscard]] std::vector<image::Grey8> press(std::size_t index, std::size_t count);
-  /// The mean of `count` untouched frames, Q8, at most kStillFrames.
+  /// The mean of `count` frames without contact, Q8, at most kStillFrames.
   [[nodiscard]] image::Grey16 reference(std::size_t count);
 
   [[nodiscard]] const hal::sim::Truth& truth() const noexcept { return renderer_.truth(); }

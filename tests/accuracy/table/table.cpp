@@ -8,7 +8,7 @@
 #include <memory>
 #include <set>
 
-#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
 #include "clients/calibrate/fit/model/model_fit.hpp"
 #include "hal/sim/scene.hpp"
 #include "tests/accuracy/table/another_law.hpp"

@@ -10,7 +10,7 @@
 
 namespace dtact::table {
 
-/// Of layer and light: the built-in sensor's, or another_law()'s.
+/// Of gel and light: the built-in sensor's, or another_law()'s.
 enum class Law : std::uint8_t { built_in, another };
 
 /// One method under one configuration over the test presses of one trial.

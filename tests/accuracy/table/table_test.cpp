@@ -59,14 +59,14 @@ TEST(Table, TheSphereAloneIsBetterThanThePublishedMethodByBothTruths) {
             0.6 * mean_of("published single image", indentation));
 }
 
-// By the true one: the circle's truth is zero where the layer is still pressed.
+// By the true one: the circle's truth is zero where the gel is still pressed.
 TEST(Table, OursIsFarBetterByTheTrueIndentation) {
   EXPECT_LT(mean_of("ours, one press", indentation),
             0.25 * mean_of("published single image", indentation));
   EXPECT_LT(mean_of("ours, one press", indentation), 0.020);
 }
 
-// Its press is the same, its light and its layer are not.
+// Its press is the same, its light and its gel are not.
 TEST(Table, AnotherLawHasARowOfItsOwn) {
   std::vector<Cell> both = cells();
   const auto other =

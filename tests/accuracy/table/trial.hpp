@@ -9,7 +9,7 @@
 
 namespace dtact::table {
 
-/// A ball pressed into the layer; x to the right and y down from the image's centre.
+/// A ball pressed into the gel; x to the right and y down from the image's centre.
 struct BallPress {
   double radius_mm = 0;
   double x_mm = 0;
@@ -26,7 +26,7 @@ struct Protocol {
 };
 
 /// The presses of one repetition. Nobody pushes a ball by hand to a set depth, so depths are drawn
-/// as well: 1.3 to 1.6 mm near the centre, where the list should reach far, 0.3 to 1.2 mm anywhere
+/// as well: 1.3 to 1.6 mm near the centre, where the LUT should reach far, 0.3 to 1.2 mm anywhere
 /// to calibrate, 0.4 to 1.4 mm to test. The paper says nothing of depths; the middle range was
 /// chosen so that the published regression errs as much as it did there (from 0.5 to 1.6 mm it errs
 /// a third less). "Anywhere" keeps the contact in the crop: up to 8 mm from the centre on either
@@ -41,14 +41,14 @@ struct Trial {
 
 [[nodiscard]] Trial draw(std::uint64_t seed, const Protocol& protocol = {});
 
-/// Contact solved for each press, one after the other with nothing touching in between. `base` has
+/// Contact solved for each press, one after the other without contact in between. `base` has
 /// the sensor; its own presses are left out.
 [[nodiscard]] std::shared_ptr<const hal::sim::Truth> solve(const hal::sim::Scene& base,
                                                            const std::vector<BallPress>& presses);
 
-/// Frames of a solved choreography that show the layer at rest.
+/// Frames of a solved choreography that show the gel at rest.
 inline constexpr std::uint64_t kStillFrames = 40;
-/// The first frame of so many that show press `index`; those with nothing touching begin at 0.
+/// The first frame of so many that show press `index`; those without contact begin at 0.
 [[nodiscard]] std::uint64_t first_still_frame(const hal::sim::Truth& truth, std::size_t index);
 
 }  // namespace dtact::table

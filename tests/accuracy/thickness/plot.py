@@ -18,14 +18,14 @@ def main():
     parser.add_argument("csv", type=pathlib.Path)
     parser.add_argument("svg", type=pathlib.Path)
     arguments = parser.parse_args()
-    layers = collections.defaultdict(lambda: collections.defaultdict(list))
+    gels = collections.defaultdict(lambda: collections.defaultdict(list))
     with open(arguments.csv, encoding="utf-8") as file:
         for line in csv.DictReader(file):
-            layers[float(line["thickness_mm"])][line["kind"]].append(line)
+            gels[float(line["thickness_mm"])][line["kind"]].append(line)
     figure, (trade, grooves, presses) = plt.subplots(1, 3, figsize=(12, 3.6))
     colours = plt.get_cmap("viridis")
     points = []
-    for i, (thickness, kinds) in enumerate(sorted(layers.items())):
+    for i, (thickness, kinds) in enumerate(sorted(gels.items())):
         colour = colours(i / 5)
         point = float(kinds["finest"][0]["value_mm"]), float(kinds["deepest"][0]["value_mm"])
         points.append(point)
@@ -43,7 +43,7 @@ def main():
     trade.plot(*zip(*points), color="grey", lw=0.7, zorder=0)
     trade.margins(0.15)
     trade.set(xlabel="finest pitch resolved, mm", ylabel="greatest depth measured, mm",
-              title="layer thickness, simulated sensor")
+              title="gel thickness, simulated sensor")
     grooves.axhline(0.5, color="grey", lw=0.7, ls=":")
     grooves.set(xlabel="pitch of the grooves, mm", ylabel="relief shown, share of the true one",
                 title="relief of grooves", xlim=(0, 4.2), ylim=(0, 1.4))

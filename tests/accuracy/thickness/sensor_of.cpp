@@ -3,10 +3,10 @@
 namespace dtact::thickness {
 
 hal::sim::Scene sensor_of(double thickness_mm) {
-  constexpr double kFittedMm = 2.0;  // the built-in scene's layer
+  constexpr double kFittedMm = 2.0;  // the built-in scene's gel
   hal::sim::Scene scene = hal::sim::default_scene();
   const double scale = thickness_mm / kFittedMm;
-  scene.layer.thickness_mm = thickness_mm;
+  scene.gel.thickness_mm = thickness_mm;
   scene.optics.narrow_mm *= scale;
   scene.optics.wide_mm *= scale;
   scene.optics.pressed_slope /= scale;

@@ -22,12 +22,12 @@
 namespace dtact::thickness {
 namespace {
 
-constexpr double kMost = 0.85;  // of the layer: the simulator's objects reach 0.9
+constexpr double kMax = 0.85;  // of the gel: the simulator's objects reach 0.9
 
 table::Trial draw(std::uint64_t seed, double thickness_mm, const table::Protocol& protocol) {
   table::Trial trial = table::draw(seed, protocol);
   const auto fit = [&](table::BallPress& press) {
-    press.depth_mm = std::min(press.depth_mm, kMost * thickness_mm);
+    press.depth_mm = std::min(press.depth_mm, kMax * thickness_mm);
   };
   fit(trial.centre);
   std::ranges::for_each(trial.many, fit);
@@ -54,7 +54,7 @@ class Reader {
   std::vector<std::int16_t> depth_;
 };
 
-/// What the list states for a depth, linear between its rows as in the daemon, millimetres.
+/// What the LUT states for a depth, linear between its rows as in the daemon, millimetres.
 double stated_mm(const recon::Model& model, double depth_mm) {
   recon::Model::Uncertainty below = model.uncertainty.front();
   for (const auto& row : model.uncertainty) {
@@ -82,7 +82,7 @@ SeveralPresses measure_several(const Specimen& specimen, std::uint64_t seed,
   SeveralPresses result{.specimen = specimen, .seed = seed, .gain = {}, .ratios = {}};
   const table::Configuration& light = table::configurations()[specimen.configuration];
   hal::sim::Scene scene = sensor_of(specimen.thickness_mm);
-  scene.layer.taper_x = specimen.taper_x;
+  scene.gel.taper_x = specimen.taper_x;
 
   const table::Trial trial = draw(seed, specimen.thickness_mm, protocol);
   table::Sensor sensor(table::solve(scene, trial.all()), light, seed);
@@ -116,7 +116,7 @@ SeveralPresses measure_several(const Specimen& specimen, std::uint64_t seed,
   result.one_mm = one.mean_mm();
 
   scene.presses = {{hal::sim::disc(10), {{1, 0, 0, 0, 0}, {1.1, 0, 0, 0.25, 0}}}};
-  scene.layer.solve_step_mm = 5;
+  scene.gel.solve_step_mm = 5;
   scene.loop_from_s = scene.loop_to_s = 0;
   table::Sensor flat(std::make_shared<const hal::sim::Truth>(scene), light, seed);
   constexpr std::uint64_t kPressed = 90;
@@ -135,7 +135,7 @@ std::string to_markdown(const std::vector<SeveralPresses>& results) {
         &r);
   }
   std::string out =
-      "| layer, mm | light | 30 presses: 5 mm ball (worst seed) | one press | flat disc: 30 "
+      "| gel, mm | light | 30 presses: 5 mm ball (worst seed) | one press | flat disc: 30 "
       "presses "
       "/ one | true error over stated: median, 95 % | gains chosen |\n"
       "| --- | --- | --- | --- | --- | --- | --- |\n";

@@ -15,20 +15,20 @@ struct Specimen {
   std::size_t configuration = 0;  ///< Of the light: into table::configurations().
 };
 
-/// The list from thirty presses of a 4 mm ball and that from one, judged on twenty presses of a
+/// The LUT from thirty presses of a 4 mm ball and that from one, judged on twenty presses of a
 /// 5 mm ball and on a flat disc of 10 mm radius pressed 0.25 mm deep, against the simulator's
-/// indentation where they touch. Presses are those of the table, at most 0.85 of the layer deep.
+/// indentation where they touch. Presses are those of the table, at most 0.85 of the gel deep.
 struct SeveralPresses {
   Specimen specimen;
   std::uint64_t seed = 0;
-  /// The one chosen; "refused" where the presses show no list (too light for a thick layer), and
+  /// The one chosen; "refused" where the presses show no LUT (too light for a thick gel), and
   /// then nothing else is measured.
   std::string gain;
   double several_mm = 0;  ///< Mean absolute error under the 5 mm ball.
   double one_mm = 0;
   double flat_several_mm = 0;
   double flat_one_mm = 0;
-  /// Of each press of the 5 mm ball: true error over what the list states for half of its depth.
+  /// Of each press of the 5 mm ball: true error over what the LUT states for half of its depth.
   std::vector<double> ratios;
 };
 

@@ -1,4 +1,4 @@
-// The list from several presses on layers of 1.5 to 3 mm, an uneven one, and other lights.
+// The LUT from several presses on gels of 1.5 to 3 mm, an uneven one, and other lights.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -50,7 +50,7 @@ std::vector<SeveralPresses> run_all(const std::vector<Specimen>& specimens, int 
 
 int main(int argc, char** argv) {
   try {
-    CLI::App app("The list from several presses, by the layer");
+    CLI::App app("The LUT from several presses, by the gel");
     int first = 11;
     int seeds = 3;
     int threads = 2;

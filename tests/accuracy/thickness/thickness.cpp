@@ -28,8 +28,8 @@ constexpr std::size_t kFrames = 8;
 /// An object that comes down after one second and stays.
 hal::sim::Scene with(hal::sim::Scene scene, const hal::sim::Object& object, double depth_mm) {
   scene.presses = {{object, {{1, 0, 0, 0, 0}, {1.1, 0, 0, depth_mm, 0}}}};
-  scene.layer.grid_mm = 0.1;
-  scene.layer.solve_step_mm = 5;
+  scene.gel.grid_mm = 0.1;
+  scene.gel.solve_step_mm = 5;
   scene.loop_from_s = scene.loop_to_s = 0;
   return scene;
 }
@@ -138,7 +138,7 @@ Result measure(double thickness_mm) {
   for (const double pitch : kPitches) {
     result.grooves.push_back(bench.groove(pitch, std::min(0.6, 0.5 * thickness_mm)));
   }
-  // The simulator's objects reach 0.9 of the layer at most.
+  // The simulator's objects reach 0.9 of the gel at most.
   const double most = 0.9 * thickness_mm;
   for (int tenths = 4; 0.1 * tenths < most; ++tenths) {
     result.presses.push_back(bench.press(0.1 * tenths));

@@ -17,10 +17,10 @@ inline constexpr std::array<double, 5> kThicknesses = {1.0, 1.5, 2.0, 2.5, 3.0};
 /// map shows is the difference between its mean over the ridges' middles and that over the
 /// grooves', across the middle of the plate, as a share of the same difference in the true surface.
 /// A pitch is resolved while that share is at least a half and the difference is at least 0.02 mm,
-/// which is above noise and list.
+/// which is above noise and LUT.
 struct Groove {
   double pitch_mm = 0;
-  double true_mm = 0;   ///< Ridge minus groove, in the layer's surface.
+  double true_mm = 0;   ///< Ridge minus groove, in the gel's surface.
   double shown_mm = 0;  ///< The same in the depth map.
   [[nodiscard]] bool resolved() const noexcept {
     return shown_mm >= 0.02 && shown_mm >= 0.5 * true_mm;
@@ -48,13 +48,13 @@ struct Result {
   [[nodiscard]] std::optional<double> deepest_mm() const;
 };
 
-/// The simulated sensor with a layer of another thickness, nothing touching. The fitted optics
+/// The simulated sensor with a gel of another thickness, no contact. The fitted optics
 /// belong to 2 mm: the width of the scattering is scaled with the thickness, and the share of light
 /// that a press takes with the share of the thickness that it takes. Neither was measured on a real
-/// layer of another thickness.
+/// gel of another thickness.
 [[nodiscard]] hal::sim::Scene sensor_of(double thickness_mm);
 
-/// Calibrates the simulated sensor with that layer by one press of a 4 mm ball, 0.85 of the
+/// Calibrates the simulated sensor with that gel by one press of a 4 mm ball, 0.85 of the
 /// thickness deep, and measures.
 [[nodiscard]] Result measure(double thickness_mm);
 

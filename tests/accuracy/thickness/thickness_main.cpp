@@ -1,4 +1,4 @@
-// Finest groove against greatest depth for layers of 1 to 3 mm.
+// Finest groove against greatest depth for gels of 1 to 3 mm.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -12,7 +12,7 @@
 
 int main(int argc, char** argv) {
   try {
-    CLI::App app("Finest groove against greatest depth, by the layer's thickness");
+    CLI::App app("Finest groove against greatest depth, by the gel's thickness");
     std::filesystem::path out;
     app.add_option("--out", out, "Folder of thickness.csv; without it, only printed");
     CLI11_PARSE(app, argc, argv);
@@ -26,7 +26,7 @@ int main(int argc, char** argv) {
     if (!out.empty()) dtact::base::write_file_atomically(out / "thickness.csv", csv);
     return 0;
   } catch (const std::exception& e) {
-    fmt::print(stderr, "layer_thickness: {}\n", e.what());
+    fmt::print(stderr, "gel_thickness: {}\n", e.what());
     return 1;
   }
 }

@@ -9,9 +9,9 @@
 namespace dtact::thickness {
 namespace {
 
-// The paper's finding, section "Measuring fine geometry": thinner layers capture finer geometry,
-// and the measuring range is bounded by the layer.
-TEST(Thickness, ThinLayersResolveFinerAndThickOnesMeasureDeeper) {
+// The paper's finding, section "Measuring fine geometry": thinner gels capture finer geometry,
+// and the measuring range is bounded by the gel.
+TEST(Thickness, ThinGelsResolveFinerAndThickOnesMeasureDeeper) {
   const Result thin = measure(1.0);
   const Result thick = measure(2.5);
   EXPECT_LT(thin.finest_mm().value(), thick.finest_mm().value());
@@ -36,8 +36,8 @@ TEST(Thickness, DeepestIsTheDeepestMeasured) {
   EXPECT_EQ(to_csv({result}).find("thickness_mm,kind"), 0U);
 }
 
-// A layer that is 8 % thicker 8 mm to the right.
-TEST(SeveralPresses, ATaperedLayerGetsAPlane) {
+// A gel that is 8 % thicker 8 mm to the right.
+TEST(SeveralPresses, ATaperedGelGetsAPlane) {
   const SeveralPresses tapered =
       measure_several({.taper_x = 0.01}, 21, {.calibration_presses = 16, .test_presses = 4});
   EXPECT_NE(tapered.gain.find("plane"), std::string::npos) << tapered.gain;

@@ -18,7 +18,7 @@ namespace dtact::whole {
 namespace {
 
 constexpr const char* kScene = R"(
-[layer]
+[gel]
 solve_step_mm = 0.1
 [[press]]
 object = "star"

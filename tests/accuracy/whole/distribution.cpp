@@ -19,7 +19,7 @@ namespace {
 constexpr double kSurelyMm2 = 1;
 bool surely_pressed(const FrameErrors& frame) {
   return frame.true_area > kSurelyMm2 &&
-         frame.true_deepest > pipeline::ContactRules{}.made_mm + 2 * frame.stated;
+         frame.true_deepest > pipeline::ContactRules{}.threshold_mm + 2 * frame.stated;
 }
 constexpr std::size_t kWorst = 10;
 
@@ -34,7 +34,7 @@ const std::vector<Quantity>& quantities() {
        [](const FrameErrors& f) { return f.inside_ratio(); }},
       {"depth within 1 mm beside", "mm", [](const FrameErrors& f) { return f.beside; }},
       {"depth within 1 mm beside / stated", "",
-       [](const FrameErrors& f) { return f.touching ? ratio(f.beside, f.stated) : NAN; }},
+       [](const FrameErrors& f) { return f.in_contact ? ratio(f.beside, f.stated) : NAN; }},
       {"depth elsewhere", "mm", [](const FrameErrors& f) { return f.away; }},
       {"depth elsewhere / stated", "",
        [](const FrameErrors& f) { return ratio(f.away, f.stated); }},
@@ -90,12 +90,12 @@ ContactMistakes contact_mistakes(const std::vector<SceneReport>& scenes) {
         continue;
       }
       if (!frame.pressed && frame.frame.phase != Phase::moving) {
-        ++out.untouched_frames;
-        out.false_touches += frame.touching ? 1 : 0;
+        ++out.no_contact_frames;
+        out.false_contacts += frame.in_contact ? 1 : 0;
       }
       if (frame.frame.phase == Phase::rest && surely_pressed(frame)) {
         ++out.contact_frames;
-        out.missed += frame.touching ? 0 : 1;
+        out.missed += frame.in_contact ? 0 : 1;
       }
     }
   }
@@ -123,8 +123,8 @@ std::string to_markdown(const std::vector<SceneReport>& scenes) {
       "\n{} of {} judged frames have a flag and are left out above and below.\n\nContact: {} of {} "
       "frames without an object say \"touching\"; {} of {} frames "
       "at rest that reach deeper than the threshold by twice what is stated do not.\n",
-      contacts.flagged, judged, contacts.false_touches, contacts.untouched_frames, contacts.missed,
-      contacts.contact_frames);
+      contacts.flagged, judged, contacts.false_contacts, contacts.no_contact_frames,
+      contacts.missed, contacts.contact_frames);
 
   fmt::format_to(to,
                  "\n| health flag | scenes that show it | without cause: scenes | frames |\n"
@@ -177,7 +177,7 @@ std::string to_csv(const std::vector<SceneReport>& scenes) {
           "{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:.4f},{:x},\"{}\"\n",
           scene.name, name_of(scene.light), scene.thickness_mm, scene.calibrated_mm,
           f.frame.sequence, name_of(f.frame.phase), f.stated, f.inside, f.beside, f.away,
-          f.untrusted, f.touching, f.pressed, f.true_area, f.area, f.centroid, f.deepest,
+          f.untrusted, f.in_contact, f.pressed, f.true_area, f.area, f.centroid, f.deepest,
           f.true_deepest, f.points, f.points_95, f.force, f.true_force, f.stated_force, f.health,
           scene.what);
     }

@@ -34,8 +34,8 @@ struct Quantity {
 
 /// Frames that say "touching" where no object touches, and resting contacts that are not told.
 struct ContactMistakes {
-  int false_touches = 0;
-  int untouched_frames = 0;
+  int false_contacts = 0;
+  int no_contact_frames = 0;
   int missed = 0;
   int contact_frames = 0;
   int flagged = 0;  ///< Left out.

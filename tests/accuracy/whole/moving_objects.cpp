@@ -90,7 +90,7 @@ std::vector<MotionFrames> choreograph(const MovingObject& object,
   const auto frames_of = [fps](double seconds) {
     return static_cast<std::uint64_t>(std::lround(seconds * fps));
   };
-  scene.layer.solve_step_mm = 5;  // a key in every frame does instead
+  scene.gel.solve_step_mm = 5;  // a key in every frame does instead
   auto& keys = scene.presses.at(0).keys;
   keys.clear();
   const auto add = [&](std::uint64_t frame, const PressKey& moved, double depth_mm) {
@@ -103,7 +103,7 @@ std::vector<MotionFrames> choreograph(const MovingObject& object,
     keys.push_back(key);
   };
   std::vector<MotionFrames> all;
-  std::uint64_t first = kUntouchedFrames;
+  std::uint64_t first = kReferenceFrames;
   for (const ObjectMotion& motion : motions) {
     MotionFrames frames;
     frames.first = first;

@@ -62,7 +62,7 @@ struct MotionFrames {
 };
 
 /// Frames before the first object comes: enough for the reference.
-inline constexpr std::uint64_t kUntouchedFrames = 60;
+inline constexpr std::uint64_t kReferenceFrames = 60;
 
 /// Gives `scene`, which has one press with any keys, a press for each of `motions`, one after the
 /// other: the object comes from above within a second, rests for a tenth of a second, moves, rests,

@@ -25,12 +25,12 @@ from dtact.messages import message_class  # noqa: E402
 Frame = message_class("Frame")
 registration = open3d.pipelines.registration
 
-LEAST_DEEP_MM = 0.06
+MIN_DEEP_MM = 0.06
 AROUND_MM = 0.25
 STRIDE = 2
 SMOOTH_PX = 2  # normals are of the map averaged over 2 · SMOOTH_PX + 1 pixels, both ways
 PAIRED_MM = 0.3  # points further apart are no pair
-LEAST_FITNESS = 0.4  # with fewer of the points in a pair the frame is lost
+MIN_FITNESS = 0.4  # with fewer of the points in a pair the frame is lost
 
 
 def read_frames(file):
@@ -87,10 +87,10 @@ def places(map_, surface, depth):
     b = (pinhole - centre) @ project
     aa, ab, bb = (a * a).sum(-1), a @ b, b @ b - surface.radius_mm ** 2
     along = (-ab + np.sqrt(ab * ab - aa * bb)) / aa
-    untouched = pinhole + along[..., None] * ray
-    normal = (untouched - centre) @ project
+    undeformed = pinhole + along[..., None] * ray
+    normal = (undeformed - centre) @ project
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    return untouched - depth[..., None] * normal
+    return undeformed - depth[..., None] * normal
 
 
 def cloud_of(frame):
@@ -98,7 +98,7 @@ def cloud_of(frame):
     values = np.frombuffer(map_.data, "<i2").reshape(map_.height, map_.width)
     trusted = values != map_.untrusted_value
     depth = np.where(trusted, values * map_.um_per_unit * 1e-3, 0)
-    chosen = near(trusted & (depth > LEAST_DEEP_MM), round(AROUND_MM / map_.mm_per_px)) & trusted
+    chosen = near(trusted & (depth > MIN_DEEP_MM), round(AROUND_MM / map_.mm_per_px)) & trusted
     kept = np.zeros_like(chosen)
     kept[::STRIDE, ::STRIDE] = chosen[::STRIDE, ::STRIDE]
     points = places(map_, frame.surface, depth)
@@ -137,7 +137,7 @@ class Icp:
         """Whether it is found; `motion` is the newest that was."""
         guess = self.step @ self.motion if self.velocity else self.motion
         result = self.register(cloud, guess @ np.linalg.inv(self.key_motion))
-        if result.fitness < LEAST_FITNESS:
+        if result.fitness < MIN_FITNESS:
             self.step = np.eye(4)
             return False
         found = result.transformation @ self.key_motion

@@ -71,7 +71,7 @@ std::size_t contact_end(const Sequence& sequence) {
   std::size_t at = sequence.begin();
   for (v1::Frame frame; at < sequence.frames.size(); ++at) {
     frame.ParseFromString(sequence.frames[at]);
-    if (!frame.contact().touching()) break;
+    if (!frame.contact().in_contact()) break;
   }
   return at;
 }
@@ -93,7 +93,7 @@ void print_frames(const Sequence& sequence, const std::string& tracker,
 
 std::size_t unobservable_at_end(const Sequence& sequence) {
   return static_cast<std::size_t>(std::ranges::count_if(sequence.shape, [&](const ShapeRow& row) {
-    return row.sequence == sequence.shape.back().sequence && row.shown < ShapeRow::kLeastShown;
+    return row.sequence == sequence.shape.back().sequence && row.shown < ShapeRow::kMinShown;
   }));
 }
 

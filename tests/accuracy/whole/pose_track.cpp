@@ -54,9 +54,9 @@ Contact contact_of(const std::string& bytes) {
   v1::Frame frame;
   frame.ParseFromString(bytes);
   const v1::Contact& contact = frame.contact();
-  constexpr double kLeastArm = 0.5;
+  constexpr double kMinArm = 0.5;
   return {{contact.x_mm(), contact.y_mm(), 0},
-          std::max(kLeastArm, std::sqrt(contact.area_mm2() / std::numbers::pi))};
+          std::max(kMinArm, std::sqrt(contact.area_mm2() / std::numbers::pi))};
 }
 
 /// Of what was found in a row, against what is true there.

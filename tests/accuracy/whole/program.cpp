@@ -12,7 +12,7 @@
 #include <variant>
 #include <vector>
 
-#include "clients/perceive/demand.hpp"
+#include "clients/perceive/upstream_subscription.hpp"
 #include "daemon/calibration/calibration.hpp"
 #include "daemon/net/frame_encoder.hpp"
 #include "daemon/pipeline/active_calibration.hpp"
@@ -137,7 +137,7 @@ net::FrameKind perceive_kind() {
   wish.set_cloud(v1::CLOUD_INT16);
   wish.set_contact_box(true);
   wish.set_pose(true);
-  perceive::Demand demand(true);
+  perceive::UpstreamSubscription demand(true);
   demand.add(accepted(wish, net::Serves::geometry));
   const net::Subscription daemon = accepted(demand.subscription(), net::Serves::images);
   return daemon.kind(daemon.parts());
@@ -189,7 +189,7 @@ struct Program::Impl {
         encoder("dtact_surface") {
     exchange.want_contact = true;
     exchange.want_depth = true;
-    loop.untouched().start();
+    loop.tracker().start();
   }
 
   const Settings settings;
@@ -208,10 +208,10 @@ Program::Program(const std::shared_ptr<const hal::sim::Truth>& truth,
           truth, std::make_shared<const calibration::Calibration>(calibration::load(calibration)),
           settings)) {}
 
-Program::~Program() { impl_->loop.untouched().stop(); }
+Program::~Program() { impl_->loop.tracker().stop(); }
 
 std::string Program::next() {
-  impl_->loop.untouched().settle();  // what it finds would else come a frame sooner or later
+  impl_->loop.tracker().settle();  // what it finds would else come a frame sooner or later
   impl_->loop.step();
   pipeline::Event event;
   while (impl_->exchange.events.pop(event)) {

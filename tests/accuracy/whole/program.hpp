@@ -17,7 +17,7 @@
 namespace dtact::whole {
 
 /// What dtact-perceive asks of the daemon for a client that wants points of the contact and pose:
-/// depth at full resolution, cut to the contact and a margin. Nothing of it while nothing touches.
+/// depth at full resolution, cut to the contact and a margin. Nothing of it without contact.
 [[nodiscard]] net::FrameKind perceive_kind();
 
 /// The whole map in every frame, as a client gets it that subscribes to depth alone.

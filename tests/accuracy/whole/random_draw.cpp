@@ -19,7 +19,7 @@ namespace {
 namespace sim = hal::sim;
 
 constexpr double kShallowestMm = 0.05;
-constexpr double kMostShare = 0.8;
+constexpr double kMaxShare = 0.8;
 constexpr double kBeginS = 0.8;  // the reference is there by then
 constexpr double kAboveMm = 0.1;
 
@@ -138,7 +138,7 @@ class PressWriter {
       at_.tilt_x_deg = tilt * std::cos(axis);
       at_.tilt_y_deg = tilt * std::sin(axis);
     }
-    const double most = kMostShare * thickness_mm;
+    const double most = kMaxShare * thickness_mm;
     depth_mm_ =
         draw_.chance(0.5) ? draw_.uniform(0.1, most) : draw_.log_uniform(kShallowestMm, most);
     speed_ = draw_.log_uniform(1, 20);
@@ -231,7 +231,7 @@ class SceneWriter {
 };
 
 void draw_presses(RandomScene& out, Draw& draw) {
-  const double thickness = out.scene.layer.thickness_mm;
+  const double thickness = out.scene.gel.thickness_mm;
   SceneWriter scene(out, draw);
   const double kind = draw.uniform(0, 1);
   if (kind < 0.05) {
@@ -319,14 +319,14 @@ void draw_light(RandomScene& out, Draw& draw) {
   }
 }
 
-/// Nothing where a contact has no solution or more than kMostNewtons press.
+/// Nothing where a contact has no solution or more than kMaxNewtons press.
 std::shared_ptr<const sim::Truth> solve_if_light(const sim::Scene& scene) {
   try {
     auto truth = std::make_shared<const sim::Truth>(scene);
     for (const sim::Press& press : scene.presses) {
       for (const sim::PressKey& key : press.keys) {
         const double sequence = std::round(key.time_s * scene.camera.fps);
-        if (truth->force_n(static_cast<std::uint64_t>(sequence)) > kMostNewtons) return nullptr;
+        if (truth->force_n(static_cast<std::uint64_t>(sequence)) > kMaxNewtons) return nullptr;
       }
     }
     return truth;
@@ -379,15 +379,15 @@ RandomSensor draw_sensor(std::uint64_t seed, int number) {
   scene.sensor = sensor.name;
   scene.presses.clear();
   scene.loop_from_s = scene.loop_to_s = 0;
-  sim::LayerModel& layer = scene.layer;
-  layer.grid_mm = 0.15;
-  layer.youngs_modulus_mpa = draw.log_uniform(0.06, 0.25);
-  if (draw.chance(0.3)) layer.poisson = draw.uniform(0.48, 0.5);
+  sim::GelModel& gel = scene.gel;
+  gel.grid_mm = 0.15;
+  gel.youngs_modulus_mpa = draw.log_uniform(0.06, 0.25);
+  if (draw.chance(0.3)) gel.poisson = draw.uniform(0.48, 0.5);
   if (draw.chance(0.5)) {
-    layer.taper_x = draw.uniform(-0.004, 0.004);
-    layer.taper_y = draw.uniform(-0.004, 0.004);
+    gel.taper_x = draw.uniform(-0.004, 0.004);
+    gel.taper_y = draw.uniform(-0.004, 0.004);
   }
-  layer.texture = draw.uniform(0.0004, 0.002);
+  gel.texture = draw.uniform(0.0004, 0.002);
   sim::OpticsModel& optics = scene.optics;
   const double response = draw.uniform(0.85, 1.15);
   for (double* value :
@@ -428,7 +428,7 @@ std::shared_ptr<const hal::sim::Truth> solve_eased(RandomScene& scene) {
   constexpr double kSlideStepMm = 0.2;  // blended contacts lie beside each other else
   const bool slides = std::ranges::any_of(
       scene.judged, [](const JudgedFrame& frame) { return frame.phase == Phase::slide; });
-  if (slides) scene.scene.layer.solve_step_mm = kSlideStepMm;
+  if (slides) scene.scene.gel.solve_step_mm = kSlideStepMm;
   double eased = 1;
   auto truth = solve_if_light(scene.scene);
   for (; !truth; truth = solve_if_light(scene.scene)) {

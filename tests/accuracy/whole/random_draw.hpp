@@ -56,8 +56,8 @@ struct RandomScene {
 /// Scene `number` on a sensor. Depth reaches 0.8 of the gel.
 [[nodiscard]] RandomScene draw_scene(const RandomSensor& sensor, int number);
 
-/// Solves its contacts, with all presses made shallower until no more than kMostNewtons press.
+/// Solves its contacts, with all presses made shallower until no more than kMaxNewtons press.
 [[nodiscard]] std::shared_ptr<const hal::sim::Truth> solve_eased(RandomScene& scene);
-inline constexpr double kMostNewtons = 30;
+inline constexpr double kMaxNewtons = 30;
 
 }  // namespace dtact::whole

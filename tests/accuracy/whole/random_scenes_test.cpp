@@ -47,9 +47,9 @@ TEST(RandomScenes, PointsLieOnTheSurface) {
   EXPECT_LT(distribution_of(scenes(), "points: mean distance").median, 0.05);
 }
 
-TEST(RandomScenes, ContactIsToldWhereItIs) {
+TEST(RandomScenes, ContactIsReportedWhereItIs) {
   const ContactMistakes mistakes = contact_mistakes(scenes());
-  EXPECT_EQ(mistakes.false_touches, 0);
+  EXPECT_EQ(mistakes.false_contacts, 0);
   EXPECT_EQ(mistakes.missed, 0);
   EXPECT_LT(distribution_of(scenes(), "contact centroid").median, 0.1);
 }

@@ -17,7 +17,7 @@
 namespace dtact::whole {
 namespace {
 
-constexpr double kContactMm = pipeline::ContactRules{}.made_mm;
+constexpr double kContactMm = pipeline::ContactRules{}.threshold_mm;
 constexpr double kContactMm2 = pipeline::ContactRules{}.area_mm2;
 
 /// A mean of absolute values; NaN without any.
@@ -37,7 +37,7 @@ class MeanError {
 /// What is true at the pixels of the depth map.
 struct TrueMap {
   cv::Mat1f indentation_mm;
-  cv::Mat1b touched;
+  cv::Mat1b in_contact;
 };
 
 class TruthReader {
@@ -64,7 +64,7 @@ class TruthReader {
     const cv::Mat1b contact(camera.height, camera.width, contact_.data());
     TrueMap map;
     cv::remap(indentation, map.indentation_mm, columns_, rows_, cv::INTER_LINEAR);
-    cv::remap(contact, map.touched, columns_, rows_, cv::INTER_NEAREST);
+    cv::remap(contact, map.in_contact, columns_, rows_, cv::INTER_NEAREST);
     truth_.blend(truth_.moment(sequence), grid_values_);
     return map;
   }
@@ -128,16 +128,16 @@ void judge_depth(const v1::DepthMap& map, const cv::Mat1s& depth, const TrueMap&
   out.stated = 0.001 * map.uncertainty_um();
   cv::Mat1b near;
   const int reach = 2 * static_cast<int>(std::lround(kBesideMm / map.mm_per_px())) + 1;
-  cv::dilate(truth.touched, near,
+  cv::dilate(truth.in_contact, near,
              cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(reach, reach)));
   MeanError inside;
   MeanError beside;
   MeanError away;
   int untrusted = 0;
-  const int touched = cv::countNonZero(truth.touched);
+  const int in_contact = cv::countNonZero(truth.in_contact);
   for (int y = 0; y < depth.rows; ++y) {
     for (int x = 0; x < depth.cols; ++x) {
-      const bool contact = truth.touched(y, x) != 0;
+      const bool contact = truth.in_contact(y, x) != 0;
       if (depth(y, x) == map.untrusted_value()) {
         untrusted += contact ? 1 : 0;
         continue;
@@ -150,7 +150,7 @@ void judge_depth(const v1::DepthMap& map, const cv::Mat1s& depth, const TrueMap&
   out.inside = inside.value();
   out.beside = beside.value();
   out.away = away.value();
-  if (touched > 0) out.untrusted = static_cast<double>(untrusted) / touched;
+  if (in_contact > 0) out.untrusted = static_cast<double>(untrusted) / in_contact;
 }
 
 void judge_contact(const v1::Frame& frame, const TrueMap& truth, double mm_per_px,
@@ -170,8 +170,8 @@ void judge_contact(const v1::Frame& frame, const TrueMap& truth, double mm_per_p
       y_sum += depth * y;
     }
   }
-  out.touching = contact.touching();
-  if (!out.touching || !out.pressed) return;
+  out.in_contact = contact.in_contact();
+  if (!out.in_contact || !out.pressed) return;
   if (out.true_area < kContactMm2) return;
   out.area = contact.area_mm2() / out.true_area - 1;
   const double x_mm = (x_sum / weight - 0.5 * (truth.indentation_mm.cols - 1)) * mm_per_px;
@@ -253,10 +253,10 @@ SceneReport judge(RandomScene scene, const std::filesystem::path& calibration) {
   report.name = scene.name;
   report.what = scene.what;
   report.light = scene.light;
-  report.thickness_mm = scene.scene.layer.thickness_mm;
-  const recon::DepthList& list = model->list;
+  report.thickness_mm = scene.scene.gel.thickness_mm;
+  const recon::DepthLut& lut = model->lut;
   report.calibrated_mm =
-      0.001 * list.um.at(static_cast<std::size_t>(list.covered_to_q6 - list.first_q6));
+      0.001 * lut.um.at(static_cast<std::size_t>(lut.covered_to_q6 - lut.first_q6));
 
   Settings settings;
   settings.seed = scene.seed;
@@ -290,7 +290,7 @@ SceneReport judge(RandomScene scene, const std::filesystem::path& calibration) {
     FrameErrors errors{.frame = judged};
     errors.health = bits_of(frame);
     const TrueMap map = reader.at(judged.sequence);
-    errors.pressed = cv::countNonZero(map.touched) > 0;
+    errors.pressed = cv::countNonZero(map.in_contact) > 0;
     errors.true_force = truth->force_n(judged.sequence);
     if (frame.has_depth()) {
       const cv::Mat1s depth = depth_of(frame.depth());
@@ -307,7 +307,7 @@ SceneReport judge(RandomScene scene, const std::filesystem::path& calibration) {
         report.beyond_missed += (errors.health & beyond.bits()) == 0 ? 1 : 0;
       }
     }
-    if (errors.touching && errors.pressed) {
+    if (errors.in_contact && errors.pressed) {
       maker.begin(parsed(program.as(perceive_kind())), false);
       if (const auto made = maker.make(points)) {
         const v1::Frame cloud = parsed(made->body);

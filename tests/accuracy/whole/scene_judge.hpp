@@ -21,7 +21,7 @@ struct FrameErrors {
   double beside = NAN;     ///< … within kBesideMm round it, …
   double away = NAN;       ///< … and everywhere else.
   double untrusted = NAN;  ///< Share of the pixels where it touches.
-  bool touching = false;
+  bool in_contact = false;
   bool pressed = false;   ///< An object touches the gel, truly and within the map.
   double true_area = 0;   ///< mm² truly deeper than the contact threshold.
   double area = NAN;      ///< Said, as a share of the true one, minus 1.
@@ -39,7 +39,7 @@ struct FrameErrors {
   /// Pixels deeper than calibrated are untrusted and take nothing from the others.
   [[nodiscard]] bool is_flagged() const noexcept;
   /// What is stated is "inside the contact": NaN where none is told.
-  [[nodiscard]] double inside_ratio() const noexcept { return touching ? inside / stated : NAN; }
+  [[nodiscard]] double inside_ratio() const noexcept { return in_contact ? inside / stated : NAN; }
 };
 
 struct SceneReport {

@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 namespace sim = hal::sim;
 
 constexpr double kPeriodS = 1;  // from one press to the next
-constexpr std::uint64_t kUntouched = 32;
+constexpr std::uint64_t kContactFree = 32;
 constexpr std::uint64_t kImages = 24;  // of a press that a lookup table or a lens is made from
 constexpr std::uint64_t kForceImages = 4;
 constexpr double kNewtonsPerGram = 0.00980665;
@@ -42,7 +42,7 @@ class Bench {
   Bench(const RandomSensor& sensor, const std::vector<Load>& loads, fs::path folder)
       : renderer_(with(sensor.scene, loads), sensor.seed), folder_(std::move(folder)) {}
 
-  std::string untouched() { return images("untouched", 0, kUntouched); }
+  std::string reference_image() { return images("untouched", 0, kContactFree); }
   std::string load(std::size_t index, std::uint64_t count = kImages) {
     return images(fmt::format("load{}", index), frame_of(index), count);
   }
@@ -50,7 +50,7 @@ class Bench {
 
  private:
   static sim::Scene with(sim::Scene scene, const std::vector<Load>& loads) {
-    scene.layer.solve_step_mm = 5;
+    scene.gel.solve_step_mm = 5;
     for (std::size_t i = 0; i < loads.size(); ++i) {
       const Load& load = loads[i];
       const double begin = kPeriodS * static_cast<double>(i + 1);
@@ -58,7 +58,7 @@ class Bench {
         return sim::PressKey{.time_s = begin + after,
                              .x_mm = load.x_mm,
                              .y_mm = load.y_mm,
-                             .depth_mm = share * scene.layer.thickness_mm};
+                             .depth_mm = share * scene.gel.thickness_mm};
       };
       scene.presses.push_back(
           {load.object, {key(0, 0), key(0.1, load.share), key(0.9, load.share), key(0.95, 0)}});
@@ -96,8 +96,8 @@ std::string run(const std::vector<std::string>& arguments) {
 std::string lens_of(const RandomSensor& sensor, const fs::path& work, std::string& printed) {
   Bench bench(sensor, {{sim::pin_board(), 0.35}}, work / "board");
   const std::string lens = (work / "lens.toml").string();
-  printed +=
-      run({"lens", "--board-reference", bench.untouched(), "--board", bench.load(0), "-o", lens});
+  printed += run(
+      {"lens", "--board-reference", bench.reference_image(), "--board", bench.load(0), "-o", lens});
   return lens;
 }
 
@@ -112,7 +112,7 @@ void calibrate_depth(const RandomSensor& sensor, const fs::path& work, const fs:
   Bench bench(sensor, loads, work / "ball");
   std::string refused;
   for (std::size_t i = 0; i < loads.size(); ++i) {
-    std::vector<std::string> arguments = {"depth",  "--reference", bench.untouched(),
+    std::vector<std::string> arguments = {"depth",  "--reference", bench.reference_image(),
                                           "--ball", bench.load(i), "--radius-mm",
                                           "4",      "-o",          folder.string()};
     arguments.insert(arguments.end(), map.begin(), map.end());
@@ -138,7 +138,7 @@ void calibrate_force(const RandomSensor& sensor, const fs::path& work, const fs:
     loads.push_back({sim::disc(2.5), share, -0.6, -1.7});
   Bench bench(sensor, loads, work / "force");
   std::vector<std::string> arguments = {"force", "--calibration", folder.string(), "--reference",
-                                        bench.untouched()};
+                                        bench.reference_image()};
   for (std::size_t i = 0; i < loads.size(); ++i) {
     const double newtons = std::round(bench.newtons(i) / kNewtonsPerGram) * kNewtonsPerGram;
     arguments.insert(arguments.end(),

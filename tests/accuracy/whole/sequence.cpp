@@ -19,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of a minute's maps.
-constexpr std::size_t kMostBytes = std::size_t{4} << 30U;
+constexpr std::size_t kMaxBytes = std::size_t{4} << 30U;
 
 const char* phase_of(const MotionFrames& frames, std::uint64_t n) {
   if (n <= frames.motion) return "press";
@@ -27,7 +27,7 @@ const char* phase_of(const MotionFrames& frames, std::uint64_t n) {
 }
 
 std::vector<std::string> read_frames(const fs::path& file) {
-  const std::string bytes = base::read_file(file, kMostBytes);
+  const std::string bytes = base::read_file(file, kMaxBytes);
   std::string_view rest = bytes;
   wire::MessageDecoder decoder;
   std::vector<std::string> frames;
@@ -61,7 +61,7 @@ std::vector<Direction> Sequence::unobservable(std::size_t at) const {
   std::vector<Direction> now;
   for (const ShapeRow& row : shape) {
     if (row.sequence > truth.at(at).sequence) break;
-    if (row.shown >= ShapeRow::kLeastShown) continue;
+    if (row.shown >= ShapeRow::kMinShown) continue;
     now.push_back(carried(row.direction, motion(index(row.sequence), at)));
   }
   return now;
@@ -127,7 +127,7 @@ void save(const Sequence& sequence, const fs::path& folder) {
   base::write_file_atomically(folder / (sequence.name + ".shape.csv"), csv);
   csv = "sequence,in_contact,r11,r12,r13,r21,r22,r23,r31,r32,r33,x_mm,y_mm,z_mm,phase\n";
   for (const TruthRow& row : sequence.truth) {
-    csv += fmt::format("{},{}", row.sequence, row.touching ? 1 : 0);
+    csv += fmt::format("{},{}", row.sequence, row.in_contact ? 1 : 0);
     for (int i = 0; i < 9; ++i) csv += fmt::format(",{:.12g}", row.pose.linear()(i / 3, i % 3));
     for (const double value : row.pose.translation()) csv += fmt::format(",{:.9g}", value);
     csv += fmt::format(",{}\n", row.phase);
@@ -140,7 +140,7 @@ Sequence load(const fs::path& folder, const std::string& name) {
   sequence.name = name;
   for_each_line(folder / (name + ".truth.csv"), [&](std::istream& fields) {
     TruthRow& row = sequence.truth.emplace_back();
-    fields >> row.sequence >> row.touching;
+    fields >> row.sequence >> row.in_contact;
     read_pose(fields, row.pose);
     fields >> row.phase;
   });

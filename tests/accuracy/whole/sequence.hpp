@@ -20,7 +20,7 @@ namespace dtact::whole {
 /// What is true of a frame. Lengths are millimetres, poses are in the map's surface frame.
 struct TruthRow {
   std::uint64_t sequence = 0;
-  bool touching = false;
+  bool in_contact = false;
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< From the object's frame.
   std::string phase;                                       ///< "press", "motion" or "end".
 };
@@ -31,7 +31,7 @@ struct ShapeRow {
   Direction direction;
   double shown = 0;  ///< ShownDirection::shown.
   /// What shows less counts as unobservable.
-  static constexpr double kLeastShown = 0.05;
+  static constexpr double kMinShown = 0.05;
 };
 
 /// One object that is pressed in and then moves, as the daemon sends it and as it is.

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "hal/sim/elastic_layer.hpp"
 #include "hal/sim/grid.hpp"
-#include "hal/sim/layer.hpp"
 #include "hal/sim/placement.hpp"
 
 namespace dtact::whole {
@@ -16,8 +16,8 @@ using hal::sim::PressKey;
 
 constexpr double kStepMm = 0.2;
 /// What is shallower has no part in it.
-constexpr double kLeastDeepMm = 0.06;
-constexpr double kLeastArmMm = 0.5;
+constexpr double kMinDeepMm = 0.06;
+constexpr double kMinArmMm = 0.5;
 
 double degrees(double radians) { return radians * 180 / M_PI; }
 
@@ -47,13 +47,13 @@ class GelSolver {
   GelSolver(const hal::sim::Scene& scene, const hal::sim::Grid& grid)
       : scene_(scene),
         grid_(grid),
-        layer_(grid_.width, grid_.height, grid_.spacing_mm, scene_.layer.thickness_mm,
-               scene_.layer.poisson) {}
+        layer_(grid_.width, grid_.height, grid_.spacing_mm, scene_.gel.thickness_mm,
+               scene_.gel.poisson) {}
 
   hal::sim::Pressed press(const Eigen::Isometry3d& pose) {
     cv::Mat1d target(grid_.height, grid_.width, -hal::sim::kNoSurface);
     lower_object(scene_.surface, scene_.presses[0].object, key_of(scene_, pose),
-                 scene_.layer.thickness_mm, grid_, target);
+                 scene_.gel.thickness_mm, grid_, target);
     hal::sim::Pressed pressed = layer_.solve(target, guess_);
     guess_ = pressed.pressure;
     return pressed;
@@ -62,7 +62,7 @@ class GelSolver {
  private:
   const hal::sim::Scene& scene_;
   const hal::sim::Grid& grid_;
-  hal::sim::Layer layer_;
+  hal::sim::ElasticLayer layer_;
   cv::Mat1d guess_;
 };
 
@@ -97,20 +97,20 @@ std::array<ShownDirection, 6> shown_directions(const hal::sim::Scene& curved,
   const hal::sim::Pressed here = gel.press(pose);
 
   Direction about{Eigen::Vector3d::Zero(), 0, Eigen::Matrix<double, 6, 1>::Zero()};
-  int touching = 0;
+  int in_contact = 0;
   for (int i = 0; i < grid.height; ++i) {
     for (int k = 0; k < grid.width; ++k) {
       if (here.pressure(i, k) <= 0) continue;
-      ++touching;
+      ++in_contact;
       about.centre +=
           Eigen::Vector3d(grid.x0_mm + k * grid.spacing_mm, grid.y0_mm + i * grid.spacing_mm, 0);
     }
   }
-  about.centre /= std::max(1, touching);
-  about.arm = std::max(kLeastArmMm, std::sqrt(touching / M_PI) * grid.spacing_mm);
+  about.centre /= std::max(1, in_contact);
+  about.arm = std::max(kMinArmMm, std::sqrt(in_contact / M_PI) * grid.spacing_mm);
 
   cv::Mat1b deep;
-  cv::compare(here.indentation_mm, kLeastDeepMm, deep, cv::CMP_GT);
+  cv::compare(here.indentation_mm, kMinDeepMm, deep, cv::CMP_GT);
   std::array<cv::Mat1d, 6> change;
   for (std::size_t i = 0; i < change.size(); ++i) {
     Direction one = about;

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "clients/calibrate/fit/build.hpp"
-#include "daemon/pipeline/untouched/cells.hpp"
+#include "daemon/pipeline/reference/cells.hpp"
 #include "daemon/recon/reconstructor.hpp"
 #include "daemon/recon/tile_readers.hpp"
 #include "hal/files/png.hpp"
@@ -69,7 +69,7 @@ class Camera {
   std::vector<std::uint8_t> payload_;
 };
 
-/// Depth of frames against one untouched image.
+/// Depth of frames against one reference image.
 class DepthOf {
  public:
   DepthOf(std::shared_ptr<const recon::Model> model, const image::Grey16& reference_q8)

@@ -50,7 +50,7 @@ struct Sample {
   std::int64_t published_ns = 0;
   std::int64_t received_ns = 0;
   std::uint64_t dropped = 0;
-  bool touching = false;
+  bool in_contact = false;
 };
 
 std::int64_t now_ns() { return dtact::base::system_clock().monotonic_ns(); }
@@ -142,18 +142,18 @@ void measure(const Arguments& arguments, std::vector<Sample>& samples) {
     const v1::Frame& frame = message.frame();
     samples.push_back({frame.sequence(), frame.monotonic_ns(), frame.meaning(), frame.ready_ns(),
                        frame.published_ns(), connection.received_ns(), frame.dropped(),
-                       frame.contact().touching()});
+                       frame.contact().in_contact()});
   }
 }
 
 void write(const std::string& file, const std::vector<std::vector<Sample>>& clients) {
   std::string text =
-      "client,sequence,stamp_ns,meaning,ready_ns,published_ns,received_ns,dropped,touching\n";
+      "client,sequence,stamp_ns,meaning,ready_ns,published_ns,received_ns,dropped,in_contact\n";
   for (std::size_t i = 0; i < clients.size(); ++i) {
     for (const Sample& s : clients[i]) {
       fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{},{}\n", i, s.sequence,
                      s.stamp_ns, static_cast<int>(s.meaning), s.ready_ns, s.published_ns,
-                     s.received_ns, s.dropped, s.touching ? 1 : 0);
+                     s.received_ns, s.dropped, s.in_contact ? 1 : 0);
     }
   }
   std::ofstream out(file);

@@ -45,7 +45,7 @@ def prepare(programs, folder):
     run(programs.frames, ball, "0", str(4 * FPS), at["mjpeg"])
     # Contact only, as pixels: nothing is left to decode when they are played.
     run(programs.render, "--scene", ball, "--frames", "90:138", "-o", at["grey"])
-    # A daemon that has seen the untouched image once keeps it for the one that plays contact only.
+    # A daemon that has seen the reference image once keeps it for the one that plays contact only.
     with Daemon(programs, folder, {"camera.replay.folder": at["reference"]}) as daemon:
         daemon.wait_serving()
     return at

@@ -97,7 +97,7 @@ def figures(result):
         "p99.9_ms": percentile(latency, 0.999), "max_ms": latency[-1],
         "exposure_p50_ms": percentile(exposure, 0.5), "exposure_p99_ms": percentile(exposure, 0.99),
         "missed_by_capture": result["missed"], "dropped_to_clients": dropped,
-        "touching_share": sum(r["touching"] == "1" for r in rows) / len(rows),
+        "contact_share": sum(r["in_contact"] == "1" for r in rows) / len(rows),
         "stolen_share": result["stolen"], **result["usage"]}
 
 
@@ -116,7 +116,7 @@ def print_table(results, tables):
     print("missed: frames the capture loop did not take; dropped: frames a client did not get;\n"
           "from exposure: p50 and p99 from the start of exposure, one period before ready; switches\n"
           "and page faults (minor+major): of the capture thread; stolen: CPU time the host took")
-    print(f"something touched in {100 * tables[0]['touching_share']:.0f} % of the frames")
+    print(f"there was contact in {100 * tables[0]['contact_share']:.0f} % of the frames")
     for fifo in (True, False):
         result = next(r for r in results if r["case"].fifo == fifo)
         print(f"\nthreads, {'FIFO' if fifo else 'normal'}: " + "; ".join(result["threads"]))

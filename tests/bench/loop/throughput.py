@@ -6,8 +6,8 @@ import time
 
 from daemon import FPS, Daemon
 
-LEAST_FPS = 600
-MOST_RSS_MIB = 60
+MIN_FPS = 600
+MAX_RSS_MIB = 60
 # What may still grow in a process that does not leak: the allocator's arenas of rare commands.
 FLAT_KIB = 512
 CLIENTS = (1, 2, 4, 8, 16, 32, 64)
@@ -43,8 +43,8 @@ def greatest_rate(programs, folder, recordings, seconds):
     encoded = after["encoded"] - before["encoded"]
     with open(os.path.join(folder, "rate.csv"), newline="", encoding="ascii") as file:
         rows = list(csv.DictReader(file))
-    touching = sum(r["touching"] == "1" for r in rows) / max(1, len(rows))
-    return delivered / passed, rss, encoded / passed, touching, after
+    in_contact = sum(r["in_contact"] == "1" for r in rows) / max(1, len(rows))
+    return delivered / passed, rss, encoded / passed, in_contact, after
 
 
 def many_clients(programs, folder, recordings, rate, count, seconds):
@@ -106,10 +106,10 @@ def plot(out, points, label):
 def measure(programs, folder, recordings, out, label, seconds):
     """Prints and writes what came out, returns the goals' lines."""
     print(f"bench: greatest frame rate on one core, {seconds:.0f} s", flush=True)
-    fps, rss, encoded, touching, status = greatest_rate(programs, folder, recordings, seconds)
+    fps, rss, encoded, in_contact, status = greatest_rate(programs, folder, recordings, seconds)
     growth = rss[-1] - rss[0]
     print(f"\nGreatest frame rate, the whole daemon on one core, no decoding, contact in "
-          f"{100 * touching:.0f} % of the frames: {fps:.0f} fps\n"
+          f"{100 * in_contact:.0f} % of the frames: {fps:.0f} fps\n"
           f"  (a client got {encoded:.0f} of them a second: the newest wins); resident "
           f"{rss[-1] / 1024:.1f} MiB, grown {growth} KiB over {len(rss)} s")
     for stage in status["stages"]:
@@ -141,12 +141,12 @@ def measure(programs, folder, recordings, out, label, seconds):
     once = all(abs(p["encoded"] - p["fetched"]) <= 2 for p in points)
     eight = max(p["rss_mib"] for p in points if p["clients"] == 8)
     return [
-        (f"greatest frame rate, one core, ball contact, no decoding: at least {LEAST_FPS} fps",
-         f"{fps:.0f} fps", fps >= LEAST_FPS, f"short by {LEAST_FPS - fps:.0f} fps"),
+        (f"greatest frame rate, one core, ball contact, no decoding: at least {MIN_FPS} fps",
+         f"{fps:.0f} fps", fps >= MIN_FPS, f"short by {MIN_FPS - fps:.0f} fps"),
         (f"memory flat meanwhile: within {FLAT_KIB} KiB", f"grown {growth} KiB",
          growth <= FLAT_KIB, f"short by {growth - FLAT_KIB} KiB"),
         ("each frame encoded once, 1 to 64 clients", "once" if once else "not once", once,
          "the counters differ"),
-        (f"resident memory with 8 clients: at most {MOST_RSS_MIB} MiB", f"{eight:.1f} MiB",
-         eight <= MOST_RSS_MIB, f"short by {eight - MOST_RSS_MIB:.1f} MiB"),
+        (f"resident memory with 8 clients: at most {MAX_RSS_MIB} MiB", f"{eight:.1f} MiB",
+         eight <= MAX_RSS_MIB, f"short by {eight - MAX_RSS_MIB:.1f} MiB"),
     ]

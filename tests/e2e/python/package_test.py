@@ -109,7 +109,7 @@ class Depth(unittest.TestCase):
 
 
 class Commands(unittest.TestCase):
-    def test_light_is_told_and_set(self):
+    def test_light_is_reported_and_set(self):
         with dtact.connect(daemon.address) as s:
             self.assertEqual(s.set_light(brightness=200).brightness, 200)
             lights = [e.light.brightness for e in s.events(timeout=1) if isinstance(e, dtact.LightEvent)]
@@ -118,13 +118,13 @@ class Commands(unittest.TestCase):
             with self.assertRaisesRegex(dtact.Invalid, "set_light"):
                 s.set_light(brightness=256)
 
-    def test_rezero_is_refused_while_something_touches(self):
+    def test_rezero_is_refused_in_contact(self):
         with dtact.connect(daemon.address) as s:
             for _ in range(10):
                 pressed(s)
                 try:
                     s.rezero()
-                except dtact.Touched as e:
+                except dtact.InContact as e:
                     self.assertIn("touches", str(e))
                     return
             self.fail("it was never refused")
@@ -198,7 +198,7 @@ class Connections(unittest.TestCase):
         async def main():
             async with dtact.aio.connect(daemon.address) as s:
                 async for f in s.frames():
-                    if f.contact and f.contact.touching:
+                    if f.contact and f.contact.in_contact:
                         return f.depth_mm.shape, (await s.status()).state
         self.assertEqual(asyncio.run(main()), ((400, 500), "serving"))
 

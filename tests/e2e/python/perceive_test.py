@@ -31,7 +31,7 @@ class Perceive(unittest.TestCase):
             time.sleep(0.05)
         cls.address = found[1]
 
-    def test_points_and_pose_of_what_touches(self):
+    def test_points_and_pose_of_the_contact(self):
         with dtact.connect(self.address) as s:
             s.subscribe(dtact.Subscription(depth=None, cloud="int16", region="contact", pose=True))
             until = time.monotonic() + 60
@@ -43,7 +43,7 @@ class Perceive(unittest.TestCase):
         self.assertEqual(f.surface, dtact.Surface("plane"))
         cloud = f.cloud
         points = cloud.points[cloud.valid]
-        # Pressed in is below the untouched surface, metres; the deepest is where the summary says.
+        # Pressed in is below the undeformed surface, metres; the deepest is where the summary says.
         deepest = points[np.argmin(points[:, 2])]
         self.assertAlmostEqual(-1e3 * deepest[2], f.contact.deepest_mm, delta=0.01)
         lengths = np.linalg.norm(cloud.normals[cloud.valid], axis=1)

@@ -79,7 +79,7 @@ def tearDownModule() -> None:
     assert ended == [0, 0, 0], ended
 
 
-def told(path: str, subprotocol: str, count: int) -> dict[str, list[Any]]:
+def reported(path: str, subprotocol: str, count: int) -> dict[str, list[Any]]:
     """What the client is told, by kind."""
     url = f"ws://127.0.0.1:{gateway.port}{path}"
     # A file: what node writes to a pipe it may not have written by its end.
@@ -140,7 +140,7 @@ def classes(channels: list[Any]) -> dict[str, Any]:
 class FoxglovesClient(unittest.TestCase):
     def test_channels_messages_and_services(self) -> None:
         with DirectFrames() as direct:
-            node = told("/sensors/left/foxglove", V1, 15)
+            node = reported("/sensors/left/foxglove", V1, 15)
         self.assertEqual(node["end"][0]["why"], "all came")
         channels = [entry["channel"] for entry in node["channel"]]
         self.assertEqual({one["topic"]: one["schemaName"] for one in channels}, TOPICS)
@@ -205,7 +205,7 @@ class FoxglovesClient(unittest.TestCase):
         self.fail("no points and contact came of one frame")
 
     def points_and_contacts_of_one_frame(self) -> int:
-        node = told("/sensors/touch/foxglove", V1, 160)
+        node = reported("/sensors/touch/foxglove", V1, 160)
         channels = [entry["channel"] for entry in node["channel"]]
         self.assertEqual({one["topic"]: one["schemaName"] for one in channels}, POINTS)
         types = classes(channels)
@@ -227,7 +227,7 @@ class FoxglovesClient(unittest.TestCase):
         return compared
 
     def test_all_sensors_under_the_sdks_name(self) -> None:
-        node = told("/foxglove", SDK, 0)
+        node = reported("/foxglove", SDK, 0)
         topics = [entry["channel"]["topic"] for entry in node["channel"]]
         self.assertEqual(topics[:8], ["/left" + topic for topic in TOPICS])
         self.assertEqual(topics[8:16], ["/gone" + topic for topic in TOPICS])
@@ -267,31 +267,31 @@ class Protocol(unittest.TestCase):
             socket.send(b"\x02" + struct.pack("<III", 7, 1, 4) + b"json{}")
             self.assertEqual(json.loads(socket.receive()[1])["op"], "serviceCallFailure")
 
-    def test_channels_are_told_when_the_daemon_comes(self) -> None:
+    def test_channels_are_reported_when_the_daemon_comes(self) -> None:
         folder = pathlib.Path(FOLDER.name)
         with create_server(("127.0.0.1", 0)) as free:
             port = free.getsockname()[1]
         gate = Gateway(folder, "--host", f"127.0.0.1:{port}")
-        told: dict[str, set[str]] = {"advertise": set(), "unadvertise": set()}
+        reported: dict[str, set[str]] = {"advertise": set(), "unadvertise": set()}
         topics: dict[int, str] = {}
         with WebSocket(gate.port, "/foxglove", Sec_WebSocket_Protocol=V1) as client:
             # Before anybody knows what is behind the address; this client subscribes to nothing.
-            while not told["advertise"]:
-                self.collect(json.loads(client.receive()[1]), told, topics)
-            self.assertEqual(told["advertise"], set(TOPICS))
+            while not reported["advertise"]:
+                self.collect(json.loads(client.receive()[1]), reported, topics)
+            self.assertEqual(reported["advertise"], set(TOPICS))
             late = Perceive(folder, daemon, port)
-            while "/dtact/points" not in told["advertise"]:
-                self.collect(json.loads(client.receive()[1]), told, topics)
-            self.assertEqual(told["unadvertise"], set(TOPICS) - set(POINTS))
+            while "/dtact/points" not in reported["advertise"]:
+                self.collect(json.loads(client.receive()[1]), reported, topics)
+            self.assertEqual(reported["unadvertise"], set(TOPICS) - set(POINTS))
         self.assertEqual((gate.stop(), late.stop()), (0, 0))
 
     @staticmethod
-    def collect(message: Any, told: dict[str, set[str]], topics: dict[int, str]) -> None:
+    def collect(message: Any, reported: dict[str, set[str]], topics: dict[int, str]) -> None:
         for channel in message.get("channels", []):
             topics[channel["id"]] = channel["topic"]
-            told["advertise"].add(channel["topic"])
+            reported["advertise"].add(channel["topic"])
         for number in message.get("channelIds", []):
-            told["unadvertise"].add(topics[number])
+            reported["unadvertise"].add(topics[number])
 
     def test_tokens(self) -> None:
         tokens = pathlib.Path(FOLDER.name, "tokens")

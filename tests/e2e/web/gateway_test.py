@@ -13,7 +13,7 @@ import unittest
 
 from programs import Daemon, Gateway, calibrate
 from viewer import Client, E, M, Viewer, length
-from web_socket import BINARY, PATIENCE, TEXT, Closed, Refused, WebSocket, connect, request
+from web_socket import BINARY, TIMEOUT, TEXT, Closed, Refused, WebSocket, connect, request
 
 FOLDER = tempfile.TemporaryDirectory(prefix="dtact_web_")
 HERE = pathlib.Path(FOLDER.name)
@@ -36,7 +36,7 @@ def setUpModule() -> None:
     # Both are there before anything is asked.
     for name in ("left", "right"):
         with Viewer(gateway.port, name) as viewer:
-            viewer.notice(lambda told: told["connected"])
+            viewer.notice(lambda reported: reported["connected"])
     # Depth comes once the reference is taken.
     with Client(left.port) as client:
         client.call(subscribe=M.Subscribe(**EVERYTHING))
@@ -130,7 +130,7 @@ class Frames(unittest.TestCase):
 
 
 class Requests(unittest.TestCase):
-    def test_light_is_passed_on_and_all_are_told(self) -> None:
+    def test_light_is_passed_on_and_all_are_reported(self) -> None:
         with Viewer(gateway.port) as viewer, Viewer(gateway.port) as other:
             reply = viewer.call(set_light=M.SetLight(brightness=97))
             self.assertEqual(reply.light.brightness, 97)
@@ -177,7 +177,7 @@ class Rights(unittest.TestCase):
     def test_control_rights(self) -> None:
         with Viewer(self.gate.port, token=CONTROL) as viewer:
             self.assertEqual(viewer.hello.rights, E.RIGHTS_CONTROL)
-            viewer.notice(lambda told: told["connected"])
+            viewer.notice(lambda reported: reported["connected"])
             viewer.call(set_light=M.SetLight(brightness=255))
 
     def test_no_token_and_a_wrong_one(self) -> None:
@@ -188,7 +188,7 @@ class Rights(unittest.TestCase):
                 with self.assertRaises(Closed):
                     viewer.socket.receive()
 
-    def test_strangers_are_told_no_addresses(self) -> None:
+    def test_unauthenticated_are_reported_no_addresses(self) -> None:
         _, _, body = request(self.gate.port, "/sensors")
         self.assertEqual(json.loads(body)[1],
                          {"name": "gone", "connected": False,
@@ -203,7 +203,7 @@ class Rights(unittest.TestCase):
         daemon = Daemon(HERE, "guarded", f"net.tokens={tokens}")
         gate = Gateway(HERE, "--daemon", f"left=127.0.0.1:{daemon.port},token-file={token}")
         with Viewer(gate.port) as viewer:
-            viewer.notice(lambda told: told["connected"])
+            viewer.notice(lambda reported: reported["connected"])
         with Viewer(gate.port) as viewer:
             self.assertEqual(viewer.hello.rights, E.RIGHTS_VIEW)
             self.assertEqual(viewer.refused(rezero=M.Rezero()).code, E.ERROR_DENIED)
@@ -215,23 +215,23 @@ class Restarts(unittest.TestCase):
         daemon = Daemon(HERE, "brief")
         gate = Gateway(HERE, "--host", f"127.0.0.1:{daemon.port}")
         with Viewer(gate.port, "sensor") as viewer:
-            viewer.notice(lambda told: told["connected"])
+            viewer.notice(lambda reported: reported["connected"])
             viewer.call(subscribe=M.Subscribe(luma=E.LUMA_GREY8))
             viewer.frame()
             daemon.stop(signal.SIGKILL)
-            told = viewer.notice(lambda told: not told["connected"])
-            self.assertEqual(told["name"], "sensor")
-            self.assertIn("dtactd", told["error"])
+            reported = viewer.notice(lambda reported: not reported["connected"])
+            self.assertEqual(reported["name"], "sensor")
+            self.assertIn("dtactd", reported["error"])
             error = viewer.refused(get_status=M.GetStatus())
             self.assertEqual(error.code, E.ERROR_DEVICE)
             self.assertIn("the daemon of sensor is away", error.message)
             self.assertEqual(viewer.refused(subscribe=M.Subscribe(summary=True)).code, E.ERROR_DEVICE)
             with Viewer(gate.port, "sensor") as late:
-                self.assertFalse(late.notice(lambda told: True)["connected"])
+                self.assertFalse(late.notice(lambda reported: True)["connected"])
                 self.assertEqual(late.hello.name, "brief", "what it said last")
                 daemon.restart()
-                late.notice(lambda told: told["connected"])
-            viewer.notice(lambda told: told["connected"])
+                late.notice(lambda reported: reported["connected"])
+            viewer.notice(lambda reported: reported["connected"])
             viewer.frames.clear()
             viewer.call(subscribe=M.Subscribe(luma=E.LUMA_GREY8))
             viewer.frame()
@@ -310,7 +310,7 @@ class Http(unittest.TestCase):
             for stream in held:
                 stream.close()
         # That those are gone is found one by one.
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + TIMEOUT
         while True:
             try:
                 self.assertEqual(request(gateway.port, "/")[0], 200)
@@ -383,7 +383,7 @@ class Security(unittest.TestCase):
         context.verify_mode = ssl.CERT_NONE
         self.assertEqual(request(gate.port, "/sensors", tls=context)[0], 200)
         with Viewer(gate.port, tls=context, Origin=f"https://127.0.0.1:{gate.port}") as viewer:
-            viewer.notice(lambda told: told["connected"])
+            viewer.notice(lambda reported: reported["connected"])
             viewer.call(subscribe=M.Subscribe(**EVERYTHING))
             self.assertEqual(len(viewer.frame().depth.data), 582 * 570 * 2)
         with self.assertRaises((Closed, ConnectionError)):

@@ -6,7 +6,7 @@ import time
 from typing import Any, Callable, Protocol
 
 from messages import E, M
-from web_socket import BINARY, PATIENCE, TEXT, WebSocket, connect
+from web_socket import BINARY, TIMEOUT, TEXT, WebSocket, connect
 
 __all__ = ["Client", "Conversation", "E", "M", "Viewer", "length"]
 
@@ -43,13 +43,13 @@ class TcpLink:
 
 
 class Conversation:
-    """Sorts what comes: `frames`, `events`, `replies` by id, `told` by the gateway itself."""
+    """Sorts what comes: `frames`, `events`, `replies` by id, `reported` by the gateway itself."""
 
     def __init__(self, link: Link, token: str = "", greet: bool = True) -> None:
         self.link = link
         self.frames: collections.deque[Any] = collections.deque()
         self.events: collections.deque[Any] = collections.deque()
-        self.told: collections.deque[Any] = collections.deque()
+        self.reported: collections.deque[Any] = collections.deque()
         self.replies: dict[int, Any] = {}
         self.next_id = 1
         if greet:
@@ -68,11 +68,11 @@ class Conversation:
         self.link.send(length(len(body)) + body)
         return number
 
-    def sort(self, seconds: float = PATIENCE) -> None:
+    def sort(self, seconds: float = TIMEOUT) -> None:
         """Takes one message."""
         opcode, payload = self.link.receive(seconds)
         if opcode == TEXT:
-            self.told.append(json.loads(payload))
+            self.reported.append(json.loads(payload))
             return
         assert struct.unpack(">I", payload[:4]) == (len(payload) - 4,), "one message, framed"
         message = M.ServerMessage.FromString(payload[4:])
@@ -87,9 +87,9 @@ class Conversation:
 
     def until(self, done: Callable[[], Any], what: str) -> Any:
         """Takes messages until `done` returns something."""
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         while not (found := done()):
-            assert time.monotonic() < end, f"{what} within {PATIENCE} s"
+            assert time.monotonic() < end, f"{what} within {TIMEOUT} s"
             self.sort(max(0.01, end - time.monotonic()))
         return found
 
@@ -120,10 +120,10 @@ class Conversation:
     def notice(self, where: Callable[[Any], bool]) -> Any:
         """What the gateway says of its daemon."""
         def next_one() -> Any:
-            while self.told:
-                told = self.told.popleft()
-                if where(told):
-                    return told
+            while self.reported:
+                reported = self.reported.popleft()
+                if where(reported):
+                    return reported
             return None
         return self.until(next_one, "a notice")
 

@@ -8,7 +8,7 @@ import struct
 import time
 from typing import Optional
 
-PATIENCE = 30.0  # seconds, for what comes by itself
+TIMEOUT = 30.0  # seconds, for what comes by itself
 TEXT, BINARY, CLOSE, PING, PONG = 1, 2, 8, 9, 10
 GUID = "258EAFA5-E914-47DA-95CA-C5AB0DC85B11"
 
@@ -30,7 +30,7 @@ class Closed(Exception):
 
 
 def connect(port: int, tls: Optional[ssl.SSLContext] = None) -> socket.socket:
-    plain = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE)
+    plain = socket.create_connection(("127.0.0.1", port), timeout=TIMEOUT)
     plain.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     return tls.wrap_socket(plain, server_hostname="localhost") if tls else plain
 
@@ -130,7 +130,7 @@ class WebSocket:
         del self.buffer[:size]
         return taken
 
-    def receive(self, seconds: float = PATIENCE) -> tuple[int, bytes]:
+    def receive(self, seconds: float = TIMEOUT) -> tuple[int, bytes]:
         """The next message, TEXT or BINARY. The server sends each in one frame."""
         until = time.monotonic() + seconds
         while True:

@@ -68,7 +68,7 @@ def zstd(content):
 
 
 def ball(width, height):
-    """A ball held in contact, with noise, marks that are not trusted and an untouched margin."""
+    """A ball held in contact, with noise, marks that are not trusted and a contact-free margin."""
     noise = random.Random(9)
     values = []
     for y in range(height):

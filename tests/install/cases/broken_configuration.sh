@@ -1,6 +1,6 @@
 # shellcheck shell=bash disable=SC2154
 # A configuration with an error: a reload is refused with the reason and disturbs nothing; a restart fails
-# with the reason, and the daemon is there once the file is mended, without another command. Likewise a
+# with the reason, and the daemon is there once the file is fixed, without another command. Likewise a
 # reload where the error is in the tokens, which lie in a file of their own.
 before=$(pid)
 cp "$config" /tmp/good.toml

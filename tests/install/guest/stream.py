@@ -13,7 +13,7 @@ import sys
 
 import dtact
 
-PATIENCE_S = 120.0  # the machine below may be busy
+TIMEOUT_S = 120.0  # the machine below may be busy
 TOLERANCE = 0.01
 
 
@@ -26,7 +26,7 @@ def lost(status) -> int:
 def main(address: str, fps: float, count: int) -> str:
     frames: list[tuple[int, int]] = []  # sequence, nanoseconds
     dropped: list[int] = []
-    with dtact.connect(address, timeout=PATIENCE_S, kept_frames=count) as client:
+    with dtact.connect(address, timeout=TIMEOUT_S, kept_frames=count) as client:
         before = lost(client.status())
         client.subscribe(dtact.Subscription(depth=None, summary=True, events=False))
         for frame in client.frames():

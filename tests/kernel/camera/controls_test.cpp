@@ -67,7 +67,7 @@ class Controls : public GuestCamera {
   static std::vector<CameraControl> locked() {
     hal::v4l2::V4l2Camera camera(config());
     camera.start();
-    EXPECT_EQ(camera.info().controls.size(), kNames.size()) << camera.report().remedy;
+    EXPECT_EQ(camera.info().controls.size(), kNames.size()) << camera.report().fix;
     return camera.info().controls;
   }
   static Verdicts verdicts() {
@@ -101,7 +101,7 @@ TEST_F(Controls, OneThatKeepsItsValueIsNeverConfirmed) {
   }
 }
 
-TEST_F(Controls, OnesThatAreRefusedAreToldWithWhatFollows) {
+TEST_F(Controls, OnesThatAreRefusedAreReportedWithWhatFollows) {
   const UsbCamera usb(every("-r"));
   wait_for_camera();
   for (const CameraControl& control : locked()) {

@@ -55,7 +55,7 @@ class Watcher {
         }
         const auto& event = std::get<v1::Event>(*item);
         if (event.has_state()) state_ = event.state().state();
-        if (event.contact().contact().touching()) ++contacts_;
+        if (event.contact().contact().in_contact()) ++contacts_;
         if (event.has_reference()) ++references_;
       }
     } catch (const client::Error&) {
@@ -132,10 +132,10 @@ TEST_F(Daemon, ComesUpWithoutACameraAndServesItOncePlugged) {
   wait_for_no_camera();
   start();
   v1::Status s = status();
-  EXPECT_EQ(s.camera().condition(), "unplugged");
-  EXPECT_NE(s.camera().remedy().find("plug it in"), std::string::npos) << s.camera().remedy();
+  EXPECT_EQ(s.camera().state(), "unplugged");
+  EXPECT_NE(s.camera().fix().find("plug it in"), std::string::npos) << s.camera().fix();
   const UsbCamera usb({folder()});
-  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "streaming"; }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return status().camera().state() == "streaming"; }));
   s = status();
   EXPECT_EQ(s.camera().pixel_format(), "MJPEG");
   EXPECT_EQ(s.camera().identity(), "serial:0001");
@@ -152,7 +152,7 @@ TEST_F(Daemon, FourClientsWatchThroughAnUnplug) {
   watchers.reserve(4);
   for (int i = 0; i < 4; ++i) watchers.push_back(std::make_unique<Watcher>(daemon_->port()));
   const auto all = [&](const auto& condition) {
-    return eventually(kPatience, [&] { return std::ranges::all_of(watchers, condition); });
+    return eventually(kTimeout, [&] { return std::ranges::all_of(watchers, condition); });
   };
   ASSERT_TRUE(all([](const auto& w) { return w->frames() > 30; }));
 
@@ -161,14 +161,14 @@ TEST_F(Daemon, FourClientsWatchThroughAnUnplug) {
     usb.reset();
     ASSERT_TRUE(all([](const auto& w) { return w->state() == v1::STATE_CAMERA_LOST; }));
     measured("unplug to camera_lost at four clients", now_s() - begin, "s");
-    EXPECT_EQ(status().camera().condition(), "unplugged");
+    EXPECT_EQ(status().camera().state(), "unplugged");
     std::vector<int> before;
     before.reserve(watchers.size());
     for (const auto& w : watchers) before.push_back(w->frames());
 
     begin = now_s();
     usb.emplace(std::vector<std::string>{"-i", folder()});  // everything automatic again
-    ASSERT_TRUE(eventually(kPatience, [&] {
+    ASSERT_TRUE(eventually(kTimeout, [&] {
       for (std::size_t i = 0; i < watchers.size(); ++i) {
         if (watchers[i]->frames() <= before[i]) return false;
       }
@@ -177,7 +177,7 @@ TEST_F(Daemon, FourClientsWatchThroughAnUnplug) {
     measured("re-plug to frames at four clients", now_s() - begin, "s");
     ASSERT_TRUE(all([](const auto& w) { return w->state() != v1::STATE_CAMERA_LOST; }));
     const v1::Status s = status();
-    EXPECT_EQ(s.camera().condition(), "streaming");
+    EXPECT_EQ(s.camera().state(), "streaming");
     EXPECT_EQ(s.camera().disconnects(), static_cast<std::uint64_t>(cycle + 1));
     for (const auto& control : s.camera().controls()) {
       EXPECT_NE(control.verdict(), v1::CONTROL_VERDICT_REFUSED)
@@ -208,7 +208,7 @@ TEST_F(Daemon, StreamsDepthThroughAnUnplug) {
   const auto depth_and_contact = [&] {
     const int depth = watcher.frames_with_depth();
     const int contacts = watcher.contacts();
-    return eventually(kPatience, [&] {
+    return eventually(kTimeout, [&] {
       return watcher.frames_with_depth() > depth + 10 && watcher.contacts() > contacts;
     });
   };
@@ -224,15 +224,15 @@ TEST_F(Daemon, StreamsDepthThroughAnUnplug) {
     measured(stage.stage() + ", p50", stage.p50_us(), "us");
 
   usb.reset();
-  ASSERT_TRUE(eventually(kPatience, [&] { return watcher.state() == v1::STATE_CAMERA_LOST; }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return watcher.state() == v1::STATE_CAMERA_LOST; }));
   wait_for_no_camera();
   begin = now_s();
   const int before = watcher.frames();
   const int depth_before = watcher.frames_with_depth();
   usb.emplace(std::vector<std::string>{"-i", sensor_pictures()});
-  ASSERT_TRUE(eventually(kPatience, [&] { return watcher.frames() > before; }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return watcher.frames() > before; }));
   measured("re-plug to the first frame at a client", now_s() - begin, "s");
-  ASSERT_TRUE(eventually(kPatience, [&] { return watcher.frames_with_depth() > depth_before; }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return watcher.frames_with_depth() > depth_before; }));
   measured("re-plug to the first depth at a client", now_s() - begin, "s");
   ASSERT_TRUE(depth_and_contact()) << status().state() << ": " << status().advice();
   // A ball of 4 mm radius, pressed as in config/scenes/calibrate_ball.toml.
@@ -249,38 +249,38 @@ TEST_F(Daemon, MeasuresDepthAgainstANewReferenceAfterAFreeze) {
   wait_for_camera();
   start({"calibration=" + e2e::calibration_folder().string()});
   const Watcher before(daemon_->port());
-  ASSERT_TRUE(eventually(kPatience, [&] { return before.contacts() > 0; })) << status().advice();
+  ASSERT_TRUE(eventually(kTimeout, [&] { return before.contacts() > 0; })) << status().advice();
   const int references = before.references();
   usb.toggle_freeze();
-  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "stalled"; }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return status().camera().state() == "stalled"; }));
   std::this_thread::sleep_for(std::chrono::seconds(4));
   usb.toggle_freeze();
-  ASSERT_TRUE(eventually(kPatience, [&] { return before.references() > references; }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return before.references() > references; }));
   EXPECT_EQ(status().camera().disconnects(), 0U);
   const Watcher after(daemon_->port());
-  ASSERT_TRUE(eventually(kPatience, [&] { return after.contacts() > 0; })) << status().advice();
+  ASSERT_TRUE(eventually(kTimeout, [&] { return after.contacts() > 0; })) << status().advice();
   // A ball of 4 mm radius, pressed as in config/scenes/calibrate_ball.toml.
   EXPECT_GT(after.deepest_mm(), 0.5);
   EXPECT_LT(after.deepest_mm(), 2.0);
   EXPECT_EQ(daemon_->stop(SIGTERM), 0);
 }
 
-TEST_F(Daemon, TellsAFreezeAndAMovedControl) {
+TEST_F(Daemon, ReportsAFreezeAndAMovedControl) {
   const UsbCamera usb({folder()});
   wait_for_camera();
   start();
   const Watcher watcher(daemon_->port());
-  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "streaming"; }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return status().camera().state() == "streaming"; }));
   usb.toggle_freeze();
-  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "stalled"; }));
-  EXPECT_TRUE(eventually(kPatience,
-                         [&] { return e2e::has(status().health(), v1::HEALTH_CAMERA_TROUBLE); }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return status().camera().state() == "stalled"; }));
+  EXPECT_TRUE(
+      eventually(kTimeout, [&] { return e2e::has(status().health(), v1::HEALTH_CAMERA_FAULT); }));
   usb.toggle_freeze();
-  ASSERT_TRUE(eventually(kPatience, [&] { return status().camera().condition() == "streaming"; }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return status().camera().state() == "streaming"; }));
   usb.drift();
-  ASSERT_TRUE(eventually(kPatience,
+  ASSERT_TRUE(eventually(kTimeout,
                          [&] { return e2e::has(status().health(), v1::HEALTH_CAMERA_MISMATCH); }));
-  ASSERT_TRUE(eventually(kPatience,
+  ASSERT_TRUE(eventually(kTimeout,
                          [&] { return !e2e::has(status().health(), v1::HEALTH_CAMERA_MISMATCH); }));
   EXPECT_EQ(daemon_->stop(SIGTERM), 0);
 }

@@ -41,7 +41,7 @@ TEST_F(Faults, AFrozenCameraIsStalledAndComesBack) {
   for (int i = 0; i < 10; ++i) grab_frame(camera, frame);
   usb.toggle_freeze();
   measured("freeze to stalled", grab_until_state(camera, CameraState::stalled), "s");
-  EXPECT_NE(camera.report().remedy.find("sends nothing"), std::string::npos);
+  EXPECT_NE(camera.report().fix.find("sends nothing"), std::string::npos);
   // Long enough for the stream to be restarted in between.
   const double until = now_s() + 4;
   grab_until(camera, frame, [&](GrabStatus status) {
@@ -52,7 +52,7 @@ TEST_F(Faults, AFrozenCameraIsStalledAndComesBack) {
   usb.toggle_freeze();
   measured("thaw to streaming", grab_until_state(camera, CameraState::streaming), "s");
   EXPECT_EQ(camera.report().disconnects, 0U);
-  EXPECT_EQ(camera.report().remedy, "");
+  EXPECT_EQ(camera.report().fix, "");
 }
 
 TEST_F(Faults, AnUnpluggedCameraComesBackWithItsControlsLocked) {
@@ -73,7 +73,7 @@ TEST_F(Faults, AnUnpluggedCameraComesBackWithItsControlsLocked) {
   measured("unplug to unplugged state", grab_until_state(camera, CameraState::unplugged), "s");
   EXPECT_EQ(camera.report().disconnects, 1U);
   EXPECT_EQ(camera.grab(frame, std::chrono::milliseconds(10)), GrabStatus::unplugged);
-  EXPECT_NE(camera.report().remedy.find("plug it in"), std::string::npos);
+  EXPECT_NE(camera.report().fix.find("plug it in"), std::string::npos);
   wait_for_no_camera();
 
   usb.emplace(std::vector<std::string>{folder()});  // with everything automatic again
@@ -95,7 +95,7 @@ TEST_F(Faults, ACameraMayBeAbsentAtTheStart) {
   hal::v4l2::V4l2Camera camera(config());
   camera.start();
   EXPECT_EQ(camera.report().state, CameraState::unplugged);
-  EXPECT_EQ(camera.report().remedy,
+  EXPECT_EQ(camera.report().fix,
             "no camera serial:0001 is attached: plug it in, or set camera.v4l2.device (no camera "
             "is attached)");
   const UsbCamera usb({folder()});
@@ -113,7 +113,7 @@ TEST_F(Faults, ABusyCameraIsTakenWhenItIsFree) {
   hal::v4l2::V4l2Camera camera(config());
   camera.start();
   EXPECT_EQ(camera.report().state, CameraState::busy);
-  EXPECT_EQ(camera.report().remedy,
+  EXPECT_EQ(camera.report().fix,
             "another program uses /dev/video0: end it (fuser -v /dev/video0 names it)");
   Frame frame;
   EXPECT_EQ(camera.grab(frame, std::chrono::milliseconds(300)), GrabStatus::unplugged);
@@ -132,7 +132,7 @@ TEST_F(Faults, AForbiddenCameraSaysWhichGroupIsMissing) {
     hal::v4l2::V4l2Camera camera(config());
     camera.start();
     EXPECT_EQ(camera.report().state, CameraState::denied);
-    EXPECT_EQ(camera.report().remedy,
+    EXPECT_EQ(camera.report().fix,
               "no permission to open /dev/video0: add the daemon's user to the group video "
               "(usermod -aG video USER) and start it again");
     ASSERT_EQ(::seteuid(0), 0);

@@ -14,7 +14,7 @@
 namespace dtact::kernel_test {
 
 /// Much longer than anything takes: the guest has one CPU, and others use this machine.
-inline constexpr double kPatience = 20;
+inline constexpr double kTimeout = 20;
 
 /// What the tests of the real uvcvideo have in common.
 class GuestCamera : public testing::Test {
@@ -43,7 +43,7 @@ class GuestCamera : public testing::Test {
 
   /// Waits for the camera's node, so that a test of streaming doesn't test plugging.
   static void wait_for_camera(std::size_t count = 1) {
-    ASSERT_TRUE(eventually(kPatience, [&] { return hal::v4l2::list_attached().size() == count; }));
+    ASSERT_TRUE(eventually(kTimeout, [&] { return hal::v4l2::list_attached().size() == count; }));
   }
   static void wait_for_no_camera() { wait_for_camera(0); }
 
@@ -54,9 +54,9 @@ class GuestCamera : public testing::Test {
     for (;;) {
       const hal::GrabStatus status = camera.grab(frame, std::chrono::milliseconds(50));
       if (condition(status)) return now_s() - begin;
-      if (now_s() - begin > kPatience) {
-        ADD_FAILURE() << "not within " << kPatience << " s; remedy: " << camera.report().remedy;
-        return kPatience;
+      if (now_s() - begin > kTimeout) {
+        ADD_FAILURE() << "not within " << kTimeout << " s; fix: " << camera.report().fix;
+        return kTimeout;
       }
     }
   }

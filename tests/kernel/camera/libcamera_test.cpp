@@ -76,7 +76,7 @@ TEST_F(Libcamera, NamesWhatTheCameraOffers) {
   c.width = 1024;
   const auto camera = hal::libcamera_backend::make_camera(c);
   try {
-    const bool seen = eventually(kPatience, [&] {
+    const bool seen = eventually(kTimeout, [&] {
       camera->start();
       return false;
     });

@@ -41,13 +41,13 @@ class Names : public GuestCamera {
   /// camera before would be taken for the next one's.
   void TearDown() override {
     GuestCamera::TearDown();
-    EXPECT_TRUE(eventually(kPatience, [] {
+    EXPECT_TRUE(eventually(kTimeout, [] {
       return !std::filesystem::is_symlink(kByPath) && !std::filesystem::is_symlink(kById);
     }));
   }
 
   static void wait_for_links() {
-    ASSERT_TRUE(eventually(kPatience, [] {
+    ASSERT_TRUE(eventually(kTimeout, [] {
       const auto cameras = hal::v4l2::list_attached();
       return cameras.size() == 1 && !cameras[0].by_path.empty() && !cameras[0].by_id.empty();
     }));
@@ -91,7 +91,7 @@ TEST_F(Names, TheMetadataNodeSLinkIsRefused) {
   wait_for_links();
   hal::CameraConfig c = config();
   c.v4l2.device = "/dev/v4l/by-path/platform-vhci_hcd.0-usb-0:1:1.0-video-index1";
-  ASSERT_TRUE(eventually(kPatience, [&] { return std::filesystem::exists(c.v4l2.device); }));
+  ASSERT_TRUE(eventually(kTimeout, [&] { return std::filesystem::exists(c.v4l2.device); }));
   hal::v4l2::V4l2Camera camera(c);
   try {
     camera.start();
@@ -150,7 +150,7 @@ TEST_F(PiNodes, AreNoCamera) {
   hal::v4l2::V4l2Camera camera(the_only_camera());
   camera.start();
   EXPECT_EQ(camera.report().state, CameraState::unplugged);
-  EXPECT_EQ(camera.report().remedy,
+  EXPECT_EQ(camera.report().fix,
             "no camera is attached: plug it in (dtactctl cameras says why other video nodes are "
             "not taken)");
   const UsbCamera usb({folder()});
@@ -165,7 +165,7 @@ TEST_F(PiNodes, AreListedWithTheReason) {
   hal::v4l2::V4l2Camera camera(the_only_camera());
   camera.start();
   EXPECT_EQ(camera.info().identity, kByPath);
-  ASSERT_TRUE(eventually(kPatience, [] { return std::filesystem::exists("/dev/video1"); }));
+  ASSERT_TRUE(eventually(kTimeout, [] { return std::filesystem::exists("/dev/video1"); }));
   const std::string text = listed();
   EXPECT_TRUE(text.starts_with(kByPath)) << text;
   const std::string codec = "it converts images, as a codec does\n";

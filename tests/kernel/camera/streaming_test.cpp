@@ -107,7 +107,7 @@ TEST_F(Streaming, NamesWhatTheCameraOffers) {
   }
 }
 
-TEST_F(Streaming, TwoCamerasAreToldApartBySerial) {
+TEST_F(Streaming, TwoCamerasAreDistinguishedBySerial) {
   const UsbCamera left({"-n", "left", "-p", "0", folder()});
   const UsbCamera right({"-n", "right", "-p", "1", folder()});
   wait_for_camera(2);
@@ -133,7 +133,7 @@ TEST_F(Streaming, TwoCamerasAreToldApartBySerial) {
   hal::v4l2::V4l2Camera any(c);
   any.start();
   EXPECT_EQ(any.report().state, CameraState::unplugged);
-  EXPECT_EQ(any.report().remedy,
+  EXPECT_EQ(any.report().fix,
             "several cameras are attached and camera.v4l2.device = \"\" doesn't say which: set it "
             "to one of them (attached: bus:usb-vhci_hcd.0-1 (serial:left), bus:usb-vhci_hcd.0-2 "
             "(serial:right))");
@@ -144,7 +144,7 @@ TEST_F(Streaming, TheMetadataNodeIsNeverTaken) {
   wait_for_camera();
   hal::CameraConfig c = config();
   c.v4l2.device = "/dev/video1";
-  ASSERT_TRUE(eventually(kPatience, [] { return ::access("/dev/video1", F_OK) == 0; }));
+  ASSERT_TRUE(eventually(kTimeout, [] { return ::access("/dev/video1", F_OK) == 0; }));
   hal::v4l2::V4l2Camera camera(c);
   EXPECT_THROW(camera.start(), std::runtime_error);
   EXPECT_EQ(hal::v4l2::list_attached().size(), 1U);

@@ -18,7 +18,7 @@ using hal::GrabStatus;
 class Vivid : public GuestCamera {
  protected:
   void SetUp() override {
-    ASSERT_TRUE(eventually(kPatience, [&] {
+    ASSERT_TRUE(eventually(kTimeout, [&] {
       fd_.reset(::open("/dev/video8", O_RDWR | O_CLOEXEC));
       return static_cast<bool>(fd_);
     }));

@@ -25,7 +25,7 @@ class RingDaemon : public testing::Test {
   }
   [[nodiscard]] bool in_trouble() const {
     const auto health = status().health();
-    return std::ranges::find(health, v1::HEALTH_RING_TROUBLE) != health.end();
+    return std::ranges::find(health, v1::HEALTH_RING_FAULT) != health.end();
   }
   int ctl(std::vector<std::string> arguments, std::string& output) const {
     arguments.insert(arguments.begin(),
@@ -53,12 +53,12 @@ TEST_F(RingDaemon, ComesUpWithoutTheRingAndLightsItOnceItIsThere) {
   EXPECT_THAT(status().advice(), HasSubstr("dtparam=spi=on"));
   EXPECT_THAT(daemon_.log(), HasSubstr("no LED ring yet, it is looked for: /dev/spidev0.0"));
 
-  std::string told;
-  EXPECT_NE(ctl({"led", "--brightness", "100"}, told), 0);
-  EXPECT_THAT(told, HasSubstr("No such file or directory"));
-  EXPECT_THAT(told, HasSubstr("The light is kept and shown when the ring is back"));
-  EXPECT_EQ(ctl({"led"}, told), 0);
-  EXPECT_THAT(told, HasSubstr("/dev/spidev0.0: cannot be opened"));
+  std::string reported;
+  EXPECT_NE(ctl({"led", "--brightness", "100"}, reported), 0);
+  EXPECT_THAT(reported, HasSubstr("No such file or directory"));
+  EXPECT_THAT(reported, HasSubstr("The light is kept and shown when the ring is back"));
+  EXPECT_EQ(ctl({"led"}, reported), 0);
+  EXPECT_THAT(reported, HasSubstr("/dev/spidev0.0: cannot be opened"));
 
   spi_mock::load();
   ASSERT_TRUE(eventually([&] { return grey_on_the_wire(100); }));

@@ -34,7 +34,7 @@ TEST(DoctorInTheGuest, FindsNothingWrongWithTheSpiRing) {
   EXPECT_THAT(out.str(), Not(HasSubstr("spi          WRONG")));
 }
 
-TEST(DoctorInTheGuest, TellsAnUnprivilegedUserWhatToDo) {
+TEST(DoctorInTheGuest, ReportsAnUnprivilegedUserWhatToDo) {
   const AsNobody nobody;
   std::ostringstream out;
   EXPECT_EQ(doctor(spi_config(), out), 1);

@@ -128,7 +128,7 @@ TEST_F(PioRing, OrderGammaAndBudgetAreTheRings) {
   EXPECT_TRUE(last_sent("1f1f1f 1f1f1f 1f1f1f 1f1f1f 1f1f1f 1f1f1f 1f1f1f 1f1f1f"));
 }
 
-TEST_F(PioRing, AnotherCountOfLedsIsTold) {
+TEST_F(PioRing, AnotherCountOfLedsIsReported) {
   for (const int leds : {1, 7}) {
     reload(leds);
     EXPECT_THAT(refusal_of("/dev/leds0"),
@@ -141,7 +141,7 @@ TEST_F(PioRing, AnotherCountOfLedsIsTold) {
   }
 }
 
-TEST_F(PioRing, WhatIsMissingOrForbiddenNamesTheRemedy) {
+TEST_F(PioRing, WhatIsMissingOrForbiddenNamesTheFix) {
   EXPECT_THAT(refusal_of("/dev/leds1"), AllOf(HasSubstr("/dev/leds1"), HasSubstr("No such file"),
                                               HasSubstr("dtoverlay=ws2812-pio,gpio=")));
   const AsNobody nobody;
@@ -150,7 +150,7 @@ TEST_F(PioRing, WhatIsMissingOrForbiddenNamesTheRemedy) {
                     HasSubstr("usermod -aG gpio"), HasSubstr("config/udev/60-dtactd.rules")));
 }
 
-TEST_F(PioRing, ARemovedDriverIsToldAndOneThatIsBackIsPreparedAnew) {
+TEST_F(PioRing, ARemovedDriverIsReportedAndOneThatIsBackIsPreparedAnew) {
   const auto ring = open_ring();
   ASSERT_TRUE(ring->show(rainbow()).ok);
   remove_driver();
@@ -175,7 +175,7 @@ TEST_F(PioRing, ADriverThatCameBackUnseenIsPreparedAnew) {
   EXPECT_TRUE(last_sent(kRainbow));
 }
 
-TEST_F(PioRing, ADriverThatCameBackWithAnotherCountIsTold) {
+TEST_F(PioRing, ADriverThatCameBackWithAnotherCountIsReported) {
   const auto ring = open_ring();
   reload(12);
   const ShowResult result = ring->show(rainbow());

@@ -150,7 +150,7 @@ TEST(GpioSim, TheChipsAreListed) {
   EXPECT_THAT(chips[0].names, testing::ElementsAre("", "RING_POWER", "", "", "", "", "", "", ""));
 }
 
-TEST(GpioSim, RefusalsNameTheReasonAndTheRemedy) {
+TEST(GpioSim, RefusalsNameTheReasonAndTheFix) {
   EXPECT_THAT(refusal_of({"dtact-test", 9, false}), HasSubstr("it has lines 0 … 8"));
   EXPECT_THAT(refusal_of({"gpiochip99", 1, false}), HasSubstr("(dtact-test, 9 lines)"));
   const auto held = gpiod::open_output({"dtact-test", 3, false}, false, "key");

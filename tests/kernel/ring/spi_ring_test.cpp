@@ -198,7 +198,7 @@ TEST_F(SpiRing, DarkAtTheEndOrLeftOn) {
   }
 }
 
-TEST_F(SpiRing, WithoutPermissionTheRemedyIsNamedAndTheRingComesWithIt) {
+TEST_F(SpiRing, WithoutPermissionTheFixIsNamedAndTheRingComesWithIt) {
   std::unique_ptr<LightRing> ring;
   {
     const AsNobody nobody;

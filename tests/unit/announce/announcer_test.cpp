@@ -82,21 +82,22 @@ class DyingBus {
 };
 
 // The answer is followed by another call, to a bus that is there no more.
-TEST(Announcer, ABusThatGoesInTheMiddleIsToldAndThrowsNothing) {
+TEST(Announcer, ABusThatGoesInTheMiddleIsReportedAndThrowsNothing) {
   boost::asio::io_context io;
-  std::string told;
+  std::string reported;
   {
     const DyingBus bus;
     Announcer announcer(
         io, [] { return Service{.name = "left", .port = 7377, .txt = {}}; },
         [&](const std::string& line) {
-          told += line + "\n";
+          reported += line + "\n";
           if (line.find("no system bus") != std::string::npos) io.stop();
         });
     EXPECT_NO_THROW(io.run_for(std::chrono::seconds(10)));
     announcer.stop();
   }
-  EXPECT_NE(told.find("the service is not announced: no system bus"), std::string::npos) << told;
+  EXPECT_NE(reported.find("the service is not announced: no system bus"), std::string::npos)
+      << reported;
 }
 
 }  // namespace

@@ -130,22 +130,24 @@ TEST_F(ConfigFile, WrongTypeOrValueNamesWhatIsAllowed) {
   EXPECT_THAT(error("[camera]\nbackend = 'usb'\n"), HasSubstr("\"null\""));
   EXPECT_THAT(error("[ring]\nscheme = 'half'\n"), HasSubstr("scheme4"));
   EXPECT_THAT(error("camera = 3\n"), HasSubstr("c.toml:1"));
-  EXPECT_THAT(error("[contact]\nmade_mm = 0.05\nlost_mm = 0.05\n"), HasSubstr("contact.lost_mm"));
+  EXPECT_THAT(error("[contact]\nthreshold_mm = 0.05\nrelease_mm = 0.05\n"),
+              HasSubstr("contact.release_mm"));
 }
 
 TEST_F(ConfigFile, SettingsThatExcludeEachOtherAreBothNamed) {
-  EXPECT_THAT(error("[reference]\nframes = 100\npatience_frames = 99\n"),
-              AllOf(HasSubstr("reference.patience_frames = 99"),
+  EXPECT_THAT(error("[reference]\nframes = 100\ntimeout_frames = 99\n"),
+              AllOf(HasSubstr("reference.timeout_frames = 99"),
                     HasSubstr("at least reference.frames = 100")));
   EXPECT_THAT(
-      error("[reference]\nframes = 8\nsettle_frames = 12\n", {"reference.patience_frames=11"}),
-      AllOf(HasSubstr("reference.patience_frames = 11"),
+      error("[reference]\nframes = 8\nsettle_frames = 12\n", {"reference.timeout_frames=11"}),
+      AllOf(HasSubstr("reference.timeout_frames = 11"),
             HasSubstr("at least reference.settle_frames = 12")));
   EXPECT_EQ(
-      load("[reference]\nframes = 100\npatience_frames = 100\n").pipeline.reference.patience_frames,
+      load("[reference]\nframes = 100\ntimeout_frames = 100\n").pipeline.reference.timeout_frames,
       100);
-  EXPECT_THAT(error("[contact]\nmade_mm = 0.04\nlost_mm = 0.05\n"),
-              AllOf(HasSubstr("contact.lost_mm = 0.05"), HasSubstr("contact.made_mm = 0.04")));
+  EXPECT_THAT(
+      error("[contact]\nthreshold_mm = 0.04\nrelease_mm = 0.05\n"),
+      AllOf(HasSubstr("contact.release_mm = 0.05"), HasSubstr("contact.threshold_mm = 0.04")));
 }
 
 // Several daemons spread over the CPUs unless one is configured.

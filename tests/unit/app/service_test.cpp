@@ -24,7 +24,7 @@ TEST(Service, SaysNothingWithoutAServiceManager) {
   EXPECT_EQ(watchdog_interval_us(), 0U);
 }
 
-TEST(Service, TellsReadinessWithStatus) {
+TEST(Service, ReportsReadinessWithStatus) {
   const fakes::NotifySocket manager(fakes::own_path());
   ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
   notify_ready("listening");
@@ -36,11 +36,11 @@ TEST(Service, TellsReadinessWithStatus) {
 TEST(Service, DoesNotWaitForAManagerThatDoesNotRead) {
   const fakes::NotifySocket manager(fakes::own_path());
   ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
-  int told = 0;
-  while (told < 100'000 && notify_status("serving")) ++told;
+  int reported = 0;
+  while (reported < 100'000 && notify_status("serving")) ++reported;
   notify_alive();
-  EXPECT_LT(told, 100'000);
-  EXPECT_GE(told, 1);
+  EXPECT_LT(reported, 100'000);
+  EXPECT_GE(reported, 1);
   EXPECT_EQ(manager.next(std::chrono::seconds(10)), "STATUS=serving");
   EXPECT_TRUE(notify_status("serving again"));
   ::unsetenv("NOTIFY_SOCKET");
@@ -61,7 +61,7 @@ TEST(Service, WatchdogIsFedTwiceAnInterval) {
   ::unsetenv("WATCHDOG_USEC");
 }
 
-TEST(Service, TellsThatItReadsItsConfigurationAgain) {
+TEST(Service, ReportsThatItReadsItsConfigurationAgain) {
   const fakes::NotifySocket manager(fakes::own_path());
   ::setenv("NOTIFY_SOCKET", manager.path().c_str(), 1);
   notify_reloading();

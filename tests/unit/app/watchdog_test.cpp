@@ -31,7 +31,7 @@ class WatchdogTest : public ::testing::Test {
 
  protected:
   /// How often systemd was told.
-  [[nodiscard]] int told() const {
+  [[nodiscard]] int reported() const {
     int count = 0;
     while (const auto message = manager.next(0ms)) {
       EXPECT_EQ(*message, "WATCHDOG=1");
@@ -49,7 +49,7 @@ TEST_F(WatchdogTest, IsFedWhileTheHeartMoves) {
   std::uint64_t beats = 0;
   const Watchdog watchdog(io, [&] { return ++beats; });
   for (int i = 0; i < 5; ++i) io.run_one();
-  EXPECT_EQ(told(), 5);
+  EXPECT_EQ(reported(), 5);
 }
 
 TEST_F(WatchdogTest, IsNotFedWhileTheHeartStandsStill) {
@@ -57,13 +57,13 @@ TEST_F(WatchdogTest, IsNotFedWhileTheHeartStandsStill) {
   std::uint64_t beats = 7;  // not at zero when the watch begins
   Watchdog watchdog(io, [&] { return beats; });
   for (int i = 0; i < 5; ++i) io.run_one();
-  EXPECT_EQ(told(), 0);
+  EXPECT_EQ(reported(), 0);
   ++beats;
   for (int i = 0; i < 5; ++i) io.run_one();
-  EXPECT_EQ(told(), 1);
+  EXPECT_EQ(reported(), 1);
   watchdog.stop();
   io.run();  // ends: nothing is left to do
-  EXPECT_EQ(told(), 0);
+  EXPECT_EQ(reported(), 0);
 }
 
 TEST_F(WatchdogTest, LeavesNoWorkWhenItIsStoppedAsItsTimeComes) {
@@ -81,7 +81,7 @@ TEST_F(WatchdogTest, HasNoWorkWhereNoWatchdogIsSet) {
   std::uint64_t beats = 0;
   const Watchdog watchdog(io, [&] { return ++beats; });
   io.run();
-  EXPECT_EQ(told(), 0);
+  EXPECT_EQ(reported(), 0);
 }
 
 }  // namespace

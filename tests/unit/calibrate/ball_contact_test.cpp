@@ -1,5 +1,5 @@
 // The axisymmetric contact against what is known of it, and against the simulator's solver, which
-// shares nothing with it but the layer's compliance: two dimensions, FFT, unknown contact region.
+// shares nothing with it but the gel's compliance: two dimensions, FFT, unknown contact region.
 #include "clients/calibrate/fit/model/ball_contact.hpp"
 
 #include <gtest/gtest.h>
@@ -8,16 +8,16 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "hal/sim/layer.hpp"
+#include "hal/sim/elastic_layer.hpp"
 
 namespace dtact::calibration {
 namespace {
 
-TEST(BallContact, OnAThickLayerIsHertz) {
+TEST(BallContact, OnAThickGelIsHertz) {
   // K. L. Johnson, Contact Mechanics, eq. 4.22 and 3.42a: depth a²/R; outside the contact
   // ((2a² − r²) asin(a/r) + r²√(1 − a²/r²)·a/r) / πR. The sphere's sag is r²/2R + r⁴/8R³ …
   const BallContact contact = press_ball(50, 1, 11.9);
-  // The bonded layer is stiffer than a half-space by the first order in a/h, so not exactly.
+  // The bonded gel is stiffer than a half-space by the first order in a/h, so not exactly.
   EXPECT_NEAR(contact.depth_mm, 1.0 / 50, 0.1 / 50);
   const double rise_at_edge = contact.depth_mm - contact.indentation_mm(1);
   EXPECT_NEAR(rise_at_edge, 0.5 / 50, 1e-5);
@@ -28,7 +28,7 @@ TEST(BallContact, OnAThickLayerIsHertz) {
   EXPECT_NEAR(contact.indentation_mm(1) - contact.indentation_mm(1.5), u_at_edge - u, 2e-4);
 }
 
-TEST(BallContact, ConservesTheLayersVolume) {
+TEST(BallContact, ConservesTheGelsVolume) {
   for (const double thickness : {1.0, 2.0, 3.0}) {
     const BallContact contact = press_ball(4, 2.5, thickness);
     double volume = 0;
@@ -59,8 +59,8 @@ TEST(BallContact, AgreesWithTheTwoDimensionalSolver) {
         if (r < 3.9) target(y, x) = depth - 4 + std::sqrt(16 - r * r);
       }
     }
-    const hal::sim::Layer layer(kSize, kSize, kSpacing, thickness);
-    const cv::Mat1d truth = layer.solve(target, {}).indentation_mm;
+    const hal::sim::ElasticLayer gel(kSize, kSize, kSpacing, thickness);
+    const cv::Mat1d truth = gel.solve(target, {}).indentation_mm;
     const BallContact contact = press_ball_to(4, depth, thickness);
     EXPECT_NEAR(contact.depth_mm, depth, 2e-4);
     for (int i = 0; i < 70; ++i) {

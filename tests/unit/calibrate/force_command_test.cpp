@@ -33,7 +33,7 @@ using testing::ThrowsMessage;
 class Force : public testing::Test {
  protected:
   Force() {
-    write("reference.png", Ball{}.untouched());
+    write("reference.png", Ball{}.reference_image());
     write("ball.png", Ball{}.frame());
     EXPECT_EQ(run({"depth", "--reference", at("reference.png"), "--ball", at("ball.png"),
                    "--radius-mm", "4.0", "--mm-per-px", "0.05", "-o", at("cal")}),
@@ -62,7 +62,7 @@ class Force : public testing::Test {
       const std::string name = fmt::format("press{}.png", std::lround(depth * 10));
       write(name, Ball{.depth_mm = depth}.frame());
       const Pair pair = reader.measure(at(name));
-      const auto answer = recon::LayerResponse(2, pair.contact).answer(pair.contact);
+      const auto answer = recon::GelResponse(2, pair.contact).answer(pair.contact);
       csv += fmt::format("{}, {}\n", name, 0.15 * factor * answer.mm2);
     }
     base::write_file_atomically(at("readings.csv"), csv);
@@ -89,8 +89,8 @@ TEST_F(Force, ReadsAPictureAsTheDaemonDoes) {
   const ContactReader reader(cal, cal.model->reference_q8);
   // The cap of 1 mm: π h² (R − h / 3).
   EXPECT_NEAR(volume_mm3(reader.measure(at("press.png")).contact), 11.5, 0.6);
-  write("untouched.png", Ball{}.untouched());
-  EXPECT_NEAR(volume_mm3(reader.measure(at("untouched.png")).contact), 0, 0.1);
+  write("current_reference.png", Ball{}.reference_image());
+  EXPECT_NEAR(volume_mm3(reader.measure(at("current_reference.png")).contact), 0, 0.1);
 }
 
 // A recording is told by the end of its name alone.
@@ -161,7 +161,7 @@ class ForceOfARecording : public Force {
         }
       }
       map.set_data(bytes);
-      frame.mutable_contact()->set_touching(i >= 4);
+      frame.mutable_contact()->set_in_contact(i >= 4);
       if (i == 15) frame.add_health(v1::HEALTH_BEYOND_CALIBRATION);
       writer.add(frame);
     }

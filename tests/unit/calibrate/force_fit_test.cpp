@@ -43,7 +43,7 @@ std::vector<Pair> pairs(double thickness_mm = 2.3) {
   std::vector<Pair> pairs;
   for (const double depth : {0.25, 0.4, 0.55, 0.7, 0.9, 1.1, 1.3, 1.5}) {
     Pair pair{"load", cap(depth), 0};
-    const auto answer = recon::LayerResponse(thickness_mm, pair.contact).answer(pair.contact);
+    const auto answer = recon::GelResponse(thickness_mm, pair.contact).answer(pair.contact);
     pair.newtons = kModulus * (answer.mm2 + kZero * answer.mm);
     pairs.push_back(std::move(pair));
   }
@@ -75,7 +75,7 @@ TEST(FitForce, LeavesOutByRefitting) {
   std::vector<Pair> others = noisy;
   others.erase(others.begin() + 5);
   const recon::ForceModel model = fit_force(others, 2.3).model;
-  const auto answer = recon::LayerResponse(2.3, noisy[5].contact).answer(noisy[5].contact);
+  const auto answer = recon::GelResponse(2.3, noisy[5].contact).answer(noisy[5].contact);
   EXPECT_NEAR(fit.left_out[5], recon::force_of(model, answer, 0).newtons - noisy[5].newtons, 1e-6);
   EXPECT_GT(fit.model.error_share, 0.02);
   EXPECT_LT(fit.model.error_share, 0.1);

@@ -12,8 +12,8 @@
 #include "clients/calibrate/guided/cells.hpp"
 #include "clients/calibrate/guided/console.hpp"
 #include "clients/calibrate/guided/coverage.hpp"
-#include "clients/calibrate/guided/fitness.hpp"
 #include "clients/calibrate/guided/preview.hpp"
+#include "clients/calibrate/guided/sensor_checks.hpp"
 #include "clients/common/guided.pb.h"
 
 namespace dtact::ctl::guided {
@@ -44,9 +44,9 @@ TEST(HalfBlocks, AveragesAndKeepsTheShape) {
 }
 
 TEST(Picture, IsDarkWhereTheSurfaceIs) {
-  const image::Grey8 untouched{3, 1, {150, 150, 150}};
+  const image::Grey8 reference{3, 1, {150, 150, 150}};
   const image::Grey8 frame{3, 1, {150, 140, 155}};
-  EXPECT_THAT(darkening_picture(untouched, frame).pixels, ElementsAre(200, 160, 220));
+  EXPECT_THAT(darkening_picture(reference, frame).pixels, ElementsAre(200, 160, 220));
 }
 
 TEST(Cells, MeansOverThePartOfTheFrame) {
@@ -63,31 +63,31 @@ TEST(Cells, MeansOverThePartOfTheFrame) {
   EXPECT_THROW(CellGrid({0, 0, 200, 95}), std::invalid_argument);
 }
 
-TEST(Cells, ADimmedLightIsNoTouch) {
-  const CellMeans untouched(100, 150);
+TEST(Cells, ADimmedLightIsNoContact) {
+  const CellMeans reference(100, 150);
   CellMeans now(100, 147);
   now[5] = 137;
-  const Seen seen = compare(untouched, now);
+  const Seen seen = compare(reference, now);
   EXPECT_EQ(seen.light, 3);
   EXPECT_EQ(seen.darkest, 10);
   EXPECT_EQ(seen.brightest, 0);
   EXPECT_EQ(seen.dark_cells, 1);
 }
 
-TEST(Cells, ARealBallsBrightRingIsNoTouchedReference) {
+TEST(Cells, ARealBallsBrightRingIsNoReferenceInContact) {
   namespace fs = std::filesystem;
   if (!fs::exists(DTACT_SHARED_DIR "/data")) GTEST_SKIP() << "no real images beside the repository";
   for (const char* sensor : {"sensor_a", "sensor_b"}) {
     const fs::path folder = fs::path(DTACT_SHARED_DIR) / "data" / sensor;
-    const image::Grey8 untouched = image::read_png_grey8(folder / "ball_reference.png");
+    const image::Grey8 reference = image::read_png_grey8(folder / "ball_reference.png");
     const image::Grey8 pressed = image::read_png_grey8(folder / "ball.png");
-    const CellGrid grid({0, 0, untouched.width, untouched.height});
-    const CellMeans before = grid.of(untouched.pixels, untouched.width);
+    const CellGrid grid({0, 0, reference.width, reference.height});
+    const CellMeans before = grid.of(reference.pixels, reference.width);
     const CellMeans now = grid.of(pressed.pixels, pressed.width);
     const Seen seen = compare(before, now);
     EXPECT_GT(seen.darkest, 30) << sensor;
-    EXPECT_FALSE(reference_was_touched(seen)) << sensor;
-    EXPECT_TRUE(reference_was_touched(compare(now, before))) << sensor << " the other way round";
+    EXPECT_FALSE(reference_in_contact(seen)) << sensor;
+    EXPECT_TRUE(reference_in_contact(compare(now, before))) << sensor << " the other way round";
   }
 }
 
@@ -108,18 +108,18 @@ TEST(NextDepth, FillsTheWidestGap) {
 }
 
 TEST(ContactWidth, OfABall) {
-  // A ball of 4 mm 1.5 mm deep cuts the surface in a circle of 3.122 mm radius; the layer's
+  // A ball of 4 mm 1.5 mm deep cuts the surface in a circle of 3.122 mm radius; the gel's
   // contact is 3.04 (fit/press_set.cpp).
   EXPECT_NEAR(contact_width_mm(1.5, 4), 6.06, 0.02);
   EXPECT_NEAR(depth_of_width_mm(6.06, 4), 1.5, 0.01);
 }
 
-TEST(Covered, IsTheDepthWhereTheListsCoverageEnds) {
+TEST(Covered, IsTheDepthWhereTheLutsCoverageEnds) {
   auto model = std::make_shared<recon::Model>();
-  model->list = {.first_q6 = -2,
-                 .um = {-9, -4, 0, 30, 70, 1250, 1500},
-                 .covered_from_q6 = -1,
-                 .covered_to_q6 = 3};
+  model->lut = {.first_q6 = -2,
+                .um = {-9, -4, 0, 30, 70, 1250, 1500},
+                .covered_from_q6 = -1,
+                .covered_to_q6 = 3};
   calibration::Calibration made;
   made.model = std::move(model);
   EXPECT_DOUBLE_EQ(covered_mm(made), 1.25);
@@ -151,7 +151,7 @@ TEST(Fitness, NamesWhatKeepsFromCalibrating) {
   status.set_state(v1::STATE_CAMERA_LOST);
   EXPECT_THAT(unfit(status), HasSubstr("camera_lost"));
   for (const v1::Health passing : {v1::HEALTH_STARTING, v1::HEALTH_LIGHT_UNSETTLED,
-                                   v1::HEALTH_IMAGE_REPEATED, v1::HEALTH_CAMERA_TROUBLE}) {
+                                   v1::HEALTH_IMAGE_REPEATED, v1::HEALTH_CAMERA_FAULT}) {
     status.clear_health();
     status.add_health(v1::HEALTH_LIGHT_DRIFTED);
     EXPECT_FALSE(passing_trouble(status.health()));
@@ -164,9 +164,9 @@ TEST(Fitness, NamesWhatKeepsFromCalibrating) {
   EXPECT_FALSE(passing_trouble(status.health()));
 }
 
-TEST(Fault, OfAnUntouchedPicture) {
+TEST(Fault, OfAReferenceImage) {
   const recon::RectifyTable table = recon::make_crop_table(100, 100, 0, 0, 100, 100);
-  Still still;
+  SteadyFrames still;
   still.frames = {{100, 100, std::vector<std::uint8_t>(10000, 150)}};
   still.cells.assign(64, 150);
   still.noise_levels = 1;
@@ -227,7 +227,7 @@ TEST_F(Piped, GivesLinesOneByOneAndThenTheEnd) {
   EXPECT_EQ(console.typed().kind, Typed::Kind::interrupted);
 }
 
-TEST_F(Piped, TellsAnotherProgramInJson) {
+TEST_F(Piped, ReportsAnotherProgramInJson) {
   JsonConsole console(ends_[0], out_, [] { return false; });
   EXPECT_TRUE(console.interactive());
   console.say("first\nsecond");
@@ -238,26 +238,26 @@ TEST_F(Piped, TellsAnotherProgramInJson) {
   scene.words = "untouched";
   scene.prompt = {"Press", {{"", "take"}, kQuit}};
   scene.presses = {{"press-01", 3, 4, 5, 1.25}};
-  scene.presses_wanted = 6;
+  scene.presses_required = 6;
   console.live(scene);
   std::istringstream lines(out_.str());
   std::string line;
-  cli::GuidedLine told;
+  cli::GuidedLine reported;
   std::getline(lines, line);
-  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &told).ok()) << line;
-  EXPECT_EQ(told.said(), "first\nsecond");
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &reported).ok()) << line;
+  EXPECT_EQ(reported.text(), "first\nsecond");
   std::getline(lines, line);
-  // dtact-web tells scenes, which may give way to newer ones, by how they begin.
+  // dtact-web tells scenes, which may yield to newer ones, by how they begin.
   EXPECT_TRUE(line.starts_with(R"({"scene":)")) << line;
-  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &told).ok()) << line;
-  EXPECT_EQ(image::decode_png_grey16(told.scene().picture_png(), "picture").width, 16);
-  EXPECT_EQ(told.scene().prompt(), "Press");
-  ASSERT_EQ(told.scene().answers_size(), 2);
-  EXPECT_EQ(told.scene().answers(0).key(), "");
-  EXPECT_EQ(told.scene().answers(1).words(), "quit");
-  ASSERT_EQ(told.scene().presses_size(), 1);
-  EXPECT_EQ(told.scene().presses(0).depth_mm(), 1.25);
-  EXPECT_EQ(told.scene().presses_wanted(), 6U);
+  ASSERT_TRUE(google::protobuf::util::JsonStringToMessage(line, &reported).ok()) << line;
+  EXPECT_EQ(image::decode_png_grey16(reported.scene().picture_png(), "picture").width, 16);
+  EXPECT_EQ(reported.scene().prompt(), "Press");
+  ASSERT_EQ(reported.scene().answers_size(), 2);
+  EXPECT_EQ(reported.scene().answers(0).key(), "");
+  EXPECT_EQ(reported.scene().answers(1).words(), "quit");
+  ASSERT_EQ(reported.scene().presses_size(), 1);
+  EXPECT_EQ(reported.scene().presses(0).depth_mm(), 1.25);
+  EXPECT_EQ(reported.scene().presses_required(), 6U);
   type("q\n");
   EXPECT_EQ(console.typed().line, "q");
 }

@@ -10,7 +10,7 @@
 #include "clients/calibrate/guided/work_folder.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/unit/calibrate/guided_fakes.hpp"
-#include "tests/unit/calibrate/imagined_press.hpp"
+#include "tests/unit/calibrate/predicted_press.hpp"
 
 namespace dtact::ctl::guided {
 namespace {
@@ -24,7 +24,7 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::ThrowsMessage;
 
-const Scene kUntouched{.frames = 60};
+const Scene kContactFree{.frames = 60};
 
 class GuidedSession : public testing::Test {
  public:
@@ -36,9 +36,9 @@ class GuidedSession : public testing::Test {
     plan_.presses = 4;
     plan_.reference_frames = 8;
     plan_.press_frames = 4;
-    plan_.patience_s = 8;
+    plan_.timeout_s = 8;
     // The fits of the other methods take seconds each.
-    plan_.method = ListMethod::alone;
+    plan_.method = FitMethod::alone;
     plan_.again = "dtact-calibrate guided --folder X";
   }
   ~GuidedSession() override { fs::remove_all(plan_.folder.parent_path()); }
@@ -54,10 +54,10 @@ class GuidedSession : public testing::Test {
 
 /// Untouched, then presses with untouched pauses in between.
 std::vector<Scene> presses(const std::vector<Scene>& each) {
-  std::vector<Scene> scenes{kUntouched};
+  std::vector<Scene> scenes{kContactFree};
   for (const Scene& press : each) {
     scenes.push_back(press);
-    scenes.push_back(kUntouched);
+    scenes.push_back(kContactFree);
   }
   return scenes;
 }
@@ -88,10 +88,10 @@ TEST_F(GuidedSession, GoesFromNothingToAnUpload) {
   EXPECT_EQ(made.origin.controls[0].value, 100);
   EXPECT_EQ(made.origin.leds, std::vector<std::uint8_t>(24, 255));
   // 30 grey levels a millimetre, within what four presses of noisy frames determine.
-  const recon::DepthList& list = made.model->list;
+  const recon::DepthLut& lut = made.model->lut;
   for (const double mm : {0.3, 0.6, 0.9, 1.2}) {
-    const auto q6 = static_cast<std::size_t>(std::lround(mm * 30 * 64) - list.first_q6);
-    EXPECT_NEAR(list.um[q6], 1000 * mm, 30) << mm;
+    const auto q6 = static_cast<std::size_t>(std::lround(mm * 30 * 64) - lut.first_q6);
+    EXPECT_NEAR(lut.um[q6], 1000 * mm, 30) << mm;
   }
 }
 
@@ -105,19 +105,19 @@ TEST_F(GuidedSession, TheBatchCommandReadsTheWorkFolder) {
     add_press(images, (plan_.folder / name).string());
   }
   calibration::PressReport report;
-  const calibration::Calibration batch = build_list(images, plan_.method, &report);
+  const calibration::Calibration batch = build_lut(images, plan_.method, &report);
   const calibration::Calibration guided = calibration::load(plan_.folder / "calibration");
-  EXPECT_EQ(batch.model->list.um, guided.model->list.um);
+  EXPECT_EQ(batch.model->lut.um, guided.model->lut.um);
   EXPECT_EQ(batch.origin.leds, guided.origin.leds);
 }
 
-TEST_F(GuidedSession, ADoubtfulListIsNotMadeUnlessForced) {
+TEST_F(GuidedSession, ADoubtfulLutIsNotMadeUnlessForced) {
   plan_.map.mm_per_px = 0.005;
   {
     FakeSensor sensor(kEnough);
     FakeConsole console({"", "", "", "", "", "s", "q"});
     EXPECT_EQ(run(sensor, console), Outcome::unfinished) << console.said;
-    EXPECT_THAT(console.said, AllOf(HasSubstr("not yet a list: a grey level is 0.3 um"),
+    EXPECT_THAT(console.said, AllOf(HasSubstr("not yet a LUT: a grey level is 0.3 um"),
                                     HasSubstr("that is not yet enough: a grey level is"),
                                     HasSubstr("--force takes it as it is")));
     EXPECT_FALSE(has("calibration"));
@@ -186,10 +186,10 @@ TEST_F(GuidedSession, RetakesTheLastPress) {
 }
 
 TEST_F(GuidedSession, APressThatStaysIsNotTakenTwice) {
-  FakeSensor sensor({kUntouched, {.depth_mm = 1.3}});
+  FakeSensor sensor({kContactFree, {.depth_mm = 1.3}});
   FakeConsole console({"", "", ""});
   EXPECT_THAT([&] { (void)run(sensor, console); },
-              ThrowsMessage<NotTaken>(HasSubstr("this press is taken already")));
+              ThrowsMessage<CaptureTimeout>(HasSubstr("this press is taken already")));
   EXPECT_TRUE(has("press-01"));
   EXPECT_FALSE(has("press-02"));
 }
@@ -197,7 +197,7 @@ TEST_F(GuidedSession, APressThatStaysIsNotTakenTwice) {
 TEST_F(GuidedSession, WaitsForAPressToHoldStill) {
   // Half a millimetre a second, to 1.3 mm; then it rests.
   FakeSensor sensor(
-      {kUntouched, {.depth_mm = 0, .frames = 156, .step_mm = 0.5 / 60}, {.depth_mm = 1.3}});
+      {kContactFree, {.depth_mm = 0, .frames = 156, .step_mm = 0.5 / 60}, {.depth_mm = 1.3}});
   FakeConsole console({"", "", "q"});
   EXPECT_EQ(run(sensor, console), Outcome::unfinished);
   // 0.3 mm of the ball's radius below the darkening of 3 grey levels: 1.3 mm were pressed.
@@ -210,12 +210,13 @@ TEST(Capture, WhatCreepsIsNoStillPicture) {
   FakeSensor sensor({{.depth_mm = 1, .frames = 1000, .step_mm = 0.0117 / 30}});
   FakeConsole console({});
   const CellGrid grid({100, 90, 120, 120});
-  Capture capture(sensor, console, grid, {.patience_s = 2}, [](const Look&, const std::string&) {});
-  EXPECT_THROW((void)capture.untouched(90), NotTaken);
+  Capture capture(sensor, console, grid, {.timeout_s = 2},
+                  [](const ObservedFrame&, const std::string&) {});
+  EXPECT_THROW((void)capture.reference(90), CaptureTimeout);
 }
 
 TEST_F(GuidedSession, APersonMayTakeWhatDoesNotHoldStill) {
-  FakeSensor sensor({kUntouched, {.depth_mm = 0.5, .frames = 1000, .step_mm = 0.001}});
+  FakeSensor sensor({kContactFree, {.depth_mm = 0.5, .frames = 1000, .step_mm = 0.001}});
   FakeConsole console({"", "~25", "", "~3", "", "~50", "q"});
   console.person = true;
   EXPECT_EQ(run(sensor, console), Outcome::unfinished);
@@ -239,8 +240,8 @@ TEST_F(GuidedSession, NamesThePressThatIsMissing) {
                     HasSubstr("Press 3 of 4: the one that is missing")));
 }
 
-/// A ball of 4 mm in a layer, at the scene's place, as deep as makes a contact of so many mm.
-v1::LumaMap layer_picture(const Scene& scene) {
+/// A ball of 4 mm in a gel, at the scene's place, as deep as makes a contact of so many mm.
+v1::LumaMap gel_picture(const Scene& scene) {
   static std::map<double, v1::LumaMap> painted;  // a picture takes a while
   v1::LumaMap& map = painted[scene.depth_mm];
   if (map.width() > 0) return map;
@@ -263,30 +264,30 @@ v1::LumaMap layer_picture(const Scene& scene) {
 }
 
 // Contacts of 2.8 and 2.5 mm are 1.1 and 0.9 mm deep: a chain of them cannot begin at zero.
-TEST_F(GuidedSession, EndsWhereTheLayerMakesUpForAPress) {
+TEST_F(GuidedSession, EndsWhereTheGelMakesUpForAPress) {
   plan_.map.mm_per_px = calibration::ImaginedView::kMmPerPx;
   plan_.presses = 6;
-  plan_.method = ListMethod::automatic;
+  plan_.method = FitMethod::automatic;
   FakeSensor sensor(presses({{.depth_mm = 2.8}, {.depth_mm = 2.5, .x_px = 150, .y_px = 158}}));
-  sensor.paint = layer_picture;
+  sensor.paint = gel_picture;
   FakeConsole console({"", "", "", "s", ""});
   EXPECT_EQ(run(sensor, console), Outcome::uploaded) << console.said;
-  EXPECT_THAT(console.said, AllOf(HasSubstr("not yet a list: no press shows indentations from"),
-                                  HasSubstr("of a layer")));
+  EXPECT_THAT(console.said, AllOf(HasSubstr("not yet a LUT: no press shows indentations from"),
+                                  HasSubstr("of a gel")));
 }
 
 TEST_F(GuidedSession, AReferenceUnderTouchIsTakenAgain) {
-  FakeSensor sensor({{.depth_mm = 1.0, .frames = 30}, kUntouched, {.depth_mm = 0.9}});
+  FakeSensor sensor({{.depth_mm = 1.0, .frames = 30}, kContactFree, {.depth_mm = 0.9}});
   FakeConsole console({"", "", "", "", "q"});
   EXPECT_EQ(run(sensor, console), Outcome::unfinished);
-  EXPECT_THAT(console.said, AllOf(HasSubstr("something touched when that was taken"),
+  EXPECT_THAT(console.said, AllOf(HasSubstr("there was contact when that was taken"),
                                   HasSubstr("press-01 taken"), HasSubstr("darkest 27 grey")));
 }
 
 TEST_F(GuidedSession, RefusesAnUnfitDaemon) {
   FakeSensor sensor(kEnough);
   sensor.now.set_state(v1::STATE_CAMERA_LOST);
-  sensor.now.add_health(v1::HEALTH_CAMERA_TROUBLE);
+  sensor.now.add_health(v1::HEALTH_CAMERA_FAULT);
   sensor.now.set_advice("The camera gives no frames. Plug it in.");
   FakeConsole console({""});
   EXPECT_THAT([&] { (void)run(sensor, console); },
@@ -298,7 +299,7 @@ TEST_F(GuidedSession, WaitsForACameraThatStumbles) {
   int asked = 0;
   sensor.on_status = [&](v1::Status& now) {
     now.clear_health();
-    if (++asked % 6 != 0) now.add_health(v1::HEALTH_CAMERA_TROUBLE);
+    if (++asked % 6 != 0) now.add_health(v1::HEALTH_CAMERA_FAULT);
   };
   FakeConsole console({"", "", "", "", "", "", "", ""});
   EXPECT_EQ(run(sensor, console), Outcome::uploaded) << console.said;
@@ -310,7 +311,7 @@ TEST_F(GuidedSession, SaysWhyNothingComes) {
   sensor.now.set_advice("Look at the cable.");
   FakeConsole console({""});
   EXPECT_THAT([&] { (void)run(sensor, console); },
-              ThrowsMessage<NotTaken>(HasSubstr("Look at the cable.")));
+              ThrowsMessage<CaptureTimeout>(HasSubstr("Look at the cable.")));
 }
 
 TEST_F(GuidedSession, AnotherLightIsRefused) {
@@ -365,7 +366,7 @@ TEST_F(GuidedSession, DrawsForAPerson) {
   EXPECT_THAT(console.said, HasSubstr("preview.png"));
   EXPECT_TRUE(console.drew);
   EXPECT_THAT(text_of(console.drawn.prompt), HasSubstr("[q] quit"));
-  EXPECT_EQ(console.drawn.presses_wanted, plan_.presses);
+  EXPECT_EQ(console.drawn.presses_required, plan_.presses);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Calibrations by the layer's model from images that the model itself makes.
+// Calibrations by the gel's model from images that the model itself makes.
 #include "clients/calibrate/fit/model/model_build.hpp"
 
 #include <gtest/gtest.h>
@@ -6,14 +6,14 @@
 #include <cmath>
 #include <vector>
 
-#include "tests/unit/calibrate/imagined_press.hpp"
+#include "tests/unit/calibrate/predicted_press.hpp"
 
 namespace dtact::calibration {
 namespace {
 
 BallPresses presses_of(const ImaginedView& view) {
   BallPresses set;
-  set.reference_q8 = view.untouched_q8();
+  set.reference_q8 = view.reference_image_q8();
   set.presses = {{.name = "ball", .frames = {view.frame()}, .depth_mm = {}}};
   set.ball_radius_mm = view.ball_radius_mm;
   set.mm_per_px = ImaginedView::kMmPerPx;
@@ -22,8 +22,8 @@ BallPresses presses_of(const ImaginedView& view) {
 
 /// Greatest depth that a calibration reads, the mean over a disc of a quarter of a millimetre.
 double deepest_mm(const Calibration& calibration, const ImaginedView& view) {
-  const std::vector<float> um =
-      mean_depth_um(*calibration.model, view.untouched_q8().pixels, std::vector{view.frame()});
+  const std::vector<float> um = mean_depth_um(*calibration.model, view.reference_image_q8().pixels,
+                                              std::vector{view.frame()});
   const double col = view.col - calibration.crop_col;
   const double row = view.row - calibration.crop_row;
   double sum = 0;
@@ -46,14 +46,14 @@ TEST(ModelBuild, ABoardThatAskedForNoGainIsBelieved) {
   view.light = [](int x, int) { return 160 * (1 + 0.012 * ImaginedView::kMmPerPx * (x - 200)); };
   BallPresses set = presses_of(view);
   EXPECT_EQ(build_model(set).calibration.model->gain.shape, recon::GainShape::uniform);
-  set.gain_told = true;
+  set.gain_specified = true;
   EXPECT_EQ(build_model(set).calibration.model->gain.shape, recon::GainShape::none);
 }
 
 TEST(ModelBuild, AGainStaysAtItsPlaceOnTheSurface) {
   ImaginedView view;
   view.col = 130;
-  const recon::SpatialGain on_surface{.polynomial = {0, 0, 0.004, 0.001, 0.002}};
+  const recon::FlatFieldGain on_surface{.polynomial = {0, 0, 0.004, 0.001, 0.002}};
   // Of a lens whose board's middle the camera shows at column 250, row 180.
   const auto gain_at = [&](double x, double y) {
     return on_surface.polynomial_at((x - 250) * ImaginedView::kMmPerPx,
@@ -66,7 +66,7 @@ TEST(ModelBuild, AGainStaysAtItsPlaceOnTheSurface) {
       1 / ImaginedView::kMmPerPx, 0, 250, 0, 1 / ImaginedView::kMmPerPx, 180, 0, 0, 1};
   set.crop = Crop{10, 20, 280, 300};
   const FittedCalibration made = build_model(set, on_surface);
-  const recon::SpatialGain& gain = made.calibration.model->gain;
+  const recon::FlatFieldGain& gain = made.calibration.model->gain;
   const auto on_map = [&](double x, double y) {
     return gain.polynomial_at((x - 10 - 139.5) * ImaginedView::kMmPerPx,
                               (y - 20 - 149.5) * ImaginedView::kMmPerPx);

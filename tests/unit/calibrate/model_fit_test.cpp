@@ -1,4 +1,4 @@
-// The fit and its lists on presses that the model itself makes: what it must find then is known.
+// The fit and its LUTs on presses that the model itself makes: what it must find then is known.
 // How it does on sensors that another simulator makes: tests/accuracy/model.
 #include "clients/calibrate/fit/model/model_fit.hpp"
 
@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-#include "clients/calibrate/fit/model/model_list.hpp"
+#include "clients/calibrate/fit/model/model_lut.hpp"
 #include "clients/calibrate/fit/model/radial_transform.hpp"
 
 namespace dtact::calibration {
@@ -17,27 +17,27 @@ namespace {
 constexpr double kLight = 160;      // grey levels
 constexpr double kSmoothing = 0.1;  // mm
 
-LayerModel layer() {
+GelModel gel() {
   return {.thickness_mm = 2.2,
           .response = {.slopes = {1.6, 1.1, 0.42, 0.4, 0.36}, .bulge_factor = 1},
           .scattering = {0.28, 1.3, 0.72}};
 }
 
 Eigen::VectorXd levels(const BallContact& contact, int steps) {
-  const LayerModel made = layer();
+  const GelModel made = gel();
   const Eigen::VectorXd scattering = scattered(made.scattering);
   return kLight *
-         RadialTransform::instance().values(imagine(made, contact)
+         RadialTransform::instance().values(predict_press(made, contact)
                                                 .spectrum.cwiseProduct(scattering)
                                                 .cwiseProduct(blurred(kSmoothing))
                                                 .cwiseProduct(sharpened(scattering, steps)));
 }
 
-double look_up_mm(const recon::DepthList& list, double level) {
-  return 0.001 * list.um[static_cast<std::size_t>(std::lround(64 * level) - list.first_q6)];
+double lut_mm(const recon::DepthLut& lut, double level) {
+  return 0.001 * lut.um[static_cast<std::size_t>(std::lround(64 * level) - lut.first_q6)];
 }
 
-TEST(ModelFit, FindsTheLayerThatMadeAPress) {
+TEST(ModelFit, FindsTheGelThatMadeAPress) {
   const BallContact contact = press_ball(4, 2.8, 2.2);
   const Eigen::VectorXd seen = levels(contact, 0);
   PressProfile press;
@@ -50,21 +50,21 @@ TEST(ModelFit, FindsTheLayerThatMadeAPress) {
     press.noise.push_back(1e-4);
   }
   const ModelFit fit = fit_model({&press, 1});
-  EXPECT_NEAR(fit.layer.thickness_mm, 2.2, 0.06);
-  EXPECT_NEAR(fit.layer.scattering.narrow_mm, 0.28, 0.03);
-  EXPECT_NEAR(fit.layer.scattering.wide_mm, 1.3, 0.15);
+  EXPECT_NEAR(fit.gel.thickness_mm, 2.2, 0.06);
+  EXPECT_NEAR(fit.gel.scattering.narrow_mm, 0.28, 0.03);
+  EXPECT_NEAR(fit.gel.scattering.wide_mm, 1.3, 0.15);
   EXPECT_NEAR(fit.deepest_mm(), contact.depth_mm, 0.015);
   EXPECT_NEAR(fit.presses[0].offset, 0.003, 5e-4);
   EXPECT_LT(fit.residual * kLight, 0.03);
   // The truth lies within what the covariance allows.
   const double thickness_error = std::sqrt(fit.covariance(0, 0));
   EXPECT_GT(thickness_error, 1e-4);
-  EXPECT_LT(std::abs(std::log(fit.layer.thickness_mm / 2.2)), 3 * thickness_error);
+  EXPECT_LT(std::abs(std::log(fit.gel.thickness_mm / 2.2)), 3 * thickness_error);
 }
 
 /// A map of a press that is darker on one side and across, about (120, 118).
-DifferenceMap lopsided(const Eigen::VectorXd& seen) {
-  DifferenceMap map{240, 240, 0.08, {}};
+DarkeningMap lopsided(const Eigen::VectorXd& seen) {
+  DarkeningMap map{240, 240, 0.08, {}};
   for (int y = 0; y < map.height; ++y) {
     for (int x = 0; x < map.width; ++x) {
       const double right = map.mm_per_px * (x - 120);
@@ -83,12 +83,13 @@ DifferenceMap lopsided(const Eigen::VectorXd& seen) {
 
 TEST(ModelFit, LooksAtALopsidedPressAboutItsMiddle) {
   const BallContact pressed = press_ball(4, 2.8, 2.2);
-  const DifferenceMap map = lopsided(levels(pressed, 0));
+  const DarkeningMap map = lopsided(levels(pressed, 0));
   const Contact contact = find_contact(map, 4);
-  const ChosenPressGain chosen = choose_press_gain(sure_samples(map, contact), 4);
-  ASSERT_EQ(chosen.gain.order, GainOrder::quadratic);
-  const auto depth_of = [&](const PressGain& gain) {
-    const PressProfile profile = profile_of(levelled(map, contact, gain), kLight, kSmoothing);
+  const ChosenAsymmetry chosen = choose_asymmetry(sure_samples(map, contact), 4);
+  ASSERT_EQ(chosen.gain.order, AsymmetryOrder::quadratic);
+  const auto depth_of = [&](const PressAsymmetry& gain) {
+    const PressProfile profile =
+        profile_of(without_asymmetry(map, contact, gain), kLight, kSmoothing);
     return fit_model({&profile, 1}).deepest_mm();
   };
   const double off = std::abs(depth_of(chosen.gain) - pressed.depth_mm);
@@ -96,24 +97,24 @@ TEST(ModelFit, LooksAtALopsidedPressAboutItsMiddle) {
   EXPECT_LT(off, std::abs(depth_of({}) - pressed.depth_mm));
 }
 
-TEST(ModelList, ReadsABallThroughEveryFilter) {
+TEST(ModelLutTest, ReadsABallThroughEveryFilter) {
   const MapOptics optics{kLight, kSmoothing, 0.04};
-  const auto lists = lists_of(layer(), optics, 1.5);
+  const auto luts = luts_of(gel(), optics, 1.5);
   const BallContact contact = press_ball_to(5, 1, 2.2);
   // Each step of the filter takes away what the shape of an object does to its reading.
   const std::vector<double> allowed = {0.03, 0.02, 0.015};
-  for (int steps = 0; steps < kLists; ++steps) {
-    const recon::DepthList& list = lists[static_cast<std::size_t>(steps)];
-    EXPECT_EQ(look_up_mm(list, 0), 0) << steps;
-    EXPECT_NO_THROW(recon::check(list, true)) << steps;
-    EXPECT_NEAR(look_up_mm(list, list.covered_to_q6 / 64.0), 1.5, 0.15) << steps;
+  for (int steps = 0; steps < kLuts; ++steps) {
+    const recon::DepthLut& lut = luts[static_cast<std::size_t>(steps)];
+    EXPECT_EQ(lut_mm(lut, 0), 0) << steps;
+    EXPECT_NO_THROW(recon::check(lut, true)) << steps;
+    EXPECT_NEAR(lut_mm(lut, lut.covered_to_q6 / 64.0), 1.5, 0.15) << steps;
     const Eigen::VectorXd seen = levels(contact, steps);
     double sum = 0;
     double area = 0;
     for (Eigen::Index i = 0;
          RadialTransform::kStepMm * static_cast<double>(i) < contact.contact_radius_mm; ++i) {
       const double r = RadialTransform::kStepMm * static_cast<double>(i);
-      sum += r * std::abs(look_up_mm(list, seen[i]) - contact.indentation_mm(r));
+      sum += r * std::abs(lut_mm(lut, seen[i]) - contact.indentation_mm(r));
       area += r;
     }
     EXPECT_LT(sum / area, allowed[static_cast<std::size_t>(steps)]) << steps;

@@ -32,7 +32,7 @@ using testing::ThrowsMessage;
 class Offline : public testing::Test {
  protected:
   Offline() {
-    write("reference.png", Ball{}.untouched());
+    write("reference.png", Ball{}.reference_image());
     write("ball.png", Ball{}.frame());
   }
   [[nodiscard]] std::string at(const std::string& name) const {
@@ -129,7 +129,7 @@ TEST_F(Offline, CropIsAboutTheCentre) {
 
 TEST_F(Offline, AFolderStandsForItsImages) {
   fs::create_directory(at("frames"));
-  image::Grey8 image = Ball{}.untouched();
+  image::Grey8 image = Ball{}.reference_image();
   write("frames/1.png", image);
   for (std::uint8_t& v : image.pixels) v = 201;
   write("frames/2.png", image);
@@ -144,7 +144,7 @@ TEST_F(Offline, AFolderStandsForItsImages) {
 
 TEST_F(Offline, AFolderSaysUnderWhichCameraAndLight) {
   fs::create_directory(at("frames"));
-  write("frames/1.png", Ball{}.untouched());
+  write("frames/1.png", Ball{}.reference_image());
   base::write_file_atomically(at("frames/sensor.toml"),
                               "version = 1\n[camera]\nidentity = \"usb-1\"\npixel_format = "
                               "\"GREY\"\nfps = 60.0\n[camera.controls]\ngain = 5\n[light]\nleds = "
@@ -212,7 +212,7 @@ TEST_F(Offline, NamesWhatIsWrong) {
   std::vector<std::string> empty = calibrate();
   empty[2] = at("empty");
   EXPECT_THAT([&] { run(empty); }, ThrowsMessage<std::runtime_error>(HasSubstr("no .png file")));
-  write("wide_reference.png", Ball{.width = 300}.untouched());
+  write("wide_reference.png", Ball{.width = 300}.reference_image());
   std::vector<std::string> other = apply("depth.npy");
   other[4] = at("wide_reference.png");
   other[6] = at("wide.png");
@@ -224,7 +224,7 @@ TEST_F(Offline, NamesWhatIsWrong) {
   EXPECT_THAT([&] { run(inside_out); }, ThrowsMessage<CLI::ParseError>(HasSubstr("--radius-mm")));
 }
 
-// Presses are told apart by their names, and one that counts twice chains with itself.
+// Presses are distinguished by their names, and one that counts twice chains with itself.
 TEST_F(Offline, RefusesAPressThatIsGivenTwice) {
   MapOptions map;
   map.mm_per_px = 0.05;

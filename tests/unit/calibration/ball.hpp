@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
 #include "hal/files/png.hpp"
 
 namespace dtact::calibration {
@@ -24,14 +24,14 @@ struct Ball {
     const double sag = 4 - std::sqrt(std::max(0.0, 16 - r * r));
     return std::max(0.0, 30 * (depth_mm - sag));
   }
-  [[nodiscard]] DifferenceMap map() const {
-    DifferenceMap map{width, height, 0.05, {}};
+  [[nodiscard]] DarkeningMap map() const {
+    DarkeningMap map{width, height, 0.05, {}};
     for (int y = 0; y < height; ++y) {
       for (int x = 0; x < width; ++x) map.levels.push_back(static_cast<float>(level(x, y)));
     }
     return map;
   }
-  /// As a frame over an untouched grey of 200.
+  /// As a frame over a contact-free grey of 200.
   [[nodiscard]] image::Grey8 frame() const {
     image::Grey8 image{width, height, {}};
     for (int y = 0; y < height; ++y) {
@@ -41,12 +41,12 @@ struct Ball {
     }
     return image;
   }
-  [[nodiscard]] image::Grey8 untouched() const {
+  [[nodiscard]] image::Grey8 reference_image() const {
     image::Grey8 image{width, height, {}};
     image.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), 200);
     return image;
   }
-  [[nodiscard]] image::Grey16 untouched_q8() const {
+  [[nodiscard]] image::Grey16 reference_image_q8() const {
     image::Grey16 image{width, height, {}};
     image.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
                         200 * 256);

@@ -19,7 +19,7 @@ using testing::ThrowsMessage;
 
 BallPress press_of(const Ball& ball) {
   BallPress press;
-  press.reference_q8 = ball.untouched_q8();
+  press.reference_q8 = ball.reference_image_q8();
   press.frames = {ball.frame()};
   press.ball_radius_mm = 4;
   press.mm_per_px = 0.05;
@@ -38,7 +38,7 @@ TEST(Build, ACalibrationThatReadsItsOwnBall) {
   EXPECT_LE(e.sector_mae_mm.value_or(1), 0.012);
   EXPECT_EQ(e.untrusted, 0U);
   EXPECT_NEAR(static_cast<double>(e.pixels), 11600, 300) << "π·(3.04/0.05)²";
-  // The sphere is put to zero where the ball is still 0.1 mm deep.
+  // The sphere is zeroed where the ball is still 0.1 mm deep.
   EXPECT_NEAR(e.offset_mm, 0.1, 0.03);
   EXPECT_NEAR(e.raw_mae_mm, 0.1, 0.03);
 }
@@ -96,7 +96,7 @@ TEST(Build, AnotherPressIsReadToo) {
   const Calibration made = build(press_of(Ball{}));
   const Ball other{.col = 140, .row = 120, .depth_mm = 1.0};
   const std::vector<image::Grey8> frames{other.frame()};
-  const Evaluation e = evaluate(made, other.untouched_q8().pixels, frames, 4);
+  const Evaluation e = evaluate(made, other.reference_image_q8().pixels, frames, 4);
   EXPECT_LE(e.mae_mm, 0.015);
   EXPECT_EQ(e.untrusted, 0U);
 }
@@ -105,7 +105,7 @@ TEST(Build, DeeperThanCalibratedIsCountedUntrusted) {
   const Calibration made = build(press_of(Ball{.depth_mm = 1.0}));
   const Ball deeper{.depth_mm = 1.5};
   const std::vector<image::Grey8> frames{deeper.frame()};
-  const Evaluation e = evaluate(made, deeper.untouched_q8().pixels, frames, 4);
+  const Evaluation e = evaluate(made, deeper.reference_image_q8().pixels, frames, 4);
   EXPECT_GT(e.untrusted, 1000U);
 }
 
@@ -133,7 +133,7 @@ TEST(Build, ALightThatFallsToOneSideIsSeenInOnePress) {
   BallPress press = press_of(Ball{});
   tilt(press.reference_q8, press.frames[0]);
   Ball beside{.col = 190, .depth_mm = 1.2};  // 3.5 mm away, where the light is 7 % stronger
-  image::Grey16 reference = beside.untouched_q8();
+  image::Grey16 reference = beside.reference_image_q8();
   std::vector<image::Grey8> frames{beside.frame()};
   tilt(reference, frames[0]);
 
@@ -141,12 +141,12 @@ TEST(Build, ALightThatFallsToOneSideIsSeenInOnePress) {
   const Calibration plain = build(press, &choices);
   EXPECT_FALSE(choices.light) << "it was not asked";
   EXPECT_EQ(plain.model->gain.shape, recon::GainShape::none);
-  EXPECT_EQ(choices.press_gain.gain.order, GainOrder::plane);
+  EXPECT_EQ(choices.press_asymmetry.gain.order, AsymmetryOrder::plane);
 
   press.may_share_light = true;
   const Calibration shared = build(press, &choices);
   EXPECT_EQ(shared.model->gain.shape, recon::GainShape::uniform);
-  EXPECT_EQ(choices.press_gain.gain.order, GainOrder::none);
+  EXPECT_EQ(choices.press_asymmetry.gain.order, AsymmetryOrder::none);
   EXPECT_THAT(choices.describe(), HasSubstr("as a share of the light: the share is used"));
   EXPECT_NEAR(read_ball(shared, reference.pixels, frames, 4).offset_mm, 0.1, 0.03);
   EXPECT_GT(read_ball(plain, reference.pixels, frames, 4).offset_mm,
@@ -196,7 +196,7 @@ TEST(Build, SaysWhatIsWrongWithTheImages) {
   expect_refused([](BallPress& p) { p.mm_per_px = 51; }, "scale");
   expect_refused([](BallPress& p) { p.crop = Crop{200, 0, 100, 100}; }, "leaves the frame");
   expect_refused([](BallPress& p) { p.crop = Crop{0, 0, 120, 120}; }, "leaves the map");
-  expect_refused([](BallPress& p) { p.frames = {Ball{}.untouched()}; }, "no contact");
+  expect_refused([](BallPress& p) { p.frames = {Ball{}.reference_image()}; }, "no contact");
   expect_refused(
       [](BallPress& p) {
         for (std::uint16_t& v : p.reference_q8.pixels) v = 255 * 256;
@@ -213,10 +213,12 @@ TEST(Evaluate, RefusesAnotherSize) {
   const Calibration made = build(press_of(Ball{}));
   const Ball wide{.width = 300};
   const std::vector<image::Grey8> frames{wide.frame()};
-  EXPECT_THROW((void)evaluate(made, wide.untouched_q8().pixels, frames, 4), std::invalid_argument);
-  EXPECT_THROW((void)evaluate(made, Ball{}.untouched_q8().pixels, frames, 4),
+  EXPECT_THROW((void)evaluate(made, wide.reference_image_q8().pixels, frames, 4),
                std::invalid_argument);
-  EXPECT_THROW((void)evaluate(made, Ball{}.untouched_q8().pixels, {}, 4), std::invalid_argument);
+  EXPECT_THROW((void)evaluate(made, Ball{}.reference_image_q8().pixels, frames, 4),
+               std::invalid_argument);
+  EXPECT_THROW((void)evaluate(made, Ball{}.reference_image_q8().pixels, {}, 4),
+               std::invalid_argument);
 }
 
 }  // namespace

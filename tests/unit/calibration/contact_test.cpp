@@ -29,7 +29,7 @@ TEST(FindContact, RadiusIsAtMostMostOfTheBall) {
 }
 
 TEST(FindContact, UntrustedPixelsAreLeftOut) {
-  DifferenceMap map = Ball{}.map();
+  DarkeningMap map = Ball{}.map();
   for (std::size_t i = 0; i < map.levels.size(); i += 11) {
     map.levels[i] = std::numeric_limits<float>::quiet_NaN();
   }
@@ -39,12 +39,12 @@ TEST(FindContact, UntrustedPixelsAreLeftOut) {
 }
 
 TEST(FindContact, ADarkSpeckElsewhereDoesNotMoveTheCentre) {
-  DifferenceMap map = Ball{}.map();
+  DarkeningMap map = Ball{}.map();
   map.levels[5 * 260 + 5] = 40;
   EXPECT_NEAR(find_contact(map, 4).col, 120.25, 0.05);
 }
 
-TEST(FindContact, SaysWhenNothingTouches) {
+TEST(FindContact, SaysWithoutContact) {
   EXPECT_THAT([] { (void)find_contact(Ball{.depth_mm = 0.2}.map(), 4); },
               ThrowsMessage<std::runtime_error>(HasSubstr("no contact found")));
 }
@@ -90,7 +90,7 @@ TEST(FindContact, EachEdgeCutsTheContact) {
 }
 
 TEST(RadialProfile, MeansOfRings) {
-  const DifferenceMap map = Ball{}.map();
+  const DarkeningMap map = Ball{}.map();
   const RadialProfile profile = radial_profile(map, find_contact(map, 4), 8);
   EXPECT_EQ(profile.levels.size(), 80U);
   EXPECT_NEAR(profile.at(0), 45, 0.1);
@@ -102,7 +102,7 @@ TEST(RadialProfile, MeansOfRings) {
 }
 
 TEST(FarFieldDrift, AnEvenShiftIsDrift) {
-  DifferenceMap map = Ball{.col = 250, .row = 200, .width = 500, .height = 400}.map();
+  DarkeningMap map = Ball{.col = 250, .row = 200, .width = 500, .height = 400}.map();
   const Contact contact = find_contact(map, 4);
   EXPECT_EQ(far_field_drift(map, contact), 0);
   for (float& level : map.levels) level -= 2;
@@ -111,7 +111,7 @@ TEST(FarFieldDrift, AnEvenShiftIsDrift) {
 
 TEST(FarFieldDrift, AnUnevenOrFaintOneIsNot) {
   const Ball ball{.col = 250, .row = 200, .width = 500, .height = 400};
-  DifferenceMap map = ball.map();
+  DarkeningMap map = ball.map();
   const Contact contact = find_contact(map, 4);
   for (std::size_t i = 0; i < map.levels.size(); ++i) {
     map.levels[i] += i % 500 < 250 ? 0.5F : 3.0F;
@@ -126,9 +126,9 @@ TEST(FarFieldDrift, UnsureWhereTheFarFieldIsOnOneSideOnly) {
   // Tiles of 40 pixels begin at columns 0 to 440 and rows 0 to 360. About the lower left corner all
   // of them are to the right and above, about the upper right one of the tall map all to the left
   // and below; rows taken for columns or columns for rows would find some on either side.
-  const DifferenceMap wide{500, 400, 0.05, std::vector<float>(std::size_t{500} * 400, 2)};
+  const DarkeningMap wide{500, 400, 0.05, std::vector<float>(std::size_t{500} * 400, 2)};
   EXPECT_EQ(far_field_drift(wide, {.col = 0, .row = 399, .ball_radius_mm = 1}), 0);
-  const DifferenceMap tall{400, 500, 0.05, std::vector<float>(std::size_t{400} * 500, 2)};
+  const DarkeningMap tall{400, 500, 0.05, std::vector<float>(std::size_t{400} * 500, 2)};
   EXPECT_EQ(far_field_drift(tall, {.col = 399, .row = 0, .ball_radius_mm = 1}), 0);
   // Above and below, if nothing to the left, is both sides.
   EXPECT_EQ(far_field_drift(wide, {.col = 0, .row = 200, .ball_radius_mm = 1}), 2);
@@ -136,7 +136,7 @@ TEST(FarFieldDrift, UnsureWhereTheFarFieldIsOnOneSideOnly) {
 }
 
 TEST(FarFieldDrift, UnsureWithoutAFarField) {
-  DifferenceMap map = Ball{}.map();
+  DarkeningMap map = Ball{}.map();
   for (float& level : map.levels) level += 2;
   EXPECT_EQ(far_field_drift(map, find_contact(Ball{}.map(), 4)), 0);
 }

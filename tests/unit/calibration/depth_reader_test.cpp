@@ -4,9 +4,9 @@
 #include <memory>
 #include <vector>
 
-#include "clients/calibrate/fit/difference.hpp"
+#include "clients/calibrate/fit/darkening_map.hpp"
 #include "daemon/pipeline/depth/resolutions.hpp"
-#include "daemon/pipeline/untouched/calibrated_image.hpp"
+#include "daemon/pipeline/reference/calibrated_image.hpp"
 #include "tests/fakes/scattering_toy.hpp"
 
 namespace dtact::calibration {

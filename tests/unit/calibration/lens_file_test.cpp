@@ -52,7 +52,7 @@ TEST_F(LensFileTest, IsRead) {
   EXPECT_EQ(file.lens.radius_px, 250);
   EXPECT_EQ(file.lens.radial, (std::vector<double>{-0.1, 0.02}));
   EXPECT_EQ(file.gain.shape, recon::GainShape::none) << "files from before there were gains";
-  EXPECT_FALSE(file.gain_told);
+  EXPECT_FALSE(file.gain_specified);
 }
 
 TEST_F(LensFileTest, IsReadBackExactly) {
@@ -60,7 +60,7 @@ TEST_F(LensFileTest, IsReadBackExactly) {
   file.lens.homography[0] = 20.1;  // no binary fraction
   file.lens.radial = {1.0 / 3, -2.0 / 7};
   file.gain.polynomial = {0, 0, 0.001, -0.0002, 1.0 / 3000};
-  file.gain_told = true;
+  file.gain_specified = true;
   file.notes = {"how it was measured"};
   base::write_file_atomically(path(), format(file));
   const LensFile again = load_lens(path());
@@ -70,16 +70,16 @@ TEST_F(LensFileTest, IsReadBackExactly) {
 }
 
 // A board of pins that asks for no gain is an answer, a chessboard is none.
-TEST_F(LensFileTest, TellsNoGainFromNoAnswer) {
+TEST_F(LensFileTest, ReportsNoGainFromNoAnswer) {
   LensFile file = load();
-  for (const bool told : {false, true}) {
-    file.gain_told = told;
+  for (const bool reported : {false, true}) {
+    file.gain_specified = reported;
     base::write_file_atomically(path(), format(file));
-    EXPECT_EQ(load_lens(path()).gain_told, told);
+    EXPECT_EQ(load_lens(path()).gain_specified, reported);
   }
 }
 
-TEST_F(LensFileTest, ErrorsNameFileKeyAndRemedy) {
+TEST_F(LensFileTest, ErrorsNameFileKeyAndFix) {
   const auto says = [](auto... parts) {
     return ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("lens.toml"), HasSubstr(parts)...));
   };

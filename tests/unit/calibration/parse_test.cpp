@@ -51,20 +51,20 @@ TEST(ParseCalibration, RefusesWhatIsNotToml) {
   expect_refused("", "upload:1: version", "missing");
 }
 
-TEST(ParseCalibration, ALayerIsOptionalAndWhole) {
+TEST(ParseCalibration, AGelIsOptionalAndWhole) {
   const Files files = format(sample());
   std::string without = files.toml;
-  const auto begin = without.find("[layer]");
+  const auto begin = without.find("[gel]");
   without.erase(begin, without.find("[uncertainty]") - begin);
-  EXPECT_FALSE(parse(without, files.reference_png, "upload").layer);
-  expect_refused(with("thickness_mm = [2.1, 0.05]", "thickness_mm = [2.1]"), "layer.thickness_mm",
+  EXPECT_FALSE(parse(without, files.reference_png, "upload").gel);
+  expect_refused(with("thickness_mm = [2.1, 0.05]", "thickness_mm = [2.1]"), "gel.thickness_mm",
                  "standard error");
-  expect_refused(with("slope = [1.5, 1, ", "slope = [1.5, "), "layer.slope", "five numbers");
+  expect_refused(with("slope = [1.5, 1, ", "slope = [1.5, "), "gel.slope", "five numbers");
 }
 
 TEST(ParseCalibration, RefusesImpossibleValues) {
   expect_refused(with("version = 1", "version = 2"), "version", "2 is not allowed");
-  expect_refused(with("\"list\"", "\"magic\""), "method", "\"published\"");
+  expect_refused(with("\"LUT\"", "\"magic\""), "method", "\"published\"");
   expect_refused(with("mm_per_px = 0.051", "mm_per_px = 0"), "mm_per_px", "0 is not allowed");
   expect_refused(with("mm_per_px = 0.051", "mm_per_px = nan"), "mm_per_px", "not allowed");
   expect_refused(with("smoothing_px = 1.5", "smoothing_px = -1"), "smoothing_px", "not allowed");
@@ -75,10 +75,10 @@ TEST(ParseCalibration, RefusesImpossibleValues) {
   expect_refused(with("row = 2", "row = -2"), "crop.row", "not allowed");
   expect_refused(with("leds = [255,", "leds = [256,"), "light.leds", "entry 1");
   expect_refused(with("leds = [255, ", "leds = ["), "light.leds", "r, g, b");
-  expect_refused(with("first_q6 = -2", "first_q6 = 0"), "list", "list.covered_from_q6");
-  expect_refused(with("covered_to_q6 = 2", "covered_to_q6 = 9"), "list", "covered_to_q6");
-  expect_refused(with("-20, -10, 0", "-20, -10, -11"), "list", "entry 3");
-  expect_refused(with("-20, -10, 0", "-20, 1.5, 0"), "list.um", "entry 2");
+  expect_refused(with("first_q6 = -2", "first_q6 = 0"), "lut", "lut.covered_from_q6");
+  expect_refused(with("covered_to_q6 = 2", "covered_to_q6 = 9"), "lut", "covered_to_q6");
+  expect_refused(with("-20, -10, 0", "-20, -10, -11"), "lut", "entry 3");
+  expect_refused(with("-20, -10, 0", "-20, 1.5, 0"), "lut.um", "entry 2");
   expect_refused(with("\"gain\" = -3", "\"gain\" = \"low\""), "camera.controls.gain", "wrong type");
   expect_refused(with("sha256 = \"aaaa", "sha256 = \"AAAA"), "source[0].sha256", "hexadecimal");
   expect_refused(with("  0, 1, 7, 2, 29, 1,", "  0, 1, 7, 2, 29, 2,"), "untrusted.runs", "pair 3");
@@ -224,24 +224,24 @@ TEST(ParseCalibration, ScatteringIsChecked) {
                  "scattering.weight", "unknown key");
 }
 
-TEST(ParseCalibration, SharpenedListsAreChecked) {
+TEST(ParseCalibration, SharpenedLutsAreChecked) {
   expect_refused(with("\nsteps = 1", "\nsteps = 0"), "sharpened[0].steps", "from 1 to 2");
   expect_refused(with("\nsteps = 2", "\nsteps = 3"), "sharpened[1].steps", "from 1 to 2");
   expect_refused(with("\nsteps = 2", "\nsteps = 1"), "sharpened[1].steps", "which has 1");
   expect_refused(with("-9, 0, 9", "-9, 0, -10"), "sharpened[0]", "entry 3");
-  expect_refused(with("-8, -4, -1, 0,", "-8,"), "sharpened[1]", "list.covered_from_q6");
+  expect_refused(with("-8, -4, -1, 0,", "-8,"), "sharpened[1]", "lut.covered_from_q6");
   expect_refused(with("  0.5,", "  0.5, 0.6,"), "sharpened[0].error_um", "one for each");
   expect_refused(with("\nsteps = 2", "\nsteps = 2\nradius = 1"), "sharpened[1].radius",
                  "unknown key");
 }
 
-TEST(ParseCalibration, SharpenedListsNeedTheirScattering) {
+TEST(ParseCalibration, SharpenedLutsNeedTheirScattering) {
   const std::string toml = format(sample()).toml;
   const auto from = toml.find("[scattering]");
   const std::string without = toml.substr(0, from) + toml.substr(toml.find("# Indentation", from));
   expect_refused(without, "sharpened[0]", "[scattering]");
-  expect_refused(with("method = \"list\"", "method = \"published\""), "sharpened[0]",
-                 "\"published\" has no such lists");
+  expect_refused(with("method = \"lut\"", "method = \"published\""), "sharpened[0]",
+                 "\"published\" has no such LUTs");
 }
 
 TEST(ParseCalibration, RefusesAnotherReference) {

@@ -29,7 +29,7 @@ Evaluation healthy() {
 
 TEST(Doubts, NoneAboutAHealthyPress) { EXPECT_THAT(doubts_about(healthy()), IsEmpty()); }
 
-TEST(Doubts, ASphereThatIsNotWhereTheListHasIt) {
+TEST(Doubts, ASphereThatIsNotWhereTheLutHasIt) {
   Evaluation press = healthy();
   press.offset_mm = 0.21;
   EXPECT_THAT(doubts_about(press), IsEmpty());
@@ -76,13 +76,13 @@ TEST(Doubts, AContactInTheDark) {
   EXPECT_THAT(doubts_about(press), ElementsAre(HasSubstr("4 % of the contact is too dark")));
 }
 
-recon::DepthList list_of(double um_a_level) {
-  recon::DepthList list;
+recon::DepthLut list_of(double um_a_level) {
+  recon::DepthLut lut;
   for (int q6 = 0; q6 <= 40 * 64; ++q6) {
-    list.um.push_back(static_cast<std::int16_t>(std::lround(um_a_level * q6 / 64)));
+    lut.um.push_back(static_cast<std::int16_t>(std::lround(um_a_level * q6 / 64)));
   }
-  list.covered_to_q6 = 40 * 64;
-  return list;
+  lut.covered_to_q6 = 40 * 64;
+  return lut;
 }
 
 TEST(Doubts, ASlopeThatNoSensorHas) {
@@ -95,7 +95,7 @@ TEST(Doubts, ASlopeThatNoSensorHas) {
 
 BallPress scaled_press_of(const Ball& ball, double mm_per_px = 0.05, double radius_mm = 4) {
   BallPress press;
-  press.reference_q8 = ball.untouched_q8();
+  press.reference_q8 = ball.reference_image_q8();
   press.frames = {ball.frame()};
   press.mm_per_px = mm_per_px;
   press.ball_radius_mm = radius_mm;
@@ -117,12 +117,12 @@ TEST(Doubts, OfBuiltCalibrations) {
               Contains(HasSubstr("a grey level is 2.9 um")));
   // 1.9 mm deep the contact is 3.4 mm wide of which a ball of 3.2 mm has not as much.
   EXPECT_THAT(doubts_of(scaled_press_of(Ball{.depth_mm = 1.9}, 0.05, 3.2)),
-              Contains(HasSubstr("list and sphere disagree")));
+              Contains(HasSubstr("LUT and sphere disagree")));
   EXPECT_THAT(doubts_of(scaled_press_of(Ball{.depth_mm = 1.9}, 0.0552)),
-              Contains(HasSubstr("list and sphere disagree")));
+              Contains(HasSubstr("LUT and sphere disagree")));
 }
 
-TEST(Doubts, OfAPublishedList) {
+TEST(Doubts, OfAPublishedLut) {
   BallPress press = scaled_press_of(Ball{});
   press.method = recon::Method::published;
   EXPECT_THAT(doubts_of(press), IsEmpty());
@@ -145,9 +145,9 @@ TEST(Doubts, OfAPressHalfInTheDark) {
 
 // A corner at a quarter of the light: 625 of 62400 pixels, the nearest at (24, 24), the ball at
 // (120.25, 110.5).
-TEST(DimPart, IsToldWhereNobodySaidTheGain) {
+TEST(DimPart, IsReportedWhereNobodySaidTheGain) {
   BallPresses set;
-  set.reference_q8 = Ball{}.untouched_q8();
+  set.reference_q8 = Ball{}.reference_image_q8();
   set.presses = {{"ball", {Ball{}.frame()}, {}}};
   set.ball_radius_mm = 4;
   set.mm_per_px = 0.05;
@@ -166,9 +166,9 @@ TEST(DimPart, IsToldWhereNobodySaidTheGain) {
   EXPECT_THAT(dim_part_of(made, set), AllOf(HasSubstr("1 % of the map"), HasSubstr("from 6.5 mm"),
                                             HasSubstr("less than half of the light")));
   EXPECT_THAT(doubts_about(made, set), IsEmpty()) << "it is to be known, not refused";
-  set.gain_told = true;
+  set.gain_specified = true;
   EXPECT_EQ(dim_part_of(made, set), "");
-  set.gain_told = false;
+  set.gain_specified = false;
   auto shared = std::make_shared<recon::Model>(*made.model);
   shared->gain.shape = recon::GainShape::uniform;
   made.model = std::move(shared);
@@ -177,7 +177,7 @@ TEST(DimPart, IsToldWhereNobodySaidTheGain) {
 
 TEST(Doubts, OfSeveralPressesNameThePress) {
   BallPresses set;
-  set.reference_q8 = Ball{}.untouched_q8();
+  set.reference_q8 = Ball{}.reference_image_q8();
   for (const double depth_mm : {0.5, 0.75, 1.0, 1.5}) {
     set.presses.push_back(
         {fmt::format("press of {}", depth_mm), {Ball{.depth_mm = depth_mm}.frame()}, {}});
@@ -187,7 +187,7 @@ TEST(Doubts, OfSeveralPressesNameThePress) {
   set.mm_per_px = 0.05;
   const Calibration made = build(set);
   EXPECT_THAT(doubts_about(made, set), IsEmpty());
-  // One that this list did not see, half in the dark, is found out by its name.
+  // One that this LUT did not see, half in the dark, is found out by its name.
   image::Grey8 half = Ball{.depth_mm = 1.2}.frame();
   for (std::size_t i = 0; i < half.pixels.size(); ++i) {
     if (i % 260 >= 120) half.pixels[i] = 200;

@@ -10,7 +10,7 @@
 
 #include "clients/calibrate/fit/chain_fit.hpp"
 #include "tests/unit/calibration/ball.hpp"
-#include "tests/unit/calibration/list_reading.hpp"
+#include "tests/unit/calibration/lut_reading.hpp"
 
 namespace dtact::calibration {
 namespace {
@@ -47,7 +47,7 @@ TEST(FitChain, AMeasuredDepthTiesTheChain) {
 }
 
 TEST(FitChain, NeverFalls) {
-  // 24 to 30 grey levels measured at 0.8 to 1.0 mm, 31 to 36 at 0.5 to 0.7 mm: a layer that
+  // 24 to 30 grey levels measured at 0.8 to 1.0 mm, 31 to 36 at 0.5 to 0.7 mm: a gel that
   // answered so could not be read.
   SagProfile deep = rings(1.0, 1.2);
   deep.depth_mm = 1.0;
@@ -82,7 +82,7 @@ TEST(FitChain, NeedsADarkRing) {
 
 BallPresses set_of(const std::vector<Ball>& balls) {
   BallPresses set;
-  set.reference_q8 = balls.front().untouched_q8();
+  set.reference_q8 = balls.front().reference_image_q8();
   for (std::size_t i = 0; i < balls.size(); ++i) {
     set.presses.push_back({"press " + std::to_string(i + 1), {balls[i].frame()}, {}});
   }
@@ -98,7 +98,7 @@ TEST(BuildFromPresses, ReadsALinearResponse) {
                     Ball{.col = 130, .row = 125, .depth_mm = 1.0}, Ball{.depth_mm = 1.5}}),
             &report);
   for (const double level : {0.0, 8.0, 15.0, 30.0, 40.0}) {
-    EXPECT_NEAR(um_at(made.model->list, level), level / 30 * 1000, 15) << level;
+    EXPECT_NEAR(um_at(made.model->lut, level), level / 30 * 1000, 15) << level;
   }
   ASSERT_EQ(report.presses.size(), 4U);
   EXPECT_NEAR(report.presses[2].depth_mm, 1.0, 0.015);
@@ -226,11 +226,11 @@ TEST(LeaveEachOut, FreesOnlyTheDepthOfThePress) {
     }
     return rings;
   };
-  const ChainFit list = chain_presses({press(0.6, 1), press(0.9, 1), press(1.3, 1)}).fit;
-  // A press that darkens by a tenth more than the list knows: its depth takes up the offset, the
+  const ChainFit lut = chain_presses({press(0.6, 1), press(0.9, 1), press(1.3, 1)}).fit;
+  // A press that darkens by a tenth more than the LUT knows: its depth takes up the offset, the
   // sphere's shape does not fit.
-  const MetPress same = meet(press(0.8, 1), list);
-  const MetPress other = meet(press(0.8, 1.1), list);
+  const LeftOutResidual same = residual_of(press(0.8, 1), lut);
+  const LeftOutResidual other = residual_of(press(0.8, 1.1), lut);
   EXPECT_LT(same.mean_error_mm(), 0.001);
   EXPECT_NEAR(same.rings.front().depth_mm, 0.8, 0.002);
   EXPECT_NEAR(other.rings.front().depth_mm, 0.88, 0.02);
@@ -240,16 +240,16 @@ TEST(LeaveEachOut, FreesOnlyTheDepthOfThePress) {
   // Where the depth was measured the offset counts, too.
   PressRings measured = press(0.8, 1.1);
   measured.all.depth_mm = 0.8;
-  EXPECT_NEAR(meet(measured, list).mean_error_mm(), 0.08, 0.015);
+  EXPECT_NEAR(residual_of(measured, lut).mean_error_mm(), 0.08, 0.015);
 }
 
 TEST(LeaveEachOut, KnowsNothingOfThePressThatIsLeftOut) {
   const auto press = [](double depth_mm) {
     return PressRings{.all = rings(depth_mm, 2), .seen_mm = 2, .ball_radius_mm = 4};
   };
-  const LeftOut out = leave_each_out({press(0.6), press(0.9), press(1.3)});
+  const LeaveOneOut out = leave_one_out({press(0.6), press(0.9), press(1.3)});
   ASSERT_EQ(out.without.size(), 3U);
-  // A list ends with the deepest press that made it, at 30 levels a millimetre.
+  // A LUT ends with the deepest press that made it, at 30 levels a millimetre.
   EXPECT_NEAR(out.without[0].knots.back().level, 39, 0.1);
   EXPECT_NEAR(out.without[2].knots.back().level, 27, 0.1);
 }
@@ -294,9 +294,9 @@ TEST(BuildFromPresses, ADarkPartOfTheMapCostsNoPress) {
   EXPECT_THAT(report.note, AllOf(HasSubstr("press 1: the contact"), HasSubstr("--crop")));
 }
 
-// Presses that differ by a tenth either way make a list that is sure to a tenth over the root of
+// Presses that differ by a tenth either way make a LUT that is sure to a tenth over the root of
 // their number.
-TEST(BuildFromPresses, StatesHowFarThePressesThatMadeTheListDiffer) {
+TEST(BuildFromPresses, StatesHowFarThePressesThatMadeTheLutDiffer) {
   std::vector<Ball> balls;
   for (const double depth_mm : {0.5, 0.8, 1.1, 1.4}) {
     balls.push_back(Ball{.depth_mm = depth_mm});
@@ -354,10 +354,10 @@ TEST(BuildRegression, FindsOneSlopeWhereThereIsOne) {
   EXPECT_EQ(made.model->gain.shape, recon::GainShape::radial);
   // Few presses: the line still sees that slopes are lower at the circles' rims.
   EXPECT_NEAR(made.model->gain.per_mm, 0, 0.1);
-  // The circle is at three levels, 0.1 mm deep, and the sphere is put to zero there.
-  EXPECT_GT(um_at(made.model->list, 30), 800);
-  EXPECT_LT(um_at(made.model->list, 30), 1000);
-  EXPECT_EQ(um_at(made.model->list, 0), 0);
+  // The circle is at three levels, 0.1 mm deep, and the sphere is zeroed there.
+  EXPECT_GT(um_at(made.model->lut, 30), 800);
+  EXPECT_LT(um_at(made.model->lut, 30), 1000);
+  EXPECT_EQ(um_at(made.model->lut, 0), 0);
 }
 
 TEST(BuildRegression, CountsTheDistanceFromTheCentreItIsGiven) {

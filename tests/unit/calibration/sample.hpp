@@ -13,14 +13,14 @@ namespace dtact::calibration {
 /// A calibration that differs from the defaults in every field.
 inline Calibration sample() {
   auto model = std::make_shared<recon::Model>();
-  model->method = recon::Method::list;
+  model->method = recon::Method::lut;
   model->rectify = recon::make_crop_table(12, 9, 3, 2, 6, 5);  // 108 pixels → 30
   model->mm_per_px = 0.051;
   model->smoothing_px = 1.5;
-  model->list.first_q6 = -2;
-  model->list.um = {-20, -10, 0, 10, 20};
-  model->list.covered_from_q6 = -1;
-  model->list.covered_to_q6 = 2;
+  model->lut.first_q6 = -2;
+  model->lut.um = {-20, -10, 0, 10, 20};
+  model->lut.covered_from_q6 = -1;
+  model->lut.covered_to_q6 = 2;
   model->reference_q8.assign(108, 160 * 256 + 37);
   model->reference_q8[5] = 65280;
   model->untrusted.assign(30, 0);
@@ -29,10 +29,10 @@ inline Calibration sample() {
   model->scattering = recon::Scattering{.narrow_mm = 0.28, .wide_mm = 1.23, .narrow_weight = 0.7};
   model->sharpened = {
       {.steps = 1,
-       .list = {.first_q6 = -1, .um = {-9, 0, 9, 18}, .covered_from_q6 = 0, .covered_to_q6 = 1},
+       .lut = {.first_q6 = -1, .um = {-9, 0, 9, 18}, .covered_from_q6 = 0, .covered_to_q6 = 1},
        .uncertainty = {{0.5, 15}}},
       {.steps = 2,
-       .list = {.first_q6 = -3, .um = {-8, -4, -1, 0}, .covered_from_q6 = -2, .covered_to_q6 = 0},
+       .lut = {.first_q6 = -3, .um = {-8, -4, -1, 0}, .covered_from_q6 = -2, .covered_to_q6 = 0},
        .uncertainty = {}}};
   model->gain = {.shape = recon::GainShape::radial,
                  .centre_x_mm = 1.5,
@@ -47,14 +47,14 @@ inline Calibration sample() {
                                    .from_n = 0.1,
                                    .to_n = 2};
   Calibration calibration;
-  calibration.layer = {.thickness_mm = {2.1, 0.05},
-                       .narrow_mm = {0.28, 0.01},
-                       .wide_mm = {1.23, 0.2},
-                       .narrow_weight = {0.7, 0.03},
-                       .indentation = {-0.24, -0.12, 0, 0.4, 0.8},
-                       .slope = {{{1.5, 0.2}, {1, 0.1}, {0.4, 0.01}, {0.5, 0.02}, {0.6, 0.3}}},
-                       .bulge_factor = 1.5,
-                       .residual_levels = 0.21};
+  calibration.gel = {.thickness_mm = {2.1, 0.05},
+                     .narrow_mm = {0.28, 0.01},
+                     .wide_mm = {1.23, 0.2},
+                     .narrow_weight = {0.7, 0.03},
+                     .indentation = {-0.24, -0.12, 0, 0.4, 0.8},
+                     .slope = {{{1.5, 0.2}, {1, 0.1}, {0.4, 0.01}, {0.5, 0.02}, {0.6, 0.3}}},
+                     .bulge_factor = 1.5,
+                     .residual_levels = 0.21};
   calibration.crop_col = 3;
   calibration.crop_row = 2;
   calibration.origin.camera = "usb-0:1.2 \"left\"\\";

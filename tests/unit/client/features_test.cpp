@@ -7,13 +7,13 @@
 namespace dtact::client::test {
 namespace {
 
-// The daemon's refusal comes after patience_frames, which may be longer than any other answer
+// The daemon's refusal comes after timeout_frames, which may be longer than any other answer
 // takes.
 TEST(Rezero, WaitsAsLongAsTheDaemonSays) {
   PlayedDaemon daemon({[](Peer& peer) {
     v1::Reply hello;
     hello.mutable_hello()->set_major(wire::kMajor);
-    hello.mutable_hello()->set_rezero_within_s(kLong.count());
+    hello.mutable_hello()->set_rezero_timeout_s(kLong.count());
     (void)peer.answer(hello);
     const v1::ClientMessage request = peer.request();
     std::this_thread::sleep_for(std::chrono::milliseconds(400));
@@ -49,14 +49,14 @@ TEST(Features, PingAndReference) {
     ADD_FAILURE();
   } catch (const Refused& e) {
     EXPECT_TRUE(e.denied());
-    EXPECT_FALSE(e.worth_repeating());
+    EXPECT_FALSE(e.is_transient());
   }
   try {
     client.rezero();
     ADD_FAILURE();
   } catch (const Refused& e) {
     EXPECT_FALSE(e.denied());
-    EXPECT_TRUE(e.worth_repeating());
+    EXPECT_TRUE(e.is_transient());
   }
 }
 

@@ -62,7 +62,7 @@ TEST(Reconnecting, TheSubscriptionSurvivesADaemonThatGoesAndComesBack) {
   EXPECT_TRUE(client.has_feature("jpeg"));
 }
 
-TEST(Reconnecting, EachLossTellsItsOwnReason) {
+TEST(Reconnecting, EachLossReportsItsOwnReason) {
   PlayedDaemon daemon({[](Peer& peer) {
                          peer.greet();
                          peer.done();
@@ -145,7 +145,7 @@ TEST(Reconnecting, ABusyDaemonIsAskedAgain) {
   EXPECT_THAT(next<Reconnected>(client).reason, HasSubstr("ended the connection"));
 }
 
-TEST(Reconnecting, WhatMoreAttemptsCannotMendIsThrown) {
+TEST(Reconnecting, WhatMoreAttemptsCannotFixIsThrown) {
   PlayedDaemon daemon({[](Peer& peer) { peer.greet(); },
                        [](Peer& peer) { peer.refuse(v1::ERROR_DENIED, "unknown token"); },
                        [](Peer& peer) { peer.refuse(v1::ERROR_VERSION, "version 2 only"); },
@@ -162,7 +162,7 @@ TEST(Reconnecting, WhatMoreAttemptsCannotMendIsThrown) {
     EXPECT_STREQ(e.what(), "unknown token");
   }
   EXPECT_THROW((void)client.next(kLong), ProtocolError);
-  // Somebody mended it.
+  // Somebody fixed it.
   (void)next<Reconnected>(client);
 }
 
@@ -268,7 +268,7 @@ TEST(Waiting, RunSaysWhenTheConnectionIsLost) {
   EXPECT_THROW(client.run({}, {}), ConnectionError);
 }
 
-TEST(Waiting, TheDescriptorTellsAnEventLoop) {
+TEST(Waiting, TheDescriptorReportsAnEventLoop) {
   PlayedDaemon daemon({[](Peer& peer) {
     peer.greet();
     peer.done();

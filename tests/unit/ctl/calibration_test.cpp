@@ -108,7 +108,7 @@ TEST(Calibration, IsListed) {
   EXPECT_THAT(
       json,
       StartsWith(R"({"number":0,"name":"factory","uploaded":"","current":false,"summary":{)"
-                 R"("name":"factory","method":"list","mm_per_px":0.0414,"width":580,"height":580,)"
+                 R"("name":"factory","method":"lut","mm_per_px":0.0414,"width":580,"height":580,)"
                  R"("covered_from_mm":-0.02,"covered_to_mm":1.4,"created":"","frame_width":800,)"
                  R"("frame_height":600,"sharpen_steps":[]},"in_use":false})"
                  "\n"));
@@ -117,7 +117,7 @@ TEST(Calibration, IsListed) {
   EXPECT_EQ(std::count(json.begin(), json.end(), '\n'), 4);
 }
 
-TEST(Calibration, InUseAndToStartWithAreToldApart) {
+TEST(Calibration, InUseAndToStartWithAreDistinguished) {
   Rig rig({}, answer_done);
   EXPECT_THAT(ctl(rig, {"calibration", "list"}).out,
               AllOf(HasSubstr("\n>          1"), EndsWith("none is in use\n"

@@ -59,7 +59,7 @@ TEST(Ctl, ReturnsThreeWithoutADaemon) {
                                   HasSubstr("systemctl status dtactd")));
 }
 
-TEST(Status, TellsWhereTheDaemonListens) {
+TEST(Status, ReportsWhereTheDaemonListens) {
   net::NetConfig config;
   config.address = "0.0.0.0";
   config.insecure = true;
@@ -168,7 +168,7 @@ TEST(Rezero, IsRefusedUnlessForced) {
   });
   const auto refused = ctl(rig, {"rezero"});
   EXPECT_EQ(refused.code, 1);
-  EXPECT_EQ(refused.error, "dtactctl: something touches\n");
+  EXPECT_EQ(refused.error, "dtactctl: there is contact\n");
   EXPECT_EQ(ctl(rig, {"rezero", "--force"}).code, 0);
 }
 

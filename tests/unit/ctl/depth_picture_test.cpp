@@ -79,7 +79,7 @@ TEST(FullScale, IsARoundNumber) {
 TEST(Picture, FitsTheTerminal) {
   const v1::Frame square = frame(145, 145, [](int, int) { return 0.1; });
   for (const auto& [columns, rows] :
-       {std::pair{80, 24}, {200, 20}, {kLeastColumns, kLeastRows}, {40, 100}}) {
+       {std::pair{80, 24}, {200, 20}, {kMinColumns, kMinRows}, {40, 100}}) {
     const auto lines = picture_of(square, 0.5, {columns, rows, Palette::rgb});
     EXPECT_LE(lines.size(), static_cast<std::size_t>(rows - 1));
     for (const auto& line : lines) {
@@ -120,7 +120,7 @@ TEST(Picture, ShowsUntrustedInGrey) {
 TEST(Picture, MarksTheContact) {
   v1::Frame f = frame(40, 40, [](int, int) { return 0.0; });
   EXPECT_THAT(picture_of(f, 0.5, {40, 22, Palette::rgb})[10], Not(HasSubstr("+")));
-  f.mutable_contact()->set_touching(true);
+  f.mutable_contact()->set_in_contact(true);
   f.mutable_contact()->set_x_mm(-1.0);  // ten columns left of the middle
   f.mutable_contact()->set_y_mm(0.45);  // four pixels below it
   const auto lines = picture_of(f, 0.5, {40, 22, Palette::rgb});

@@ -57,7 +57,7 @@ TEST(LightStep, APictureThatStaysIsNoStep) {
   EXPECT_EQ(feed(step, then({}, 120, 103)), Verdict::unseen);
 }
 
-TEST(LightStep, APictureThatWandersIsRestless) {
+TEST(LightStep, AnUnsteadyImageIsNotAtRest) {
   LightStep step(100, 10);
   std::vector<double> wandering;
   for (int i = 0; i < 120; ++i) wandering.push_back(i % 2 == 0 ? 30 : 40);

@@ -59,7 +59,7 @@ TEST(Cert, MakesAPairThatTheDaemonTakes) {
                           ContainsRegex("CN ?= ?gripper.lab.example"), HasSubstr("CA:FALSE")));
 }
 
-TEST(Cert, ReplacesAPairOnlyWhenToldTo) {
+TEST(Cert, ReplacesAPairOnlyOnRequest) {
   const TempFolder folder;
   const std::string path = folder.path().string();
   ASSERT_EQ(ctl({"cert", "-o", path}).code, 0);

@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-std::string told(const std::vector<std::string>& arguments) {
+std::string reported(const std::vector<std::string>& arguments) {
   std::ostringstream out;
   std::ostringstream error;
   EXPECT_EQ(run(arguments, out, error), 2);
@@ -24,18 +24,18 @@ std::string told(const std::vector<std::string>& arguments) {
 }
 
 TEST(Usage, NamesTheWordThatIsNoCommand) {
-  const std::string sentence = told({"--port", "7400", "statsu"});
+  const std::string sentence = reported({"--port", "7400", "statsu"});
   EXPECT_THAT(sentence, StartsWith("dtactctl: \"statsu\" is no command; known are status, watch,"));
 }
 
 TEST(Usage, AsksForACommandWhereThereIsNone) {
-  EXPECT_THAT(told({"--port", "7400"}), HasSubstr("A subcommand is required"));
+  EXPECT_THAT(reported({"--port", "7400"}), HasSubstr("A subcommand is required"));
 }
 
 TEST(Usage, RefusesJsonWhereThereIsNothingToPrint) {
-  EXPECT_THAT(told({"rezero", "--json"}), HasSubstr("--json"));
-  EXPECT_THAT(told({"token", "--new", "view", "--json"}), HasSubstr("--json"));
-  EXPECT_THAT(told({"watch", "--draw", "--json"}), HasSubstr("--json"));
+  EXPECT_THAT(reported({"rezero", "--json"}), HasSubstr("--json"));
+  EXPECT_THAT(reported({"token", "--new", "view", "--json"}), HasSubstr("--json"));
+  EXPECT_THAT(reported({"watch", "--draw", "--json"}), HasSubstr("--json"));
 }
 
 // What a program asks its user to run again.

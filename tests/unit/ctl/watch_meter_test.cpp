@@ -15,7 +15,7 @@ v1::Frame frame(std::int64_t captured_ns) {
   v1::Frame f;
   f.set_sequence(7);
   f.set_monotonic_ns(captured_ns);
-  f.mutable_contact()->set_touching(true);
+  f.mutable_contact()->set_in_contact(true);
   f.mutable_contact()->set_area_mm2(12.34);
   f.mutable_contact()->set_deepest_mm(0.5127);
   f.set_dropped(3);

@@ -25,7 +25,7 @@ TEST(DoctorCamera, NoNodeIsWrongWhenOneIsNeeded) {
   const FakeMachine machine;
   const Finding finding = only_trouble(check_camera(machine, v4l2()));
   EXPECT_EQ(finding.verdict, Verdict::wrong);
-  EXPECT_THAT(finding.mend, HasSubstr("modprobe uvcvideo"));
+  EXPECT_THAT(finding.fix, HasSubstr("modprobe uvcvideo"));
 }
 
 TEST(DoctorCamera, NamesTheNodeThatCapturesAndPassesOverMetadata) {
@@ -67,7 +67,7 @@ TEST(DoctorCamera, AForbiddenNodeNamesTheGroup) {
   machine.owner = "video";
   const Finding finding = only_trouble(check_camera(machine, v4l2()));
   EXPECT_EQ(finding.verdict, Verdict::wrong);
-  EXPECT_EQ(finding.mend, "sudo usermod -aG video anna, then log in again");
+  EXPECT_EQ(finding.fix, "sudo usermod -aG video anna, then log in again");
   // Nobody asked for a camera: worth knowing, not wrong.
   EXPECT_EQ(only_trouble(check_camera(machine, hal::CameraConfig{})).verdict, Verdict::note);
 }
@@ -79,7 +79,7 @@ TEST(DoctorCamera, ANodeThatTheServicesUserMayNotOpen) {
   machine.denied = {{"/dev/video0", EACCES}};
   machine.owner = "video";
   machine.opener = kServiceUser;
-  EXPECT_EQ(only_trouble(check_camera(machine, v4l2())).mend,
+  EXPECT_EQ(only_trouble(check_camera(machine, v4l2())).fix,
             "sudo usermod -aG video dtactd && sudo systemctl restart dtactd");
 }
 
@@ -115,7 +115,7 @@ TEST(DoctorUsb, APortOfUsb1IsTooSlow) {
   EXPECT_EQ(finding.verdict, Verdict::wrong);
   EXPECT_EQ(finding.what,
             "/dev/video0 is on a port of 12 Mbit/s: too slow for a stream of pictures");
-  EXPECT_THAT(finding.mend, HasSubstr("lsusb -t"));
+  EXPECT_THAT(finding.fix, HasSubstr("lsusb -t"));
 }
 
 TEST(DoctorUsb, RawPicturesHaveToFitIntoUsb2) {
@@ -156,7 +156,7 @@ TEST(DoctorDmaHeap, IsForLibcameraAndMayBeMissing) {
   machine.denied = {{"/dev/dma_heap/linux,cma", EACCES}};
   const Finding finding = only_trouble(check_dma_heap(machine, camera));
   EXPECT_EQ(finding.verdict, Verdict::note);
-  EXPECT_THAT(finding.mend, HasSubstr("usermod -aG video anna"));
+  EXPECT_THAT(finding.fix, HasSubstr("usermod -aG video anna"));
   machine.file("/proc/device-tree/model", "Raspberry Pi 5 Model B Rev 1.0");
   EXPECT_EQ(only_trouble(check_dma_heap(machine, camera)).verdict, Verdict::wrong);
   machine.file("/dev/dma_heap/vidbuf_cached");
@@ -170,7 +170,7 @@ TEST(DoctorIpa, IsForLibcameraAndMayBeMissing) {
   camera.backend = "libcamera";
   Finding finding = only_trouble(check_ipa(machine, camera));
   EXPECT_EQ(finding.verdict, Verdict::wrong);
-  EXPECT_EQ(finding.mend, "sudo apt install libcamera-ipa");
+  EXPECT_EQ(finding.fix, "sudo apt install libcamera-ipa");
   // Debian 12's, which is older than the board.
   const std::string folder = "/usr/lib/aarch64-linux-gnu/libcamera/";
   machine.file(folder + "ipa_rpi.so");
@@ -200,10 +200,10 @@ TEST(DoctorSpi, AllIsWell) {
 
 TEST(DoctorSpi, AnAbsentDevice) {
   FakeMachine machine;
-  EXPECT_THAT(only_trouble(check_spi(machine, spi_ring())).mend, HasSubstr("device tree"));
+  EXPECT_THAT(only_trouble(check_spi(machine, spi_ring())).fix, HasSubstr("device tree"));
   // Device-tree strings end in a zero byte.
   machine.file("/proc/device-tree/model", std::string("Raspberry Pi 5 Model B Rev 1.0\0", 31));
-  EXPECT_EQ(only_trouble(check_spi(machine, spi_ring())).mend,
+  EXPECT_EQ(only_trouble(check_spi(machine, spi_ring())).fix,
             "sudo raspi-config nonint do_spi 0 && sudo reboot");
 }
 
@@ -212,11 +212,11 @@ TEST(DoctorSpi, AForbiddenDeviceOfRootsNeedsTheRuleAndTheGroup) {
   machine.denied = {{"/dev/spidev0.0", EACCES}};
   const Finding finding = only_trouble(check_spi(machine, spi_ring()));
   EXPECT_THAT(finding.what, HasSubstr("Permission denied"));
-  EXPECT_THAT(finding.mend, HasSubstr("60-dtactd.rules"));
-  EXPECT_THAT(finding.mend, HasSubstr("usermod -aG spi anna"));
+  EXPECT_THAT(finding.fix, HasSubstr("60-dtactd.rules"));
+  EXPECT_THAT(finding.fix, HasSubstr("usermod -aG spi anna"));
   // As the package brings it.
   machine.file("/usr/lib/udev/rules.d/60-dtactd.rules");
-  EXPECT_EQ(only_trouble(check_spi(machine, spi_ring())).mend,
+  EXPECT_EQ(only_trouble(check_spi(machine, spi_ring())).fix,
             "sudo udevadm control --reload && sudo udevadm trigger && sudo usermod -aG spi anna, "
             "then log in again");
 }
@@ -237,7 +237,7 @@ TEST(DoctorSpi, ASmallBufsiz) {
   machine.file("/sys/module/spidev/parameters/bufsiz", "256\n");
   const Finding finding = only_trouble(check_spi(machine, spi_ring()));
   EXPECT_EQ(finding.what, "spidev.bufsiz = 256, the ring needs 336");
-  EXPECT_THAT(finding.mend, HasSubstr("spidev.bufsiz=4096"));
+  EXPECT_THAT(finding.fix, HasSubstr("spidev.bufsiz=4096"));
 }
 
 TEST(DoctorSpi, AWrongTrueRate) {
@@ -255,13 +255,13 @@ TEST(DoctorPio, TheDriversDevice) {
   EXPECT_THAT(check_pio(machine, spi_ring()), IsEmpty());
   const Finding absent = only_trouble(check_pio(machine, ring));
   EXPECT_EQ(absent.what, "/dev/leds0 is not there");
-  EXPECT_THAT(absent.mend, HasSubstr("dtoverlay=ws2812-pio,gpio=18,num_leds=8"));
+  EXPECT_THAT(absent.fix, HasSubstr("dtoverlay=ws2812-pio,gpio=18,num_leds=8"));
   const FakeMachine other;
-  EXPECT_THAT(only_trouble(check_pio(other, ring)).mend, HasSubstr("ws2812_spi"));
+  EXPECT_THAT(only_trouble(check_pio(other, ring)).fix, HasSubstr("ws2812_spi"));
   machine.file("/dev/leds0");
   EXPECT_TRUE(all_good(check_pio(machine, ring)));
   machine.denied = {{"/dev/leds0", EACCES}};
-  EXPECT_THAT(only_trouble(check_pio(machine, ring)).mend, HasSubstr("usermod -aG gpio anna"));
+  EXPECT_THAT(only_trouble(check_pio(machine, ring)).fix, HasSubstr("usermod -aG gpio anna"));
 }
 
 TEST(DoctorGpio, NothingConfiguredNothingWrong) {
@@ -299,7 +299,7 @@ TEST(DoctorGpio, WhatCanBeWrongWithALine) {
   machine.held_line = -1;
   machine.file("/dev/gpiochip0");
   machine.denied = {{"/dev/gpiochip0", EACCES}};
-  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).mend, HasSubstr("usermod -aG gpio anna"));
+  EXPECT_THAT(only_trouble(check_gpio(machine, ring)).fix, HasSubstr("usermod -aG gpio anna"));
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ class TellingMachine : public PiMachine {
     file("/proc/meminfo", "MemTotal:        4147120 kB\nMemAvailable:    3500000 kB\n");
     file("/dev/video0");
     denied = {{"/dev/video0", EACCES}};
-    rtprio = 0;  // Its mend names the user.
+    rtprio = 0;  // Its fix names the user.
     answers = {{"get_throttled", "throttled=0x50000"}};
     hal::v4l2::SurveyedCamera& camera = attached.emplace_back();
     camera.attached.card = "USB Endoscope";
@@ -57,7 +57,7 @@ TEST(Doctor, PrintsAReportAndAnExitStatusThatAgree) {
   EXPECT_EQ(doctor(config, out), 1);
   EXPECT_THAT(out.str(),
               HasSubstr("spi          WRONG  /dev/spidev-that-is-not-there is not there"));
-  EXPECT_THAT(out.str(), HasSubstr("mend:"));
+  EXPECT_THAT(out.str(), HasSubstr("fix:"));
   EXPECT_THAT(out.str(), HasSubstr("wrong\n"));
 }
 

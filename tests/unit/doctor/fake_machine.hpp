@@ -105,7 +105,7 @@ inline Finding only_trouble(const Findings& findings) {
 
 inline bool all_good(const Findings& findings) {
   return !findings.empty() && std::all_of(findings.begin(), findings.end(), [](const Finding& f) {
-    return f.verdict == Verdict::good && f.mend.empty();
+    return f.verdict == Verdict::good && f.fix.empty();
   });
 }
 

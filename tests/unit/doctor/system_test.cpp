@@ -20,7 +20,7 @@ TEST(DoctorCoreClock, IsOfInterestOnARaspberryPi4) {
   machine.file("/boot/firmware/config.txt", "dtparam=spi=on\n#core_freq_min=500\n");
   const Finding finding = only_trouble(check_core_clock(machine, spi_ring()));
   EXPECT_EQ(finding.verdict, Verdict::note);
-  EXPECT_THAT(finding.mend, HasSubstr("core_freq=500\\ncore_freq_min=500"));
+  EXPECT_THAT(finding.fix, HasSubstr("core_freq=500\\ncore_freq_min=500"));
   machine.answers = {{"measure_clock core", "frequency(1)=200000992"}};
   EXPECT_THAT(only_trouble(check_core_clock(machine, spi_ring())).what,
               HasSubstr("moves with load, now 200 MHz"));
@@ -45,7 +45,7 @@ TEST(DoctorPower, DecodesTheFirmwaresBits) {
   ASSERT_THAT(findings, SizeIs(3));
   EXPECT_EQ(findings[0].verdict, Verdict::wrong);
   EXPECT_EQ(findings[0].what, "throttled=0x70005: under-voltage now");
-  EXPECT_THAT(findings[0].mend, HasSubstr("vcgencmd get_throttled"));
+  EXPECT_THAT(findings[0].fix, HasSubstr("vcgencmd get_throttled"));
   EXPECT_EQ(findings[1].verdict, Verdict::note);
   EXPECT_EQ(findings[1].what, "throttled=0x70005: processor clock capped since the board started");
   EXPECT_EQ(findings[2].what, "throttled=0x70005: throttled now");
@@ -66,10 +66,10 @@ TEST(DoctorGroups, AMissingOneIsNamed) {
   machine.file("/etc/group", "root:x:0:\nvideo:x:44:anna\nspi:x:999:\nnotgpio:x:986:\n");
   const Finding finding = only_trouble(check_groups(machine));
   EXPECT_EQ(finding.what, "missing: gpio; their devices stay root's");
-  EXPECT_THAT(finding.mend, HasSubstr("cp systemd/dtactd.sysusers"));
+  EXPECT_THAT(finding.fix, HasSubstr("cp systemd/dtactd.sysusers"));
   // As the package brings it.
   machine.file("/usr/lib/sysusers.d/dtactd.conf");
-  EXPECT_EQ(only_trouble(check_groups(machine)).mend, "sudo systemd-sysusers");
+  EXPECT_EQ(only_trouble(check_groups(machine)).fix, "sudo systemd-sysusers");
   machine.file("/etc/group", "gpio:x:986:\nvideo:x:44:anna\nspi:x:999:\n");
   EXPECT_TRUE(all_good(check_groups(machine)));
 }
@@ -78,7 +78,7 @@ TEST(DoctorRealtime, LimitsOfAnUnprivilegedUser) {
   FakeMachine machine;
   EXPECT_TRUE(all_good(check_realtime(machine)));
   machine.rtprio = 0;
-  EXPECT_THAT(only_trouble(check_realtime(machine)).mend, HasSubstr("echo 'anna - rtprio 90'"));
+  EXPECT_THAT(only_trouble(check_realtime(machine)).fix, HasSubstr("echo 'anna - rtprio 90'"));
   machine.rtprio = 90;
   machine.memlock = 8U << 20U;
   EXPECT_THAT(only_trouble(check_realtime(machine)).what, HasSubstr("8192 kB"));
@@ -117,7 +117,7 @@ TEST(DoctorRealtime, TheShareOfAllRealTimeThreads) {
   const Finding finding = only_trouble(check_realtime_share(machine));
   EXPECT_EQ(finding.verdict, Verdict::wrong);
   EXPECT_THAT(finding.what, HasSubstr("sched_rt_runtime_us = 0 of 1000000"));
-  EXPECT_THAT(finding.mend, HasSubstr("sudo sysctl"));
+  EXPECT_THAT(finding.fix, HasSubstr("sudo sysctl"));
 }
 
 TEST(DoctorMemory, TooLittleIsNoted) {
@@ -128,7 +128,7 @@ TEST(DoctorMemory, TooLittleIsNoted) {
   machine.file("/proc/meminfo", "MemTotal:  4000000 kB\nMemAvailable: 131071 kB\n");
   const Finding finding = only_trouble(check_memory(machine));
   EXPECT_EQ(finding.what, "127 MiB are available: too few for a daemon that locks its memory");
-  EXPECT_THAT(finding.mend, HasSubstr("ps -eo rss"));
+  EXPECT_THAT(finding.fix, HasSubstr("ps -eo rss"));
 }
 
 TEST(DoctorClock, AQuickSourceIsGood) {
@@ -148,7 +148,7 @@ TEST(DoctorClock, ASlowSourceIsWrongWhenAQuickOneIsThere) {
   machine.file(folder + "available_clocksource", "hpet tsc acpi_pm \n");
   const Finding finding = only_trouble(check_clock_source(machine));
   EXPECT_EQ(finding.verdict, Verdict::wrong);
-  EXPECT_THAT(finding.mend, HasSubstr("echo tsc | sudo tee"));
+  EXPECT_THAT(finding.fix, HasSubstr("echo tsc | sudo tee"));
 }
 
 TEST(DoctorClock, NoSourceFileIsANote) {

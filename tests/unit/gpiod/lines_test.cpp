@@ -21,7 +21,7 @@ std::vector<Chip> chips() {
 std::string place_of(const GpioLineConfig& line) {
   const Place place = find_line(chips(), line, "key");
   return place.why.empty() ? place.chip + " " + std::to_string(place.line)
-                           : place.why + ": " + place.mend;
+                           : place.why + ": " + place.fix;
 }
 
 TEST(GpioLine, AChipGoesByPathNameLabelAndLink) {

@@ -62,7 +62,7 @@ TEST(PowerSwitch, ALineThatCannotBeDrivenStopsTheStart) {
   EXPECT_THROW(PowerSwitch(std::make_unique<FakeLine>(levels, EIO), 50, clock), std::runtime_error);
 }
 
-TEST(GpioLines, AnAbsentChipIsNamedWithKeyAndRemedy) {
+TEST(GpioLines, AnAbsentChipIsNamedWithKeyAndFix) {
   try {
     (void)open_output({"no-such-chip", 3, false}, false, "ring.ws2812.power");
     FAIL() << "opened";

@@ -78,14 +78,14 @@ TEST_F(GreyDecoderTest, DoubledMarkersAndTrailingBytesAreTolerated) {
   EXPECT_LE(worst_error(), 3);
 }
 
-TEST_F(GreyDecoderTest, NothingAndNonsenseAreTold) {
+TEST_F(GreyDecoderTest, NothingAndNonsenseAreReported) {
   EXPECT_EQ(decode({}), Status::empty);
   EXPECT_EQ(decode(Bytes(5000, 0x55)), Status::not_jpeg);
   EXPECT_EQ(decode(Bytes{0xFF}), Status::truncated);
   EXPECT_EQ(decode(Bytes{0xFF, 0xD8, 0xFF}), Status::truncated);
 }
 
-TEST_F(GreyDecoderTest, EveryTruncationIsTold) {
+TEST_F(GreyDecoderTest, EveryTruncationIsReported) {
   const Bytes jpeg = make_jpeg({}, slope);
   for (std::size_t keep = 1; keep < jpeg.size(); ++keep) {
     ASSERT_EQ(decode(std::span(jpeg).first(keep)), Status::truncated) << keep;
@@ -93,7 +93,7 @@ TEST_F(GreyDecoderTest, EveryTruncationIsTold) {
   EXPECT_EQ(decode(jpeg), Status::ok);  // and the decoder is none the worse
 }
 
-TEST_F(GreyDecoderTest, TruncationHiddenByAnEndMarkerIsTold) {
+TEST_F(GreyDecoderTest, TruncationHiddenByAnEndMarkerIsReported) {
   Bytes jpeg = make_jpeg({}, slope);
   jpeg.resize(jpeg.size() / 2 + 300);
   jpeg.insert(jpeg.end(), {0xFF, 0xD9});
@@ -112,7 +112,7 @@ TEST_F(GreyDecoderTest, StuffingBeforeTheEndMarkerIsToleratedUpTo16Bytes) {
   EXPECT_EQ(decode(stuffed(16 + 8 + 1)), Status::corrupt);
 }
 
-TEST_F(GreyDecoderTest, AnotherSizeIsTold) {
+TEST_F(GreyDecoderTest, AnotherSizeIsReported) {
   EXPECT_EQ(decode(make_jpeg({.width = 48, .height = 64}, slope)), Status::wrong_size);
   Size size;
   ASSERT_EQ(decoder.read_size(make_jpeg({.width = 48, .height = 64}, slope), size), Status::ok);
@@ -175,7 +175,7 @@ TEST_F(GreyDecoderTest, ACropHoldsTheSameBitsWhereverItLies) {
   }
 }
 
-TEST_F(GreyDecoderTest, DamageBelowTheCropIsTold) {
+TEST_F(GreyDecoderTest, DamageBelowTheCropIsReported) {
   const Bytes jpeg = make_jpeg({}, slope);
   decoder.set_crop({16, 8, 16, 8});
   for (std::size_t keep = 1; keep < jpeg.size(); keep += 7) {

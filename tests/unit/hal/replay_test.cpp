@@ -102,7 +102,7 @@ TEST_F(ReplayTest, EndsWhenPlayedOnce) {
   ASSERT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ok);
   EXPECT_EQ(camera.grab(frame, milliseconds(50)), GrabStatus::ended);
   EXPECT_EQ(camera.report().state, CameraState::ended);
-  EXPECT_NE(camera.report().remedy, "");
+  EXPECT_NE(camera.report().fix, "");
 }
 
 TEST_F(ReplayTest, FollowsItsTimestamps) {

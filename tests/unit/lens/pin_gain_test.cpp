@@ -78,7 +78,7 @@ TEST(PinGain, IsTheShareOfTheLightUnderAVignette) {
   EXPECT_NEAR(found.left_out_of_each[1], 0.05, 0.015);
 }
 
-TEST(PinGain, IsAQuadraticWhereTheLayerIsThickerInTheMiddle) {
+TEST(PinGain, IsAQuadraticWhereTheGelIsThickerInTheMiddle) {
   const auto gain = [](double x, double y) { return 1 + 0.004 * x * x + 0.002 * y * y; };
   const PinGain found =
       GainScene(even, [&](double x, double y) { return 20 / gain(x, y); }).choose();

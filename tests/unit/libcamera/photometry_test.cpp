@@ -70,45 +70,53 @@ TEST(LibcameraPhotometry, RefusesAnExposureLongerThanAFrame) {
 
 TEST(LibcameraPhotometry, AsksForADefaultExposureThatFitsTheFrame) {
   const PiSensor sensor;
-  const auto at_60 = PhotometricLock({}, 60).wishes(sensor.offered());
+  const auto at_60 = PhotometricLock({}, 60).requested_controls(sensor.offered());
   EXPECT_EQ(*at_60.list.get(lc::controls::ExposureTime), 15000);
   EXPECT_EQ(*at_60.list.get(lc::controls::AnalogueGain), 1.0F);
   EXPECT_EQ((*at_60.list.get(lc::controls::FrameDurationLimits))[0], 16667);
   EXPECT_EQ((*at_60.list.get(lc::controls::FrameDurationLimits))[1], 16667);
-  const auto at_30 = PhotometricLock({}, 30).wishes(sensor.offered());
+  const auto at_30 = PhotometricLock({}, 30).requested_controls(sensor.offered());
   EXPECT_EQ(*at_30.list.get(lc::controls::ExposureTime), 20000);
 }
 
 TEST(LibcameraPhotometry, ConfirmsWhatTheFramesWereTakenWith) {
   const PiSensor sensor;
-  auto wishes = PhotometricLock(exposure(6000), 60).wishes(sensor.offered());
-  EXPECT_EQ(control(wishes.controls, "exposure_time").verdict, ControlVerdict::accepted);
-  EXPECT_EQ(PhotometricLock::compare(sensor.run(wishes.list), wishes.controls), "");
+  auto requested_controls =
+      PhotometricLock(exposure(6000), 60).requested_controls(sensor.offered());
+  EXPECT_EQ(control(requested_controls.controls, "exposure_time").verdict,
+            ControlVerdict::accepted);
+  EXPECT_EQ(
+      PhotometricLock::compare(sensor.run(requested_controls.list), requested_controls.controls),
+      "");
   for (const char* name : {"exposure_time", "analogue_gain", "frame_duration"}) {
-    EXPECT_EQ(control(wishes.controls, name).verdict, ControlVerdict::confirmed) << name;
-    EXPECT_EQ(control(wishes.controls, name).note, "") << name;
+    EXPECT_EQ(control(requested_controls.controls, name).verdict, ControlVerdict::confirmed)
+        << name;
+    EXPECT_EQ(control(requested_controls.controls, name).note, "") << name;
   }
-  EXPECT_EQ(control(wishes.controls, "frame_duration").value, 16667);
+  EXPECT_EQ(control(requested_controls.controls, "frame_duration").value, 16667);
 }
 
 TEST(LibcameraPhotometry, TakesTheNearestExposureThatTheSensorHas) {
   const PiSensor sensor;
-  auto wishes = PhotometricLock(exposure(500), 60).wishes(sensor.offered());
-  const Readings readings = sensor.run(wishes.list);
-  EXPECT_EQ(PhotometricLock::compare(readings, wishes.controls), "");
-  const CameraControl entry = control(wishes.controls, "exposure_time");
+  auto requested_controls = PhotometricLock(exposure(500), 60).requested_controls(sensor.offered());
+  const Readings readings = sensor.run(requested_controls.list);
+  EXPECT_EQ(PhotometricLock::compare(readings, requested_controls.controls), "");
+  const CameraControl entry = control(requested_controls.controls, "exposure_time");
   EXPECT_EQ(entry.verdict, ControlVerdict::confirmed);
   EXPECT_EQ(entry.value, 495);
   // It stays that, and is no control that moved.
-  EXPECT_EQ(PhotometricLock::compare(readings, wishes.controls), "");
+  EXPECT_EQ(PhotometricLock::compare(readings, requested_controls.controls), "");
 }
 
 TEST(LibcameraPhotometry, SaysWhichRateTheSensorRunsAt) {
   PiSensor sensor;
   sensor.shortest_us = 24000;
-  auto wishes = PhotometricLock(exposure(6000), 60).wishes(sensor.offered());
-  EXPECT_EQ(PhotometricLock::compare(sensor.run(wishes.list), wishes.controls), "");
-  const CameraControl entry = control(wishes.controls, "frame_duration");
+  auto requested_controls =
+      PhotometricLock(exposure(6000), 60).requested_controls(sensor.offered());
+  EXPECT_EQ(
+      PhotometricLock::compare(sensor.run(requested_controls.list), requested_controls.controls),
+      "");
+  const CameraControl entry = control(requested_controls.controls, "frame_duration");
   EXPECT_EQ(entry.verdict, ControlVerdict::refused);
   EXPECT_EQ(entry.value, 24000);
   EXPECT_EQ(entry.note,
@@ -119,9 +127,12 @@ TEST(LibcameraPhotometry, SaysWhichRateTheSensorRunsAt) {
 TEST(LibcameraPhotometry, SaysWhichExposureAFrameLeavesRoomFor) {
   PiSensor sensor;
   sensor.line_us = 100;
-  auto wishes = PhotometricLock(exposure(16600), 60).wishes(sensor.offered());
-  EXPECT_EQ(PhotometricLock::compare(sensor.run(wishes.list), wishes.controls), "");
-  const CameraControl entry = control(wishes.controls, "exposure_time");
+  auto requested_controls =
+      PhotometricLock(exposure(16600), 60).requested_controls(sensor.offered());
+  EXPECT_EQ(
+      PhotometricLock::compare(sensor.run(requested_controls.list), requested_controls.controls),
+      "");
+  const CameraControl entry = control(requested_controls.controls, "exposure_time");
   EXPECT_EQ(entry.verdict, ControlVerdict::refused);
   EXPECT_EQ(entry.value, 14400);
   EXPECT_EQ(entry.note,
@@ -131,27 +142,30 @@ TEST(LibcameraPhotometry, SaysWhichExposureAFrameLeavesRoomFor) {
 
 TEST(LibcameraPhotometry, NamesAControlThatMovesLater) {
   const PiSensor sensor;
-  auto wishes = PhotometricLock(exposure(6000), 60).wishes(sensor.offered());
-  Readings readings = sensor.run(wishes.list);
-  (void)PhotometricLock::compare(readings, wishes.controls);
+  auto requested_controls =
+      PhotometricLock(exposure(6000), 60).requested_controls(sensor.offered());
+  Readings readings = sensor.run(requested_controls.list);
+  (void)PhotometricLock::compare(readings, requested_controls.controls);
   readings[lc::controls::ExposureTime.id()] = 7000;
-  EXPECT_EQ(PhotometricLock::compare(readings, wishes.controls),
+  EXPECT_EQ(PhotometricLock::compare(readings, requested_controls.controls),
             "exposure_time is 7000 though it was 6000");
-  EXPECT_EQ(control(wishes.controls, "exposure_time").value, 6000);
+  EXPECT_EQ(control(requested_controls.controls, "exposure_time").value, 6000);
 }
 
 TEST(LibcameraPhotometry, AsksNothingOfACameraWithoutControls) {
-  const auto wishes = PhotometricLock(exposure(6000), 60).wishes({});
-  EXPECT_TRUE(wishes.list.empty());
-  EXPECT_EQ(control(wishes.controls, "exposure_time").note, "this camera has no exposure_time");
+  const auto requested_controls = PhotometricLock(exposure(6000), 60).requested_controls({});
+  EXPECT_TRUE(requested_controls.list.empty());
+  EXPECT_EQ(control(requested_controls.controls, "exposure_time").note,
+            "this camera has no exposure_time");
 }
 
 // uvcvideo's pipeline reports no control back.
 TEST(LibcameraPhotometry, ConfirmsNothingThatTheFramesDoNotSay) {
   const PiSensor sensor;
-  auto wishes = PhotometricLock(exposure(6000), 60).wishes(sensor.offered());
-  EXPECT_EQ(PhotometricLock::compare({}, wishes.controls), "");
-  const CameraControl entry = control(wishes.controls, "exposure_time");
+  auto requested_controls =
+      PhotometricLock(exposure(6000), 60).requested_controls(sensor.offered());
+  EXPECT_EQ(PhotometricLock::compare({}, requested_controls.controls), "");
+  const CameraControl entry = control(requested_controls.controls, "exposure_time");
   EXPECT_EQ(entry.verdict, ControlVerdict::accepted);
   EXPECT_EQ(entry.note, "set; this camera's frames do not say what came of it");
 }

@@ -62,7 +62,7 @@ TEST(SensorMode, ReadsTheBitsOfAFormatsName) {
   EXPECT_EQ(bit_depth("NV12"), 0U);
 }
 
-TEST(SensorMode, TellsWhatWouldDo) {
+TEST(SensorMode, ReportsWhatWouldDo) {
   EXPECT_EQ(too_slow("imx219", 41.85, {{640, 480, 10, 206.65}}, asked(800, 600, 60)),
             "imx219 gives at most 41.9 frames a second at 800x600, not 60: lower camera.fps, or "
             "camera.width and camera.height; its sensor has 640x480 with 10 bits at up to 206.7");

@@ -106,7 +106,7 @@ TEST_F(VirtualCamera, StreamsFromTheHeapAndStretchesItsLimitedRange) {
   Frame frame;
   for (int i = 0; i < 100; ++i) {
     ASSERT_EQ(camera.grab(frame, std::chrono::seconds(10)), GrabStatus::ok)
-        << i << ": " << camera.report().remedy << camera.report().damage.flagged << " flagged, "
+        << i << ": " << camera.report().fix << camera.report().damage.flagged << " flagged, "
         << camera.report().damage.too_short << " short";
     // Eight bars from white to black that move to the left.
     const std::span row(frame.luma().row(300), 800);
@@ -127,7 +127,7 @@ TEST_F(VirtualCamera, StreamsFromTheHeapAndStretchesItsLimitedRange) {
 TEST_F(VirtualCamera, AFrameThatCannotBeReadSafelyIsDamaged) {
   const std::shared_ptr<Session> session = open(60);
   libcamera_test::kernel().failures = {EIO};
-  live::Filled filled;
+  live::FilledBuffer filled;
   while (session->dequeue(filled) == live::DequeueStatus::none) {
     session->wait(std::numeric_limits<std::int64_t>::max() / 2);
   }

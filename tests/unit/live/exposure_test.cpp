@@ -20,7 +20,7 @@ TEST(Exposure, RefusesWhatContradicts) {
   EXPECT_THROW((void)exposure_us("s", 100, 3, 2000), std::runtime_error);
 }
 
-TEST(Exposure, TellsRoundingBeyondAHundredth) {
+TEST(Exposure, ReportsRoundingBeyondAHundredth) {
   EXPECT_EQ(rounding_note(1000, 1009), "");
   EXPECT_EQ(rounding_note(1000, 1100), "1100 us is the nearest this camera has to 1000.0 us");
 }

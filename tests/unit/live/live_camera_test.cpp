@@ -25,23 +25,23 @@ constexpr int kSide = 16;
 constexpr std::size_t kPixels = 256;
 
 /// A source of grey frames that lends its payloads.
-class LendingSource final : public Source {
+class LeasingSource final : public Source {
  public:
-  ~LendingSource() override { *destroyed = true; }
+  ~LeasingSource() override { *destroyed = true; }
 
   [[nodiscard]] Format format() const noexcept override {
     Format f;
     f.width = f.height = kSide;
     f.bytes_per_line = kSide;
     f.full_range = full_range;
-    f.lendable = true;
+    f.zero_copy = true;
     f.encoding = encoding;
     return f;
   }
   void wait(std::int64_t deadline_ns) noexcept override {
     base::system_clock().sleep_until(deadline_ns);
   }
-  DequeueStatus dequeue(Filled& out) noexcept override {
+  DequeueStatus dequeue(FilledBuffer& out) noexcept override {
     if (stopped || broken) return DequeueStatus::failed;
     if (filled.empty()) return DequeueStatus::none;
     out.index = filled.front();
@@ -53,10 +53,10 @@ class LendingSource final : public Source {
     return DequeueStatus::filled;
   }
   int queued() const noexcept override {
-    return static_cast<int>(memory.size() + home.size()) - taken;
+    return static_cast<int>(memory.size() + index_to_requeue.size()) - taken;
   }
   bool enqueue(int index) noexcept override {
-    home.push_back(index);
+    index_to_requeue.push_back(index);
     return true;
   }
   void stop() noexcept override { stopped = true; }
@@ -85,7 +85,7 @@ class LendingSource final : public Source {
   std::shared_ptr<bool> destroyed = std::make_shared<bool>(false);
   std::array<std::array<std::uint8_t, kRoom>, 3> memory{};
   std::deque<int> filled;
-  std::vector<int> home;  // what came back
+  std::vector<int> index_to_requeue;  // what came back
   std::uint32_t sequence = 0;
   int taken = 0;
 };
@@ -99,7 +99,7 @@ CameraConfig small() {
 
 /// A camera whose opener hands out `source` until it is taken away.
 struct Rig {
-  std::shared_ptr<LendingSource> source = std::make_shared<LendingSource>();
+  std::shared_ptr<LeasingSource> source = std::make_shared<LeasingSource>();
   LiveCamera camera{small(), "test", "nothing yet", [this]() -> Opened {
                       if (!source) throw DeviceError(CameraState::busy, "busy: wait");
                       return {source, "the one", "GREY", {}};
@@ -112,7 +112,7 @@ TEST(LiveCamera, IsOpenedAnewOnAThreadThatIsNeitherPinnedNorRealTime) {
   cpu_set_t seen;
   CPU_ZERO(&seen);
   int policy = -1;
-  auto source = std::make_shared<LendingSource>();
+  auto source = std::make_shared<LeasingSource>();
   LiveCamera camera(small(), "test", "nothing yet", [&]() -> Opened {
     if (!source) throw DeviceError(CameraState::busy, "busy: wait");
     seen = base::allowed_cpus();
@@ -129,7 +129,7 @@ TEST(LiveCamera, IsOpenedAnewOnAThreadThatIsNeitherPinnedNorRealTime) {
   base::RtThread capture({.name = "capture", .cpu = last, .fifo_priority = 1}, [&] {
     Frame frame;
     (void)camera.grab(frame, milliseconds(20));
-    source = std::make_shared<LendingSource>();
+    source = std::make_shared<LeasingSource>();
     (void)camera.grab(frame, milliseconds(300));
   });
   capture.join();
@@ -145,20 +145,21 @@ TEST(LiveCamera, LendsFullRangeLumaWithoutACopy) {
   rig.source->fill(0, 50);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   EXPECT_EQ(frame.luma().data, rig.source->memory[0].data());
-  EXPECT_TRUE(rig.source->home.empty());
+  EXPECT_TRUE(rig.source->index_to_requeue.empty());
   rig.source->fill(1, 60);
   rig.source->fill(2, 70);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   EXPECT_EQ(frame.luma().data, rig.source->memory[2].data());
-  EXPECT_EQ(rig.source->home, (std::vector<int>{0, 1}));  // the one before, and the one skipped
+  EXPECT_EQ(rig.source->index_to_requeue,
+            (std::vector<int>{0, 1}));  // the one before, and the one skipped
   frame.reset();
-  EXPECT_EQ(rig.source->home, (std::vector<int>{0, 1, 2}));
+  EXPECT_EQ(rig.source->index_to_requeue, (std::vector<int>{0, 1, 2}));
 }
 
 TEST(LiveCamera, LendsTheJpegWithTheFrame) {
   const std::vector<std::uint8_t> jpeg = fakes::make_jpeg(
       {.width = kSide, .height = kSide, .colour = false}, [](int, int) { return 120; });
-  ASSERT_LE(jpeg.size(), LendingSource::kRoom);
+  ASSERT_LE(jpeg.size(), LeasingSource::kRoom);
   Rig rig;
   rig.source->encoding = Encoding::jpeg;
   rig.camera.start();
@@ -168,13 +169,13 @@ TEST(LiveCamera, LendsTheJpegWithTheFrame) {
   EXPECT_EQ(frame.jpeg().data(), rig.source->memory[0].data());
   EXPECT_EQ(frame.jpeg().size(), jpeg.size());
   EXPECT_NEAR(frame.luma().row(3)[3], 120, 2);
-  EXPECT_TRUE(rig.source->home.empty()) << "the driver must not write over it";
+  EXPECT_TRUE(rig.source->index_to_requeue.empty()) << "the driver must not write over it";
   rig.source->fill(1, jpeg);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   EXPECT_EQ(frame.jpeg().data(), rig.source->memory[1].data());
-  EXPECT_EQ(rig.source->home, (std::vector<int>{0}));
+  EXPECT_EQ(rig.source->index_to_requeue, (std::vector<int>{0}));
   frame.reset();
-  EXPECT_EQ(rig.source->home, (std::vector<int>{0, 1}));
+  EXPECT_EQ(rig.source->index_to_requeue, (std::vector<int>{0, 1}));
   EXPECT_TRUE(frame.jpeg().empty());
 }
 
@@ -187,7 +188,7 @@ TEST(LiveCamera, CopiesWhatMustBeExpanded) {
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   EXPECT_NE(frame.luma().data, rig.source->memory[0].data());
   EXPECT_EQ(frame.luma().row(0)[0], 255);
-  EXPECT_EQ(rig.source->home, (std::vector<int>{0}));
+  EXPECT_EQ(rig.source->index_to_requeue, (std::vector<int>{0}));
 }
 
 TEST(LiveCamera, AFrameOutlivesTheSourceItWasLentFrom) {
@@ -202,7 +203,7 @@ TEST(LiveCamera, AFrameOutlivesTheSourceItWasLentFrom) {
   Frame none;
   EXPECT_EQ(rig.camera.grab(none, milliseconds(250)), GrabStatus::unplugged);
   EXPECT_EQ(rig.camera.report().state, CameraState::busy);  // as the opener says now
-  EXPECT_EQ(rig.camera.report().remedy, "busy: wait");
+  EXPECT_EQ(rig.camera.report().fix, "busy: wait");
   EXPECT_FALSE(*destroyed);
   EXPECT_EQ(frame.luma().row(3)[3], 50);
   frame.reset();
@@ -220,19 +221,19 @@ TEST(LiveCamera, AFrameOfTheSourceBeforeGoesToNoOther) {
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   const auto before = rig.source;
   before->stopped = true;
-  const auto after = rig.source = std::make_shared<LendingSource>();
+  const auto after = rig.source = std::make_shared<LeasingSource>();
   after->fill(1, 60);
   Frame other;
   ASSERT_EQ(rig.camera.grab(other, milliseconds(1000)), GrabStatus::ok);
   other.reset();
-  EXPECT_EQ(after->home, (std::vector<int>{1}));
+  EXPECT_EQ(after->index_to_requeue, (std::vector<int>{1}));
   after->fill(0, 70);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
   EXPECT_EQ(frame.luma().row(3)[3], 70);
-  EXPECT_EQ(before->home, (std::vector<int>{}));
-  EXPECT_EQ(after->home, (std::vector<int>{1})) << "the buffer that is being read";
+  EXPECT_EQ(before->index_to_requeue, (std::vector<int>{}));
+  EXPECT_EQ(after->index_to_requeue, (std::vector<int>{1})) << "the buffer that is being read";
   frame.reset();
-  EXPECT_EQ(after->home, (std::vector<int>{1, 0}));
+  EXPECT_EQ(after->index_to_requeue, (std::vector<int>{1, 0}));
 }
 
 // A device that is still open somewhere cannot be opened again.
@@ -257,7 +258,7 @@ TEST(LiveCamera, ANewSourcesCountIsNoGap) {
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   EXPECT_EQ(frame.info().sequence, 1U);
   rig.source->stopped = true;
-  rig.source = std::make_shared<LendingSource>();
+  rig.source = std::make_shared<LeasingSource>();
   rig.source->sequence = 500;
   rig.source->fill(1, 60);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(1000)), GrabStatus::ok);
@@ -332,7 +333,7 @@ TEST(LiveCamera, SilenceIsAStallAndIsRestarted) {
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   EXPECT_EQ(rig.camera.grab(frame, milliseconds(200)), GrabStatus::timeout);
   EXPECT_EQ(rig.camera.report().state, CameraState::stalled);
-  EXPECT_NE(rig.camera.report().remedy.find("sends nothing"), std::string::npos);
+  EXPECT_NE(rig.camera.report().fix.find("sends nothing"), std::string::npos);
   // Three seconds later the source is let go; this one cannot be opened twice.
   GrabStatus status = GrabStatus::timeout;
   for (int i = 0; i < 1000 && !rig.source->stopped; ++i) {
@@ -343,7 +344,7 @@ TEST(LiveCamera, SilenceIsAStallAndIsRestarted) {
 }
 
 TEST(LiveCamera, ASlowCamerasFirstFrameIsWaitedFor) {
-  const auto source = std::make_shared<LendingSource>();
+  const auto source = std::make_shared<LeasingSource>();
   CameraConfig slow = small();
   slow.fps = 0.25;
   LiveCamera camera{slow, "test", "nothing yet",
@@ -362,8 +363,8 @@ TEST(LiveCamera, TheFirstFrameAfterARestartSaysSo) {
   rig.source->fill(0, 50);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   EXPECT_EQ(frame.info().flags, kFrameNormal);
-  const std::shared_ptr<LendingSource> stalled =
-      std::exchange(rig.source, std::make_shared<LendingSource>());
+  const std::shared_ptr<LeasingSource> stalled =
+      std::exchange(rig.source, std::make_shared<LeasingSource>());
   rig.source->fill(1, 60);
   rig.source->fill(2, 70);
   GrabStatus status = GrabStatus::timeout;
@@ -386,9 +387,9 @@ TEST(LiveCamera, AReopenedCamerasFirstFrameIsWaitedFor) {
   rig.source->fill(0, 50);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(100)), GrabStatus::ok);
   rig.source->broken = true;
-  const std::shared_ptr<LendingSource> lost = std::exchange(rig.source, nullptr);
+  const std::shared_ptr<LeasingSource> lost = std::exchange(rig.source, nullptr);
   ASSERT_EQ(rig.camera.grab(frame, milliseconds(150)), GrabStatus::unplugged);
-  rig.source = std::make_shared<LendingSource>();
+  rig.source = std::make_shared<LeasingSource>();
   EXPECT_EQ(rig.camera.grab(frame, milliseconds(300)), GrabStatus::timeout);
   EXPECT_NE(rig.camera.report().state, CameraState::stalled);
 }

@@ -30,8 +30,8 @@ attachment a.txt text/plain 5 4 attached
 metadata m key=value
 EOF
 "$sample" write ours.mcap
-node npm.mjs read ours.mcap >told
-cat expected - <<'EOF' | diff - told
+node npm.mjs read ours.mcap >reported
+cat expected - <<'EOF' | diff - reported
 statistics 6 1 2 1 1 2 100 105 1:3,2:3
 streamed 6 true
 EOF

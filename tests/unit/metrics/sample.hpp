@@ -22,7 +22,7 @@ inline net::Overview overview() {
   camera.set_backend("v4l2");
   camera.set_identity("a \"quoted\"\\name\nof two lines");
   camera.set_pixel_format("MJPEG");
-  camera.set_condition("streaming");
+  camera.set_state("streaming");
   camera.set_fps(60);
   camera.set_delivered(1001);
   camera.set_lost(1);
@@ -36,7 +36,7 @@ inline net::Overview overview() {
   status.mutable_ring()->set_backend("ws2812_spi");
   status.mutable_light()->set_brightness(51);
   status.mutable_calibration()->set_name("gripper");
-  status.mutable_calibration()->set_method("list");
+  status.mutable_calibration()->set_method("lut");
   status.add_clients();
   auto& usage = *status.mutable_capture_thread();
   usage.set_minor_faults(11);

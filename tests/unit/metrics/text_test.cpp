@@ -24,8 +24,8 @@ TEST(MetricsText, SaysTheStateOnce) {
   EXPECT_THAT(text, AllOf(HasSubstr("dtactd_build_info{version=\"9.8.7\"} 1\n"),
                           HasSubstr("dtactd_state{state=\"serving\"} 1\n"),
                           HasSubstr("dtactd_state{state=\"camera_lost\"} 0\n"),
-                          HasSubstr("dtactd_condition{condition=\"not_realtime\"} 1\n"),
-                          HasSubstr("dtactd_condition{condition=\"exposure_follows\"} 0\n")));
+                          HasSubstr("dtactd_health_flag{flag=\"not_realtime\"} 1\n"),
+                          HasSubstr("dtactd_health_flag{flag=\"exposure_unlocked\"} 0\n")));
 }
 
 TEST(MetricsText, CountsDropsByCause) {
@@ -57,7 +57,7 @@ TEST(MetricsText, IsInBaseUnits) {
             HasSubstr("_temperature_celsius{zone=\"thermal_zone0\",type=\"cpu-thermal\"} 48.312")));
 }
 
-TEST(MetricsText, TellsLeakedFromKeptMemory) {
+TEST(MetricsText, ReportsLeakedFromKeptMemory) {
   EXPECT_THAT(test::sample(), AllOf(HasSubstr("dtactd_heap_bytes{kind=\"used\"} 1000\n"),
                                     HasSubstr("dtactd_heap_bytes{kind=\"mapped\"} 2000\n"),
                                     HasSubstr("dtactd_heap_bytes{kind=\"kept\"} 500\n")));

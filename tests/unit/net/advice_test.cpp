@@ -36,22 +36,22 @@ TEST(Advice, HasASentenceForEveryCondition) {
 TEST(Advice, AddsTheDevicesOwnSentenceAndPutsItFirst) {
   pipeline::Status status;
   status.state = pipeline::State::camera_lost;
-  status.camera_report.remedy = "/dev/video0 is gone: plug it in.";
+  status.camera_report.fix = "/dev/video0 is gone: plug it in.";
   EXPECT_EQ(advice(status), "The camera is away. /dev/video0 is gone: plug it in.");
-  status.health.set(Health::camera_trouble);
+  status.health.set(Health::camera_fault);
   status.health.set(Health::not_realtime);
   EXPECT_THAT(
       advice(status),
       StartsWith("The camera gives no usable frames. /dev/video0 is gone: plug it in. The capture "
                  "thread"));
-  status.health.set(Health::ring_trouble);
+  status.health.set(Health::ring_fault);
   status.ring_message = "the ring is gone.";
   EXPECT_THAT(advice(status), HasSubstr("LED ring cannot be written to. the ring is gone."));
 }
 
 TEST(Advice, SaysWhatToDoAboutDamagedFramesOnly) {
   pipeline::Status status;
-  status.health.set(Health::camera_trouble);
+  status.health.set(Health::camera_fault);
   status.camera_damaged = true;
   EXPECT_EQ(advice(status),
             "The camera gives no usable frames. All that come are damaged: check its USB cable, "
@@ -61,10 +61,10 @@ TEST(Advice, SaysWhatToDoAboutDamagedFramesOnly) {
 TEST(Advice, SaysHowFarTheCameraHasMovedOnlyWhileItHas) {
   pipeline::Status status;
   status.state = pipeline::State::serving;
-  status.place_message = "They are about 4 px right and 2 px up of there.";
+  status.camera_shift_message = "They are about 4 px right and 2 px up of there.";
   EXPECT_EQ(advice(status), "");
-  status.health.set(Health::camera_moved);
-  EXPECT_THAT(advice(status), EndsWith("calibrate again. " + status.place_message));
+  status.health.set(Health::camera_shifted);
+  EXPECT_THAT(advice(status), EndsWith("calibrate again. " + status.camera_shift_message));
 }
 
 TEST(Advice, NamesBothRatesOfASlowCamera) {

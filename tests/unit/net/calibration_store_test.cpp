@@ -130,7 +130,7 @@ TEST_F(Store, ListsWhatEachIs) {
   // From tests/unit/calibration/sample.hpp: 6x5 pixels of 12x9, entries -1 … 2 of the list.
   EXPECT_EQ(*all[1].summary,
             (CalibrationSummary{
-                "ball", "list", 0.051, 6, 5, -0.01, 0.02, "2026-01-31T12:00:00Z", 12, 9, {1, 2}}));
+                "ball", "lut", 0.051, 6, 5, -0.01, 0.02, "2026-01-31T12:00:00Z", 12, 9, {1, 2}}));
 }
 
 TEST_F(Store, GoesBackToAnEarlierOne) {

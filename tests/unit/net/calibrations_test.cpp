@@ -76,7 +76,7 @@ std::uint64_t in_use(RawClient& client) {
 
 void refuse_as_invalid(FakePort& port) { port.set_unfit("the camera gives 640x480"); }
 
-TEST(Upload, IsCheckedUsedKeptAndTold) {
+TEST(Upload, IsCheckedUsedKeptAndReported) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   RawClient watcher(rig.tcp_port());
@@ -182,7 +182,7 @@ TEST(GetCalibration, OneAfterAnotherAreNeverTooMany) {
   }
 }
 
-TEST(ListCalibrations, TellsEverything) {
+TEST(ListCalibrations, ReportsEverything) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   client.hello();
@@ -196,7 +196,7 @@ TEST(ListCalibrations, TellsEverything) {
   EXPECT_EQ(first.name(), "first");
   EXPECT_EQ(first.uploaded(), "2026-01-31T12:00:00Z");
   EXPECT_TRUE(first.current());
-  EXPECT_EQ(first.summary().method(), "list");
+  EXPECT_EQ(first.summary().method(), "lut");
   EXPECT_EQ(first.summary().mm_per_px(), 0.0414);
   EXPECT_EQ(first.summary().width(), 580U);
   EXPECT_EQ(first.summary().frame_height(), 600U);
@@ -207,7 +207,7 @@ TEST(ListCalibrations, TellsEverything) {
   EXPECT_EQ(current_of(client), 4U);
 }
 
-TEST(ListCalibrations, TellsTheOneInUse) {
+TEST(ListCalibrations, ReportsTheOneInUse) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   client.hello();
@@ -216,7 +216,7 @@ TEST(ListCalibrations, TellsTheOneInUse) {
   EXPECT_EQ(in_use(client), 1U);
 }
 
-TEST(ActivateCalibration, IsCheckedUsedKeptAndTold) {
+TEST(ActivateCalibration, IsCheckedUsedKeptAndReported) {
   Rig rig({}, answer_done);
   RawClient client(rig.tcp_port());
   RawClient watcher(rig.tcp_port());

@@ -31,7 +31,7 @@ using testing::HasSubstr;
 Options options(const Rig& rig) {
   Options o;
   o.port = rig.tcp_port();
-  o.timeout = kPatience;
+  o.timeout = kTimeout;
   return o;
 }
 
@@ -46,7 +46,7 @@ v1::UploadCalibration files_of(const std::string& name, const std::string& toml)
 template <typename T>
 T next(Client& client) {
   for (;;) {
-    auto message = client.next(kPatience);
+    auto message = client.next(kTimeout);
     if (!message.has_value()) throw std::runtime_error("silence");
     if (auto* wanted = std::get_if<T>(&*message)) return std::move(*wanted);
   }
@@ -241,7 +241,7 @@ TEST(ClientLibrary, SaysWhenTheDaemonEnds) {
   Rig rig;
   Client client(options(rig));
   rig.stop();
-  EXPECT_THROW((void)client.next(kPatience), client::ConnectionError);
+  EXPECT_THROW((void)client.next(kTimeout), client::ConnectionError);
   EXPECT_THROW((void)client.status(), client::ConnectionError);
 }
 

@@ -38,7 +38,7 @@ TEST(Subscribe, RefusesUnknownEncodings) {
   expect_invalid(client, message, "subscribe.luma_hz: 2000");
 }
 
-TEST(Ping, TellsTheTime) {
+TEST(Ping, ReportsTheTime) {
   Rig rig;
   RawClient client(rig.tcp_port());
   client.hello();
@@ -102,7 +102,7 @@ TEST(GetReference, SaysWhyThereIsNone) {
   EXPECT_EQ(client.request(get_reference()).error().code(), v1::ERROR_BUSY);
 }
 
-TEST(Status, TellsNameSerialAndWhatEachClientTook) {
+TEST(Status, ReportsNameSerialAndWhatEachClientTook) {
   NetConfig config;
   config.name = "gripper";
   Rig rig(config);
@@ -122,16 +122,16 @@ TEST(Status, TellsNameSerialAndWhatEachClientTook) {
               testing::ElementsAre("jpeg", "reconstruction", "reference"));
   v1::ClientMessage get;
   get.mutable_get_status();
-  const auto told = client.request(get).status();
-  EXPECT_EQ(told.name(), "gripper");
-  EXPECT_EQ(told.serial(), "usb-1.2");
-  EXPECT_EQ(told.light().since_ns(), 9);
-  ASSERT_EQ(told.clients_size(), 1);
-  EXPECT_EQ(told.clients(0).rights(), v1::RIGHTS_CONTROL);
+  const auto reported = client.request(get).status();
+  EXPECT_EQ(reported.name(), "gripper");
+  EXPECT_EQ(reported.serial(), "usb-1.2");
+  EXPECT_EQ(reported.light().since_ns(), 9);
+  ASSERT_EQ(reported.clients_size(), 1);
+  EXPECT_EQ(reported.clients(0).rights(), v1::RIGHTS_CONTROL);
   v1::ServerMessage answer;
   *answer.mutable_reply() = hello;
-  EXPECT_EQ(told.clients(0).sent_bytes(), answer.ByteSizeLong() + 4) << "with its length";
-  EXPECT_EQ(told.clients(0).waiting_bytes(), 0U);
+  EXPECT_EQ(reported.clients(0).sent_bytes(), answer.ByteSizeLong() + 4) << "with its length";
+  EXPECT_EQ(reported.clients(0).waiting_bytes(), 0U);
 }
 
 TEST(Rezero, IsRefusedUnderContactUnlessForced) {
@@ -140,14 +140,14 @@ TEST(Rezero, IsRefusedUnderContactUnlessForced) {
       if (std::get<pipeline::Rezero>(command.what).force) {
         return CommandDone{command, Outcome::done, ""};
       }
-      return CommandDone{command, Outcome::refused_contact, "something touches: free it"};
+      return CommandDone{command, Outcome::refused_contact, "there is contact: free it"};
     });
   });
   RawClient client(rig.tcp_port());
   client.hello();
   const auto reply = client.request(rezero(false));
   EXPECT_EQ(reply.error().code(), v1::ERROR_CONTACT);
-  EXPECT_EQ(reply.error().message(), "something touches: free it");
+  EXPECT_EQ(reply.error().message(), "there is contact: free it");
   EXPECT_TRUE(client.request(rezero(true)).has_done());
 }
 
@@ -176,7 +176,7 @@ TEST(Commands, OutliveTheClientThatSentThem) {
   EXPECT_NO_THROW(other.hello());
 }
 
-TEST(GetStatus, TellsEverything) {
+TEST(GetStatus, ReportsEverything) {
   Rig rig;
   pipeline::Status status;
   status.state = pipeline::State::serving;
@@ -199,7 +199,7 @@ TEST(GetStatus, TellsEverything) {
   calibration->name = "ball";
   auto model = std::make_shared<recon::Model>();
   model->mm_per_px = 0.051;
-  model->list = {-64, {-10, 0, 20, 40}, -64, -62};
+  model->lut = {-64, {-10, 0, 20, 40}, -64, -62};
   model->rectify.width = 580;
   model->rectify.height = 570;
   model->rectify.frame_width = 800;
@@ -217,7 +217,7 @@ TEST(GetStatus, TellsEverything) {
   EXPECT_THAT(reply.advice(), HasSubstr("dtactctl led"));
   EXPECT_EQ(reply.camera().backend(), "sim");
   EXPECT_EQ(reply.camera().width(), 800U);
-  EXPECT_EQ(reply.camera().condition(), "stalled");
+  EXPECT_EQ(reply.camera().state(), "stalled");
   EXPECT_EQ(reply.camera().lost(), 3U);
   EXPECT_EQ(reply.camera().controls(0).value(), 157);
   EXPECT_EQ(reply.camera().controls(0).verdict(), v1::CONTROL_VERDICT_CONFIRMED);

@@ -5,13 +5,13 @@
 namespace dtact::net {
 namespace {
 
-pipeline::DepthFrame touched() {
+pipeline::DepthFrame in_contact() {
   pipeline::DepthFrame frame;
   frame.has_depth = true;
   frame.width = 100;
   frame.height = 80;
   frame.depth_um.assign(8000, 0);
-  frame.contact.touching = true;
+  frame.contact.in_contact = true;
   frame.contact_um = 100;
   return frame;
 }
@@ -21,7 +21,7 @@ void press(pipeline::DepthFrame& frame, int x, int y, std::int16_t um = 101) {
 }
 
 TEST(ContactBox, LiesSixteenPixelsAroundWhatIsPressed) {
-  auto frame = touched();
+  auto frame = in_contact();
   press(frame, 40, 35);
   press(frame, 50, 30);
   press(frame, 90, 70, 100);  // not deeper than the threshold
@@ -29,25 +29,25 @@ TEST(ContactBox, LiesSixteenPixelsAroundWhatIsPressed) {
 }
 
 TEST(ContactBox, IsCutAtTheOrigin) {
-  auto frame = touched();
+  auto frame = in_contact();
   press(frame, 3, 2);
   EXPECT_EQ(contact_box(frame), (DepthRegion{0, 0, 20, 19}));
 }
 
 TEST(ContactBox, IsInPixelsOfTheFullResolution) {
-  auto frame = touched();
+  auto frame = in_contact();
   frame.decimation = 2;
   press(frame, 10, 20);
   EXPECT_EQ(contact_box(frame), (DepthRegion{4, 24, 34, 34}));
 }
 
-TEST(ContactBox, IsNowhereWhileNothingTouches) {
-  auto frame = touched();
+TEST(ContactBox, IsNowhereWithoutContact) {
+  auto frame = in_contact();
   EXPECT_EQ(contact_box(frame), std::nullopt) << "not deep enough any more, and not lost yet";
   press(frame, 10, 20);
-  frame.contact.touching = false;
+  frame.contact.in_contact = false;
   EXPECT_EQ(contact_box(frame), std::nullopt);
-  frame.contact.touching = true;
+  frame.contact.in_contact = true;
   frame.has_depth = false;
   EXPECT_EQ(contact_box(frame), std::nullopt);
 }

@@ -89,9 +89,9 @@ std::uint64_t encoded(RawClient& asking) {
 
 // NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send for constants
 // To the kernel a program that was stopped is one that does not read.
-TEST(StoppedReader, IsKeptAndToldWhatItMissed) {
+TEST(StoppedReader, IsKeptAndReportedWhatItMissed) {
   NetConfig config;
-  config.dead_after = kDeadAfter;
+  config.peer_timeout = kDeadAfter;
   Rig rig(config);
   RawClient stopped(rig.tcp_port(), kSmallBuffer);
   stopped.hello();
@@ -198,7 +198,7 @@ class DeadPeer : public ::testing::Test {
     if (!network_.made()) {
       GTEST_SKIP() << "no network namespace can be made here: " << std::strerror(errno);
     }
-    config_.dead_after = kDeadAfter;
+    config_.peer_timeout = kDeadAfter;
   }
   OwnNetwork network_;
   NetConfig config_;

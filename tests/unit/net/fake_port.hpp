@@ -21,7 +21,7 @@
 namespace dtact::net::test {
 
 /// Longer than anything takes on the slowest machine; a wait that reaches it has failed.
-inline constexpr std::chrono::seconds kPatience{60};
+inline constexpr std::chrono::seconds kTimeout{60};
 
 /// A pipeline that a test plays. The network thread sees the Port, the test the rest.
 class FakePort : public pipeline::Port {
@@ -138,7 +138,7 @@ class FakePort : public pipeline::Port {
  private:
   void check_fit() const {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, kPatience, [this] { return !slow_; });
+    changed_.wait_for(lock, kTimeout, [this] { return !slow_; });
     if (!unfit_.empty()) throw std::invalid_argument(unfit_);
   }
   void ring() const {
@@ -146,9 +146,9 @@ class FakePort : public pipeline::Port {
     (void)!::write(fd_.get(), &one, sizeof one);
   }
   template <typename Condition>
-  bool wait(Condition condition) {
+  bool wait(Condition flag) {
     std::unique_lock lock(mutex_);
-    return changed_.wait_for(lock, kPatience, condition);
+    return changed_.wait_for(lock, kTimeout, flag);
   }
 
   base::UniqueFd fd_{::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};

@@ -74,13 +74,13 @@ TEST(FrameEncoder, AddsItsOwnTimeToTheOthers) {
   auto frame = make_frame(1, 800, 600);
   frame.times.smooth_ns = 400;
   frame.times.decode_ns = std::int64_t{1} << 40U;  // more than the wire holds
-  frame.times.list_ns = -1;
+  frame.times.lut_ns = -1;
   encoder.begin(frame);
   v1::Frame message;
   ASSERT_TRUE(message.ParseFromString(encoder.encode(kind(1, 0))->body));
   EXPECT_EQ(message.times().smooth_ns(), 400U);
   EXPECT_EQ(message.times().decode_ns(), 4294967295U);
-  EXPECT_EQ(message.times().list_ns(), 0U);
+  EXPECT_EQ(message.times().lut_ns(), 0U);
   EXPECT_GT(message.times().encode_ns(), 0U);
 }
 
@@ -192,7 +192,7 @@ TEST(FrameEncoder, CarriesWhatIsNewIn11) {
   FrameEncoder encoder("f");
   auto frame = make_frame(3);
   frame.light_since_ns = 77;
-  frame.contact.touching = true;
+  frame.contact.in_contact = true;
   frame.has_jpeg = true;
   frame.jpeg_width = 8;
   frame.jpeg_height = 4;
@@ -203,7 +203,7 @@ TEST(FrameEncoder, CarriesWhatIsNewIn11) {
   EXPECT_EQ(message.light().since_ns(), 77);
   EXPECT_EQ(message.calibration(), 7U);
   EXPECT_EQ(message.contact_absence(), v1::CONTACT_ABSENCE_NONE);
-  EXPECT_TRUE(message.contact().touching());
+  EXPECT_TRUE(message.contact().in_contact());
   EXPECT_FALSE(message.contact().has_force_n()) << "not calibrated is not 0 N";
   EXPECT_EQ(message.jpeg().width(), 8U);
   EXPECT_EQ(message.jpeg().height(), 4U);
@@ -279,7 +279,7 @@ TEST(FrameEncoder, SaysHowAMapWasMade) {
   EXPECT_EQ(message.depth().made_decimation(), 0U) << "no finer than it was made";
 }
 
-TEST(FrameEncoder, OfTheContactsBoxSendsNoMapWhileNothingTouches) {
+TEST(FrameEncoder, OfTheContactsBoxSendsNoMapWithoutContact) {
   FrameEncoder encoder("f");
   auto frame = make_frame(1, 100, 80);
   frame.contact_um = 100;
@@ -290,7 +290,7 @@ TEST(FrameEncoder, OfTheContactsBoxSendsNoMapWhileNothingTouches) {
   ASSERT_TRUE(message.ParseFromString(encoder.encode(asked)->body));
   EXPECT_FALSE(message.has_depth());
   EXPECT_TRUE(message.has_contact());
-  frame.contact.touching = true;
+  frame.contact.in_contact = true;
   frame.depth_um[30 * 100 + 40] = 500;
   encoder.begin(frame);
   ASSERT_TRUE(message.ParseFromString(encoder.encode(asked)->body));

@@ -24,7 +24,7 @@ v1::ClientMessage hello(std::uint32_t major) {
 
 // NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send and messages that are
 // filled for constants
-TEST(Handshake, TellsVersionProgramAndSurfaceFrame) {
+TEST(Handshake, ReportsVersionProgramAndSurfaceFrame) {
   NetConfig config;
   config.frame_id = "finger_3";
   const Rig rig(config);
@@ -39,13 +39,13 @@ TEST(Handshake, TellsVersionProgramAndSurfaceFrame) {
   EXPECT_EQ(reply.hello().surface_frame().origin(), "centre");
 }
 
-TEST(Handshake, TellsHowLongARezeroMayTake) {
+TEST(Handshake, ReportsHowLongARezeroMayTake) {
   Rig rig;
   pipeline::Status status;
-  status.rezero_within_s = 11.5;
+  status.rezero_timeout_s = 11.5;
   rig.port.set_status(status);
   RawClient client(rig.tcp_port());
-  EXPECT_EQ(client.request(hello(1)).hello().rezero_within_s(), 11.5);
+  EXPECT_EQ(client.request(hello(1)).hello().rezero_timeout_s(), 11.5);
 }
 
 TEST(Handshake, RefusesAnotherMajorVersionAndEnds) {

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "daemon/serve/admission.hpp"
-#include "daemon/serve/guests.hpp"
 #include "daemon/serve/large_message.hpp"
 #include "daemon/serve/limited_log.hpp"
+#include "daemon/serve/session_list.hpp"
 #include "daemon/serve/token_bucket.hpp"
 #include "tests/unit/net/raw_client.hpp"
 #include "tests/unit/net/requests.hpp"
@@ -81,7 +81,7 @@ TEST(BeforeHello, AFloodLeavesRoomForOthers) {
   const Rig rig;
   std::vector<std::unique_ptr<RawClient>> flood;
   RawClient early{connected_from("127.0.0.2", rig.tcp_port())};
-  for (std::size_t i = 0; i < 3 * Guests::kMaxStrangers; ++i) {
+  for (std::size_t i = 0; i < 3 * SessionList::kMaxUnauthenticated; ++i) {
     flood.push_back(std::make_unique<RawClient>(rig.tcp_port()));
   }
   // One who came before, from elsewhere, has kept its place.
@@ -96,7 +96,7 @@ TEST(BeforeHello, AFloodFromEverywhereTakesTheOldestOnesPlace) {
   const Rig rig;
   RawClient oldest{connected_from("127.0.9.9", rig.tcp_port())};
   std::vector<std::unique_ptr<RawClient>> flood;
-  for (std::size_t i = 0; i < Guests::kMaxStrangers; ++i) {
+  for (std::size_t i = 0; i < SessionList::kMaxUnauthenticated; ++i) {
     const std::string from = "127.0.0." + std::to_string(i + 2);
     flood.push_back(std::make_unique<RawClient>(connected_from(from.c_str(), rig.tcp_port())));
   }
@@ -255,7 +255,7 @@ TEST(Incoming, ABrokenOffUploadGivesItsRoomBack) {
       leaves.hello();
       leaves.send_bytes(part);
     }
-    const auto end = std::chrono::steady_clock::now() + kPatience;
+    const auto end = std::chrono::steady_clock::now() + kTimeout;
     while (rig.overview().status.clients_size() > 0) {
       ASSERT_LT(std::chrono::steady_clock::now(), end);
       std::this_thread::sleep_for(milliseconds(1));

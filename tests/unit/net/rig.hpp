@@ -45,7 +45,7 @@ class FakeStore : public CalibrationStore {
       if (files.toml == "bad") {
         stored.damage = "calibration.toml:3: scale missing";
       } else {
-        stored.summary = {files.name, "list", 0.0414, 580, 580, -0.02, 1.4, "", 800, 600, {}};
+        stored.summary = {files.name, "lut", 0.0414, 580, 580, -0.02, 1.4, "", 800, 600, {}};
       }
     }
     return all;
@@ -101,9 +101,9 @@ class Rig {
     thread_.join();
   }
   [[nodiscard]] Overview overview() {
-    std::promise<Overview> told;
-    boost::asio::post(io_, [&] { told.set_value(server_->overview()); });
-    return told.get_future().get();
+    std::promise<Overview> reported;
+    boost::asio::post(io_, [&] { reported.set_value(server_->overview()); });
+    return reported.get_future().get();
   }
   [[nodiscard]] std::uint16_t tcp_port() const { return server_->port(); }
   [[nodiscard]] std::string log() {
@@ -112,7 +112,7 @@ class Rig {
   }
   /// Waits until the log says so.
   [[nodiscard]] bool wait_log(const std::string& text) {
-    const auto end = std::chrono::steady_clock::now() + kPatience;
+    const auto end = std::chrono::steady_clock::now() + kTimeout;
     while (log().find(text) == std::string::npos) {
       if (std::chrono::steady_clock::now() > end) return false;
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
@@ -131,7 +131,7 @@ class Rig {
   std::thread thread_;
 };
 
-/// Answers every command with "done", at once; the untouched image is one grey pixel.
+/// Answers every command with "done", at once; the reference image is one grey pixel.
 inline void answer_done(FakePort& port) {
   port.answer([](const pipeline::Command& command) {
     pipeline::CommandDone done{command, pipeline::Outcome::done, ""};

@@ -47,7 +47,7 @@ TEST(Rights, AreEverythingWhereNoTokensAre) {
   EXPECT_EQ(client.say_hello().hello().rights(), v1::RIGHTS_CONTROL);
 }
 
-TEST_F(Guarded, TellsWhatATokenAllows) {
+TEST_F(Guarded, ReportsWhatATokenAllows) {
   Rig rig(config_);
   RawClient viewer(rig.tcp_port());
   EXPECT_EQ(viewer.say_hello(kView).hello().rights(), v1::RIGHTS_VIEW);
@@ -118,7 +118,7 @@ TEST_F(Guarded, LetsViewersViewAndNothingElse) {
   EXPECT_TRUE(controller.request(message_of([](M& m) { m.mutable_rezero(); })).has_done());
 }
 
-TEST_F(Guarded, TellsStatusOfItsEndpointsAndClients) {
+TEST_F(Guarded, ReportsStatusOfItsEndpointsAndClients) {
   const Rig rig(config_);
   RawClient viewer(rig.tcp_port());
   viewer.hello(kView);
@@ -136,7 +136,7 @@ TEST_F(Guarded, TellsStatusOfItsEndpointsAndClients) {
   EXPECT_GT(status.clients(0).sent_bytes(), 0U);
 }
 
-TEST(Security, TellsWhereAnybodyMayCome) {
+TEST(Security, ReportsWhereAnybodyMayCome) {
   NetConfig config;
   config.address = "0.0.0.0";
   config.insecure = true;

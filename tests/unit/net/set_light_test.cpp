@@ -20,7 +20,7 @@ v1::ClientMessage scheme(const std::string& name) {
   return message;
 }
 
-TEST(SetLight, TellsSinceWhenFramesAreExposedUnderIt) {
+TEST(SetLight, ReportsSinceWhenFramesAreExposedUnderIt) {
   Rig rig({}, [](FakePort& port) {
     port.answer([](const pipeline::Command& command) {
       CommandDone done{command, Outcome::done, ""};
@@ -114,7 +114,7 @@ TEST(SetLight, AnswersOnlyWhenTheRingHasBeenWritten) {
   EXPECT_EQ(reply.light().brightness(), 10U);
 }
 
-TEST(SetLight, TheLastWriterWinsAndEveryoneIsTold) {
+TEST(SetLight, TheLastWriterWinsAndEveryoneIsReported) {
   Rig rig({}, [](FakePort& port) {
     port.answer([&port](const pipeline::Command& command) {
       port.emit(pipeline::LightChanged{std::get<pipeline::SetLight>(command.what).light});

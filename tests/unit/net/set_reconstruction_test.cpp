@@ -22,7 +22,7 @@ v1::ClientMessage asking(Change change) {
   return message;
 }
 
-TEST(SetReconstruction, ChangesOnlyWhatIsSetAndTellsEveryone) {
+TEST(SetReconstruction, ChangesOnlyWhatIsSetAndReportsEveryone) {
   Rig rig({}, [](FakePort& port) {
     port.answer([](const pipeline::Command& command) {
       return CommandDone{command, Outcome::done, "", {4, 5, 6}};
@@ -117,7 +117,7 @@ TEST(SetReconstruction, WaitsForAnotherCalibration) {
   EXPECT_TRUE(rig.port.wait_command(1).has_value());
 }
 
-TEST(SetReconstruction, WhatThePipelineRefusesIsToldToNobodyElse) {
+TEST(SetReconstruction, WhatThePipelineRefusesIsReportedToNobodyElse) {
   Rig rig({}, [](FakePort& port) { port.set_unfit("no list"); });
   RawClient client(rig.tcp_port());
   client.hello();

@@ -10,7 +10,7 @@
 namespace dtact::net::test {
 namespace {
 
-TEST(Stream, SendsEventsToEveryoneGreeted) {
+TEST(Stream, SendsEventsToEveryAuthenticatedClient) {
   Rig rig;
   RawClient subscribed(rig.tcp_port());
   RawClient idle(rig.tcp_port());
@@ -18,7 +18,7 @@ TEST(Stream, SendsEventsToEveryoneGreeted) {
   idle.hello();
   subscribed.subscribe(v1::DEPTH_INT16);
   pipeline::ContactChanged made;
-  made.touching = true;
+  made.in_contact = true;
   made.at = {11, 12, 13};
   made.contact.deepest_mm = 0.5;
   rig.port.emit(made);
@@ -28,7 +28,7 @@ TEST(Stream, SendsEventsToEveryoneGreeted) {
   rig.port.emit(state);
   for (auto* client : {&subscribed, &idle}) {
     auto event = client->event();
-    EXPECT_TRUE(event.contact().contact().touching());
+    EXPECT_TRUE(event.contact().contact().in_contact());
     EXPECT_EQ(event.contact().sequence(), 11U);
     EXPECT_EQ(event.contact().monotonic_ns(), 12);
     EXPECT_EQ(event.contact().contact().deepest_mm(), 0.5);

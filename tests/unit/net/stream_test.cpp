@@ -50,7 +50,7 @@ TEST(Stream, EncodesWhatEachClientAskedFor) {
   luma.subscribe(v1::DEPTH_NONE, v1::LUMA_GREY8);
   summary.subscribe(v1::DEPTH_NONE, v1::LUMA_NONE, 1, true);
   auto published = make_frame(7);
-  published.contact.touching = true;
+  published.contact.in_contact = true;
   published.contact.area_mm2 = 12.5;
   rig.port.publish(published);
 
@@ -104,7 +104,7 @@ TEST(Stream, LeavesDepthOutWhenThereIsNone) {
   EXPECT_TRUE(frame.has_luma());
 }
 
-TEST(Stream, TellsThePipelineTheUnionOfWhatIsWanted) {
+TEST(Stream, ReportsThePipelineTheUnionOfWhatIsWanted) {
   Rig rig;
   ASSERT_TRUE(rig.port.wait_wanted({}));
   auto depth = std::make_unique<RawClient>(rig.tcp_port());
@@ -226,9 +226,9 @@ TEST(Stream, SaysOnceThatFramesAreTooLarge) {
     EXPECT_EQ(summary.frame().sequence(), sequence);
   }
   const std::string log = rig.log();
-  const std::size_t told = log.find("above the wire's cap");
-  ASSERT_NE(told, std::string::npos);
-  EXPECT_EQ(log.find("above the wire's cap", told + 1), std::string::npos);
+  const std::size_t reported = log.find("above the wire's cap");
+  ASSERT_NE(reported, std::string::npos);
+  EXPECT_EQ(log.find("above the wire's cap", reported + 1), std::string::npos);
 }
 
 TEST(Stream, EncodesOnceForEachDistinctChoice) {

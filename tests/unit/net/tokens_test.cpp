@@ -47,7 +47,7 @@ TEST(Tokens, KnowNoOthers) {
   }
 }
 
-TEST(Tokens, NameFileLineAndRemedy) {
+TEST(Tokens, NameFileLineAndFix) {
   EXPECT_THAT(refusal("# a\nmay 0123456789abcdef\n"), HasSubstr("/etc/tokens:2: a line is \"view"));
   EXPECT_THAT(refusal("view\n"), HasSubstr("/etc/tokens:1: a line is"));
   EXPECT_THAT(refusal("view 0123456789abcdef a b\n"), HasSubstr("/etc/tokens:1: a line is"));
@@ -62,7 +62,7 @@ TEST(Tokens, NameFileLineAndRemedy) {
   EXPECT_THAT(refusal("#\n"), HasSubstr("dtactctl token --new control prints one"));
 }
 
-TEST(Tokens, AreNotToldInErrors) {
+TEST(Tokens, AreNotReportedInErrors) {
   EXPECT_THAT(refusal("contrlo 0123456789abcdef\n"), Not(HasSubstr("0123456789abcdef")));
   EXPECT_THAT(refusal("view 0123456789abcde\n"), Not(HasSubstr("0123456789abcde")));
 }

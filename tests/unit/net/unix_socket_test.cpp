@@ -70,7 +70,7 @@ class UnixSocket : public ::testing::Test {
 };
 
 // NOLINTBEGIN(misc-const-correctness): clang-tidy 19 takes clients that send for constants
-TEST_F(UnixSocket, ServesBesideTcpAndTellsWhoCame) {
+TEST_F(UnixSocket, ServesBesideTcpAndReportsWhoCame) {
   Rig rig(config_);
   RawClient local{connected(path_)};
   local.hello();
@@ -127,8 +127,8 @@ TEST_F(UnixSocket, AsksOtherUsersForAToken) {
   int exit = 0;
   ::waitpid(child, &exit, 0);
   ASSERT_EQ(exit, 0);
-  RawClient stranger{std::move(fd)};
-  EXPECT_EQ(stranger.say_hello().error().code(), v1::ERROR_DENIED);
+  RawClient unauthenticated{std::move(fd)};
+  EXPECT_EQ(unauthenticated.say_hello().error().code(), v1::ERROR_DENIED);
 }
 
 TEST_F(UnixSocket, IsOpenToAllUsersAndGoneAfterTheEnd) {

@@ -151,7 +151,7 @@ TEST(CloudMaker, LeavesACloudOfAnotherMakerAlone) {
   expect_same(cloud, expected, "after a sphere's");
 }
 
-TEST(CloudMaker, WhereZeroIsNoDepthNothingIsUntouched) {
+TEST(CloudMaker, WhereZeroIsNoDepthNothingIsContactFree) {
   const auto map = map_of(0);
   DepthGrid grid = grid_of(map);
   CloudMaker maker;

@@ -19,7 +19,7 @@ using v1::ObjectPose;
 v1::Frame sent(const Frame& seen, std::uint64_t sequence) {
   v1::Frame frame;
   frame.set_sequence(sequence);
-  frame.mutable_contact()->set_touching(true);
+  frame.mutable_contact()->set_in_contact(true);
   v1::DepthMap& map = *frame.mutable_depth();
   map.set_encoding(v1::DEPTH_INT16);
   map.set_width(kWidth);
@@ -38,7 +38,7 @@ v1::Frame sent(const Frame& seen, std::uint64_t sequence) {
 v1::Frame nothing(std::uint64_t sequence) {
   v1::Frame frame;
   frame.set_sequence(sequence);
-  frame.mutable_contact()->set_touching(false);
+  frame.mutable_contact()->set_in_contact(false);
   return frame;
 }
 

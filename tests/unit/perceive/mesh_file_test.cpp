@@ -72,7 +72,7 @@ TEST(MeshFile, FurtherPropertiesAndElementsArePassedOver) {
   EXPECT_DOUBLE_EQ(volume_of(parse_mesh(text, "object")), 64);
 }
 
-TEST(MeshFile, BrokenFilesAreToldByPlaceAndRemedy) {
+TEST(MeshFile, BrokenFilesAreReportedByPlaceAndFix) {
   const std::string stl = seed("ascii.stl");
   const std::string ply = seed("ascii.ply");
   EXPECT_THAT(error_of(""), HasSubstr("object, line 1: neither PLY nor STL"));
@@ -99,7 +99,7 @@ TEST(MeshFile, BrokenFilesAreToldByPlaceAndRemedy) {
       "z\nend_header\n1 2 3\n";
   EXPECT_THAT(error_of(points), HasSubstr("neither faces nor normals"));
   EXPECT_THAT(error_of("solid x\nendsolid x\n"), HasSubstr("no points"));
-  EXPECT_THAT(error_of(std::string(kMostMeshBytes + 1, ' ')), HasSubstr("larger than 64 MiB"));
+  EXPECT_THAT(error_of(std::string(kMaxMeshBytes + 1, ' ')), HasSubstr("larger than 64 MiB"));
 }
 
 }  // namespace

@@ -6,10 +6,10 @@
 namespace dtact::perceive {
 namespace {
 
-v1::Frame frame_of(std::uint64_t sequence, bool touching) {
+v1::Frame frame_of(std::uint64_t sequence, bool in_contact) {
   v1::Frame frame;
   frame.set_sequence(sequence);
-  frame.mutable_contact()->set_touching(touching);
+  frame.mutable_contact()->set_in_contact(in_contact);
   return frame;
 }
 
@@ -25,7 +25,7 @@ TEST(NewestFrame, IsTakenOnceAndCountsWhatItReplaced) {
   EXPECT_FALSE(newest.take().has_value());
 }
 
-TEST(NewestFrame, AReleaseThatWasReplacedIsTold) {
+TEST(NewestFrame, AReleaseThatWasReplacedIsReported) {
   NewestFrame newest;
   newest.put(frame_of(1, true));
   (void)newest.take();

@@ -73,11 +73,11 @@ TEST(ObjectModel, ABoxIsSampledEvenlyAndRestsOnSixFaces) {
 
 TEST(ObjectModel, LargeOnesAreSampledLess) {
   const ObjectModel model = make_object(box(100, 100, 20), 1e-3, "box");
-  EXPECT_LE(model.surfels.size(), kMostSurfels);
-  EXPECT_GT(model.surfels.size(), kMostSurfels / 3);
+  EXPECT_LE(model.surfels.size(), kMaxSurfels);
+  EXPECT_GT(model.surfels.size(), kMaxSurfels / 3);
 }
 
-TEST(ObjectModel, AWrongUnitAndAnInsideOutShapeAreTold) {
+TEST(ObjectModel, AWrongUnitAndAnInsideOutShapeAreReported) {
   EXPECT_THAT(message_of(box(4, 5, 6), 1), testing::HasSubstr("is its unit another one?"));
   EXPECT_THAT(message_of(box(0.004, 0.005, 0.006), 1e-3), testing::HasSubstr("unit"));
   Mesh turned = box(4, 5, 6);
@@ -167,7 +167,7 @@ TEST(ObjectTracker, SearchesFindsAndFollowsWithoutWaiting) {
   }
 }
 
-TEST(ObjectTracker, ALossIsToldAndEndsWithASearch) {
+TEST(ObjectTracker, ALossIsReportedAndEndsWithASearch) {
   const auto model = model_of(bumps());
   ObjectTracker tracker(model);
   const Frame frame(bumps(), Motion::Identity(), 5);
@@ -197,7 +197,7 @@ TEST(ObjectTracker, AnotherContactBeginsWithASearch) {
 }
 
 // As files of large assemblies have it: a degree of a first correction is 1.7 mm there.
-TEST(ObjectTracker, TheFilesOriginMayLieFarFromWhatTouches) {
+TEST(ObjectTracker, TheFilesOriginMayLieFarFromTheContact) {
   const Vector3d far(100, 0, 0);
   Balls object = bumps();
   for (auto& ball : object.balls) ball.middle += far;
@@ -217,7 +217,7 @@ TEST(ObjectTracker, TheFilesOriginMayLieFarFromWhatTouches) {
 
 // A ball with a bump, rolled until the bump has left the contact: what turns it from there on is
 // seen neither on the ball nor by the contact's motion.
-TEST(ObjectTracker, WhatNobodyFollowsIsTold) {
+TEST(ObjectTracker, WhatNobodyFollowsIsReported) {
   const Balls object{{{{0, 0, 3.2}, 4.0}, {{2.2, 0, 1.1}, 1.5}}};
   ObjectTracker tracker(model_of(object));
   const Vector3d middle(0, 0, 3.2);

@@ -8,7 +8,7 @@
 
 #include "clients/cpp/errors.hpp"
 #include "clients/perceive/cloud_message.hpp"
-#include "clients/perceive/depth_part.hpp"
+#include "clients/perceive/depth_crop.hpp"
 #include "clients/perceive/frame_maker.hpp"
 #include "clients/perceive/pose_message.hpp"
 #include "proto/dtact.pb.h"
@@ -36,8 +36,8 @@ v1::DepthMap map_of(const std::vector<std::int16_t>& values) {
   return map;
 }
 
-TEST(DepthPart, CutsRegionsOfTheCalibrationsResolution) {
-  DepthPart part(map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23}));
+TEST(DepthCrop, CutsRegionsOfTheCalibrationsResolution) {
+  DepthCrop part(map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23}));
   EXPECT_EQ(part.whole().full_width, 100);
   // 23 … 26: grown to the map's columns 11 … 13.
   const auto cut = part.cut({23, 42, 4, 1});
@@ -48,12 +48,12 @@ TEST(DepthPart, CutsRegionsOfTheCalibrationsResolution) {
   EXPECT_FALSE(part.cut({0, 0, 10, 10}).has_value());
 }
 
-TEST(DepthPart, RefusesMapsThatContradictThemselves) {
+TEST(DepthCrop, RefusesMapsThatContradictThemselves) {
   const v1::DepthMap good = map_of(std::vector<std::int16_t>(12, 100));
   const auto with = [&good](const std::function<void(v1::DepthMap&)>& change) {
     v1::DepthMap map = good;
     change(map);
-    return [map] { const DepthPart part(map); };
+    return [map] { const DepthCrop part(map); };
   };
   EXPECT_NO_THROW(with([](v1::DepthMap&) {})());
   EXPECT_THROW(with([](v1::DepthMap& map) { map.set_x(97); })(), client::ProtocolError);
@@ -64,29 +64,29 @@ TEST(DepthPart, RefusesMapsThatContradictThemselves) {
   EXPECT_THROW(with([](v1::DepthMap& map) { map.set_um_per_unit(-1); })(), client::ProtocolError);
 }
 
-TEST(DepthPart, TheContactHasAMargin) {
+TEST(DepthCrop, TheContactHasAMargin) {
   std::vector<std::int16_t> values(12, 100);
-  DepthPart none(map_of(values));
+  DepthCrop none(map_of(values));
   EXPECT_FALSE(none.contact(0.3).has_value()) << "not deeper than the threshold";
   values[5] = 101;
-  DepthPart part(map_of(values));
+  DepthCrop part(map_of(values));
   const auto contact = part.contact(0.3);
   ASSERT_TRUE(contact.has_value());
   EXPECT_EQ(contact->width, 4) << "cut at the map's border";
   EXPECT_EQ(contact->height, 3);
 }
 
-// As where the daemon's contact.made_mm is 0.03.
-TEST(DepthPart, ALightPressHasAContactAsWell) {
+// As where the daemon's contact.threshold_mm is 0.03.
+TEST(DepthCrop, ALightPressHasAContactAsWell) {
   std::vector<std::int16_t> values(12, 20);
   values[5] = 42;
-  DepthPart part(map_of(values));
+  DepthCrop part(map_of(values));
   EXPECT_TRUE(part.contact(0.042).has_value());
   EXPECT_FALSE(part.contact(0.2).has_value());
 }
 
-TEST(DepthPart, RefusesADamagedMap) {
-  EXPECT_THROW(DepthPart(map_of({1, 2, 3})), client::ProtocolError);
+TEST(DepthCrop, RefusesADamagedMap) {
+  EXPECT_THROW(DepthCrop(map_of({1, 2, 3})), client::ProtocolError);
 }
 
 TEST(CloudMessage, Float32AndInt16) {
@@ -124,9 +124,9 @@ TEST(PoseMessage, MillimetresAndDegrees) {
   pose.alignment.motion.linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
   pose.alignment.rms = 4e-6;
   pose.alignment.arm = 2e-3;
-  Twist hidden = Twist::Zero();
-  hidden[4] = 1;
-  pose.unobservable.push_back(hidden);
+  Twist unobservable = Twist::Zero();
+  unobservable[4] = 1;
+  pose.unobservable.push_back(unobservable);
   v1::ObjectPose message;
   fill(pose, message);
   EXPECT_EQ(message.tracking(), v1::ObjectPose::TRACKED);
@@ -150,11 +150,11 @@ v1::DepthMap whole(v1::DepthMap map) {
 }
 
 /// With a depth map; touching 23 um deep.
-v1::Frame frame_of(bool touching) {
+v1::Frame frame_of(bool in_contact) {
   v1::Frame frame;
   frame.set_sequence(5);
   frame.set_dropped(3);
-  frame.mutable_contact()->set_touching(touching);
+  frame.mutable_contact()->set_in_contact(in_contact);
   frame.mutable_contact()->set_deepest_mm(0.023);
   *frame.mutable_depth() = whole(map_of({0, 1, 2, 3, 10, 11, 12, 13, 20, 21, 22, 23}));
   return frame;
@@ -217,7 +217,7 @@ TEST(FrameMaker, PointsThatDoNotFitAMessageAreMadeCoarser) {
   EXPECT_EQ(coarse.cloud().width(), kSide / 2);
 }
 
-TEST(FrameMaker, NothingTouchingNoPoints) {
+TEST(FrameMaker, WithoutContactNoPoints) {
   FrameMaker maker;
   maker.begin(frame_of(false), true);
   net::FrameKind all;

@@ -79,7 +79,7 @@ TEST(SurfaceTable, HasTheMapsPixels) {
   EXPECT_GT(table.point[1][6 * 21 + 10], 0.5e-3F);
 }
 
-TEST(FootOf, IsWhereThePointWasLiftedFrom) {
+TEST(ProjectToSurface, IsWhereThePointWasLiftedFrom) {
   for (const recon::Surface& surface :
        {recon::Surface{Kind::sphere, 12, 0, 20, 8, 1.41}, {Kind::cylinder, 9, 30, 15, 6, 1.41}}) {
     constexpr double kPx = 0.05;
@@ -91,26 +91,26 @@ TEST(FootOf, IsWhereThePointWasLiftedFrom) {
         for (const double lift : {-1e-3, 0.0, 0.5e-3}) {
           Vector point = at->point;
           for (std::size_t i = 0; i < 3; ++i) point[i] += lift * at->normal[i];
-          const auto foot = foot_of(table, point);
-          ASSERT_TRUE(foot.has_value()) << column << ", " << row << ", " << lift;
-          EXPECT_NEAR(foot->column, column, 0.02);
-          EXPECT_NEAR(foot->row, row, 0.02);
-          expect_near(foot->normal, at->normal, 1e-3);
+          const auto projection = project_to_surface(table, point);
+          ASSERT_TRUE(projection.has_value()) << column << ", " << row << ", " << lift;
+          EXPECT_NEAR(projection->column, column, 0.02);
+          EXPECT_NEAR(projection->row, row, 0.02);
+          expect_near(projection->normal, at->normal, 1e-3);
         }
       }
     }
   }
 }
 
-TEST(FootOf, BesideTheTableThereIsNone) {
+TEST(ProjectToSurface, BesideTheTableThereIsNone) {
   const SurfaceTable table = make_surface_table({Kind::sphere, 12, 0, 20, 8, 1.41}, 101, 101, 0.05);
-  EXPECT_TRUE(foot_of(table, {2.3e-3, 0, 0}).has_value());
-  EXPECT_FALSE(foot_of(table, {2.7e-3, 0, -0.3e-3}).has_value());
-  EXPECT_FALSE(foot_of(table, {0, -9e-3, -4e-3}).has_value());
-  EXPECT_FALSE(foot_of(table, {std::nan(""), 0, 0}).has_value());
+  EXPECT_TRUE(project_to_surface(table, {2.3e-3, 0, 0}).has_value());
+  EXPECT_FALSE(project_to_surface(table, {2.7e-3, 0, -0.3e-3}).has_value());
+  EXPECT_FALSE(project_to_surface(table, {0, -9e-3, -4e-3}).has_value());
+  EXPECT_FALSE(project_to_surface(table, {std::nan(""), 0, 0}).has_value());
   // Rays that miss the surface.
   const SurfaceTable wide = make_surface_table({Kind::sphere, 3, 0, 20, 5, 1.41}, 181, 181, 0.1);
-  EXPECT_FALSE(foot_of(wide, {8e-3, 0, -2e-3}).has_value());
+  EXPECT_FALSE(project_to_surface(wide, {8e-3, 0, -2e-3}).has_value());
 }
 
 }  // namespace

@@ -118,7 +118,7 @@ TEST(Tracker, FollowsASmallTipAtAQuarterOfTheResolution) {
 
 // A plate over all of the map, of which no edge is seen, is pushed to the right until its left edge
 // is in view: how far it went before is not known however well the edge is followed later.
-TEST(Tracker, WhatWasNotSeenOnTheWayStaysTold) {
+TEST(Tracker, WhatWasNotSeenOnTheWayStaysReported) {
   Tracker tracker;
   for (unsigned i = 0; i <= 60; ++i) {
     const double edge_mm = -5.5 + 0.1 * i;
@@ -147,8 +147,8 @@ TEST(Tracker, ABallThatIsPressedInIsNotTurnedByNoise) {
     double turned = 0;
     for (int i = 0; i < 120; i += gap(random)) {
       const double depth_mm = std::min(1.0, -0.3 + 1.3 * i / 60);
-      constexpr double kTouches = 0.02;
-      if (depth_mm < kTouches) continue;
+      constexpr double kPressed = 0.02;
+      if (depth_mm < kPressed) continue;
       const double x_mm = 0.5 + std::max(0, i - 60) / 60.0;
       const Frame frame({{{{x_mm, -0.5, 4 - depth_mm}, 4}}}, Motion::Identity(), 4,
                         seed * 1000 + static_cast<unsigned>(i));
@@ -187,9 +187,9 @@ TEST(Tracker, ABallThatIsPressedInOutgrowsTheShouldersOfItsFirstTouch) {
           constexpr double kRadiusMm = 4;
           const double edge_mm = std::sqrt(0.8 * kRadiusMm * depth_mm);
           const double from_mm = 1e3 * std::hypot(at.point[0], at.point[1]);
-          const double touching_mm = std::min(from_mm, edge_mm);
-          return (depth_mm - touching_mm * touching_mm / (2 * kRadiusMm)) *
-                 std::exp((touching_mm - from_mm) / 0.3);
+          const double contact_depth_mm = std::min(from_mm, edge_mm);
+          return (depth_mm - contact_depth_mm * contact_depth_mm / (2 * kRadiusMm)) *
+                 std::exp((contact_depth_mm - from_mm) / 0.3);
         },
         5, i);
     const auto& pose = tracker.follow(frame.view(), 100 + i);
@@ -198,7 +198,7 @@ TEST(Tracker, ABallThatIsPressedInOutgrowsTheShouldersOfItsFirstTouch) {
   }
 }
 
-// 10 µm, which is more than an untouched map has.
+// 10 µm, which is more than a reference map has.
 TEST(Tracker, NoiseIsNoContactHoweverUncertainTheCalibration) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const Frame frame(Balls{}, Motion::Identity(), 10, seed);

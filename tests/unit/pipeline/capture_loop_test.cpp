@@ -70,17 +70,17 @@ TEST(CaptureLoop, FramesThatWereSkippedAreNotLost) {
   EXPECT_FALSE(loop.health().has(Health::frames_lost));
 }
 
-TEST(CaptureLoop, AStreamOfDamagedFramesIsToldFromSilence) {
+TEST(CaptureLoop, AStreamOfDamagedFramesIsReportedFromSilence) {
   SteppedLoop loop;
   loop.begin(toy_calibration());
   ASSERT_TRUE(loop.until_fresh());
   loop.camera.status = hal::GrabStatus::damaged;
   loop.step(5);
-  EXPECT_TRUE(loop.health().has(Health::camera_trouble));
+  EXPECT_TRUE(loop.health().has(Health::camera_fault));
   EXPECT_TRUE(loop.exchange.camera_damaged);
   loop.camera.status = hal::GrabStatus::ok;
   loop.step(1);
-  EXPECT_FALSE(loop.health().has(Health::camera_trouble));
+  EXPECT_FALSE(loop.health().has(Health::camera_fault));
   EXPECT_FALSE(loop.exchange.camera_damaged);
 }
 
@@ -129,7 +129,7 @@ TEST(CaptureLoop, AStaleReferenceIsInTheUncertainty) {
     SteppedLoop loop;
     loop.camera.scene.press_mm = 1;
     loop.begin(toy_calibration());
-    if (restored) loop.loop->untouched().restore(fakes::toy_reference_q8(), loop.config.light);
+    if (restored) loop.loop->tracker().restore(fakes::toy_reference_q8(), loop.config.light);
     EXPECT_TRUE(loop.until([&] { return loop.frame != nullptr && loop.frame->has_depth; }));
     EXPECT_NE(loop.frame->health.has(Health::reference_stale), restored);
     return loop.frame->uncertainty_um;
@@ -143,7 +143,7 @@ TEST(CaptureLoop, AReferenceFromAnotherBrightnessIsNotTheLastGoodOne) {
   loop.begin(toy_calibration());
   hal::Light dim;
   dim.brightness = 128;
-  loop.loop->untouched().restore(fakes::toy_reference_q8(), dim);
+  loop.loop->tracker().restore(fakes::toy_reference_q8(), dim);
   ASSERT_TRUE(loop.until([&] { return loop.frame != nullptr && loop.frame->has_depth; }));
   EXPECT_TRUE(loop.frame->health.has(Health::reference_stale));
   EXPECT_FALSE(loop.frame->health.has(Health::reference_restored));
@@ -192,7 +192,7 @@ TEST(CaptureLoop, ACameraOpenedAnewBeginsAnew) {
   EXPECT_NEAR(loop.frame->contact.deepest_mm, 0.5, 0.02);
 }
 
-TEST(CaptureLoop, EveryFrameTellsTheForceThatTheCalibrationKnows) {
+TEST(CaptureLoop, EveryFrameReportsTheForceThatTheCalibrationKnows) {
   auto calibration = toy_calibration();
   auto model = std::make_shared<recon::Model>(*calibration->model);
   model->force = recon::ForceModel{
@@ -243,7 +243,7 @@ TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
   loop.step(20);
   EXPECT_TRUE(loop.all<ContactChanged>().empty());
   for (const StageStatistics& stage : loop.exchange.statistics.stages()) {
-    EXPECT_NE(stage.stage, std::string("list"));
+    EXPECT_NE(stage.stage, std::string("lut"));
   }
   // The light and what the picture shows are looked at all the same.
   loop.camera.scene = {};
@@ -259,8 +259,8 @@ TEST(CaptureLoop, MakesNoDepthThatNobodyListensTo) {
   EXPECT_NEAR(loop.all<ContactChanged>()[0].contact.deepest_mm, 1, 0.05);
 }
 
-// Light changes while something touches that nobody listens to: what is active counts as touch.
-TEST(CaptureLoop, TakesNoReferenceUnderATouchThatNobodyHears) {
+// Light changes during contact that nobody listens to: what is active counts as touch.
+TEST(CaptureLoop, TakesNoReferenceInContactThatNobodyHears) {
   SteppedLoop loop;
   loop.exchange.want_contact = loop.exchange.want_depth = false;
   loop.begin(toy_calibration());
@@ -323,7 +323,7 @@ TEST(CaptureLoop, EveryRezeroIsAnswered) {
   EXPECT_EQ(answers[1].outcome, Outcome::done);
 }
 
-TEST(CaptureLoop, BeyondTheListIsCountedInTheCalibrationsPixels) {
+TEST(CaptureLoop, BeyondTheLutIsCountedInTheCalibrationsPixels) {
   SteppedLoop loop;
   loop.config.reconstruction.decimation = 4;
   loop.begin(toy_calibration());

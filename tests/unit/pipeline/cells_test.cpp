@@ -1,4 +1,4 @@
-#include "daemon/pipeline/untouched/cells.hpp"
+#include "daemon/pipeline/reference/cells.hpp"
 
 #include <gtest/gtest.h>
 
@@ -75,7 +75,7 @@ class CellsTest : public testing::Test {
 };
 
 // Ten rows of cells, from the frame's first row on.
-TEST_F(CellsTest, TellsWhichRowsAreNotNew) {
+TEST_F(CellsTest, ReportsWhichRowsAreNotNew) {
   const auto first = untouched();
   (void)active_tiles(first);
   auto second = untouched();
@@ -135,7 +135,7 @@ TEST_F(CellsTest, FineBandsRippleInHalfRows) {
   EXPECT_GT(report_.frame.fine_ripple, 8);
 }
 
-TEST_F(CellsTest, NoiseAloneTouchesNothing) {
+TEST_F(CellsTest, NoiseAloneIsNoContact) {
   for (int i = 0; i < 500; ++i) ASSERT_EQ(active_tiles(untouched()), 0) << i;
 }
 
@@ -182,7 +182,7 @@ TEST_F(CellsTest, AFaintWidePressIsFound) {
   }
 }
 
-TEST_F(CellsTest, ASpotOfTheLayersBlurIsFoundWhereverItLies) {
+TEST_F(CellsTest, ASpotOfTheGelsBlurIsFoundWhereverItLies) {
   // Scattering of 0.3 mm is a standard deviation of 8 pixels at 0.0375 mm a pixel. 0.8 levels at
   // the peak are 26 µm. Without noise, so that it is the cells' places that are tried.
   for (int dy = 0; dy < 16; dy += 3) {
@@ -244,7 +244,7 @@ TEST_F(CellsTest, DriftEndsAtItsLimit) {
   EXPECT_GT(darker(3), 0);
 }
 
-TEST_F(CellsTest, TellsAChangeOfLightFromAPress) {
+TEST_F(CellsTest, ReportsAChangeOfLightFromAPress) {
   settle();
   (void)active_tiles(untouched());
   EXPECT_EQ(report_.light.from, LightSeen::From::all);
@@ -267,7 +267,7 @@ TEST_F(CellsTest, TellsAChangeOfLightFromAPress) {
   EXPECT_NE(report_.light.from, LightSeen::From::all);
 }
 
-TEST_F(CellsTest, KnowsTheLightItWasTold) {
+TEST_F(CellsTest, KnowsTheLightItWasReported) {
   const auto dimmed = [this] { return frame([](int, int) { return 3.0; }); };
   EXPECT_GT(active_tiles(dimmed()), 0);
   cells_.set_light(0.98);

@@ -33,16 +33,16 @@ class ContactTest : public ::testing::Test {
     }
     return detector.inspect(sums, kSide, kSide, kMmPerPx);
   }
-  bool inspect() { return summarise().touching; }
+  bool inspect() { return summarise().in_contact; }
 
   ContactDetector detector{
-      {.made_mm = 0.10, .lost_mm = 0.05, .area_mm2 = 0.5, .debounce_frames = 2}};
+      {.threshold_mm = 0.10, .release_mm = 0.05, .area_mm2 = 0.5, .debounce_frames = 2}};
   std::vector<std::int16_t> map = std::vector<std::int16_t>(kPixels, 0);
 };
 
 TEST_F(ContactTest, NothingPressedIsNoContact) {
   const ContactSummary summary = summarise();
-  EXPECT_FALSE(summary.touching);
+  EXPECT_FALSE(summary.in_contact);
   EXPECT_EQ(summary.area_mm2, 0);
   EXPECT_EQ(summary.volume_mm3, 0);
   EXPECT_EQ(summary.deepest_mm, 0);
@@ -111,15 +111,15 @@ TEST_F(ContactTest, UntrustedPixelsCountForNothing) {
 TEST_F(ContactTest, AMapOfWhichNothingWasComputedIsNoContact) {
   const ContactSummary summary =
       detector.inspect(recon::DepthSums(detector.sum_rules()), 580, 580, kMmPerPx);
-  EXPECT_FALSE(summary.touching);
+  EXPECT_FALSE(summary.in_contact);
   EXPECT_EQ(summary.deepest_mm, 0);
   EXPECT_EQ(summary.deepest_x_mm, 0);
 }
 
 TEST_F(ContactTest, AsksForItsOwnThresholdsAndForNoBend) {
   const recon::SumRules rules = detector.sum_rules();
-  EXPECT_EQ(rules.made_um, 100);
-  EXPECT_EQ(rules.lost_um, 50);
+  EXPECT_EQ(rules.threshold_um, 100);
+  EXPECT_EQ(rules.release_um, 50);
   EXPECT_EQ(rules.bend_reach, 0);
 }
 

@@ -10,7 +10,7 @@
 #include "daemon/pipeline/histogram.hpp"
 #include "daemon/pipeline/latest_slot.hpp"
 #include "daemon/pipeline/spsc_queue.hpp"
-#include "hal/base/side_thread.hpp"
+#include "hal/base/background_thread.hpp"
 
 namespace dtact::pipeline {
 namespace {
@@ -196,11 +196,11 @@ TEST(Histogram, CountsWhatIsWithinBounds) {
   EXPECT_EQ(histogram.sum_ns(), 17'000'045);
 }
 
-TEST(SideThread, DoesWhatItWasGivenOfEachJobBeforeItEnds) {
+TEST(BackgroundThread, DoesWhatItWasGivenOfEachJobBeforeItEnds) {
   std::vector<int> done;
-  base::SideThread thread("side");
-  base::SideThread::Job one(thread, [&] { done.push_back(1); });
-  base::SideThread::Job two(thread, [&] { done.push_back(2); });
+  base::BackgroundThread thread("side");
+  base::BackgroundThread::Job one(thread, [&] { done.push_back(1); });
+  base::BackgroundThread::Job two(thread, [&] { done.push_back(2); });
   two.hand_over();
   EXPECT_TRUE(two.busy());
   EXPECT_FALSE(one.busy());

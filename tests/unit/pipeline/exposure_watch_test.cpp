@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "daemon/pipeline/untouched/image_watch.hpp"
+#include "daemon/pipeline/reference/image_watch.hpp"
 #include "tests/fakes/stepped_loop.hpp"
 
 namespace dtact::pipeline {
@@ -33,30 +33,30 @@ class ExposureWatchTest : public ::testing::Test {
       loop_.step(1);
     }
   }
-  [[nodiscard]] bool told() const { return loop_.health().has(Health::exposure_follows); }
+  [[nodiscard]] bool reported() const { return loop_.health().has(Health::exposure_unlocked); }
 
   SteppedLoop loop_;
 };
 
-TEST_F(ExposureWatchTest, TellsAnExposureThatKeepsTheMeanAsAnEdgeIsCovered) {
+TEST_F(ExposureWatchTest, ReportsAnExposureThatKeepsTheMeanAsAnEdgeIsCovered) {
   cover(0.4);  // a tenth of the whole
   expose(1.1);
-  EXPECT_FALSE(told()) << "not before it has lasted a second";
+  EXPECT_FALSE(reported()) << "not before it has lasted a second";
   loop_.step(60);
-  EXPECT_TRUE(told());
+  EXPECT_TRUE(reported());
   cover(0);
   expose(1);
   loop_.step(150);
-  EXPECT_TRUE(told()) << "the camera has not become another";
+  EXPECT_TRUE(reported()) << "the camera has not become another";
   ASSERT_TRUE(loop_.submit(Rezero{}));
   loop_.step(60);
-  EXPECT_FALSE(told());
+  EXPECT_FALSE(reported());
 }
 
 TEST_F(ExposureWatchTest, ACoveredEdgeAloneIsNot) {
   cover(0.4);
   loop_.step(120);
-  EXPECT_FALSE(told());
+  EXPECT_FALSE(reported());
 }
 
 TEST_F(ExposureWatchTest, LightThatWasBrighterBeforeIsNot) {
@@ -64,7 +64,7 @@ TEST_F(ExposureWatchTest, LightThatWasBrighterBeforeIsNot) {
   loop_.step(60);
   cover(0.4);
   loop_.step(120);
-  EXPECT_FALSE(told());
+  EXPECT_FALSE(reported());
 }
 
 TEST_F(ExposureWatchTest, LightThatBrightensLongAfterIsNot) {
@@ -72,21 +72,21 @@ TEST_F(ExposureWatchTest, LightThatBrightensLongAfterIsNot) {
   loop_.step(320);
   expose(1.1);
   loop_.step(120);
-  EXPECT_FALSE(told());
+  EXPECT_FALSE(reported());
 }
 
 TEST_F(ExposureWatchTest, LightThatDimsOrBrightensBySomethingElseIsNot) {
   cover(0.4);
   expose(0.95);
   loop_.step(120);
-  EXPECT_FALSE(told());
+  EXPECT_FALSE(reported());
   cover(0);
   expose(1);
   loop_.step(60);
   cover(0.12);  // 3 % of the whole
   expose(1.15);
   loop_.step(120);
-  EXPECT_FALSE(told());
+  EXPECT_FALSE(reported());
 }
 
 TEST_F(ExposureWatchTest, ACameraOpenedAnewWithAnotherExposureIsNot) {
@@ -96,7 +96,7 @@ TEST_F(ExposureWatchTest, ACameraOpenedAnewWithAnotherExposureIsNot) {
   loop_.camera.scene.covered = 0.4;
   loop_.camera.scene.light = 1.1;
   loop_.step(150);
-  EXPECT_FALSE(told());
+  EXPECT_FALSE(reported());
 }
 
 TEST_F(ExposureWatchTest, PressesAreNot) {
@@ -106,7 +106,7 @@ TEST_F(ExposureWatchTest, PressesAreNot) {
     loop_.camera.scene.press_mm = 0;
     loop_.step(30);
   }
-  EXPECT_FALSE(told());
+  EXPECT_FALSE(reported());
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ class DrivenSource final : public hal::live::Source {
   void wait(std::int64_t deadline_ns) noexcept override {
     base::system_clock().sleep_until(std::min(deadline_ns, last_ns_ + kPeriodNs));
   }
-  hal::live::DequeueStatus dequeue(hal::live::Filled& out) noexcept override {
+  hal::live::DequeueStatus dequeue(hal::live::FilledBuffer& out) noexcept override {
     driver_.grabbing.pass();
     if (!driver_.attached) return hal::live::DequeueStatus::failed;
     const std::int64_t now_ns = base::system_clock().monotonic_ns();

@@ -1,4 +1,4 @@
-#include "daemon/pipeline/untouched/image_watch.hpp"
+#include "daemon/pipeline/reference/image_watch.hpp"
 
 #include <gtest/gtest.h>
 
@@ -26,7 +26,7 @@ class ImageWatchTest : public ::testing::Test {
   }
 
   void look() { watch_.look(report_, {pixels_.data(), kWidth, kHeight, kWidth}, light_); }
-  [[nodiscard]] bool has(Health health) const { return watch_.conditions().has(health); }
+  [[nodiscard]] bool has(Health health) const { return watch_.health_flags().has(health); }
 
   std::vector<std::uint8_t> pixels_ = std::vector<std::uint8_t>(std::size_t{kWidth} * kHeight, 100);
   CellReport report_;
@@ -36,7 +36,7 @@ class ImageWatchTest : public ::testing::Test {
 
 TEST_F(ImageWatchTest, CleanPictureIsFine) {
   look();
-  EXPECT_TRUE(watch_.conditions().empty());
+  EXPECT_TRUE(watch_.health_flags().empty());
 }
 
 TEST_F(ImageWatchTest, LightIsComparedOnlyWhereMuchIsActive) {
@@ -117,7 +117,7 @@ TEST_F(ImageWatchTest, BandsMustLastSixFrames) {
   look();
   EXPECT_TRUE(has(Health::light_banded));
   watch_.forget();
-  EXPECT_TRUE(watch_.conditions().empty());
+  EXPECT_TRUE(watch_.health_flags().empty());
 }
 
 // However long they were there.
@@ -155,7 +155,7 @@ TEST_F(ImageWatchTest, StatisticsHaveTheirLimits) {
   report_.frame.rough_noise = 2.5;
   report_.frame.unchanged_rows = 1;
   look();
-  EXPECT_TRUE(watch_.conditions().empty());
+  EXPECT_TRUE(watch_.health_flags().empty());
 }
 
 }  // namespace

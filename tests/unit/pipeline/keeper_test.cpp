@@ -7,7 +7,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "daemon/pipeline/untouched/reference_keeper.hpp"
+#include "daemon/pipeline/reference/reference_keeper.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
 namespace dtact::pipeline {
@@ -34,7 +34,7 @@ class KeeperTest : public ::testing::Test {
     }
     return false;
   }
-  /// Grey levels by which the reference in use misses the untouched image under the present light.
+  /// Grey levels by which the reference in use misses the reference image under the present light.
   [[nodiscard]] double worst_error() const {
     ToyScene untouched = scene;
     untouched.press_mm = 0;
@@ -51,7 +51,7 @@ class KeeperTest : public ::testing::Test {
   }
 
   static ReferenceRules rules() {
-    return {.frames = 16, .settle_frames = 8, .settle_grey = 0.25, .patience_frames = 100};
+    return {.frames = 16, .settle_frames = 8, .settle_grey = 0.25, .timeout_frames = 100};
   }
   std::shared_ptr<calibration::Calibration> calibration = fakes::toy_calibration();
   LumaGrid grid;
@@ -59,7 +59,7 @@ class KeeperTest : public ::testing::Test {
   ReferenceKeeper keeper{fakes::kToyWidth, fakes::kToyHeight, rules()};
   ToyScene scene;
   std::uint64_t sequence = 0;
-  KeeperStep last;
+  ReferenceStep last;
 };
 
 TEST_F(KeeperTest, TakesAReferenceOnceTheMeanHasSettled) {
@@ -70,9 +70,9 @@ TEST_F(KeeperTest, TakesAReferenceOnceTheMeanHasSettled) {
   EXPECT_EQ(keeper.state(), State::referencing);
   EXPECT_TRUE(run(1));
   EXPECT_TRUE(last.reference_changed);
-  EXPECT_EQ(keeper.footing(), Footing::fresh);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
   EXPECT_EQ(keeper.state(), State::serving);
-  EXPECT_TRUE(keeper.worth_keeping());
+  EXPECT_TRUE(keeper.storable());
   // Rounding scatters by at most half a level; over 16 frames 0.125, five of which are 0.63.
   EXPECT_LT(worst_error(), 0.7);
 }
@@ -88,43 +88,43 @@ TEST_F(KeeperTest, WaitsWhileTheLightWarmsUp) {
   EXPECT_LT(worst_error(), 0.7);
 }
 
-TEST_F(KeeperTest, TouchedAtStartUsesTheLastGoodOne) {
+TEST_F(KeeperTest, InContactAtStartUsesTheLastGoodOne) {
   const ToyScene yesterday{.light = 0.97};  // drift since
   keeper.restore(fakes::toy_reference_q8(yesterday), true, true);
   calibrate();
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::restored);
-  EXPECT_FALSE(keeper.worth_keeping());
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::restored);
+  EXPECT_FALSE(keeper.storable());
   EXPECT_LT(worst_error(), 1.0);
   EXPECT_FALSE(run(100));  // as long as it touches nothing changes
   scene.press_mm = 0;
   ASSERT_TRUE(run(60));
-  EXPECT_EQ(keeper.footing(), Footing::fresh);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
 }
 
-TEST_F(KeeperTest, TouchedAtStartWithoutOneScalesTheCalibrations) {
+TEST_F(KeeperTest, InContactAtStartWithoutOneScalesTheCalibrations) {
   calibrate();
   scene.press_mm = 1;
   scene.light = 0.8;
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::stale);
   EXPECT_LT(worst_error(), 1.0);
 }
 
 // 0.016 of the field's light: other LEDs leave as much of their shape, a touch of 0.1 mm takes it.
-TEST_F(KeeperTest, UnderAnotherLightThanTheCalibrationsALittleShapeIsNoTouch) {
+TEST_F(KeeperTest, UnderAnotherLightThanTheCalibrationsALittleShapeIsNoContact) {
   scene.press_mm = 0.1;
   calibrate(false);
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::fresh);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
 }
 
-TEST_F(KeeperTest, UnderTheCalibrationsLightTheSameIsATouch) {
+TEST_F(KeeperTest, UnderTheCalibrationsLightTheSameIsAContact) {
   scene.press_mm = 0.1;
   calibrate();
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::stale);
 }
 
 TEST_F(KeeperTest, ALastGoodOneFromAnotherLightIsStale) {
@@ -132,17 +132,17 @@ TEST_F(KeeperTest, ALastGoodOneFromAnotherLightIsStale) {
   calibrate();
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::stale);
   EXPECT_LT(worst_error(), 1.0);
 }
 
-TEST_F(KeeperTest, AMovingPressAtStartIsTouchedInTheEnd) {
+TEST_F(KeeperTest, AMovingPressAtStartIsContactInTheEnd) {
   calibrate();
   for (int i = 0; i < 300 && !keeper.ready(); ++i) {
     scene.press_mm = 0.5 + 0.1 * (i % 5);
     (void)run(1);
   }
-  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::stale);
 }
 
 TEST_F(KeeperTest, RezeroUnderContactIsRefusedAtOnce) {
@@ -151,7 +151,7 @@ TEST_F(KeeperTest, RezeroUnderContactIsRefusedAtOnce) {
   EXPECT_EQ(keeper.rezero(false, true), Outcome::refused_contact);
 }
 
-TEST_F(KeeperTest, RezeroSeesATouchThatTheDepthMissed) {
+TEST_F(KeeperTest, RezeroSeesAContactThatTheDepthMissed) {
   calibrate();
   ASSERT_TRUE(run(40));
   scene.press_mm = 0.09;  // 1.8 % of the light; the limit is 1.25 %
@@ -178,11 +178,11 @@ TEST_F(KeeperTest, WhatMovesSlowlyIsNotAveraged) {
   EXPECT_LT(worst_error(), 0.7);
 }
 
-TEST_F(KeeperTest, UntouchedTwiceInARowEndsAStandIn) {
+TEST_F(KeeperTest, NoContactTwiceInARowEndsAFallback) {
   calibrate();
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
-  ASSERT_EQ(keeper.footing(), Footing::stale);
+  ASSERT_EQ(keeper.quality(), ReferenceQuality::stale);
   // It looks every eighth frame.
   ASSERT_FALSE(run(8));
   scene.press_mm = 0;
@@ -192,7 +192,7 @@ TEST_F(KeeperTest, UntouchedTwiceInARowEndsAStandIn) {
   scene.press_mm = 0;
   EXPECT_FALSE(run(16 + 15)) << "two looks, and all but one frame of an average";
   EXPECT_TRUE(run(1));
-  EXPECT_EQ(keeper.footing(), Footing::fresh);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
 }
 
 TEST_F(KeeperTest, ANewCalibrationForgetsTheLastGoodOneThatOnlyStoodIn) {
@@ -200,14 +200,14 @@ TEST_F(KeeperTest, ANewCalibrationForgetsTheLastGoodOneThatOnlyStoodIn) {
   calibrate();
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
-  ASSERT_EQ(keeper.footing(), Footing::restored);
+  ASSERT_EQ(keeper.quality(), ReferenceQuality::restored);
   calibrate();
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::stale);
   EXPECT_LT(worst_error(), 1.0) << "the calibration's own, scaled";
 }
 
-TEST_F(KeeperTest, ForcedRezeroTakesTheTouchedImageButDoesNotKeepIt) {
+TEST_F(KeeperTest, ForcedRezeroTakesTheImageInContactButDoesNotKeepIt) {
   calibrate();
   ASSERT_TRUE(run(40));
   scene.press_mm = 1;
@@ -215,13 +215,13 @@ TEST_F(KeeperTest, ForcedRezeroTakesTheTouchedImageButDoesNotKeepIt) {
   ASSERT_TRUE(run(40));
   EXPECT_EQ(last.answer, Outcome::done);
   EXPECT_TRUE(last.reference_changed);
-  EXPECT_FALSE(keeper.worth_keeping());
+  EXPECT_FALSE(keeper.storable());
   // Lifted, the surface is brighter than its reference; re-zeroing then is no touch.
   scene.press_mm = 0;
   EXPECT_EQ(keeper.rezero(false, false), std::nullopt);
   ASSERT_TRUE(run(40));
   EXPECT_EQ(last.answer, Outcome::done);
-  EXPECT_TRUE(keeper.worth_keeping());
+  EXPECT_TRUE(keeper.storable());
 }
 
 TEST_F(KeeperTest, RezeroFollowsDrift) {
@@ -254,7 +254,7 @@ TEST_F(KeeperTest, ALightChangeWithoutContactTakesANewOne) {
   scene.light = 0.5;
   scene.tilt = 0.2;
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::fresh);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
   EXPECT_LT(worst_error(), 0.7);
 }
 
@@ -265,11 +265,11 @@ TEST_F(KeeperTest, ALightChangeUnderContactScalesAndWaits) {
   keeper.light_changed(true, true);
   scene.light = 0.5;
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::stale);
   EXPECT_LT(worst_error(), 0.8);
   scene.press_mm = 0;
   ASSERT_TRUE(run(60));
-  EXPECT_EQ(keeper.footing(), Footing::fresh);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
 }
 
 TEST_F(KeeperTest, AfterATouchALighterOneIsNotTakenForNone) {
@@ -279,10 +279,10 @@ TEST_F(KeeperTest, AfterATouchALighterOneIsNotTakenForNone) {
   scene.light = 0.5;
   scene.press_mm = 1;
   ASSERT_TRUE(run(60));
-  ASSERT_EQ(keeper.footing(), Footing::stale);
+  ASSERT_EQ(keeper.quality(), ReferenceQuality::stale);
   scene.press_mm = 0.15;
   EXPECT_FALSE(run(200));
-  EXPECT_EQ(keeper.footing(), Footing::stale);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::stale);
 }
 
 TEST_F(KeeperTest, ALongPressIsNeverAbsorbed) {
@@ -304,7 +304,7 @@ TEST_F(KeeperTest, InTheDarkThereIsNoReference) {
   EXPECT_EQ(last.answer, Outcome::refused_dark);
   scene.light = 1;
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::fresh);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::fresh);
 }
 
 TEST_F(KeeperTest, ACameraThatCameBackIsLookedAtAnew) {
@@ -315,7 +315,7 @@ TEST_F(KeeperTest, ACameraThatCameBackIsLookedAtAnew) {
   EXPECT_FALSE(keeper.ready());
   scene.press_mm = 1;
   ASSERT_TRUE(run(40));
-  EXPECT_EQ(keeper.footing(), Footing::restored);
+  EXPECT_EQ(keeper.quality(), ReferenceQuality::restored);
 }
 
 TEST_F(KeeperTest, ANewCalibrationKeepsAFreshReference) {

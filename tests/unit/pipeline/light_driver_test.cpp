@@ -40,12 +40,12 @@ class LightDriverTest : public ::testing::Test {
     return std::nullopt;
   }
   template <typename Condition>
-  bool eventually(Condition condition) {
-    for (int i = 0; i < 1000 && !condition(); ++i) {
+  bool eventually(Condition flag) {
+    for (int i = 0; i < 1000 && !flag(); ++i) {
       take_notes();
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
-    return condition();
+    return flag();
   }
   std::vector<LightNote> notes;
   Exchange exchange{DepthFrame{}};
@@ -66,7 +66,7 @@ TEST_F(LightDriverTest, ShowsTheFirstLightBeforeItReturns) {
   EXPECT_EQ(note.light.brightness, 200);
 }
 
-TEST_F(LightDriverTest, AnswersAndTellsEveryone) {
+TEST_F(LightDriverTest, AnswersAndReportsEveryone) {
   driver.start();
   ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   const auto done = next();
@@ -96,9 +96,9 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   const auto done = next();
   ASSERT_TRUE(done);
   EXPECT_EQ(std::get<CommandDone>(*done).outcome, Outcome::device_error);
-  EXPECT_EQ(std::get<CommandDone>(*done).message, "the fake ring is broken: mend it");
+  EXPECT_EQ(std::get<CommandDone>(*done).message, "the fake ring is broken: fix it");
   EXPECT_TRUE(driver.trouble());
-  EXPECT_EQ(driver.message(), "the fake ring is broken: mend it");
+  EXPECT_EQ(driver.message(), "the fake ring is broken: fix it");
   EXPECT_EQ(driver.light().brightness, 200);  // what it still shows
   ring.broken = false;
   ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
@@ -108,31 +108,33 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
   driver.stop();
   take_notes();
   // At the start, then the light that failed and the one that still shone, then it again.
-  std::vector<std::pair<bool, int>> told;
-  for (const LightNote& note : notes) told.emplace_back(note.begins, note.light.brightness);
-  EXPECT_EQ(told,
+  std::vector<std::pair<bool, int>> reported;
+  for (const LightNote& note : notes) reported.emplace_back(note.begins, note.light.brightness);
+  EXPECT_EQ(reported,
             (std::vector<std::pair<bool, int>>{
                 {true, 200}, {false, 200}, {true, 100}, {false, 200}, {true, 100}, {false, 100}}));
 }
 
 TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
   driver.start();
-  ring.tell({.ok = false, .message = "the wire is cut", .note = {}, .writes = 2, .failures = 1});
+  ring.set_left(
+      {.ok = false, .message = "the wire is cut", .note = {}, .writes = 2, .failures = 1});
   EXPECT_TRUE(eventually([&] { return driver.trouble(); }));
   EXPECT_TRUE(eventually([&] { return driver.message() == "the wire is cut"; }));
-  ring.tell({.ok = true, .message = {}, .note = {}, .writes = 3, .failures = 1});
+  ring.set_left({.ok = true, .message = {}, .note = {}, .writes = 3, .failures = 1});
   EXPECT_TRUE(eventually([&] { return !driver.trouble() && driver.message().empty(); }));
 }
 
-TEST_F(LightDriverTest, WhatIsWorthKnowingOfTheRingIsToldWhileNothingIsWrong) {
+TEST_F(LightDriverTest, WhatIsWorthKnowingOfTheRingIsReportedWhileNothingIsWrong) {
   driver.start();
-  ring.tell({.ok = true, .message = {}, .note = "one write was late", .writes = 2, .failures = 0});
+  ring.set_left(
+      {.ok = true, .message = {}, .note = "one write was late", .writes = 2, .failures = 0});
   EXPECT_TRUE(eventually([&] { return driver.message() == "one write was late"; }));
   EXPECT_FALSE(driver.trouble());
   ring.broken = true;
   ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   ASSERT_TRUE(next());
-  EXPECT_EQ(driver.message(), "the fake ring is broken: mend it");
+  EXPECT_EQ(driver.message(), "the fake ring is broken: fix it");
 }
 
 // It writes for nobody but us, so that its report says nothing of how it goes.
@@ -141,10 +143,10 @@ TEST_F(LightDriverTest, ARingThatNeverReSendsHealsByTheNextWriteAlone) {
   ring.broken = true;
   ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   ASSERT_TRUE(next());
-  ring.tell({.ok = true, .message = {}, .note = {}, .writes = 0, .failures = 0});
+  ring.set_left({.ok = true, .message = {}, .note = {}, .writes = 0, .failures = 0});
   std::this_thread::sleep_for(std::chrono::milliseconds(600));  // in which it is looked at twice
   EXPECT_TRUE(driver.trouble());
-  EXPECT_EQ(driver.message(), "the fake ring is broken: mend it");
+  EXPECT_EQ(driver.message(), "the fake ring is broken: fix it");
 }
 
 TEST_F(LightDriverTest, ALightAskedForWhileTheRingIsAwayIsShownWhenItComes) {
@@ -182,7 +184,7 @@ TEST_F(LightDriverTest, ARingThatWentAndCameShowsItsLightAgain) {
   ring.away = true;
   EXPECT_TRUE(eventually([&] { return driver.message() == "the fake ring is away: plug it in"; }));
   ring.away = false;  // it is found and does not work yet
-  EXPECT_TRUE(eventually([&] { return driver.message() == "the fake ring is broken: mend it"; }));
+  EXPECT_TRUE(eventually([&] { return driver.message() == "the fake ring is broken: fix it"; }));
   ring.broken = false;
   EXPECT_TRUE(eventually([&] { return !driver.trouble(); }));
   ASSERT_EQ(ring.all().size(), 2U);
@@ -230,7 +232,7 @@ TEST_F(LightDriverTest, StopsWhileItsQueuesAreFull) {
   EXPECT_EQ(notes.size(), 16U);
 }
 
-TEST_F(LightDriverTest, TellsSinceWhenFramesAreExposedUnderALight) {
+TEST_F(LightDriverTest, ReportsSinceWhenFramesAreExposedUnderALight) {
   exchange.sequence = 41;
   driver.start();
   EXPECT_EQ(driver.light_since_ns(), std::nullopt)

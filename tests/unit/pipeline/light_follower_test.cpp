@@ -1,4 +1,4 @@
-#include "daemon/pipeline/untouched/light_follower.hpp"
+#include "daemon/pipeline/reference/light_follower.hpp"
 
 #include <gtest/gtest.h>
 
@@ -15,7 +15,7 @@ constexpr int kMinute = 600;
 class LightFollowerTest : public ::testing::Test {
  protected:
   void untouched(double light, int frames = 1) { see(light, LightSeen::From::all, frames); }
-  void touched(double light, int frames) { see(light, LightSeen::From::nothing, frames); }
+  void in_contact(double light, int frames) { see(light, LightSeen::From::nothing, frames); }
   /// From the light of now, evenly.
   void drift(double to, int frames, LightSeen::From how = LightSeen::From::all) {
     const double from = light_;
@@ -53,7 +53,7 @@ TEST_F(LightFollowerTest, FollowsSlowDriftToWithinASixteenthOfALevel) {
   EXPECT_NEAR(follower_.factor(), 1.005, 0.0005);
 }
 
-TEST_F(LightFollowerTest, EndsAtTheLimitAndTells) {
+TEST_F(LightFollowerTest, EndsAtTheLimitAndReports) {
   drift(0.97, 3 * kMinute);
   EXPECT_NEAR(follower_.factor(), 0.98, 0.0004);
   EXPECT_NEAR(follower_.left(), -0.0102, 0.0004);
@@ -63,7 +63,7 @@ TEST_F(LightFollowerTest, EndsAtTheLimitAndTells) {
   EXPECT_FALSE(follower_.drifted());
 }
 
-TEST_F(LightFollowerTest, AStepIsToldAndNeverFollowed) {
+TEST_F(LightFollowerTest, AStepIsReportedAndNeverFollowed) {
   untouched(1, kMinute);
   untouched(0.995, 2);
   EXPECT_FALSE(follower_.drifted()) << "a single odd frame says nothing";
@@ -76,7 +76,7 @@ TEST_F(LightFollowerTest, AStepIsToldAndNeverFollowed) {
   EXPECT_FALSE(follower_.drifted());
 }
 
-TEST_F(LightFollowerTest, DriftFasterThanTheRateIsTold) {
+TEST_F(LightFollowerTest, DriftFasterThanTheRateIsReported) {
   untouched(1, kMinute);
   drift(0.96, kMinute);
   EXPECT_GT(follower_.factor(), 0.98);
@@ -96,11 +96,11 @@ TEST_F(LightFollowerTest, CatchesUpAfterALongPress) {
 TEST_F(LightFollowerTest, StatesHowFarTheLightMayHaveMovedOutOfSight) {
   untouched(1, kMinute);
   EXPECT_EQ(follower_.unseen(), 0);
-  touched(1, 3 * kSecond);
+  in_contact(1, 3 * kSecond);
   EXPECT_EQ(follower_.unseen(), 0) << "between two looks beside a press";
-  touched(1, 27 * kSecond);
+  in_contact(1, 27 * kSecond);
   EXPECT_NEAR(follower_.unseen(), 0.005, 1e-9) << "half of 2 % a minute";
-  touched(1, 5 * kMinute);
+  in_contact(1, 5 * kMinute);
   EXPECT_NEAR(follower_.unseen(), 0.01, 1e-9) << "half of the limit";
   untouched(1);
   EXPECT_EQ(follower_.unseen(), 0);
@@ -121,7 +121,7 @@ TEST_F(LightFollowerTest, WaitsASecondWhenTheLightIsSeenAnotherWay) {
   EXPECT_NEAR(follower_.factor(), 0.99957, 0.00001);
 }
 
-TEST_F(LightFollowerTest, AStepThatComesWithAPressIsToldAndNotFollowed) {
+TEST_F(LightFollowerTest, AStepThatComesWithAPressIsReportedAndNotFollowed) {
   untouched(1, kMinute);
   see(0.99, LightSeen::From::quiet, kMinute);
   EXPECT_EQ(follower_.factor(), 1);
@@ -131,7 +131,7 @@ TEST_F(LightFollowerTest, AStepThatComesWithAPressIsToldAndNotFollowed) {
 
 TEST_F(LightFollowerTest, AShortPressAllowsNoStep) {
   untouched(1, kMinute);
-  touched(1, 2 * kSecond);
+  in_contact(1, 2 * kSecond);
   untouched(0.99, 10 * kMinute);
   EXPECT_EQ(follower_.factor(), 1);
   EXPECT_TRUE(follower_.drifted());
@@ -141,7 +141,7 @@ TEST_F(LightFollowerTest, WhatWasNotFollowedIsNotAllowedForLater) {
   untouched(1, kMinute);
   untouched(0.99, kSecond);
   for (int i = 0; i < 60; ++i) {  // a flat press that moves a little
-    touched(0.99, 9);
+    in_contact(0.99, 9);
     untouched(0.99);
   }
   untouched(0.99, kMinute);
@@ -157,19 +157,19 @@ TEST_F(LightFollowerTest, ANewReferenceBeginsAnew) {
   EXPECT_FALSE(follower_.drifted());
 }
 
-TEST_F(LightFollowerTest, OnlyTellsWhereNobodyAppliesIt) {
+TEST_F(LightFollowerTest, OnlyReportsWhereNobodyAppliesIt) {
   follower_.restart(false);
   drift(0.99, kMinute);
   EXPECT_EQ(follower_.factor(), 1);
   EXPECT_TRUE(follower_.drifted());
 }
 
-TEST_F(LightFollowerTest, ALimitOfZeroOnlyTells) {
+TEST_F(LightFollowerTest, ALimitOfZeroOnlyReports) {
   follower_ = LightFollower(DriftRules{.limit_percent = 0, .percent_per_minute = 2});
   drift(0.99, kMinute);
   EXPECT_EQ(follower_.factor(), 1);
   EXPECT_TRUE(follower_.drifted());
-  touched(1, 5 * kMinute);
+  in_contact(1, 5 * kMinute);
   EXPECT_NEAR(follower_.unseen(), 0.01, 1e-9) << "no less than where it is followed";
 }
 

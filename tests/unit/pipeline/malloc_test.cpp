@@ -139,7 +139,7 @@ TEST_F(CaptureThread, AllocatesAndFreesNothingWhileItSharpensMoreAndLess) {
   EXPECT_EQ(fakes::counted_allocations(), 0U);
 }
 
-TEST_F(CaptureThread, TouchesNoNewPageOnceItHasDoneEverything) {
+TEST_F(CaptureThread, FaultsNoNewPageOnceItHasDoneEverything) {
   if (!fakes::can_count_allocations()) GTEST_SKIP() << "the sanitizer's shadow pages would count";
   // Code is mapped at its first execution: the first round of commands belongs to the warm-up.
   void* const fresh =
@@ -147,17 +147,17 @@ TEST_F(CaptureThread, TouchesNoNewPageOnceItHasDoneEverything) {
   ASSERT_NE(fresh, MAP_FAILED);
   std::array<long, 2> warm{};
   std::array<long, 2> after{};
-  std::array<long, 2> touched{};
+  std::array<long, 2> in_contact{};
   run(1200, [&](std::uint64_t delivered) {
     if (delivered == 600) warm = faults();
     if (delivered == 1200) {
       after = faults();
       *static_cast<volatile char*>(fresh) = 1;
-      touched = faults();
+      in_contact = faults();
     }
   });
   ::munmap(fresh, 1);
-  EXPECT_EQ(touched[0] - after[0], 1);  // so they are counted here
+  EXPECT_EQ(in_contact[0] - after[0], 1);  // so they are counted here
   EXPECT_EQ(after[0] - warm[0], 0) << "minor";
   EXPECT_EQ(after[1] - warm[1], 0) << "major";
 }

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "daemon/pipeline/untouched/reference_store.hpp"
+#include "daemon/pipeline/reference/reference_store.hpp"
 #include "tests/fakes/scattering_toy.hpp"
 #include "tests/unit/pipeline/whole_pipeline.hpp"
 
@@ -21,13 +21,14 @@ TEST_F(PipelineTest, ServesDepthAfterItsSequence) {
   EXPECT_EQ(frame->depth_um.size(), 144U * 104U);
   EXPECT_DOUBLE_EQ(frame->mm_per_px, 0.2);
   EXPECT_FALSE(frame->has_luma);
-  EXPECT_FALSE(frame->contact.touching);
+  EXPECT_FALSE(frame->contact.in_contact);
   // CLOCK_REALTIME of the same moment: within a second of now.
   EXPECT_LT(std::abs(base::system_clock().wall_ns() - frame->wall_ns), 1'000'000'000);
   // A frame is published before what it changed is told.
   ASSERT_TRUE(until([&] {
-    const auto told = all<StateChanged>();
-    return !told.empty() && told.back().state == State::serving && told.back().health.empty();
+    const auto reported = all<StateChanged>();
+    return !reported.empty() && reported.back().state == State::serving &&
+           reported.back().health.empty();
   }));
   const auto references = all<ReferenceTaken>();
   ASSERT_EQ(references.size(), 1U);
@@ -48,28 +49,28 @@ TEST_F(PipelineTest, SaysWhichCpuTheCaptureThreadIsPinnedTo) {
   EXPECT_EQ(pipeline->status().cpu, std::nullopt);
 }
 
-// A picture that never holds still is refused after patience_frames in each of two phases.
+// A picture that never holds still is refused after timeout_frames in each of two phases.
 TEST_F(PipelineTest, SaysHowLongARezeroMayTake) {
-  config.reference.patience_frames = 90;
+  config.reference.timeout_frames = 90;
   build(fakes::toy_calibration());
   const Status status = pipeline->status();
-  EXPECT_DOUBLE_EQ(status.rezero_within_s, 1 + 2 * 90 / status.camera.fps);
+  EXPECT_DOUBLE_EQ(status.rezero_timeout_s, 1 + 2 * 90 / status.camera.fps);
 }
 
-TEST_F(PipelineTest, MeasuresAPressAndTellsContact) {
+TEST_F(PipelineTest, MeasuresAPressAndReportsContact) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
   camera.press(1);
-  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.05);
   // Pixel (80, 60) of the frame is (72, 52) of the map, half a pixel right and down of its centre.
   EXPECT_NEAR(frame->contact.x_mm, 0.1, 0.05);
   EXPECT_NEAR(frame->contact.y_mm, 0.1, 0.05);
   camera.press(0);
-  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return !f.contact.touching; }));
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return !f.contact.in_contact; }));
   ASSERT_TRUE(until([&] { return all<ContactChanged>().size() == 2; }));
-  EXPECT_TRUE(all<ContactChanged>()[0].touching);
-  EXPECT_FALSE(all<ContactChanged>()[1].touching);
+  EXPECT_TRUE(all<ContactChanged>()[0].in_contact);
+  EXPECT_FALSE(all<ContactChanged>()[1].in_contact);
 }
 
 TEST_F(PipelineTest, ACoarserMapHoldsTheSameSurface) {
@@ -81,7 +82,7 @@ TEST_F(PipelineTest, ACoarserMapHoldsTheSameSurface) {
   EXPECT_EQ(frame->depth_um.size(), 36U * 26U);
   EXPECT_DOUBLE_EQ(frame->mm_per_px, 0.8);
   camera.press(1);
-  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   // The mean over 4×4 pixels around the peak, smoothed: 5 % below it.
   EXPECT_NEAR(frame->contact.deepest_mm, 0.95, 0.02);
   EXPECT_NEAR(frame->contact.x_mm, 0.1, 0.1);
@@ -101,7 +102,7 @@ TEST_F(PipelineTest, ASharpenedMapSaysHowItWasMade) {
   EXPECT_DOUBLE_EQ(frame->mm_per_px, 0.2);
   EXPECT_NEAR(frame->uncertainty_um, 15, 0.1);
   camera.press(1);
-  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   // 0.937 plain, the press's mean over the deepest of the 4×4 pixels, smoothed; by Fourier
   // transform of the toy's picture (1 − (1 − h)³)/h times its spectrum, h the two Gaussians',
   // gives 1.379 there.
@@ -109,9 +110,9 @@ TEST_F(PipelineTest, ASharpenedMapSaysHowItWasMade) {
   EXPECT_NEAR(frame->contact.x_mm, 0.1, 0.1);
   EXPECT_NEAR(frame->contact.y_mm, 0.1, 0.1);
   // The finer map's pixels lie an eighth of a coarse one beside its middle, at least.
-  const int most_um = *std::ranges::max_element(frame->depth_um);
-  EXPECT_LE(most_um, 1000 * frame->contact.deepest_mm + 0.5);
-  EXPECT_GE(most_um, 970 * frame->contact.deepest_mm);
+  const int max_um = *std::ranges::max_element(frame->depth_um);
+  EXPECT_LE(max_um, 1000 * frame->contact.deepest_mm + 0.5);
+  EXPECT_GE(max_um, 970 * frame->contact.deepest_mm);
 }
 
 TEST_F(PipelineTest, ASharpenedMapMayStayCoarse) {
@@ -152,7 +153,7 @@ TEST_F(PipelineTest, AutoTakesTheCoarsestMapWithinTheBound) {
   EXPECT_EQ(frame->width, 36);
   EXPECT_NEAR(frame->uncertainty_um, 50, 1);  // a list that says nothing of itself, nothing pressed
   camera.press(1);
-  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   EXPECT_GT(frame->uncertainty_um, 50);
   EXPECT_NEAR(frame->contact.deepest_mm, 0.95, 0.03);  // as in ACoarserMapHoldsTheSameSurface
 }
@@ -175,7 +176,7 @@ TEST_F(PipelineTest, LumaIsWholeThoughDepthReadsAPart) {
   EXPECT_GT(frame->luma.back(), 90);
 }
 
-TEST_F(PipelineTest, KeepsTheReferenceForATouchedStart) {
+TEST_F(PipelineTest, KeepsTheReferenceForAStartInContact) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
   pipeline.reset();  // writes it out
@@ -186,7 +187,7 @@ TEST_F(PipelineTest, KeepsTheReferenceForATouchedStart) {
   camera.press(1);
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_frame([](const DepthFrame& f) {
-    return f.has_depth && f.health.has(Health::reference_restored) && f.contact.touching;
+    return f.has_depth && f.health.has(Health::reference_restored) && f.contact.in_contact;
   }));
   EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.06);
   ASSERT_TRUE(until([&] { return !all<ReferenceTaken>().empty(); }));
@@ -197,11 +198,11 @@ TEST_F(PipelineTest, KeepsTheReferenceForATouchedStart) {
   EXPECT_FALSE(all<ReferenceTaken>()[1].restored);
 }
 
-TEST_F(PipelineTest, TouchedFirstStartScalesTheCalibrations) {
+TEST_F(PipelineTest, InContactFirstStartScalesTheCalibrations) {
   camera.press(1);
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_frame([](const DepthFrame& f) {
-    return f.has_depth && f.health.has(Health::reference_stale) && f.contact.touching;
+    return f.has_depth && f.health.has(Health::reference_stale) && f.contact.in_contact;
   }));
   EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.06);
   EXPECT_FALSE(fs::exists(folder / "reference.png"));
@@ -212,13 +213,13 @@ TEST_F(PipelineTest, RezeroUnderContactIsRefusedUnlessForced) {
   ASSERT_TRUE(until_fresh());
   EXPECT_EQ(ask(Rezero{}).outcome, Outcome::done);
   camera.press(0.5);
-  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   const CommandDone refused = ask(Rezero{});
   EXPECT_EQ(refused.outcome, Outcome::refused_contact);
-  EXPECT_EQ(refused.message, "something touches: lift it and ask again, or force it");
+  EXPECT_EQ(refused.message, "there is contact: lift it and ask again, or force it");
   EXPECT_EQ(ask(Rezero{.force = true}).outcome, Outcome::done);
   ASSERT_TRUE(until_frame([](const DepthFrame& f) {
-    return f.has_depth && !f.contact.touching && f.contact.deepest_mm < 0.1;
+    return f.has_depth && !f.contact.in_contact && f.contact.deepest_mm < 0.1;
   }));
 }
 
@@ -235,11 +236,11 @@ TEST_F(PipelineTest, HalvedLightReadsTheSameDepthAfterANewReference) {
   ASSERT_EQ(all<LightChanged>().size(), 1U);
   EXPECT_EQ(all<LightChanged>()[0].light.brightness, 128);
   camera.press(1);
-  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.1);
 }
 
-TEST_F(PipelineTest, HandsOutTheUntouchedImage) {
+TEST_F(PipelineTest, HandsOutTheReferenceImage) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
   const CommandDone done = ask(CopyReference{});
@@ -272,15 +273,15 @@ TEST_F(PipelineTest, ALightChangeUnderContactIsStaleUntilItLifts) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
   camera.press(1);
-  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   EXPECT_EQ(ask(SetLight{dimmed(128)}).outcome, Outcome::done);
   ASSERT_TRUE(until_frame(
       [](const DepthFrame& f) { return f.has_depth && f.health.has(Health::reference_stale); }));
-  EXPECT_TRUE(frame->contact.touching);
+  EXPECT_TRUE(frame->contact.in_contact);
   EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.12);
   camera.press(0);
   ASSERT_TRUE(until_frame([](const DepthFrame& f) {
-    return f.has_depth && !f.health.has(Health::reference_stale) && !f.contact.touching;
+    return f.has_depth && !f.health.has(Health::reference_stale) && !f.contact.in_contact;
   }));
 }
 
@@ -288,11 +289,11 @@ TEST_F(PipelineTest, ABrokenRingIsAConditionNotTheEnd) {
   ring.broken = true;
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth; }));
-  EXPECT_TRUE(frame->health.has(Health::ring_trouble));
+  EXPECT_TRUE(frame->health.has(Health::ring_fault));
   const CommandDone failed = ask(SetLight{dimmed(10)});
   EXPECT_EQ(failed.outcome, Outcome::device_error);
-  EXPECT_EQ(failed.message, "the fake ring is broken: mend it");
-  EXPECT_EQ(pipeline->status().ring_message, "the fake ring is broken: mend it");
+  EXPECT_EQ(failed.message, "the fake ring is broken: fix it");
+  EXPECT_EQ(pipeline->status().ring_message, "the fake ring is broken: fix it");
 }
 
 // What was averaged before it came is no reference for its light, though that is the one asked for.
@@ -301,14 +302,14 @@ TEST_F(PipelineTest, ARingThatComesLaterBeginsTheReferenceAnew) {
   camera.light(0.5);  // the room's
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_frame(
-      [](const DepthFrame& f) { return f.has_depth && f.health.has(Health::ring_trouble); }));
+      [](const DepthFrame& f) { return f.has_depth && f.health.has(Health::ring_fault); }));
   ASSERT_TRUE(until([&] { return all<ReferenceTaken>().size() == 1; }));
   ring.away = false;
   ASSERT_TRUE(until_fresh());
   ASSERT_TRUE(until([&] { return all<ReferenceTaken>().size() == 2; }));
   EXPECT_TRUE(all<LightChanged>().empty());
   camera.press(1);
-  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.touching; }));
+  ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   EXPECT_NEAR(frame->contact.deepest_mm, 1.0, 0.1);
 }
 

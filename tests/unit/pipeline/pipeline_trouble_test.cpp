@@ -16,8 +16,8 @@ TEST_F(PipelineTest, UnpluggedAndBack) {
   ASSERT_TRUE(until_fresh());
   camera.mode = Mode::unplugged;
   ASSERT_TRUE(until_state(State::camera_lost));
-  EXPECT_TRUE(pipeline->status().health.has(Health::camera_trouble));
-  EXPECT_EQ(pipeline->status().camera_report.remedy, "plug the fake camera in");
+  EXPECT_TRUE(pipeline->status().health.has(Health::camera_fault));
+  EXPECT_EQ(pipeline->status().camera_report.fix, "plug the fake camera in");
   EXPECT_EQ(ask(Rezero{}).outcome, Outcome::camera_away);
   camera.mode = Mode::streaming;
   ASSERT_TRUE(until_fresh());
@@ -29,7 +29,7 @@ TEST_F(PipelineTest, ASilentCameraIsTroubleAndAnswersStillCome) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
   camera.mode = Mode::silent;
-  ASSERT_TRUE(until([&] { return pipeline->status().health.has(Health::camera_trouble); }));
+  ASSERT_TRUE(until([&] { return pipeline->status().health.has(Health::camera_fault); }));
   EXPECT_EQ(pipeline->status().state, State::serving);
   EXPECT_EQ(ask(Rezero{}).outcome, Outcome::camera_away);
   camera.mode = Mode::streaming;
@@ -46,7 +46,7 @@ TEST_F(PipelineTest, LostAndDamagedFramesAreAConditionForASecond) {
   ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.health.has(Health::frames_lost); }));
 }
 
-TEST_F(PipelineTest, DeeperThanTheListIsACondition) {
+TEST_F(PipelineTest, DeeperThanTheLutIsACondition) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
   camera.press(3);  // the list ends at 70 grey levels, 2.2 mm
@@ -59,10 +59,10 @@ TEST_F(PipelineTest, AFullEventQueueLosesNoAnswerAndNoState) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
   // Nobody reads events while contact comes and goes more often than the queue is long, 64.
-  const auto shown = [&](bool touching) {
+  const auto shown = [&](bool in_contact) {
     for (int i = 0; i < 5000; ++i) {
       const DepthFrame* newest = pipeline->latest();
-      if (newest != nullptr && newest->contact.touching == touching) return true;
+      if (newest != nullptr && newest->contact.in_contact == in_contact) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
     }
     return false;
@@ -80,10 +80,10 @@ TEST_F(PipelineTest, AFullEventQueueLosesNoAnswerAndNoState) {
     const auto answers = all<CommandDone>();
     return !answers.empty() && std::holds_alternative<Rezero>(answers.back().command.what);
   }));
-  ASSERT_TRUE(until([&] { return all<ContactChanged>().back().touching; }));
+  ASSERT_TRUE(until([&] { return all<ContactChanged>().back().in_contact; }));
   const auto changes = all<ContactChanged>();
   for (std::size_t i = 1; i < changes.size(); ++i) {
-    EXPECT_NE(changes[i].touching, changes[i - 1].touching) << i;
+    EXPECT_NE(changes[i].in_contact, changes[i - 1].in_contact) << i;
   }
 }
 
@@ -104,7 +104,7 @@ TEST_F(PipelineTest, TheNewestFrameWinsAndTheOthersAreCounted) {
   EXPECT_EQ(newest->number - number, newest->camera.sequence - sequence) << "the camera lost none";
 }
 
-TEST_F(PipelineTest, WithoutSubscribersNothingIsPublishedButContactIsTold) {
+TEST_F(PipelineTest, WithoutSubscribersNothingIsPublishedButContactIsReported) {
   build(fakes::toy_calibration());
   pipeline->want({.contact = true});
   pipeline->start();
@@ -122,7 +122,7 @@ TEST_F(PipelineTest, StatusHasStagesAndRate) {
   const Status status = pipeline->status();
   ASSERT_EQ(status.stages.size(), 8U);
   EXPECT_EQ(status.stages[3].stage, "smooth");
-  // Nothing touches, so nothing is smoothed; the look at the frame takes its time all the same.
+  // There is no contact, so nothing is smoothed; the look at the frame takes its time all the same.
   EXPECT_EQ(status.stages[1].stage, "activity");
   EXPECT_GT(status.stages[1].p50_us, 0);
   EXPECT_EQ(status.stages[7].stage, "total");
@@ -149,7 +149,7 @@ TEST_F(PipelineTest, StopsWhileTheCameraIsSilent) {
   start(fakes::toy_calibration());
   ASSERT_TRUE(until_fresh());
   camera.mode = Mode::silent;
-  ASSERT_TRUE(until([&] { return pipeline->status().health.has(Health::camera_trouble); }));
+  ASSERT_TRUE(until([&] { return pipeline->status().health.has(Health::camera_fault); }));
   const auto began = std::chrono::steady_clock::now();
   pipeline->stop();
   // 0.1 s by design; the margin is for a busy machine.

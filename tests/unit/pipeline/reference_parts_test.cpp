@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "daemon/pipeline/untouched/luma_grid.hpp"
-#include "daemon/pipeline/untouched/reference_average.hpp"
-#include "daemon/pipeline/untouched/reference_keeper.hpp"
-#include "daemon/pipeline/untouched/touch_check.hpp"
+#include "daemon/pipeline/reference/contact_check.hpp"
+#include "daemon/pipeline/reference/luma_grid.hpp"
+#include "daemon/pipeline/reference/reference_average.hpp"
+#include "daemon/pipeline/reference/reference_keeper.hpp"
 #include "hal/files/png.hpp"
 #include "tests/fakes/toy_sensor.hpp"
 
@@ -87,7 +87,7 @@ TEST(LumaGrid, ReferencesAreMeasuredInGreyLevels) {
   EXPECT_FLOAT_EQ(grid.cells[kGridCells - 1], 10.25F);
 }
 
-class TouchTest : public ::testing::Test {
+class ContactCheckTest : public ::testing::Test {
  protected:
   static LumaGrid grid_of(const ToyScene& scene) {
     LumaGrid grid;
@@ -95,47 +95,48 @@ class TouchTest : public ::testing::Test {
     return grid;
   }
   float darkening(const ToyScene& now) {
-    return check.compare(grid_of({}), grid_of(now), region, TouchCheck::kAnyShape, field).darkening;
+    return check.compare(grid_of({}), grid_of(now), region, ContactCheck::kAnyShape, field)
+        .darkening;
   }
-  TouchCheck check;
+  ContactCheck check;
   LightField field{};
   CellRegion region{.x0 = 2, .y0 = 2, .x1 = 38, .y1 = 28};
 };
 
-TEST_F(TouchTest, LightIsNoTouch) {
+TEST_F(ContactCheckTest, LightIsNoContact) {
   EXPECT_LT(darkening({}), 0.001F);
   EXPECT_LT(darkening({.light = 0.5}), 0.001F);
   EXPECT_LT(darkening({.light = 1.3, .tilt = 0.3}), 0.001F);
 }
 
-TEST_F(TouchTest, APressIsATouchUnderAnyLight) {
+TEST_F(ContactCheckTest, APressIsAContactUnderAnyLight) {
   // 31.25 of about 150 grey levels a millimetre, less what the cells average away.
   EXPECT_NEAR(darkening({.press_mm = 1}), 0.2, 0.03);
   EXPECT_NEAR(darkening({.light = 0.5, .press_mm = 1}), 0.2, 0.03);
   EXPECT_GT(darkening({.light = 0.8, .tilt = -0.3, .press_mm = 0.15}), 0.02F);
 }
 
-TEST_F(TouchTest, TheFitSeesTheLightThroughAPress) {
+TEST_F(ContactCheckTest, TheFitSeesTheLightThroughAPress) {
   (void)darkening({.light = 0.5, .press_mm = 1.5});
   EXPECT_NEAR(field[cell_at(20, 15)], 0.5, 0.02);  // under the press
   EXPECT_NEAR(field[cell_at(5, 5)], 0.5, 0.01);
 }
 
-TEST_F(TouchTest, OneNumberSeesADimmedRingThroughALargePress) {
+TEST_F(ContactCheckTest, OneNumberSeesADimmedRingThroughALargePress) {
   const LumaGrid now = grid_of({.light = 0.5, .press_mm = 1.5});
-  (void)check.compare(grid_of({}), now, region, TouchCheck::kSameShape, field);
+  (void)check.compare(grid_of({}), now, region, ContactCheck::kSameShape, field);
   EXPECT_NEAR(field[cell_at(20, 15)], 0.5, 0.003);
   EXPECT_EQ(field[cell_at(20, 15)], field[0]);
 }
 
-TEST_F(TouchTest, OneOddCellIsNoTouchAndTwoAre) {
+TEST_F(ContactCheckTest, OneOddCellIsNoContactAndTwoAre) {
   LumaGrid now = grid_of({});
   now.cells[cell_at(20, 15)] *= 0.5F;
-  EXPECT_LT(check.compare(grid_of({}), now, region, TouchCheck::kAnyShape, field).darkening,
+  EXPECT_LT(check.compare(grid_of({}), now, region, ContactCheck::kAnyShape, field).darkening,
             0.001F);
   now.cells[cell_at(21, 15)] *= 0.9F;
-  EXPECT_NEAR(check.compare(grid_of({}), now, region, TouchCheck::kAnyShape, field).darkening, 0.1F,
-              0.002F);
+  EXPECT_NEAR(check.compare(grid_of({}), now, region, ContactCheck::kAnyShape, field).darkening,
+              0.1F, 0.002F);
 }
 
 TEST(Relight, EndsAtWhite) {
@@ -148,7 +149,7 @@ TEST(Relight, EndsAtWhite) {
   EXPECT_EQ(relit.back(), 65280);
 }
 
-TEST_F(TouchTest, RelightingBringsAReferenceToTheLightOfNow) {
+TEST_F(ContactCheckTest, RelightingBringsAReferenceToTheLightOfNow) {
   (void)darkening({.light = 0.7, .tilt = 0.2});
   const auto then = toy_reference_q8();
   const auto now = toy_reference_q8({.light = 0.7, .tilt = 0.2});
@@ -166,12 +167,12 @@ struct RealPair {
   const char* folder;
   const char* then;
   const char* now;
-  bool touched;
+  bool in_contact;
 };
 
 class RealTouch : public ::testing::TestWithParam<RealPair> {};
 
-TEST_P(RealTouch, IsToldFromDrift) {
+TEST_P(RealTouch, IsReportedFromDrift) {
   const RealPair& pair = GetParam();
   const std::filesystem::path folder =
       std::filesystem::path(DTACT_SHARED_DIR) / "data" / pair.folder;
@@ -184,14 +185,14 @@ TEST_P(RealTouch, IsToldFromDrift) {
     measure({image.pixels.data(), image.width, image.height, image.width}, grid);
     return grid;
   };
-  TouchCheck check;
+  ContactCheck check;
   LightField field{};
   // The published crop of 460×345 pixels about the middle, in cells of 16 pixels.
   const CellRegion crop{.x0 = 7, .y0 = 5, .x1 = 34, .y1 = 25};
-  const TouchVerdict verdict =
-      check.compare(load(pair.then), load(pair.now), crop, TouchCheck::kAnyShape, field);
+  const ContactVerdict verdict =
+      check.compare(load(pair.then), load(pair.now), crop, ContactCheck::kAnyShape, field);
   RecordProperty("darkening", std::to_string(verdict.darkening));
-  if (pair.touched) {
+  if (pair.in_contact) {
     EXPECT_GT(verdict.darkening, 0.04F);
   } else {
     EXPECT_LT(verdict.darkening, 0.0063F);  // half of what counts as a touch

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/pipeline/untouched/calibrated_image.hpp"
+#include "daemon/pipeline/reference/calibrated_image.hpp"
 #include "tests/fakes/scattering_toy.hpp"
 
 namespace dtact::pipeline {
@@ -18,22 +18,22 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using Calibration = std::shared_ptr<const calibration::Calibration>;
 
-struct Rung {
+struct MapVariant {
   int made = 0;  ///< 1/made of the resolution, …
   int steps = 0;
   int map = 0;  ///< … interpolated to 1/map.
-  bool operator==(const Rung&) const = default;
+  bool operator==(const MapVariant&) const = default;
 };
 
 constexpr int kAuto = ReconstructionRules::kAutoSharpen;
 
 /// `method`: ReconstructionRules::decimation.
-std::vector<Rung> rungs(const Calibration& calibration, int method, int sharpen) {
+std::vector<MapVariant> resolutions(const Calibration& calibration, int method, int sharpen) {
   const CalibratedImage image(calibration);
   Resolutions maps(calibration->model, image.cells.lattice(),
                    {.decimation = method, .sharpen = sharpen});
-  std::vector<Rung> all;
-  for (std::size_t i = 0; i < maps.rungs().size(); ++i) {
+  std::vector<MapVariant> all;
+  for (std::size_t i = 0; i < maps.resolutions().size(); ++i) {
     maps.use(i);
     all.push_back({maps.in_use().decimation(), maps.in_use().steps(), maps.shape().decimation});
   }
@@ -52,19 +52,20 @@ Calibration too_wide() {
 
 TEST(Resolutions, ArePlainWithoutSharpening) {
   const Calibration toy = fakes::scattering_toy_calibration(15);
-  EXPECT_THAT(rungs(toy, 1, 0), ElementsAre(Rung{1, 0, 1}));
-  EXPECT_THAT(rungs(toy, 2, 0), ElementsAre(Rung{2, 0, 2}));
-  EXPECT_THAT(rungs(toy, 4, 0), ElementsAre(Rung{4, 0, 4}));
-  EXPECT_THAT(rungs(toy, 0, 0), ElementsAre(Rung{4, 0, 4}, Rung{2, 0, 2}, Rung{1, 0, 1}));
+  EXPECT_THAT(resolutions(toy, 1, 0), ElementsAre(MapVariant{1, 0, 1}));
+  EXPECT_THAT(resolutions(toy, 2, 0), ElementsAre(MapVariant{2, 0, 2}));
+  EXPECT_THAT(resolutions(toy, 4, 0), ElementsAre(MapVariant{4, 0, 4}));
+  EXPECT_THAT(resolutions(toy, 0, 0),
+              ElementsAre(MapVariant{4, 0, 4}, MapVariant{2, 0, 2}, MapVariant{1, 0, 1}));
 }
 
 TEST(Resolutions, SharpenAtAQuarterForTheMapOfTheMethod) {
   const Calibration toy = fakes::scattering_toy_calibration(15);
   for (const int steps : {1, 2}) {
-    EXPECT_THAT(rungs(toy, 1, steps), ElementsAre(Rung{4, steps, 1}));
-    EXPECT_THAT(rungs(toy, 2, steps), ElementsAre(Rung{4, steps, 2}));
-    EXPECT_THAT(rungs(toy, 4, steps), ElementsAre(Rung{4, steps, 4}));
-    EXPECT_THAT(rungs(toy, 0, steps), ElementsAre(Rung{4, steps, 4}));
+    EXPECT_THAT(resolutions(toy, 1, steps), ElementsAre(MapVariant{4, steps, 1}));
+    EXPECT_THAT(resolutions(toy, 2, steps), ElementsAre(MapVariant{4, steps, 2}));
+    EXPECT_THAT(resolutions(toy, 4, steps), ElementsAre(MapVariant{4, steps, 4}));
+    EXPECT_THAT(resolutions(toy, 0, steps), ElementsAre(MapVariant{4, steps, 4}));
   }
 }
 
@@ -73,16 +74,17 @@ TEST(Resolutions, SharpenAtAQuarterForTheMapOfTheMethod) {
 TEST(Resolutions, ThatChooseTheirStepsAreAllMadeAtAQuarter) {
   const Calibration toy = fakes::scattering_toy_calibration(15);
   for (const int map : {1, 2, 4}) {
-    EXPECT_THAT(rungs(toy, map, kAuto),
-                ElementsAre(Rung{4, 0, map}, Rung{4, 1, map}, Rung{4, 2, map}));
+    EXPECT_THAT(resolutions(toy, map, kAuto),
+                ElementsAre(MapVariant{4, 0, map}, MapVariant{4, 1, map}, MapVariant{4, 2, map}));
   }
-  EXPECT_THAT(rungs(toy, 0, kAuto), ElementsAre(Rung{4, 0, 4}, Rung{4, 1, 4}, Rung{4, 2, 4}));
+  EXPECT_THAT(resolutions(toy, 0, kAuto),
+              ElementsAre(MapVariant{4, 0, 4}, MapVariant{4, 1, 4}, MapVariant{4, 2, 4}));
 }
 
 TEST(Resolutions, ThatChooseTheirStepsArePlainWhereThereAreNone) {
   for (const Calibration& toy : {Calibration(fakes::toy_calibration()), too_wide()}) {
     for (const int method : {0, 1, 2, 4}) {
-      EXPECT_EQ(rungs(toy, method, kAuto), rungs(toy, method, 0)) << method;
+      EXPECT_EQ(resolutions(toy, method, kAuto), resolutions(toy, method, 0)) << method;
     }
   }
 }
@@ -110,7 +112,7 @@ TEST(Resolutions, CountTheLightOfTheMapAlone) {
 }
 
 TEST(Resolutions, RefuseStepsThatTheFilterCannotTake) {
-  EXPECT_THAT([] { (void)rungs(too_wide(), 1, 2); },
+  EXPECT_THAT([] { (void)resolutions(too_wide(), 1, 2); },
               testing::ThrowsMessage<std::invalid_argument>(
                   testing::AllOf(HasSubstr("scattering.wide_mm: 19"), HasSubstr("\"auto\""))));
 }

@@ -7,8 +7,8 @@
 #include <string>
 #include <thread>
 
-#include "daemon/pipeline/untouched/reference_store.hpp"
-#include "daemon/pipeline/untouched/reference_writer.hpp"
+#include "daemon/pipeline/reference/reference_store.hpp"
+#include "daemon/pipeline/reference/reference_writer.hpp"
 #include "hal/base/atomic_file.hpp"
 #include "tests/fakes/own_path.hpp"
 #include "tests/fakes/toy_sensor.hpp"
@@ -82,7 +82,7 @@ TEST_F(StoreTest, HalvesOfDifferentAgesAreNoticed) {
   }
 }
 
-TEST_F(StoreTest, DamageNamesFileAndRemedy) {
+TEST_F(StoreTest, DamageNamesFileAndFix) {
   save_reference(some(), *calibration, folder);
   std::ofstream(folder / "reference.toml") << "version = 1\nlight =\n";
   try {
@@ -96,7 +96,7 @@ TEST_F(StoreTest, DamageNamesFileAndRemedy) {
 }
 
 TEST_F(StoreTest, TheWriterWritesBehind) {
-  base::SideThread thread("side");
+  base::BackgroundThread thread("side");
   ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder, thread);
   thread.start();
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
@@ -108,14 +108,14 @@ TEST_F(StoreTest, TheWriterWritesBehind) {
 
 TEST_F(StoreTest, TheWriterSaysWhatFailed) {
   std::ofstream(folder.string()) << "a file where the folder should be";
-  base::SideThread thread("side");
+  base::BackgroundThread thread("side");
   ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder, thread);
   thread.start();
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
   thread.stop();
   EXPECT_NE(writer.message().find("make the state folder writable"), std::string::npos)
       << writer.message();
-  std::filesystem::remove(folder);  // mended
+  std::filesystem::remove(folder);  // fixed
   thread.start();
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
   thread.stop();
@@ -123,14 +123,14 @@ TEST_F(StoreTest, TheWriterSaysWhatFailed) {
 }
 
 TEST_F(StoreTest, WithoutAFolderNothingIsKept) {
-  base::SideThread thread("side");
+  base::BackgroundThread thread("side");
   ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, {}, thread);
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));
 }
 
 TEST_F(StoreTest, ABusyWriterRefuses) {
-  base::SideThread thread("side");
+  base::BackgroundThread thread("side");
   ReferenceWriter writer(fakes::kToyWidth, fakes::kToyHeight, folder,
                          thread);  // not started: stays busy
   EXPECT_TRUE(writer.offer(fakes::toy_reference_q8(), {}, calibration));

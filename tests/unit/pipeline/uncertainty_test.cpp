@@ -81,7 +81,7 @@ TEST(Uncertainty, RimOfWhatIsTooDeepBendsMoreThanIsSeen) {
   EXPECT_DOUBLE_EQ(rim_factor(0, 700), 1);
 }
 
-TEST(Uncertainty, AddsListAndBlurInSquares) {
+TEST(Uncertainty, AddsLutAndBlurInSquares) {
   EXPECT_DOUBLE_EQ(uncertainty_um(30, 0), 30);
   EXPECT_DOUBLE_EQ(uncertainty_um(28, 3), 35);  // √(28² + 21²)
   EXPECT_DOUBLE_EQ(uncertainty_at_um(30, 0, 4), 30);
@@ -90,7 +90,7 @@ TEST(Uncertainty, AddsListAndBlurInSquares) {
 
 /// What a list is uncertain by at 0.5 mm after a change to its model.
 template <typename Change>
-double list_um(Change change) {
+double lut_um(Change change) {
   const auto calibration = fakes::toy_calibration();
   recon::Model model = *calibration->model;
   change(model);
@@ -98,51 +98,51 @@ double list_um(Change change) {
   hal::CameraInfo camera;
   camera.width = fakes::kToyWidth;
   camera.height = fakes::kToyHeight;
-  return activate(calibration, camera, {})->maps.list_um(0.5, 0);
+  return activate(calibration, camera, {})->maps.lut_um(0.5, 0);
 }
 
-TEST(ListUncertainty, IsTheCalibrationsBetweenItsRows) {
+TEST(LutUncertainty, IsTheCalibrationsBetweenItsRows) {
   EXPECT_DOUBLE_EQ(
-      list_um([](recon::Model& m) { m.uncertainty = {{.depth_mm = 0.4, .error_um = 30}}; }), 30);
-  EXPECT_DOUBLE_EQ(list_um([](recon::Model& m) {
+      lut_um([](recon::Model& m) { m.uncertainty = {{.depth_mm = 0.4, .error_um = 30}}; }), 30);
+  EXPECT_DOUBLE_EQ(lut_um([](recon::Model& m) {
                      m.uncertainty = {{.depth_mm = 0.4, .error_um = 30},
                                       {.depth_mm = 0.8, .error_um = 70}};
                    }),
                    40);
 }
 
-TEST(ListUncertainty, OfACalibrationThatDoesNotSayIsWhatTheTableMeasured) {
-  EXPECT_EQ(list_um([](recon::Model&) {}), 50);
-  EXPECT_EQ(list_um([](recon::Model& m) { m.method = recon::Method::published; }), 118);
-  EXPECT_EQ(list_um([](recon::Model& m) { m.gain.shape = recon::GainShape::radial; }), 118);
+TEST(LutUncertainty, OfACalibrationThatDoesNotSayIsWhatTheTableMeasured) {
+  EXPECT_EQ(lut_um([](recon::Model&) {}), 50);
+  EXPECT_EQ(lut_um([](recon::Model& m) { m.method = recon::Method::published; }), 118);
+  EXPECT_EQ(lut_um([](recon::Model& m) { m.gain.shape = recon::GainShape::radial; }), 118);
 }
 
 /// The ladder of plain resolutions, by what a frame's list and bend are expected to cost on each.
 class LadderChooser {
  public:
-  int next(double list_um, double bend_um) {
+  int next(double lut_um, double bend_um) {
     std::array<double, 3> expected{};
     for (std::size_t i = 0; i < 3; ++i) {
-      expected[i] = uncertainty_at_um(list_um, bend_um, kDecimations[i]);
+      expected[i] = uncertainty_at_um(lut_um, bend_um, kDecimations[i]);
     }
     return kDecimations[chooser_.next(expected)];
   }
 
  private:
   static constexpr std::array<int, 3> kDecimations{4, 2, 1};
-  RungChooser chooser_{50};
+  ResolutionChooser chooser_{50};
 };
 
-TEST(RungChooser, GoesFinerAtOnceAndCoarserWithPatience) {
+TEST(ResolutionChooser, GoesFinerAtOnceAndCoarserWithPatience) {
   LadderChooser chooser;
   EXPECT_EQ(chooser.next(20, 0), 4);
   EXPECT_EQ(chooser.next(20, 6.4), 2);  // √(20² + 44.8²) = 49.06; + 0.54 at half, + 1.98 at quarter
-  for (int i = 1; i < RungChooser::kPatience; ++i) EXPECT_NE(chooser.next(20, 1), 4) << i;
+  for (int i = 1; i < ResolutionChooser::kPatience; ++i) EXPECT_NE(chooser.next(20, 1), 4) << i;
   int frames = 0;
-  while (chooser.next(20, 1) != 4) ASSERT_LT(++frames, 3 * RungChooser::kPatience);
+  while (chooser.next(20, 1) != 4) ASSERT_LT(++frames, 3 * ResolutionChooser::kPatience);
 }
 
-TEST(RungChooser, PatienceBeginsAnewAfterEveryFrameThatIsNotWellInside) {
+TEST(ResolutionChooser, PatienceBeginsAnewAfterEveryFrameThatIsNotWellInside) {
   LadderChooser chooser;
   ASSERT_EQ(chooser.next(20, 6.4), 2);
   for (int round = 0; round < 3; ++round) {
@@ -156,7 +156,7 @@ TEST(RungChooser, PatienceBeginsAnewAfterEveryFrameThatIsNotWellInside) {
   EXPECT_EQ(chooser.next(20, 1), 4);
 }
 
-TEST(RungChooser, GoesOneStepCoarserAfterFifteenFramesEach) {
+TEST(ResolutionChooser, GoesOneStepCoarserAfterFifteenFramesEach) {
   LadderChooser chooser;
   ASSERT_EQ(chooser.next(60, 0), 1);
   std::vector<int> chosen;
@@ -167,21 +167,21 @@ TEST(RungChooser, GoesOneStepCoarserAfterFifteenFramesEach) {
   EXPECT_EQ(chosen, expected);
 }
 
-TEST(RungChooser, TakesFullResolutionWhereNothingIsInside) {
+TEST(ResolutionChooser, TakesFullResolutionWhereNothingIsInside) {
   LadderChooser chooser;
   EXPECT_EQ(chooser.next(60, 0), 1);
   for (int i = 0; i < 100; ++i) EXPECT_EQ(chooser.next(60, 0), 1);
 }
 
-TEST(RungChooser, DoesNotSwingAtTheBound) {
+TEST(ResolutionChooser, DoesNotSwingAtTheBound) {
   // At quarter resolution just outside, at half just inside: never inside by the margin.
   LadderChooser chooser;
   const int first = chooser.next(20, 6.3);
   for (int i = 0; i < 200; ++i) EXPECT_EQ(chooser.next(20, 6.3), first);
 }
 
-TEST(RungChooser, TakesTheLeastWrongWhereNothingIsInside) {
-  RungChooser chooser(50);
+TEST(ResolutionChooser, TakesTheLeastWrongWhereNothingIsInside) {
+  ResolutionChooser chooser(50);
   EXPECT_EQ(chooser.next(std::array{80.0, 60.0, 70.0}), 1U);
   EXPECT_EQ(chooser.next(std::array{80.0, 70.0, 60.0}), 2U);
   EXPECT_EQ(chooser.next(std::array{60.0, 70.0, 80.0}), 0U);

@@ -92,7 +92,7 @@ TEST(CameraWatch, SilenceOfThreePeriodsIsTrouble) {
   EXPECT_FALSE(watch.trouble());
 }
 
-TEST(CameraWatch, ReturningIsToldOnceAndIsNoGap) {
+TEST(CameraWatch, ReturningIsReportedOnceAndIsNoGap) {
   CameraWatch watch(kPeriod);
   (void)watch.arrived(numbered(100), 0);
   watch.missed(hal::GrabStatus::unplugged, kPeriod);
@@ -148,7 +148,7 @@ TEST(RateWatch, OneLongPauseIsNoSlowCamera) {
   EXPECT_DOUBLE_EQ(watch.fps(), 100);
 }
 
-TEST(RateWatch, ATenthLessIsToldAndAClocksErrorIsNot) {
+TEST(RateWatch, ATenthLessIsReportedAndAClocksErrorIsNot) {
   RateWatch watch(kPeriod);
   hal::FrameInfo info;
   add_frames(watch, info, 101, kPeriod * 110 / 100);
@@ -264,7 +264,7 @@ TEST(LightDiffers, ComparesAlongTheRingsGamma) {
       *calibration, {.leds = hal::Light::all({128, 128, 128}), .brightness = 255, .gamma = 2.2}));
 }
 
-TEST(Activate, NamesTheListThatSharpeningNeeds) {
+TEST(Activate, NamesTheLutThatSharpeningNeeds) {
   hal::CameraInfo camera;
   camera.width = fakes::kToyWidth;
   camera.height = fakes::kToyHeight;
@@ -326,7 +326,7 @@ TEST(Statistics, CountsFramesOfTheLastSecond) {
   EXPECT_DOUBLE_EQ(stages[7].max_us, 2000);
 }
 
-TEST(Statistics, KnowsThePagesItsThreadTouchedOnceASecondIsOver) {
+TEST(Statistics, KnowsThePagesItsThreadFaultedOnceASecondIsOver) {
   constexpr std::size_t kPages = 100;
   const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
   void* const fresh =

@@ -57,7 +57,7 @@ class Aio(unittest.IsolatedAsyncioTestCase):
         with FakeDaemon() as daemon:
             daemon.answers["rezero"] = refuse
             async with dtact.aio.connect(daemon.address) as s:
-                with self.assertRaisesRegex(dtact.Touched, "something touches"):
+                with self.assertRaisesRegex(dtact.InContact, "something touches"):
                     await s.rezero()
                 with self.assertRaisesRegex(dtact.NoFrame, "serving"):
                     await self.first(s.frames(timeout=0.05))

@@ -88,7 +88,7 @@ class Connecting(unittest.TestCase):
             with self.assertRaisesRegex(dtact.Error, "it is the second word"):
                 dtact.connect(token_file=file.name)
 
-    def test_no_token_to_strangers(self):
+    def test_no_token_to_unauthenticated(self):
         with FakeDaemon() as daemon, mock.patch("dtact.transport.is_local", return_value=False):
             with self.assertRaisesRegex(dtact.IdentityError, "fingerprint"):
                 dtact.connect(daemon.address, token="secret")
@@ -179,7 +179,7 @@ class Frames(unittest.TestCase):
 
 class Requests(unittest.TestCase):
     def test_refusals_have_types_and_the_daemons_sentence(self):
-        kinds = {4: dtact.Invalid, 5: dtact.Touched, 6: dtact.DeviceFailed, 7: dtact.Busy,
+        kinds = {4: dtact.Invalid, 5: dtact.InContact, 6: dtact.DeviceFailed, 7: dtact.Busy,
                  8: dtact.Uncalibrated, 9: dtact.StorageFailed, 10: dtact.Unsupported,
                  11: dtact.Denied, 99: dtact.Refused}
         with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
@@ -263,7 +263,7 @@ class Requests(unittest.TestCase):
 
     def test_a_rezero_may_take_as_long_as_the_daemon_says(self):
         def hello(request, reply):
-            reply.hello.major, reply.hello.rezero_within_s = 1, 60
+            reply.hello.major, reply.hello.rezero_timeout_s = 1, 60
 
         def late(request, reply):
             time.sleep(0.5)

@@ -69,16 +69,16 @@ class Else(unittest.TestCase):
 
     def test_contact(self):
         message = frame(1).frame
-        message.contact.touching = True
+        message.contact.in_contact = True
         message.contact.area_mm2 = 2.5
         message.contact.deepest_mm = 0.75
         contact = dtact.Frame(message).contact
-        self.assertTrue(contact.touching)
+        self.assertTrue(contact.in_contact)
         self.assertEqual((contact.area_mm2, contact.deepest_mm, contact.x_mm), (2.5, 0.75, 0.0))
 
     def test_force_is_none_where_there_is_none(self):
         message = frame(1).frame
-        message.contact.touching = True
+        message.contact.in_contact = True
         contact = dtact.Frame(message).contact
         self.assertEqual((contact.force_n, contact.force_uncertainty_n), (None, None))
         self.assertFalse(contact.force_valid)
@@ -122,11 +122,11 @@ class Events(unittest.TestCase):
         event.state.state = 5
         event.state.health.append(10)
         self.assertEqual((event_of(event).state, event_of(event).health),
-                         ("camera_lost", ("camera_trouble",)))
+                         ("camera_lost", ("camera_fault",)))
         event.reference.restored = True
         self.assertTrue(event_of(event).restored)
-        event.contact.contact.touching = True
-        self.assertTrue(event_of(event).contact.touching)
+        event.contact.contact.in_contact = True
+        self.assertTrue(event_of(event).contact.in_contact)
 
 
 if __name__ == "__main__":

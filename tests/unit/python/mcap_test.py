@@ -113,7 +113,7 @@ class Record(unittest.TestCase):
         # The sessions of both clients, without a connection.
         return dtact.aio.Client(address, **options)
 
-    def test_is_started_and_told_to_finish(self):
+    def test_is_started_and_reported_to_finish(self):
         self.dtactctl(f'trap "echo finished >> {self.said}; exit 0" TERM; echo "$@" > {self.said}\n'
                       "while true; do sleep 0.01; done")
         with self.session("gripper:7", fingerprint="AB" * 32).record("press.mcap"):

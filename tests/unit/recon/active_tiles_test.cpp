@@ -28,13 +28,13 @@ Model make_model() {
       make_crop_table(kFrameWidth, kFrameHeight, 1, 2, kFrameWidth - 2, kFrameHeight - 5);
   model.mm_per_px = 0.05;
   model.smoothing_px = 2;
-  model.list = {-40 * 64, {}, -40 * 64, 100 * 64};
+  model.lut = {-40 * 64, {}, -40 * 64, 100 * 64};
   for (int q6 = -40 * 64; q6 <= 110 * 64; ++q6) {
-    model.list.um.push_back(static_cast<std::int16_t>(q6 / 2));  // 32 µm a level
+    model.lut.um.push_back(static_cast<std::int16_t>(q6 / 2));  // 32 µm a level
   }
   model.scattering = Scattering{.narrow_mm = 0.08, .wide_mm = 0.25, .narrow_weight = 0.7};
-  model.sharpened = {{.steps = 1, .list = model.list, .uncertainty = {}},
-                     {.steps = 2, .list = model.list, .uncertainty = {}}};
+  model.sharpened = {{.steps = 1, .lut = model.lut, .uncertainty = {}},
+                     {.steps = 2, .lut = model.lut, .uncertainty = {}}};
   model.reference_q8.assign(pixel(0, kFrameHeight, kFrameWidth), 150 * 256);
   return model;
 }

@@ -17,9 +17,9 @@ Model straight_model() {
   Model model;
   model.rectify = make_crop_table(24, 20, 2, 3, 16, 12);
   model.mm_per_px = 0.05;
-  model.list = {-100 * 64, {}, -100 * 64, 100 * 64};
+  model.lut = {-100 * 64, {}, -100 * 64, 100 * 64};
   for (int q6 = -100 * 64; q6 <= 100 * 64; ++q6) {
-    model.list.um.push_back(static_cast<std::int16_t>(q6 / 2));
+    model.lut.um.push_back(static_cast<std::int16_t>(q6 / 2));
   }
   model.reference_q8.assign(std::size_t{24} * 20, 150 * 256);
   return model;

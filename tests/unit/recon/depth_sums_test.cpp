@@ -19,7 +19,8 @@
 namespace dtact::recon {
 namespace {
 
-constexpr SumRules kRules{.made_um = 100, .lost_um = 50, .bend_reach = 0, .bend_from_um = 80};
+constexpr SumRules kRules{
+    .threshold_um = 100, .release_um = 50, .bend_reach = 0, .bend_from_um = 80};
 
 auto all_of(const DepthSums& s) {
   return std::tuple(s.made, s.um, s.um_x, s.um_y, s.lost, s.deepest_um, s.deepest_x, s.deepest_y,
@@ -80,7 +81,7 @@ TEST(BendRow, IsTheSecondDifferenceOfPressedAndTrustedPixels) {
   EXPECT_EQ(std::tuple(fewer.bent, fewer.bend_um), std::tuple(1, 1550));
 }
 
-// Far beyond any layer: pixels of 16 mm beside pixels of −16 mm.
+// Far beyond any gel: pixels of 16 mm beside pixels of −16 mm.
 TEST(BendRow, NoPixelAddsMoreThan32Millimetres) {
   std::vector<std::int16_t> map(9, -16383);
   map[4] = 16383;
@@ -174,8 +175,8 @@ DepthSums walk(const std::vector<std::int16_t>& map, const TileGrid& grid, const
       const std::uint64_t row = tiles[static_cast<std::size_t>(y / TileGrid::kRows)];
       if ((row >> (x / grid.tile_width()) & 1U) == 0 || at(x, y) == kUntrusted) continue;
       const int um = at(x, y);
-      sums.lost += um > rules.lost_um ? 1 : 0;
-      if (um > rules.made_um) {
+      sums.lost += um > rules.release_um ? 1 : 0;
+      if (um > rules.threshold_um) {
         sums.made += 1;
         sums.um += um;
         sums.um_x += um * x;
@@ -221,7 +222,7 @@ TEST_P(VectorSums, StripsGiveWhatAWalkOverTheMapGives) {
   }
 }
 
-/// A frame read one to one; a list of half a micrometre a sixty-fourth.
+/// A frame read one to one; a LUT of half a micrometre a sixty-fourth.
 Model model_of(Method method, int width, int height) {
   Model model;
   model.method = method;
@@ -234,9 +235,9 @@ Model model_of(Method method, int width, int height) {
   }
   model.mm_per_px = 0.05;
   model.smoothing_px = 1;
-  model.list = {-40 * 64, {}, -40 * 64, 90 * 64};
+  model.lut = {-40 * 64, {}, -40 * 64, 90 * 64};
   for (int q6 = -40 * 64; q6 <= 90 * 64; ++q6) {
-    model.list.um.push_back(static_cast<std::int16_t>(q6 / 2));
+    model.lut.um.push_back(static_cast<std::int16_t>(q6 / 2));
   }
   model.reference_q8.assign(static_cast<std::size_t>((width + 1) * (height + 1)), 150 << 8);
   model.untrusted.resize(model.rectify.entries.size());
@@ -244,7 +245,7 @@ Model model_of(Method method, int width, int height) {
 }
 
 TEST_P(VectorSums, AReconstructionAddsUpItsOwnMap) {
-  for (const Method method : {Method::list, Method::published}) {
+  for (const Method method : {Method::lut, Method::published}) {
     constexpr int kWidth = 200;
     constexpr int kHeight = 130;
     Model model = model_of(method, kWidth, kHeight);

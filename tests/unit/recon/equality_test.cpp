@@ -25,7 +25,7 @@ class Equality : public EveryTarget {
   int uniform(int low, int high) {
     return low + static_cast<int>(random_() % static_cast<unsigned>(high - low + 1));
   }
-  /// A lens that bends rows and columns, a list that is looked up entry by entry or, at even
+  /// A lens that bends rows and columns, a LUT that is looked up entry by entry or, at even
   /// widths, has knots, a mask and a reference that is not the calibration's.
   Model make_model(const Shape& shape, Method method) {
     Model model;
@@ -50,22 +50,22 @@ class Equality : public EveryTarget {
     }
     model.mm_per_px = 0.05;
     model.smoothing_px = shape.smoothing_px;
-    model.list = {-40 * 64, {}, -20 * 64, 90 * 64};
+    model.lut = {-40 * 64, {}, -20 * 64, 90 * 64};
     for (int q6 = -40 * 64; q6 <= 110 * 64; ++q6) {
-      model.list.um.push_back(static_cast<std::int16_t>(q6 < 0                 ? q6 / 3
-                                                        : shape.width % 2 == 0 ? q6 / 2
-                                                                               : 2 * q6));
+      model.lut.um.push_back(static_cast<std::int16_t>(q6 < 0                 ? q6 / 3
+                                                       : shape.width % 2 == 0 ? q6 / 2
+                                                                              : 2 * q6));
     }
     // The narrow one reaches 1 to 6 pixels; the wide one, on its coarse grid, 1 to 9.
-    if (method == Method::list) {
+    if (method == Method::lut) {
       model.scattering = Scattering{.narrow_mm = 0.012 + shape.smoothing_px * 0.008,
                                     .wide_mm = 0.21 + shape.smoothing_px * 0.03,
                                     .narrow_weight = 0.6};
-      // Each list says otherwise at any level.
-      model.sharpened = {{.steps = 1, .list = model.list, .uncertainty = {}},
-                         {.steps = 2, .list = model.list, .uncertainty = {}}};
+      // Each LUT says otherwise at any level.
+      model.sharpened = {{.steps = 1, .lut = model.lut, .uncertainty = {}},
+                         {.steps = 2, .lut = model.lut, .uncertainty = {}}};
       for (Model::Sharpened& sharpened : model.sharpened) {
-        for (std::int16_t& um : sharpened.list.um) {
+        for (std::int16_t& um : sharpened.lut.um) {
           um = static_cast<std::int16_t>(um + sharpened.steps);
         }
       }
@@ -126,8 +126,8 @@ constexpr Shape kShapes[] = {{1, 1, 1},      {2, 3, 0},     {31, 17, 2},  {32, 1
                              {33, 15, 2},    {64, 47, 0.6}, {90, 33, 10}, {95, 64, 3.2},
                              {130, 70, 1.4}, {580, 40, 2}};
 
-TEST_P(Equality, List) {
-  for (const Shape& shape : kShapes) check(shape, Method::list);
+TEST_P(Equality, Lut) {
+  for (const Shape& shape : kShapes) check(shape, Method::lut);
 }
 
 TEST_P(Equality, Published) {
@@ -138,7 +138,7 @@ TEST_P(Equality, HalfAndQuarterResolution) {
   for (const int factor : {2, 4}) {
     for (const Shape& shape : kShapes) {
       if (shape.width < factor || shape.height < factor) continue;
-      check(shape, Method::list, factor);
+      check(shape, Method::lut, factor);
       check(shape, Method::published, factor);
     }
   }
@@ -146,10 +146,10 @@ TEST_P(Equality, HalfAndQuarterResolution) {
 
 TEST_P(Equality, Sharpened) {
   for (const int steps : {1, 2}) {
-    for (const Shape& shape : kShapes) check(shape, Method::list, 1, steps);
+    for (const Shape& shape : kShapes) check(shape, Method::lut, 1, steps);
     // As the daemon has it.
     for (const Shape& shape : {Shape{581, 163, 2}, Shape{130, 70, 1.4}}) {
-      check(shape, Method::list, 4, steps);
+      check(shape, Method::lut, 4, steps);
     }
   }
 }

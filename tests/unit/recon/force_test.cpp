@@ -1,4 +1,4 @@
-// The law of force against the simulator's layer, which solves contact on a grid of its own.
+// The law of force against the simulator's gel, which solves contact on a grid of its own.
 #include "daemon/recon/force.hpp"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "daemon/recon/model.hpp"
-#include "hal/sim/layer.hpp"
+#include "hal/sim/elastic_layer.hpp"
 
 namespace dtact::recon {
 namespace {
@@ -57,7 +57,7 @@ struct Contact {
 /// `height_mm(x, y)`: of the object above its lowest point.
 template <typename Height>
 Contact press(double thickness_mm, double depth_mm, Height height_mm) {
-  const hal::sim::Layer layer(kGrid, kGrid, kSpacing, thickness_mm);
+  const hal::sim::ElasticLayer layer(kGrid, kGrid, kSpacing, thickness_mm);
   cv::Mat1d target(kGrid, kGrid);
   for (int i = 0; i < kGrid; ++i) {
     for (int j = 0; j < kGrid; ++j) {
@@ -93,14 +93,14 @@ double block(double x, double y) {
   return std::abs(a) < 2.5 && std::abs(b) < 1.5 ? 0 : 1e3;
 }
 
-LayerResponse::Answer answer_to(const Contact& contact, double thickness_mm) {
+GelResponse::Answer answer_to(const Contact& contact, double thickness_mm) {
   CellMap cells(kWidth, kHeight, kMmPerPx);
   cells.read(contact.depth_um);
-  LayerResponse response(thickness_mm, cells);
+  GelResponse response(thickness_mm, cells);
   return response.answer(cells);
 }
 
-TEST(LayerResponse, IsTheForceThatHoldsTheIndentation) {
+TEST(GelResponse, IsTheForceThatHoldsTheIndentation) {
   for (const double thickness : {1.5, 3.0}) {
     const Contact small =
         press(thickness, 0.4, [](double x, double y) { return ball(2, x - 2.3, y + 1.1); });
@@ -118,10 +118,10 @@ TEST(LayerResponse, IsTheForceThatHoldsTheIndentation) {
   }
 }
 
-TEST(LayerResponse, IsLinearInTheDepthOfAFlatFace) {
+TEST(GelResponse, IsLinearInTheDepthOfAFlatFace) {
   const auto flat = [](double x, double y) { return block(x - 1.7, y + 0.6); };
-  const LayerResponse::Answer shallow = answer_to(press(2, 0.3, flat), 2);
-  const LayerResponse::Answer deep = answer_to(press(2, 0.6, flat), 2);
+  const GelResponse::Answer shallow = answer_to(press(2, 0.3, flat), 2);
+  const GelResponse::Answer deep = answer_to(press(2, 0.6, flat), 2);
   EXPECT_NEAR(deep.mm2 / shallow.mm2, 2, 0.1);
 }
 
@@ -154,7 +154,7 @@ TEST_F(ForceTest, IsTheModulusTimesTheAnswer) {
   fill(112, 80, 96, 64, 500);
   CellMap cells(kWidth, kHeight, kMmPerPx);
   cells.read(map);
-  const LayerResponse::Answer answer = LayerResponse(2, cells).answer(cells);
+  const GelResponse::Answer answer = GelResponse(2, cells).answer(cells);
   const ForceMeter::Reading said = read();
   ASSERT_TRUE(said.force);
   EXPECT_EQ(said.absence, ForceAbsence::none);
@@ -164,7 +164,7 @@ TEST_F(ForceTest, IsTheModulusTimesTheAnswer) {
 }
 
 TEST_F(ForceTest, IsLessSureOfUncertainMapsAndBeyondItsReadings) {
-  const LayerResponse::Answer answer{.mm2 = 10, .mm = 20};
+  const GelResponse::Answer answer{.mm2 = 10, .mm = 20};
   const Force sure = force_of(kModel, answer, 0.01);
   EXPECT_NEAR(sure.newtons, 2.08, 1e-9);
   EXPECT_GT(sure.uncertainty_n, 0.1);

@@ -110,23 +110,23 @@ TEST(Smooth, VerticalTakesRowsAboveAndBelow) {
   EXPECT_EQ(out[0], 50);  // 25 + 100 − 75
 }
 
-class GainListMask : public testing::Test {
+class GainLutMask : public testing::Test {
  protected:
   // −2 … 2 in Q6 become −20 … 20 µm; 3 stands for everything darker.
   const std::array<std::int16_t, 6> um{-20, -10, 0, 10, 20, kUntrusted};
-  const LookUp list{um.data(), -2, 3, 2};
+  const LutView lut{um.data(), -2, 3, 2};
   int run(int difference, int gain, bool untrusted, int* depth) const {
     const auto d = static_cast<std::int16_t>(difference);
     const auto g = static_cast<std::int16_t>(gain);
     const std::uint8_t mark = untrusted ? 1 : 0;
     std::int16_t out = 0;
-    const int beyond = gain_list_mask_row(&d, &g, &mark, list, 1, &out);
+    const int beyond = gain_lut_mask_row(&d, &g, &mark, lut, 1, &out);
     *depth = out;
     return beyond;
   }
 };
 
-TEST_F(GainListMask, LooksUpAndClamps) {
+TEST_F(GainLutMask, LooksUpAndClamps) {
   int depth = 0;
   EXPECT_EQ(run(1, 4096, false, &depth), 0);
   EXPECT_EQ(depth, 10);
@@ -136,7 +136,7 @@ TEST_F(GainListMask, LooksUpAndClamps) {
   EXPECT_EQ(depth, -20);
 }
 
-TEST_F(GainListMask, BeyondTheCoveredRangeIsUntrustedAndCounted) {
+TEST_F(GainLutMask, BeyondTheCoveredRangeIsUntrustedAndCounted) {
   int depth = 0;
   EXPECT_EQ(run(3, 4096, false, &depth), 1);
   EXPECT_EQ(depth, kUntrusted);
@@ -144,7 +144,7 @@ TEST_F(GainListMask, BeyondTheCoveredRangeIsUntrustedAndCounted) {
   EXPECT_EQ(depth, kUntrusted);
 }
 
-TEST_F(GainListMask, GainIsRoundedHalfUp) {
+TEST_F(GainLutMask, GainIsRoundedHalfUp) {
   int depth = 0;
   EXPECT_EQ(run(1, 2048, false, &depth), 0);  // 0.5 → 1
   EXPECT_EQ(depth, 10);
@@ -154,7 +154,7 @@ TEST_F(GainListMask, GainIsRoundedHalfUp) {
   EXPECT_EQ(depth, 0);
 }
 
-TEST_F(GainListMask, GreatestProductsSaturateInsteadOfWrapping) {
+TEST_F(GainLutMask, GreatestProductsSaturateInsteadOfWrapping) {
   int depth = 0;
   EXPECT_EQ(run(16320, 32767, false, &depth), 1);  // 130554 would wrap to −518
   EXPECT_EQ(depth, kUntrusted);
@@ -162,7 +162,7 @@ TEST_F(GainListMask, GreatestProductsSaturateInsteadOfWrapping) {
   EXPECT_EQ(depth, -20);
 }
 
-TEST_F(GainListMask, MarkComesLastAndHidesFromTheCount) {
+TEST_F(GainLutMask, MarkComesLastAndHidesFromTheCount) {
   int depth = 0;
   EXPECT_EQ(run(1, 4096, true, &depth), 0);
   EXPECT_EQ(depth, kUntrusted);
@@ -170,10 +170,10 @@ TEST_F(GainListMask, MarkComesLastAndHidesFromTheCount) {
   EXPECT_EQ(depth, kUntrusted);
 }
 
-TEST_F(GainListMask, WithoutGainAndMaskTheDifferenceIsLookedUp) {
+TEST_F(GainLutMask, WithoutGainAndMaskTheDifferenceIsLookedUp) {
   const std::array<std::int16_t, 2> difference{-1, 2};
   std::array<std::int16_t, 2> out{};
-  EXPECT_EQ(gain_list_mask_row(difference.data(), nullptr, nullptr, list, 2, out.data()), 0);
+  EXPECT_EQ(gain_lut_mask_row(difference.data(), nullptr, nullptr, lut, 2, out.data()), 0);
   EXPECT_EQ(out[0], -10);
   EXPECT_EQ(out[1], 20);
 }

@@ -28,12 +28,12 @@ Model model_of(Method method) {
   model.rectify = make_crop_table(kFrameWidth, kFrameHeight, 5, 4, kMapWidth, kMapHeight);
   model.mm_per_px = 0.05;
   model.smoothing_px = 1;
-  model.list.first_q6 = -40 * 64;
+  model.lut.first_q6 = -40 * 64;
   for (int q6 = -40 * 64; q6 <= 60 * 64; ++q6) {
-    model.list.um.push_back(static_cast<std::int16_t>(q6 / 2));
+    model.lut.um.push_back(static_cast<std::int16_t>(q6 / 2));
   }
-  model.list.covered_from_q6 = -20 * 64;
-  model.list.covered_to_q6 = 50 * 64;
+  model.lut.covered_from_q6 = -20 * 64;
+  model.lut.covered_to_q6 = 50 * 64;
   model.reference_q8.assign(static_cast<std::size_t>(kFrameWidth) * kFrameHeight, 160 * 256);
   return model;
 }
@@ -58,15 +58,15 @@ struct Bench {
   std::vector<std::int16_t> depth;
 };
 
-TEST(ReconstructorList, UntouchedIsZeroPressedPositiveBulgeNegative) {
-  Bench bench(model_of(Method::list));
+TEST(ReconstructorLut, NoContactIsZeroPressedPositiveBulgeNegative) {
+  Bench bench(model_of(Method::lut));
   EXPECT_THAT(bench.run(160), Each(0));
   EXPECT_THAT(bench.run(130), Each(960));
   EXPECT_THAT(bench.run(170), Each(-320));
 }
 
-TEST(ReconstructorList, BulgeSideHoldsDeepSideIsUntrusted) {
-  Bench bench(model_of(Method::list));
+TEST(ReconstructorLut, BulgeSideHoldsDeepSideIsUntrusted) {
+  Bench bench(model_of(Method::lut));
   EXPECT_THAT(bench.run(255), Each(-1280));
   EXPECT_EQ(bench.reconstructor.beyond_pixels(), 0);
   EXPECT_THAT(bench.run(110), Each(1600));
@@ -74,15 +74,15 @@ TEST(ReconstructorList, BulgeSideHoldsDeepSideIsUntrusted) {
   EXPECT_EQ(bench.reconstructor.beyond_pixels(), kMapWidth * kMapHeight);
 }
 
-TEST(ReconstructorList, HalfTheLightReadsTheSameDepth) {
-  Bench bench(model_of(Method::list));
+TEST(ReconstructorLut, HalfTheLightReadsTheSameDepth) {
+  Bench bench(model_of(Method::lut));
   bench.reference(80);
   EXPECT_THAT(bench.run(80), Each(0));
   EXPECT_THAT(bench.run(65), Each(960));  // 15 levels of half the light are 30 of the whole
 }
 
-TEST(ReconstructorList, LightThatChangedByAFactorReadsTheSameDepth) {
-  Bench bench(model_of(Method::list));
+TEST(ReconstructorLut, LightThatChangedByAFactorReadsTheSameDepth) {
+  Bench bench(model_of(Method::lut));
   bench.reconstructor.set_light(0.8);
   EXPECT_THAT(bench.run(128), Each(0));
   EXPECT_THAT(bench.run(104), Each(960));  // 24 levels of the dimmed light are 30
@@ -101,16 +101,16 @@ TEST(ReconstructorPublished, KnowsNoLight) {
   EXPECT_EQ(bench.run(150), before);
 }
 
-TEST(ReconstructorList, TooLittleLightIsUntrusted) {
-  Bench bench(model_of(Method::list));
+TEST(ReconstructorLut, TooLittleLightIsUntrusted) {
+  Bench bench(model_of(Method::lut));
   bench.reference(7);
   EXPECT_THAT(bench.run(7), Each(kUntrusted));
   bench.reference(160);
   EXPECT_THAT(bench.run(160), Each(0)) << "a later reference brings the pixels back";
 }
 
-TEST(ReconstructorList, TheMaskIsAppliedLast) {
-  Model model = model_of(Method::list);
+TEST(ReconstructorLut, TheMaskIsAppliedLast) {
+  Model model = model_of(Method::lut);
   model.untrusted.assign(static_cast<std::size_t>(kMapWidth) * kMapHeight, 0);
   model.untrusted[3 * kMapWidth + 2] = 1;
   Bench bench(std::move(model));
@@ -120,8 +120,8 @@ TEST(ReconstructorList, TheMaskIsAppliedLast) {
       << "no neighbour smeared";
 }
 
-TEST(ReconstructorList, OneDarkPixelSpreadsAsTheKernel) {
-  Bench bench(model_of(Method::list));
+TEST(ReconstructorLut, OneDarkPixelSpreadsAsTheKernel) {
+  Bench bench(model_of(Method::lut));
   std::ranges::fill(bench.luma, std::uint8_t{160});
   bench.luma[(4 + 8) * kFrameWidth + 5 + 10] = 60;  // the pixel at row 8, column 10 of the map
   bench.reconstructor.run(bench.luma.data(), kFrameWidth, bench.depth);
@@ -133,36 +133,36 @@ TEST(ReconstructorList, OneDarkPixelSpreadsAsTheKernel) {
   EXPECT_EQ(bench.depth[8 * kMapWidth + 14], 0) << "beyond the kernel";
 }
 
-TEST(ReconstructorList, TheSameFrameGivesTheSameDepth) {
-  Bench bench(model_of(Method::list));
+TEST(ReconstructorLut, TheSameFrameGivesTheSameDepth) {
+  Bench bench(model_of(Method::lut));
   const std::vector<std::int16_t> first = bench.run(137);
   bench.run(90);
   EXPECT_EQ(bench.run(137), first);
 }
 
-TEST(ReconstructorList, SharpenedLevelsNeedTheirOwnList) {
-  Model model = model_of(Method::list);
+TEST(ReconstructorLut, SharpenedLevelsNeedTheirOwnLut) {
+  Model model = model_of(Method::lut);
   model.scattering = Scattering{.narrow_mm = 0.1, .wide_mm = 0.4, .narrow_weight = 0.7};
-  model.sharpened = {{.steps = 2, .list = model.list, .uncertainty = {}}};
+  model.sharpened = {{.steps = 2, .lut = model.lut, .uncertainty = {}}};
   const auto shared = std::make_shared<const Model>(std::move(model));
   EXPECT_EQ(Reconstructor(shared, 2).sharpen_steps(), 2);
   EXPECT_EQ(Reconstructor(shared).sharpen_steps(), 0);
   EXPECT_THAT([&] { Reconstructor(shared, 1); },
               testing::ThrowsMessage<std::invalid_argument>(
-                  testing::HasSubstr("no list for 1 step of sharpening")));
+                  testing::HasSubstr("no LUT for 1 step of sharpening")));
 }
 
-TEST(ReconstructorList, TimesAreReportedWhenAskedFor) {
-  Bench bench(model_of(Method::list));
+TEST(ReconstructorLut, TimesAreReportedWhenAskedFor) {
+  Bench bench(model_of(Method::lut));
   StepTimes times{-1, -1, -1};
   bench.reconstructor.run(bench.luma.data(), kFrameWidth, bench.depth, &times);
   EXPECT_GE(times.rectify_ns, 0);
   EXPECT_GE(times.smooth_ns, 0);
-  EXPECT_GE(times.list_ns, 0);
+  EXPECT_GE(times.lut_ns, 0);
 }
 
-TEST(ReconstructorList, RowsMayBePaddedAndTheLastPixelIsReached) {
-  Model model = model_of(Method::list);
+TEST(ReconstructorLut, RowsMayBePaddedAndTheLastPixelIsReached) {
+  Model model = model_of(Method::lut);
   model.rectify = make_crop_table(kFrameWidth, kFrameHeight, kFrameWidth - kMapWidth,
                                   kFrameHeight - kMapHeight, kMapWidth, kMapHeight);
   model.smoothing_px = 0;
@@ -178,10 +178,10 @@ TEST(ReconstructorList, RowsMayBePaddedAndTheLastPixelIsReached) {
 
 TEST(ReconstructorPublished, HoldsBothEndsAndIgnoresTheLight) {
   Model model = model_of(Method::published);
-  model.list = {0, {}, 0, 40 * 64};
+  model.lut = {0, {}, 0, 40 * 64};
   for (int q6 = 0; q6 <= 40 * 64; ++q6) {
     const int level = (q6 + 32) / 64;
-    model.list.um.push_back(static_cast<std::int16_t>(std::max(0, level - 5) * 32));
+    model.lut.um.push_back(static_cast<std::int16_t>(std::max(0, level - 5) * 32));
   }
   Bench bench(std::move(model));
   EXPECT_THAT(bench.run(160), Each(0));
@@ -216,7 +216,7 @@ TEST(ReconstructorPublished, TheMaskDoesNotSmear) {
 }
 
 TEST(Reconstructor, MovesAndKeepsItsModel) {
-  Bench bench(model_of(Method::list));
+  Bench bench(model_of(Method::lut));
   Reconstructor moved(std::move(bench.reconstructor));
   std::vector<std::uint8_t> luma(static_cast<std::size_t>(kFrameWidth) * kFrameHeight + 64, 130);
   moved.run(luma.data(), kFrameWidth, bench.depth);
@@ -225,7 +225,7 @@ TEST(Reconstructor, MovesAndKeepsItsModel) {
 }
 
 void expect_refused(const std::function<void(Model&)>& spoil, const char* what) {
-  auto model = std::make_shared<Model>(model_of(Method::list));
+  auto model = std::make_shared<Model>(model_of(Method::lut));
   spoil(*model);
   EXPECT_THAT([&] { const Reconstructor r(model); },
               ThrowsMessage<std::invalid_argument>(HasSubstr(what)));
@@ -242,7 +242,7 @@ TEST(Reconstructor, RefusesPartsThatDisagree) {
   expect_refused([](Model& m) { m.rectify.width = 0; }, "rectify");
   expect_refused([](Model& m) { m.mm_per_px = 0; }, "mm_per_px");
   expect_refused([](Model& m) { m.smoothing_px = 50; }, "smoothing");
-  expect_refused([](Model& m) { m.list.um.clear(); }, "list.um");
+  expect_refused([](Model& m) { m.lut.um.clear(); }, "lut.um");
 }
 
 TEST(CropTable, CopiesTheRectangleAndReachesTheLastPixelByWeight) {

@@ -62,15 +62,15 @@ TEST(SharpenRow, ReadsTheCoarseGridBilinearly) {
 }
 
 TEST(SharpenRow, SaturatesAtBothEnds) {
-  constexpr std::int16_t kMost = kernels::kSmoothable;
-  const std::vector<std::int16_t> high(32, kMost);
-  const std::vector<std::int16_t> low(32, -kMost);
-  const std::vector<std::int16_t> coarse_low(10, -kMost);
+  constexpr std::int16_t kMax = kernels::kSmoothable;
+  const std::vector<std::int16_t> high(32, kMax);
+  const std::vector<std::int16_t> low(32, -kMax);
+  const std::vector<std::int16_t> coarse_low(10, -kMax);
   std::vector<std::int16_t> after(32);
   kernels::sharpen_row(high.data(), high.data(), low.data(),
                        {coarse_low.data() + 1, coarse_low.data() + 1, kernels::kEighth}, 9000, 32,
                        after.data());
-  EXPECT_THAT(after, testing::Each(kMost));
+  EXPECT_THAT(after, testing::Each(kMax));
 }
 
 /// A point of 64 levels' light in the middle, scattered and sharpened.

@@ -28,9 +28,8 @@ Specification::Specification(const Model& model, int sharpen_steps)
       steps_(sharpen_steps),
       width_(model.rectify.width),
       height_(model.rectify.height),
-      list_(steps_ == 0
-                ? model.list
-                : std::ranges::find(model.sharpened, steps_, &Model::Sharpened::steps)->list,
+      list_(steps_ == 0 ? model.lut
+                        : std::ranges::find(model.sharpened, steps_, &Model::Sharpened::steps)->lut,
             model.method) {
   set_reference(model.reference_q8);
 }
@@ -144,7 +143,7 @@ Specification::Plane Specification::sharpen(const Plane& level, const Plane& bef
 
 void Specification::set_reference(std::span<const std::uint16_t> reference_q8) {
   const std::vector<std::int16_t> taps =
-      model_.method == Method::list ? gaussian_taps(model_.smoothing_px) : kPublishedTaps;
+      model_.method == Method::lut ? gaussian_taps(model_.smoothing_px) : kPublishedTaps;
   reference_q6_ = rectify(reference_q8);
   const Plane calibration = smooth(rectify(model_.reference_q8), width_, height_, taps);
   const Plane now = smooth(reference_q6_, width_, height_, taps);
@@ -158,28 +157,28 @@ void Specification::set_reference(std::span<const std::uint16_t> reference_q8) {
   }
 }
 
-Specification::Plane Specification::look_up(const Plane& in, const std::int16_t* gain,
-                                            const std::uint8_t* untrusted) {
+Specification::Plane Specification::view(const Plane& in, const std::int16_t* gain,
+                                         const std::uint8_t* untrusted) {
   Plane out(in.size());
-  beyond_ = kernels::gain_list_mask_row(in.data(), gain, untrusted, list_.look_up(),
-                                        static_cast<int>(in.size()), out.data());
+  beyond_ = kernels::gain_lut_mask_row(in.data(), gain, untrusted, list_.view(),
+                                       static_cast<int>(in.size()), out.data());
   return out;
 }
 
 std::vector<std::int16_t> Specification::run(const std::uint8_t* luma, std::ptrdiff_t stride) {
   const Plane before = difference(luma, stride);
-  if (model_.method == Method::list) {
+  if (model_.method == Method::lut) {
     const Plane smoothed = smooth(before, width_, height_, gaussian_taps(model_.smoothing_px));
-    if (steps_ == 0) return look_up(smoothed, gain_q12_.data(), untrusted_.data());
+    if (steps_ == 0) return view(smoothed, gain_q12_.data(), untrusted_.data());
     std::vector<std::int16_t> gain = gain_q12_;
     for (std::size_t i = 0; i < gain.size(); ++i) gain[i] = untrusted_[i] != 0 ? 0 : gain[i];
     Plane level(smoothed.size());
     kernels::lit_row(smoothed.data(), gain.data(), static_cast<int>(gain.size()), level.data());
     Plane sharpened = level;
     for (int i = 0; i < steps_; ++i) sharpened = sharpen(level, sharpened);
-    return look_up(sharpened, nullptr, untrusted_.data());
+    return view(sharpened, nullptr, untrusted_.data());
   }
-  Plane depth = look_up(before, nullptr, nullptr);
+  Plane depth = view(before, nullptr, nullptr);
   for (int i = 0; i < 2; ++i) depth = smooth(depth, width_, height_, kPublishedTaps);
   kernels::mask_row(untrusted_.data(), static_cast<int>(depth.size()), depth.data());
   return depth;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "daemon/recon/list_table.hpp"
+#include "daemon/recon/kernel_lut.hpp"
 #include "daemon/recon/model.hpp"
 
 namespace dtact::recon {
@@ -18,7 +18,7 @@ class Specification {
   void set_reference(std::span<const std::uint16_t> reference_q8);
   /// Depth in micrometres, width × height of the model's table, row-major.
   [[nodiscard]] std::vector<std::int16_t> run(const std::uint8_t* luma, std::ptrdiff_t stride);
-  /// Pixels of the last run() that were darker than the list covers.
+  /// Pixels of the last run() that were darker than the LUT covers.
   [[nodiscard]] int beyond() const { return beyond_; }
 
  private:
@@ -28,8 +28,8 @@ class Specification {
   [[nodiscard]] Plane difference(const std::uint8_t* luma, std::ptrdiff_t stride) const;
   [[nodiscard]] static Plane smooth(const Plane& in, int width, int height,
                                     std::span<const std::int16_t> taps);
-  [[nodiscard]] Plane look_up(const Plane& in, const std::int16_t* gain,
-                              const std::uint8_t* untrusted);
+  [[nodiscard]] Plane view(const Plane& in, const std::int16_t* gain,
+                           const std::uint8_t* untrusted);
 
   /// One of Van Cittert's steps.
   [[nodiscard]] Plane sharpen(const Plane& level, const Plane& before) const;
@@ -38,7 +38,7 @@ class Specification {
   int steps_;
   int width_;
   int height_;
-  ListTable list_;
+  KernelLut list_;
   Plane reference_q6_;
   Plane gain_q12_;
   std::vector<std::uint8_t> untrusted_;

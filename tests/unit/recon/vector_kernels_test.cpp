@@ -258,14 +258,14 @@ TEST_P(VectorSmooth, BothDirectionsForEveryRadius) {
   }
 }
 
-class VectorList : public VectorKernels {
+class VectorLut : public VectorKernels {
  protected:
   void check(int first_q6, int entries, int covered_q6, bool gain) {
     std::vector<std::int16_t> um = values(entries, -32767, 32767);
     um.push_back(kUntrusted);
     check({um.data(), first_q6, first_q6 + entries - 1, covered_q6}, gain);
   }
-  void check(const kernels::LookUp& list, bool gain) {
+  void check(const kernels::LutView& lut, bool gain) {
     for (int width = 1; width < 140; width += uniform(1, 7)) {
       const int stride = padded(width) + uniform(0, 9);
       const std::vector<std::int16_t> difference = values(3 * stride, -32768, 32767);
@@ -277,25 +277,25 @@ class VectorList : public VectorKernels {
       std::vector<std::int16_t> is = should;
       int beyond = 0;
       for (std::ptrdiff_t y = 0; y < 3; ++y) {
-        beyond += kernels::gain_list_mask_row(
+        beyond += kernels::gain_lut_mask_row(
             difference.data() + y * stride, gain ? gains.data() + y * stride : nullptr,
-            gain ? marks.data() + y * stride : nullptr, list, width, should.data() + y * width);
+            gain ? marks.data() + y * stride : nullptr, lut, width, should.data() + y * width);
       }
-      const ListRows rows{difference.data(),
-                          stride,
-                          gain ? gains.data() : nullptr,
-                          stride,
-                          is.data(),
-                          width,
-                          width,
-                          3};
-      ASSERT_EQ(gain_list_mask(rows, list), beyond) << width;
+      const LutRows rows{difference.data(),
+                         stride,
+                         gain ? gains.data() : nullptr,
+                         stride,
+                         is.data(),
+                         width,
+                         width,
+                         3};
+      ASSERT_EQ(gain_lut_mask(rows, lut), beyond) << width;
       ASSERT_EQ(is, should) << width;
     }
   }
 };
 
-TEST_P(VectorList, EveryWidthWithAndWithoutGain) {
+TEST_P(VectorLut, EveryWidthWithAndWithoutGain) {
   for (const bool gain : {false, true}) {
     check(-40 * 64, 150 * 64 + 1, 100 * 64, gain);
     check(-16320, 32641, 16320, gain);
@@ -304,7 +304,7 @@ TEST_P(VectorList, EveryWidthWithAndWithoutGain) {
   }
 }
 
-TEST_P(VectorList, KnotsGiveWhatTheirTableGives) {
+TEST_P(VectorLut, KnotsGiveWhatTheirTableGives) {
   for (int round = 0; round < 30; ++round) {
     kernels::Knots knots;
     knots.step_bits = uniform(6, 7);
@@ -329,10 +329,10 @@ TEST_P(VectorList, KnotsGiveWhatTheirTableGives) {
   }
 }
 
-TEST_P(VectorList, WritesOverItsOwnInput) {
+TEST_P(VectorLut, WritesOverItsOwnInput) {
   std::vector<std::int16_t> um = values(150 * 64 + 1, -32767, 32767);
   um.push_back(kUntrusted);
-  const kernels::LookUp list{um.data(), -40 * 64, 110 * 64, 100 * 64};
+  const kernels::LutView lut{um.data(), -40 * 64, 110 * 64, 100 * 64};
   // Longer than the places that are looked up at once, too.
   for (const int width : {1, 31, 32, 33, 100, 640, 641, 1400}) {
     const int stride = padded(width);
@@ -340,12 +340,11 @@ TEST_P(VectorList, WritesOverItsOwnInput) {
     std::vector<std::int16_t> should = rows;
     int beyond = 0;
     for (std::ptrdiff_t y = 0; y < 2; ++y) {
-      beyond += kernels::gain_list_mask_row(rows.data() + y * stride, nullptr, nullptr, list, width,
-                                            should.data() + y * stride);
+      beyond += kernels::gain_lut_mask_row(rows.data() + y * stride, nullptr, nullptr, lut, width,
+                                           should.data() + y * stride);
     }
-    ASSERT_EQ(
-        gain_list_mask({rows.data(), stride, nullptr, 0, rows.data(), stride, width, 2}, list),
-        beyond);
+    ASSERT_EQ(gain_lut_mask({rows.data(), stride, nullptr, 0, rows.data(), stride, width, 2}, lut),
+              beyond);
     ASSERT_EQ(rows, should) << width;
   }
 }
@@ -353,7 +352,7 @@ TEST_P(VectorList, WritesOverItsOwnInput) {
 DTACT_EVERY_TARGET(VectorKernels);
 DTACT_EVERY_TARGET(VectorRectify);
 DTACT_EVERY_TARGET(VectorSmooth);
-DTACT_EVERY_TARGET(VectorList);
+DTACT_EVERY_TARGET(VectorLut);
 
 }  // namespace
 }  // namespace dtact::recon::vec

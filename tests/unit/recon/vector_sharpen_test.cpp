@@ -18,7 +18,7 @@ using kernels::kSmoothable;
 
 class VectorSharpen : public EveryTarget {
  protected:
-  static constexpr int kMostBlocks = 19;
+  static constexpr int kMaxBlocks = 19;
   static constexpr std::int16_t kUnwritten = 12321;
 
   int uniform(int low, int high) { return std::uniform_int_distribution(low, high)(random_); }
@@ -46,7 +46,7 @@ class VectorSharpen : public EveryTarget {
 };
 
 TEST_P(VectorSharpen, LitRow) {
-  for (int blocks = 1; blocks <= kMostBlocks; ++blocks) {
+  for (int blocks = 1; blocks <= kMaxBlocks; ++blocks) {
     const int width = blocks * kBlock;
     const auto difference = values(width, -32768, 32767);
     auto gain = values(width, 0, 32767);
@@ -61,7 +61,7 @@ TEST_P(VectorSharpen, LitRow) {
 }
 
 TEST_P(VectorSharpen, ShrinkRow) {
-  for (int blocks = 1; blocks <= kMostBlocks; ++blocks) {
+  for (int blocks = 1; blocks <= kMaxBlocks; ++blocks) {
     std::vector<std::vector<std::int16_t>> fine;
     std::vector<const std::int16_t*> rows;
     for (int i = 0; i < kCoarse; ++i) fine.push_back(levels(blocks * kBlock));
@@ -77,7 +77,7 @@ TEST_P(VectorSharpen, ShrinkRow) {
 }
 
 TEST_P(VectorSharpen, SharpenRow) {
-  for (int blocks = 1; blocks <= kMostBlocks; ++blocks) {
+  for (int blocks = 1; blocks <= kMaxBlocks; ++blocks) {
     const int width = blocks * kBlock;
     const auto level = levels(width);
     const auto before = levels(width);

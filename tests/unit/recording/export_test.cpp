@@ -31,7 +31,7 @@ class Export : public testing::Test {
     event.set_sequence(14);
     event.set_monotonic_ns(kBoot + 14 * 16'666'667);
     event.set_wall_ns(kWall);
-    event.mutable_contact()->mutable_contact()->set_touching(true);
+    event.mutable_contact()->mutable_contact()->set_in_contact(true);
     event.mutable_contact()->mutable_contact()->set_deepest_mm(0.5);
     writer.add(event);
     writer.finish();
@@ -89,7 +89,7 @@ TEST_F(Export, Tables) {
   ASSERT_EQ(run({"--to", "csv", "--frames", "3:"}), 0) << said_;
   EXPECT_EQ(
       read("frames.csv"),
-      "frame,sequence,time_ns,monotonic_ns,touching,area_mm2,x_mm,y_mm,deepest_mm,"
+      "frame,sequence,time_ns,monotonic_ns,in_contact,area_mm2,x_mm,y_mm,deepest_mm,"
       "deepest_x_mm,deepest_y_mm,volume_mm3,force_n,force_uncertainty_n,brightness,calibration,"
       "health,map\n"
       "3,13,1700000000216666671,1216666671,0,0,0,0,1.25,0,0,0,,,128,,,\n"

@@ -33,13 +33,13 @@ class RecorderTest : public testing::Test {
     Seen seen;
     const mcap::Reader reader(path_);
     seen.damage = reader.damage();
-    Takers takers;
-    takers.frame = [&](const v1::Frame& frame, std::uint64_t) {
+    RecordingHandlers handlers;
+    handlers.frame = [&](const v1::Frame& frame, std::uint64_t) {
       seen.frames.push_back(frame.sequence());
       return true;
     };
-    takers.event = [&](const v1::Event&, std::uint64_t) { return ++seen.events > 0; };
-    read_recording(reader, takers);
+    handlers.event = [&](const v1::Event&, std::uint64_t) { return ++seen.events > 0; };
+    read_recording(reader, handlers);
     return seen;
   }
 };

@@ -56,8 +56,8 @@ TEST_F(RecordingFile, KeepsAFrameWholeAndItsJpegOnce) {
   writer.add(sample_frame(1));
   writer.finish();
   std::vector<std::string> frames;
-  Takers takers;
-  takers.frame = [&](const v1::Frame& frame, std::uint64_t time) {
+  RecordingHandlers handlers;
+  handlers.frame = [&](const v1::Frame& frame, std::uint64_t time) {
     EXPECT_EQ(time, static_cast<std::uint64_t>(frame.wall_ns()));
     v1::Frame expected = sample_frame(frame.sequence());
     // The JPEG says its size itself.
@@ -67,7 +67,7 @@ TEST_F(RecordingFile, KeepsAFrameWholeAndItsJpegOnce) {
     frames.push_back(frame.jpeg().data());
     return true;
   };
-  read_recording(mcap::Reader(path_), takers);
+  read_recording(mcap::Reader(path_), handlers);
   EXPECT_THAT(frames, ElementsAre("jpeg 0", "jpeg 1"));
   EXPECT_FALSE(first<v1::Frame>(kFrameTopic).has_jpeg());
   const auto image = first<foxglove::CompressedImage>(kCameraTopic);
@@ -115,7 +115,7 @@ TEST_F(RecordingFile, TimesRunOnWhenTheWallClockIsSet) {
               ElementsAre(Row(1, kBegin + 20'000'000, kBegin - 3'599'000'000'000)));
 }
 
-TEST_F(RecordingFile, TellsEachLightOnce) {
+TEST_F(RecordingFile, ReportsEachLightOnce) {
   RecordingWriter writer(sink_, {.program = "test"});
   for (std::uint64_t i = 0; i < 4; ++i) {
     v1::Frame frame = sample_frame(i);

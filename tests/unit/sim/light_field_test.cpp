@@ -29,7 +29,7 @@ TEST(LightField, LevelsAreLumaTimesBrightness) {
 
 TEST(LightField, AllWhiteGivesTheSetLevelAtTheCentre) {
   Scene scene = small_scene("");
-  scene.layer.texture = 0;
+  scene.gel.texture = 0;
   EXPECT_NEAR(field(scene, {})[kCentre] / 64.0, scene.light.level, 0.1);
 }
 
@@ -88,7 +88,7 @@ TEST(LightField, IsAsUnevenAsThePapers) {
 
 TEST(LightField, SidesLightFromLeftAndRight) {
   Scene scene = small_scene("[light]\narrangement = \"sides\"\n");
-  scene.layer.texture = 0;
+  scene.gel.texture = 0;
   Light right;
   for (std::size_t i = 4; i < 8; ++i) right.leds[i] = {};
   const auto plane = field(scene, right);

@@ -52,13 +52,13 @@ TEST(Optics, AThickerSideDarkensLess) {
   OpticsModel linear = model();
   linear.pressed_curve = 0;
   linear.narrow_weight = 1;
-  LayerModel layer;
-  layer.taper_x = 0.02;
-  Optics optics(linear, kGrid, layer);
+  GelModel gel;
+  gel.taper_x = 0.02;
+  Optics optics(linear, kGrid, gel);
   const std::vector<std::int16_t> indentation(kPoints, Truth::kPerMm);  // 1 mm
   std::vector<std::int16_t> loss(kPoints);
   optics.run(indentation, loss);
-  // 10 mm to the left and to the right the layer is 0.8 and 1.2 of its mean.
+  // 10 mm to the left and to the right the gel is 0.8 and 1.2 of its mean.
   EXPECT_NEAR(loss[at(20, 100)], 0.2 / 0.8 * 32768, 10);
   EXPECT_NEAR(loss[at(100, 20)], 0.2 * 32768, 10);
   EXPECT_NEAR(loss[at(180, 100)], 0.2 / 1.2 * 32768, 10);
@@ -115,9 +115,9 @@ TEST(Optics, AResponseByKnotsIsTheIntegralOfItsSlopes) {
 // The variance across of the light that is lost round a small square, less the square's own; the
 // square is 8 points wide.
 double variance_of(const OpticsModel& optics, std::int16_t indentation_of_square) {
-  LayerModel layer;
-  layer.thickness_mm = 4.0;
-  Optics chain(optics, kGrid, layer);
+  GelModel gel;
+  gel.thickness_mm = 4.0;
+  Optics chain(optics, kGrid, gel);
   std::vector<std::int16_t> indentation(kPoints, 0);
   std::vector<std::int16_t> loss(kPoints);
   for (int y = 96; y < 104; ++y) {
@@ -158,9 +158,9 @@ TEST(Optics, WidthsFollowTheLocalThickness) {
 TEST(Optics, SharingOutBetweenThicknessesLosesNoLight) {
   OpticsModel optics = model();
   optics.growth = 1;
-  LayerModel layer;
-  layer.thickness_mm = 2.0;
-  Optics chain(optics, kGrid, layer);
+  GelModel gel;
+  gel.thickness_mm = 2.0;
+  Optics chain(optics, kGrid, gel);
   const std::vector<std::int16_t> indentation(kPoints, 5600);  // 0.7 mm: 0.65 of the thickness
   std::vector<std::int16_t> loss(kPoints);
   chain.run(indentation, loss);

@@ -51,10 +51,10 @@ vignetting = 0.02
 
 TEST(Renderer, SameSeedSameBytesWithEveryCompiler) {
   std::string toml = kSmallSensor;
-  toml.replace(toml.find("[layer]"), 7, kFixedSensor + "[layer]");
+  toml.replace(toml.find("[gel]"), 7, kFixedSensor + "[gel]");
   Scene scene = parse_scene(toml + kBallPress, "fixed.toml");
-  scene.layer.texture = 0.002;
-  scene.layer.texture_mm = 0.3;
+  scene.gel.texture = 0.002;
+  scene.gel.texture_mm = 0.3;
   // Recorded from this program; gcc 12 and clang 19 agree.
   EXPECT_EQ(checksum(render_frame(scene, 0, {}, 1)), 3335524664780952345U);
   EXPECT_EQ(checksum(render_frame(scene, 17, {}, 1)), 16580221340756209375U);

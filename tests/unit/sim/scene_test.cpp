@@ -36,7 +36,7 @@ TEST(Scene, DefaultIsThePapersField) {
   EXPECT_EQ(scene.camera.height, 600);
   EXPECT_EQ(scene.camera.fps, 60);
   EXPECT_NEAR(scene.camera.mm_per_px * 580, 24, 1e-4);
-  EXPECT_EQ(scene.layer.thickness_mm, 2);
+  EXPECT_EQ(scene.gel.thickness_mm, 2);
   ASSERT_EQ(scene.presses.size(), 3U);
   EXPECT_EQ(scene.presses[0].object.kind, "ball");
   EXPECT_GE(scene.presses[0].keys.front().time_s, 2.5);
@@ -53,8 +53,8 @@ TEST(Scene, EverySceneOfTheFolderLoads) {
 }
 
 TEST(Scene, WhatIsLeftOutIsTheBuiltInSensorsButNotItsPresses) {
-  const Scene scene = parse_scene("[layer]\nthickness_mm = 1.5\n", "x.toml");
-  EXPECT_EQ(scene.layer.thickness_mm, 1.5);
+  const Scene scene = parse_scene("[gel]\nthickness_mm = 1.5\n", "x.toml");
+  EXPECT_EQ(scene.gel.thickness_mm, 1.5);
   EXPECT_EQ(scene.camera.width, 800);
   EXPECT_EQ(scene.optics.pressed_slope, default_scene().optics.pressed_slope);
   EXPECT_TRUE(scene.presses.empty());
@@ -75,12 +75,12 @@ TEST(Scene, KeysInheritFromTheOneBefore) {
 
 TEST(Scene, TakesAnotherLaw) {
   const Scene scene = parse_scene(
-      "[layer]\npoisson = 0.49\n[optics]\nnarrow_weight = 0.6\nfar_mm = 3.0\nfar_weight = 0.1\n"
+      "[gel]\npoisson = 0.49\n[optics]\nnarrow_weight = 0.6\nfar_mm = 3.0\nfar_weight = 0.1\n"
       "growth = 1.0\nknots = [-0.2, 0.0, 0.5]\nslopes = [1.0, 0.5, 0.4]\n"
       "[[press]]\nobject = \"two_pillars\"\nradius_mm = 0.5\nspacing_mm = 1.5\n"
       "keys = [ { t = 1.0 } ]\n",
       "x.toml");
-  EXPECT_EQ(scene.layer.poisson, 0.49);
+  EXPECT_EQ(scene.gel.poisson, 0.49);
   EXPECT_EQ(scene.optics.far_mm, 3);
   EXPECT_EQ(scene.optics.growth, 1);
   EXPECT_EQ(scene.optics.slopes.at(2), 0.4);
@@ -113,7 +113,7 @@ class CalibratedScene : public ::testing::Test {
 // As dtact-calibrate writes it, errors beside the numbers.
 std::string model(double bulge_factor) {
   return fmt::format(
-      "[layer]\nthickness_mm = [2.4, 0.1]\nnarrow_mm = [0.12, 0.01]\nwide_mm = [1.16, 0.1]\n"
+      "[gel]\nthickness_mm = [2.4, 0.1]\nnarrow_mm = [0.12, 0.01]\nwide_mm = [1.16, 0.1]\n"
       "narrow_weight = [0.7, 0.02]\nindentation = [-0.24, -0.12, 0, 0.4, 0.8]\n"
       "slope = [2.5, 2.4, 0.6, 0.4, 0.5]\nslope_error = [1, 1, 0.1, 0.1, 0.2]\n"
       "bulge_factor = {}\nresidual_levels = 0.2\n",
@@ -124,11 +124,11 @@ TEST_F(CalibratedScene, IsThatSensor) {
   write(model(1));
   const Scene scene = parse_scene(
       fmt::format("calibration = \"{}\"\n[optics]\nwide_mm = 1.5\n", folder_.string()), "x.toml");
-  EXPECT_EQ(scene.layer.thickness_mm, 2.4);
+  EXPECT_EQ(scene.gel.thickness_mm, 2.4);
   EXPECT_EQ(scene.optics.narrow_mm, 0.12);
   EXPECT_EQ(scene.optics.wide_mm, 1.5);  // the scene's own
   // A tenth of the thickness in: half of (0.6 + 0.55) · 0.1.
-  EXPECT_NEAR(response(scene.optics, 0.24, scene.layer.thickness_mm), 0.0575, 1e-12);
+  EXPECT_NEAR(response(scene.optics, 0.24, scene.gel.thickness_mm), 0.0575, 1e-12);
 }
 
 TEST_F(CalibratedScene, MayHaveAKinkAtZero) {
@@ -141,7 +141,7 @@ TEST_F(CalibratedScene, MayHaveAKinkAtZero) {
 }
 
 TEST_F(CalibratedScene, NeedsAModel) {
-  write("[list]\nfirst_q6 = 0\n");
+  write("[lut]\nfirst_q6 = 0\n");
   Scene scene = default_scene();
   EXPECT_THROW(take_from_calibration(folder_, scene), std::runtime_error);
   EXPECT_THROW(take_from_calibration(folder_ / "absent", scene), std::exception);
@@ -165,9 +165,9 @@ TEST(Scene, ErrorsNameFileLineKeyAndWhatIsAllowed) {
 
 TEST(Scene, UnknownKeysAreErrorsEverywhere) {
   EXPECT_THAT(error_of("colour = 1\n"),
-              AllOf(HasSubstr("x.toml:1: colour"), HasSubstr("camera, fault, layer")));
-  EXPECT_THAT(error_of("[layer]\nthickness = 2.0\n"),
-              AllOf(HasSubstr("x.toml:2: layer.thickness:"), HasSubstr("thickness_mm")));
+              AllOf(HasSubstr("x.toml:1: colour"), HasSubstr("camera, fault, gel")));
+  EXPECT_THAT(error_of("[gel]\nthickness = 2.0\n"),
+              AllOf(HasSubstr("x.toml:2: gel.thickness:"), HasSubstr("thickness_mm")));
   EXPECT_THAT(error_of("[[press]]\nobject = \"m4_nut\"\nradius_mm = 2.0\nkeys = [ { t = 1.0 } ]\n"),
               HasSubstr("x.toml:3: press[0].radius_mm"));
   EXPECT_THAT(error_of("[[press]]\nobject = \"m4_nut\"\nkeys = [ { t = 1.0, z = 2.0 } ]\n"),

@@ -243,10 +243,10 @@ TEST_F(SimCameraTest, StallAndUnplugEndAndSayWhatToDo) {
   ASSERT_EQ(camera.grab(frame, 0s), GrabStatus::ok);
   EXPECT_EQ(frame.info().sequence, 3U);
   EXPECT_EQ(camera.report().state, CameraState::streaming);
-  EXPECT_TRUE(camera.report().remedy.empty());
+  EXPECT_TRUE(camera.report().fix.empty());
   for (int i = 0; i < 3; ++i) EXPECT_EQ(camera.grab(frame, 0s), GrabStatus::unplugged);
   EXPECT_EQ(camera.report().state, CameraState::unplugged);
-  EXPECT_THAT(camera.report().remedy, ::testing::HasSubstr("comes back"));
+  EXPECT_THAT(camera.report().fix, ::testing::HasSubstr("comes back"));
   EXPECT_EQ(camera.report().disconnects, 1U);
   ASSERT_EQ(camera.grab(frame, 0s), GrabStatus::ok);
   EXPECT_EQ(frame.info().sequence, 7U);
@@ -273,7 +273,7 @@ TEST_F(SimCameraTest, PacedFramesComeInOrderAndTheNewestFirst) {
   EXPECT_EQ(camera.grab(frame, 0s), GrabStatus::timeout);
 }
 
-TEST_F(SimCameraTest, PacedUnplugIsToldAtOnceAndEnds) {
+TEST_F(SimCameraTest, PacedUnplugIsReportedAtOnceAndEnds) {
   // Two seconds: a machine that is busy for longer than it lasts skips it.
   SimCamera camera(config(fault("unplug", 3, 200), "luma", true), link_);
   camera.start();

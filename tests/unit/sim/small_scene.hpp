@@ -14,7 +14,7 @@ width = 160
 height = 120
 fps = 10.0
 mm_per_px = 0.2
-[layer]
+[gel]
 grid_mm = 0.25
 )";
 

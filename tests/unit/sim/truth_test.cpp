@@ -38,7 +38,7 @@ TEST(Truth, IsPure) {
   EXPECT_EQ(forwards, again);
 }
 
-TEST(Truth, IsABallWhereItTouchesAndBulgesOutside) {
+TEST(Truth, IsABallInTheContactAndBulgesOutside) {
   const Truth truth(small_scene());
   std::vector<float> map;
   std::vector<std::uint8_t> contact;
@@ -46,7 +46,7 @@ TEST(Truth, IsABallWhereItTouchesAndBulgesOutside) {
   truth.contact(30, contact);
   ASSERT_EQ(map.size(), 160U * 120U);
   ASSERT_EQ(contact.size(), map.size());
-  int touching = 0;
+  int in_contact = 0;
   float lowest = 0;
   for (int y = 0; y < 120; ++y) {
     for (int x = 0; x < 160; ++x) {
@@ -54,7 +54,7 @@ TEST(Truth, IsABallWhereItTouchesAndBulgesOutside) {
       lowest = std::min(lowest, map[i]);
       const double r = std::hypot(x - 79.5, y - 59.5) * 0.2;
       if (contact[i] == 255 && r < 2) {
-        ++touching;
+        ++in_contact;
         // Sphere of radius 4, 1 mm deep; 0.006 for straight lines between points 0.25 mm apart.
         ASSERT_NEAR(map[i], 1 - (4 - std::sqrt(16 - r * r)), 0.006);
       }
@@ -63,7 +63,7 @@ TEST(Truth, IsABallWhereItTouchesAndBulgesOutside) {
       }
     }
   }
-  EXPECT_GT(touching, 300);  // π 2² / 0.2² = 314
+  EXPECT_GT(in_contact, 300);  // π 2² / 0.2² = 314
   EXPECT_LT(lowest, -0.02F);
 }
 
@@ -97,7 +97,7 @@ keys = [ { t = 0.0, x = 4.0, y = -3.0, depth = 0.5, rotation = 45.0 } ]
   EXPECT_LT(at(4 + 2.5, -3 - 2.5), 0.05F);
 }
 
-TEST(Truth, TellsWhereTheObjectIs) {
+TEST(Truth, ReportsWhereTheObjectIs) {
   const Scene scene = small_scene(R"(
 [[press]]
 object = "ball"
@@ -117,16 +117,16 @@ keys = [ { t = 1.0 }, { t = 2.0, depth = 1.0 }, { t = 3.0, x = 2.0, rotation = 1
   EXPECT_THROW((void)truth.pose(1, 0), std::out_of_range);
 }
 
-// Of a bonded layer no thicker than the contact is wide: more than the half-space's 16/9 E √R
+// Of a bonded gel no thicker than the contact is wide: more than the half-space's 16/9 E √R
 // d^1.5.
 TEST(Truth, ForceGrowsWithDepthAndIsYoungsModulusTimesAShape) {
   Scene scene = small_scene();  // R = 4 mm, 1 mm at frame 20
-  scene.layer.youngs_modulus_mpa = 0.1;
+  scene.gel.youngs_modulus_mpa = 0.1;
   const Truth soft(scene);
   EXPECT_EQ(soft.force_n(5), 0);
   EXPECT_GT(soft.force_n(20), 16.0 / 9 * 0.1 * 2);
   EXPECT_LT(soft.force_n(15), soft.force_n(20) / std::pow(2, 1.5));
-  scene.layer.youngs_modulus_mpa = 0.3;
+  scene.gel.youngs_modulus_mpa = 0.3;
   EXPECT_NEAR(Truth(scene).force_n(20), 3 * soft.force_n(20), 1e-9);
 }
 

@@ -27,9 +27,9 @@ ROOMS = {
     "daemon/recon": [],
     "daemon/calibration": ["hal/base", "hal/files", "daemon/recon"],
     # The two rooms inside know of the pipeline its settings, conditions and the frame it fills.
-    "daemon/pipeline/untouched": ["hal", "hal/base", "hal/files", "daemon/recon", "daemon/calibration", "daemon/pipeline"],
-    "daemon/pipeline/depth": ["hal", "hal/base", "daemon/recon", "daemon/pipeline", "daemon/pipeline/untouched"],
-    "daemon/pipeline": ["hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth"],
+    "daemon/pipeline/reference": ["hal", "hal/base", "hal/files", "daemon/recon", "daemon/calibration", "daemon/pipeline"],
+    "daemon/pipeline/depth": ["hal", "hal/base", "daemon/recon", "daemon/pipeline", "daemon/pipeline/reference"],
+    "daemon/pipeline": ["hal", "hal/base", "daemon/recon", "daemon/calibration", "daemon/pipeline/reference", "daemon/pipeline/depth"],
     "daemon/serve": ["hal/base", "proto"],
     "daemon/net": ["daemon/serve", "hal", "hal/base", "hal/files", "proto", "daemon/pipeline", "daemon/calibration", "daemon/recon"],
     # The text alone is made of what the network part gives; nothing includes it but the assembly.
@@ -51,7 +51,7 @@ ROOMS = {
     "clients/calibrate/offline": ["hal/base", "hal/files", "daemon/recon", "daemon/calibration", "clients/common", "clients/calibrate/fit", "clients/calibrate/fit/model", "clients/calibrate/lens"],
     "clients/calibrate/guided": ["hal/base", "hal/files", "proto", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/fit", "clients/calibrate/offline"],
     # Depth of a recording, made by what makes it in the daemon.
-    "clients/calibrate/reprocess": ["hal", "hal/base", "hal/files", "hal/luma", "hal/mjpeg", "proto", "daemon/calibration", "daemon/pipeline/untouched", "daemon/pipeline/depth", "clients/common", "clients/recording"],
+    "clients/calibrate/reprocess": ["hal", "hal/base", "hal/files", "hal/luma", "hal/mjpeg", "proto", "daemon/calibration", "daemon/pipeline/reference", "daemon/pipeline/depth", "clients/common", "clients/recording"],
     # Contacts of pictures and of recordings.
     "clients/calibrate/force": ["hal/base", "hal/files", "daemon/recon", "daemon/calibration", "clients/common", "clients/cpp", "clients/calibrate/offline", "clients/recording"],
     "clients/calibrate": ["clients/common", "clients/calibrate/force", "clients/calibrate/guided", "clients/calibrate/offline", "clients/calibrate/reprocess"],

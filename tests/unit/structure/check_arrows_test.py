@@ -18,12 +18,12 @@ class Arrows(unittest.TestCase):
 
     def test_allowed_includes_pass(self):
         self.assertEqual(self.found({
-            "daemon/recon/list.cpp": '#include "daemon/recon/list.hpp"\n#include <vector>\n',
+            "daemon/recon/depth_lut.cpp": '#include "daemon/recon/depth_lut.hpp"\n#include <vector>\n',
             "daemon/pipeline/slot.hpp": '#include "hal/frame.hpp"\n#include <sys/eventfd.h>\n',
         }), [])
 
     def test_hal_must_not_know_the_daemon(self):
-        self.assertEqual(len(self.found({"hal/sim/a.cpp": '#include "daemon/recon/list.hpp"\n'})), 1)
+        self.assertEqual(len(self.found({"hal/sim/a.cpp": '#include "daemon/recon/depth_lut.hpp"\n'})), 1)
 
     def test_recon_knows_the_standard_library_only(self):
         self.assertEqual(len(self.found({"daemon/recon/a.cpp": "#include <opencv2/core.hpp>\n"})), 1)

@@ -60,7 +60,7 @@ TEST(DeviceName, SaysWhatIsAttachedInstead) {
   }
 }
 
-TEST(ListAttached, TellsNamesApartAndLeavesOutWhatCapturesNothing) {
+TEST(ListAttached, ReportsNamesApartAndLeavesOutWhatCapturesNothing) {
   EmulatedCamera device;
   const auto cameras = list_attached();
   ASSERT_EQ(cameras.size(), 1U);

@@ -102,7 +102,7 @@ TEST(Payload, FindsAJpegsMarkersUnderPadding) {
   format.width = format.height = 8;
   const PayloadDecoder decoder(format);
   const auto inspect = [&](const std::vector<std::uint8_t>& payload) {
-    live::Filled filled;
+    live::FilledBuffer filled;
     filled.payload = payload;
     return decoder.inspect(filled);
   };

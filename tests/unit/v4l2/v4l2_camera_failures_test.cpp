@@ -17,12 +17,12 @@ struct StartFailure {
   unsigned long request;
   int error;
   CameraState state;
-  const char* remedy;
+  const char* fix;
 };
 
 class StartFails : public testing::TestWithParam<StartFailure> {};
 
-TEST_P(StartFails, IsAStateWithARemedyAndPasses) {
+TEST_P(StartFails, IsAStateWithAFixAndPasses) {
   EmulatedCamera device;
   const StartFailure& p = GetParam();
   device.fail(p.request, p.error);
@@ -31,7 +31,7 @@ TEST_P(StartFails, IsAStateWithARemedyAndPasses) {
   V4l2Camera camera(c);
   camera.start();
   EXPECT_EQ(camera.report().state, p.state);
-  EXPECT_EQ(camera.report().remedy, p.remedy);
+  EXPECT_EQ(camera.report().fix, p.fix);
   Frame frame;
   EXPECT_EQ(camera.grab(frame, milliseconds(1)), GrabStatus::unplugged);
 

@@ -30,7 +30,7 @@ TEST(V4l2Camera, ConvertsAndStampsAFrame) {
   EXPECT_EQ(camera.info().pixel_format, "GREY");
   EXPECT_EQ(camera.info().identity, "serial:4711");
   EXPECT_EQ(camera.report().state, CameraState::streaming);
-  EXPECT_EQ(camera.report().remedy, "");
+  EXPECT_EQ(camera.report().fix, "");
 }
 
 // uvc_video_decode_start() takes the time as it decodes a frame's first packet, while the queue

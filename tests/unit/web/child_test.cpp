@@ -20,7 +20,7 @@ namespace {
 
 using testing::ElementsAre;
 
-struct Told {
+struct Received {
   std::vector<std::string> lines;
   std::optional<int> status;
   std::string errors;
@@ -28,40 +28,40 @@ struct Told {
 
 /// Runs a script of the shell's to its end. `with`: once it runs.
 template <typename With>
-Told run(const std::string& script, const std::string& secret, With&& with) {
+Received run(const std::string& script, const std::string& secret, With&& with) {
   boost::asio::io_context io;
-  Told told;
+  Received received;
   const auto child = std::make_shared<Child>(io.get_executor());
   child->start({"sh", "-c", script}, secret,
-               {.line = [&](std::string line) { told.lines.push_back(std::move(line)); },
+               {.line = [&](std::string line) { received.lines.push_back(std::move(line)); },
                 .ended =
                     [&](int status, const std::string& errors) {
-                      told.status = status;
-                      told.errors = errors;
+                      received.status = status;
+                      received.errors = errors;
                     }});
   EXPECT_TRUE(child->runs());
   with(*child);
   io.run();
   EXPECT_FALSE(child->runs());
-  return told;
+  return received;
 }
 
 TEST(Child, IsTypedLinesAndAnswersInThem) {
-  const Told told =
+  const Received received =
       run("read a; read b; echo \"$b\"; echo \"$a\"; echo why >&2; exit 3", "", [](Child& child) {
         EXPECT_TRUE(child.type("first"));
         EXPECT_TRUE(child.type("second one"));
       });
-  EXPECT_THAT(told.lines, ElementsAre("second one", "first"));
-  ASSERT_TRUE(told.status.has_value());
-  EXPECT_EQ(WEXITSTATUS(*told.status), 3);
-  EXPECT_EQ(told.errors, "why\n");
+  EXPECT_THAT(received.lines, ElementsAre("second one", "first"));
+  ASSERT_TRUE(received.status.has_value());
+  EXPECT_EQ(WEXITSTATUS(*received.status), 3);
+  EXPECT_EQ(received.errors, "why\n");
 }
 
 TEST(Child, ReadsASecretThatNobodyElseCan) {
-  const Told told =
+  const Received received =
       run("cat /proc/self/fd/3; echo; stat -Lc %a /proc/self/fd/3", "gripper-token", [](Child&) {});
-  EXPECT_THAT(told.lines, ElementsAre("gripper-token", "600"));
+  EXPECT_THAT(received.lines, ElementsAre("gripper-token", "600"));
 }
 
 TEST(Child, HasNoneOfOurOtherFiles) {
@@ -85,8 +85,8 @@ TEST(Child, TakesNoMoreThanItIsBoundTo) {
 }
 
 TEST(Child, IsEndedAlsoWhereItWillNot) {
-  const Told told = run("exec sleep 60", "", [](Child& child) { child.end(); });
-  EXPECT_EQ(WTERMSIG(*told.status), SIGTERM);
+  const Received received = run("exec sleep 60", "", [](Child& child) { child.end(); });
+  EXPECT_EQ(WTERMSIG(*received.status), SIGTERM);
   // The trap stands once it says so.
   boost::asio::io_context io;
   const auto deaf = std::make_shared<Child>(io.get_executor());
@@ -100,9 +100,9 @@ TEST(Child, IsEndedAlsoWhereItWillNot) {
 }
 
 TEST(Child, KeepsTheEndOfALongComplaint) {
-  const Told told = run("seq 1 5000 >&2; echo last >&2; exit 1", "", [](Child&) {});
-  EXPECT_LE(told.errors.size(), 2000U);
-  EXPECT_TRUE(told.errors.ends_with("5000\nlast\n"));
+  const Received received = run("seq 1 5000 >&2; echo last >&2; exit 1", "", [](Child&) {});
+  EXPECT_LE(received.errors.size(), 2000U);
+  EXPECT_TRUE(received.errors.ends_with("5000\nlast\n"));
 }
 
 TEST(Child, SaysThatAProgramIsNotThere) {

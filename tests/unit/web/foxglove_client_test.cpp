@@ -60,10 +60,10 @@ class SlowSocket final : public WebSocket {
 TEST(FoxgloveClient, OnASlowLinkTheNewestMapWaits) {
   asio::io_context io;
   const auto socket = std::make_shared<SlowSocket>(io);
-  const auto station =
-      std::make_shared<Station>(std::make_shared<Source>(io, "left", client::Options{}));
+  const auto sensor =
+      std::make_shared<SensorTopics>(std::make_shared<Source>(io, "left", client::Options{}));
   const auto client =
-      std::make_shared<FoxgloveClient>(socket, std::vector<Place>{{station, "", {}}},
+      std::make_shared<FoxgloveClient>(socket, std::vector<Mount>{{sensor, "", {}}},
                                        net::Rights::view, "test", [](const std::string&) {});
   client->start();
   while (socket->finish_write()) {
@@ -71,12 +71,12 @@ TEST(FoxgloveClient, OnASlowLinkTheNewestMapWaits) {
   socket->receive(R"({"op":"subscribe","subscriptions":[{"id":7,"channelId":)" +
                   std::to_string(index(Topic::depth) + 1) + "}]}");
   socket->sent.clear();
-  const auto tell = [&](const char* map) {
-    client->on_message(*station, Topic::depth, std::make_shared<const Message>(Message{1, map}));
+  const auto publish = [&](const char* map) {
+    client->on_message(*sensor, Topic::depth, std::make_shared<const Message>(Message{1, map}));
   };
-  tell("first");  // on its way at once
-  tell("second");
-  tell("third");
+  publish("first");  // on its way at once
+  publish("second");
+  publish("third");
   while (socket->finish_write()) {
   }
   ASSERT_EQ(socket->sent.size(), 2U);

@@ -173,7 +173,7 @@ TEST(FoxgloveTopics, AreThoseThatTheDaemonServes) {
   EXPECT_EQ(unadvertise({{1, "/left", wanted}}), R"({"op":"unadvertise","channelIds":[18]})");
 }
 
-TEST(FoxgloveDoor, ATokenInTheAddress) {
+TEST(FoxgloveEndpoint, ATokenInTheAddress) {
   EXPECT_EQ(token_of("/foxglove"), "");
   EXPECT_EQ(token_of("/foxglove?token=abc"), "abc");
   EXPECT_EQ(token_of("/foxglove?x=1&token=a%2Bb%&y"), "a+b%");

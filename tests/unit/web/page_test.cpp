@@ -51,7 +51,7 @@ TEST_F(PageFolder, IsServedByItsPaths) {
   }
 }
 
-TEST_F(PageFolder, ATagTellsVersionsApart) {
+TEST_F(PageFolder, ATagReportsVersionsApart) {
   write("index.html", "<p>");
   const std::string before = Page(folder_).find("/")->tag;
   EXPECT_EQ(before, Page(folder_).find("/")->tag);

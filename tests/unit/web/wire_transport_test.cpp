@@ -52,7 +52,7 @@ using testing::ElementsAre;
 
 TEST(WireTransport, ATextGoesAtOnceWhenNothingIsWritten) {
   Rig rig;
-  rig.transport.tell("a");
+  rig.transport.publish("a");
   EXPECT_THAT(rig.socket->written, ElementsAre("text:a"));
   const std::string bytes = "1";
   rig.write(bytes);
@@ -67,12 +67,12 @@ TEST(WireTransport, OfTextsThatWaitTheNewestGoes) {
   Rig rig;
   const std::string bytes = "1";
   rig.write(bytes);
-  rig.transport.tell("a");
-  rig.transport.tell("b");
+  rig.transport.publish("a");
+  rig.transport.publish("b");
   rig.socket->finish();
   EXPECT_EQ(rig.done, 1);
   EXPECT_THAT(rig.socket->written, ElementsAre("1", "text:b"));
-  rig.transport.tell("c");
+  rig.transport.publish("c");
   rig.transport.shutdown_send(nullptr);
   rig.socket->finish();
   EXPECT_THAT(rig.socket->written, ElementsAre("1", "text:b", "end"));
@@ -80,17 +80,17 @@ TEST(WireTransport, OfTextsThatWaitTheNewestGoes) {
 
 TEST(WireTransport, ClientsSendNoTexts) {
   Rig rig;
-  error_code told;
-  rig.transport.read_some({}, [&](const error_code& error, std::size_t) { told = error; });
+  error_code reported;
+  rig.transport.read_some({}, [&](const error_code& error, std::size_t) { reported = error; });
   rig.socket->read({}, {3, true, true});
-  EXPECT_EQ(told, asio::error::operation_not_supported);
+  EXPECT_EQ(reported, asio::error::operation_not_supported);
 }
 
 TEST(WireTransport, ATextMayOutliveIt) {
   const auto socket = std::make_shared<FakeSocket>();
   {
     WireTransport transport(socket, {});
-    transport.tell("a");
+    transport.publish("a");
   }
   socket->finish();
   EXPECT_THAT(socket->written, ElementsAre("text:a"));

@@ -41,7 +41,7 @@ TEST(Ws2812Dimming, CurrentFollowsTheDatasheet) {
 }
 
 TEST(Ws2812Dimming, TheBudgetHolds) {
-  const Dimmed dimmed = dim(white(255), {.budget_ma = 250});
+  const DimmedLight dimmed = dim(white(255), {.budget_ma = 250});
   EXPECT_NEAR(dimmed.scale, 0.5127, 0.0001);  // (250 − 8) / (480 − 8)
   EXPECT_EQ(dimmed.leds[0], (Rgb{130, 130, 130}));
   EXPECT_LE(dimmed.milliamps, 250);
@@ -50,18 +50,18 @@ TEST(Ws2812Dimming, TheBudgetHolds) {
 
 TEST(Ws2812Dimming, TheBudgetKeepsTheHue) {
   const Light orange{Light::all({255, 128, 0}), 255};
-  const Dimmed dimmed = dim(orange, {.budget_ma = 120});
+  const DimmedLight dimmed = dim(orange, {.budget_ma = 120});
   EXPECT_EQ(dimmed.leds[0], (Rgb{120, 60, 0}));  // scale 112 / 236.3
 }
 
 TEST(Ws2812Dimming, ABudgetJustEnoughChangesNothing) {
-  const Dimmed dimmed = dim(white(255), {.budget_ma = 480});
+  const DimmedLight dimmed = dim(white(255), {.budget_ma = 480});
   EXPECT_EQ(dimmed.scale, 1);
   EXPECT_EQ(dimmed.leds[0], (Rgb{255, 255, 255}));
 }
 
 TEST(Ws2812Dimming, ABudgetForSleepOnlyIsDark) {
-  const Dimmed dimmed = dim(white(255), {.budget_ma = 8});
+  const DimmedLight dimmed = dim(white(255), {.budget_ma = 8});
   EXPECT_EQ(dimmed.leds[0], (Rgb{0, 0, 0}));
 }
 

@@ -178,7 +178,7 @@ TEST(Ws2812Encoder, AClockMayFallByTheWindowsWidth) {
     EXPECT_EQ(why_refused({c.bits, fastest * (c.share + 0.001)}), "") << c.bits;
     EXPECT_NE(why_refused({c.bits, fastest * (c.share - 0.001)}), "") << c.bits;
   }
-  EXPECT_EQ(why_refused({8, 0.626 * 8e6}), "");  // what kCure in spi_wire.cpp promises
+  EXPECT_EQ(why_refused({8, 0.626 * 8e6}), "");  // what kFix in spi_wire.cpp promises
 }
 
 }  // namespace

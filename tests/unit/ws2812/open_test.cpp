@@ -10,7 +10,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(OpenSpiRing, AnAbsentDeviceIsLookedForAndNamedWithItsRemedy) {
+TEST(OpenSpiRing, AnAbsentDeviceIsLookedForAndNamedWithItsFix) {
   Ws2812Config config;
   config.spi_device = "/dev/spidev-that-is-not-there";
   const auto ring = open_spi_ring(config);

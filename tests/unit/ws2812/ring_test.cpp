@@ -102,7 +102,7 @@ bool eventually(Condition condition) {
 
 const Light kRed{Light::all({255, 0, 0}), 255};
 
-TEST(Ws2812Ring, WritesWhatItIsToldAndGoesDarkAtTheEnd) {
+TEST(Ws2812Ring, WritesWhatItIsReportedAndGoesDarkAtTheEnd) {
   const auto record = std::make_shared<Record>();
   {
     const auto ours = ring(record, quiet());
@@ -152,11 +152,11 @@ TEST(Ws2812Ring, AFailedWriteIsTheCommandsErrorAndHealsByItself) {
   const auto record = std::make_shared<Record>();
   Ws2812Config config = quiet();
   config.resend_ms = 2;
-  record->error = "the wire is cut: mend it";
+  record->error = "the wire is cut: fix it";
   const auto ours = ring(record, config);
   const ShowResult result = ours->show(kRed);
   EXPECT_FALSE(result.ok);
-  EXPECT_EQ(result.message, "the wire is cut: mend it");
+  EXPECT_EQ(result.message, "the wire is cut: fix it");
   EXPECT_FALSE(ours->attend().ok);
   EXPECT_GE(ours->attend().failures, 1U);
 
@@ -172,7 +172,7 @@ TEST(Ws2812Ring, AfterAFailedCommandTheLightBeforeItIsSentAgain) {
   config.resend_ms = 2;
   const auto ours = ring(record, config);
   ASSERT_TRUE(ours->show(kRed).ok);
-  record->fail_with("the wire is cut: mend it");
+  record->fail_with("the wire is cut: fix it");
   EXPECT_FALSE(ours->show(Light{Light::all({0, 0, 9}), 255}).ok);
   record->fail_with("");
   ASSERT_TRUE(eventually([&] { return ours->attend().ok; }));
@@ -185,9 +185,9 @@ TEST(Ws2812Ring, AReSendThatFailsShowsInTheReport) {
   config.resend_ms = 2;
   const auto ours = ring(record, config);
   ASSERT_TRUE(ours->show(kRed).ok);
-  record->fail_with("the wire is cut: mend it");
+  record->fail_with("the wire is cut: fix it");
   ASSERT_TRUE(eventually([&] { return !ours->attend().ok; }));
-  EXPECT_EQ(ours->attend().message, "the wire is cut: mend it");
+  EXPECT_EQ(ours->attend().message, "the wire is cut: fix it");
 }
 
 TEST(Ws2812Ring, SaysWhenTheBudgetDimmed) {
@@ -248,7 +248,7 @@ TEST(Ws2812Ring, AnAbsentRingIsLookedForAndWorksOnceItIsThere) {
   EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
 }
 
-TEST(Ws2812Ring, AnAbsentRingStaysUntouchedAtTheEnd) {
+TEST(Ws2812Ring, AnAbsentRingStaysUnchangedAtTheEnd) {
   const auto record = std::make_shared<Record>();
   record->absence = "not there";
   (void)ring(record, quiet())->show(kRed);

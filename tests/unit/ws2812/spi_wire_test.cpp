@@ -128,7 +128,7 @@ TEST(Ws2812SpiWire, SendsWhatAChainThenShows) {
   EXPECT_EQ(chain.odd_pulses(), 0);
 }
 
-TEST(Ws2812SpiWire, ErrorsNameDeviceAndRemedy) {
+TEST(Ws2812SpiWire, ErrorsNameDeviceAndFix) {
   Bench bench;
   SpiWire wire = bench.wire();
   bench.port.error = EACCES;
@@ -239,7 +239,7 @@ TEST(Ws2812SpiWire, IsLostWithItsDeviceOnly) {
   }
 }
 
-TEST(Spidev, AnAbsentDeviceIsNamedWithTheRemedy) {
+TEST(Spidev, AnAbsentDeviceIsNamedWithTheFix) {
   try {
     const Spidev port("/dev/spidev-that-is-not-there", 3'200'000);
     FAIL() << "opened";

@@ -26,14 +26,14 @@ double outside_place(double index) {
   return 1 + (kFarthest - 1) * part * part;
 }
 
-/// What a layer of thickness x / k differs by from a half-space, of that one's answer:
+/// What a gel of thickness x / k differs by from a half-space, of that one's answer:
 /// (sinh 2x − 2x) / (cosh 2x + 1 + 2x²) − 1, written without cancellation.
 double layer_minus_half_space(double x) {
   return -(std::exp(-2 * x) + 2 * x + 1 + 2 * x * x) / (std::cosh(2 * x) + 1 + 2 * x * x);
 }
 
 /// Where that has fallen to 1e-9.
-constexpr double kNoLayerLeft = 13;
+constexpr double kNoGelLeft = 13;
 
 double knot(Eigen::Index j) {
   return std::sin(std::numbers::pi * static_cast<double>(j) / (2 * static_cast<double>(kHats)));
@@ -134,11 +134,11 @@ struct Matrices {
 
  private:
   void lay_out_kappa() {
-    // Narrow panels for thick layers, whose answer lives at small wave numbers, wide ones up to
+    // Narrow panels for thick gels, whose answer lives at small wave numbers, wide ones up to
     // where the thinnest is a half-space; J₀ at the farthest place turns once a panel.
     std::vector<double> nodes;
     std::vector<double> weights;
-    const double last = kNoLayerLeft / kThinnestLayer;
+    const double last = kNoGelLeft / kMinGelThicknessMm;
     for (double from = 0; from < last;) {
       const double to = from + (from < 0.5 ? 0.0625 : 0.4);
       for_gauss_points(from, to, [&](double k, double w) {
@@ -192,20 +192,20 @@ double BallContact::indentation_mm(double r_mm) const {
 BallContact press_ball(double ball_radius_mm, double contact_radius_mm, double thickness_mm) {
   const double a = contact_radius_mm;
   const double thickness = thickness_mm / a;  // contact radii
-  if (!(a > 0 && a <= kWidestContact * ball_radius_mm && thickness >= kThinnestLayer &&
-        thickness <= kThickestLayer)) {
+  if (!(a > 0 && a <= kWidestContact * ball_radius_mm && thickness >= kMinGelThicknessMm &&
+        thickness <= kMaxGelThicknessMm)) {
     throw std::invalid_argument(fmt::format(
-        "no contact {} mm wide of a ball of radius {} mm on a layer of {} mm can be computed",
-        2 * a, ball_radius_mm, thickness_mm));
+        "no contact {} mm wide of a ball of radius {} mm on a gel of {} mm can be computed", 2 * a,
+        ball_radius_mm, thickness_mm));
   }
   const Matrices& m = matrices();
   Eigen::Index count = 0;
-  while (count < m.kappa.size() && m.kappa[count] * thickness < kNoLayerLeft) ++count;
-  Eigen::VectorXd layer(count);
+  while (count < m.kappa.size() && m.kappa[count] * thickness < kNoGelLeft) ++count;
+  Eigen::VectorXd gel(count);
   for (Eigen::Index i = 0; i < count; ++i) {
-    layer[i] = m.weight[i] * layer_minus_half_space(m.kappa[i] * thickness);
+    gel[i] = m.weight[i] * layer_minus_half_space(m.kappa[i] * thickness);
   }
-  const Eigen::MatrixXd answered = layer.asDiagonal() * m.transform.topRows(count);
+  const Eigen::MatrixXd answered = gel.asDiagonal() * m.transform.topRows(count);
 
   // Unknowns: the pressures in units of E/(3/2·a), and the depth; one row a knot, edge included.
   Eigen::MatrixXd equations(kHats + 1, kHats + 1);
@@ -224,11 +224,11 @@ BallContact press_ball(double ball_radius_mm, double contact_radius_mm, double t
 }
 
 BallContact press_ball_to(double ball_radius_mm, double depth_mm, double thickness_mm) {
-  const double least = 1.001 * thickness_mm / kThickestLayer;
+  const double least = 1.001 * thickness_mm / kMaxGelThicknessMm;
   const double most =
-      0.999 * std::min(kWidestContact * ball_radius_mm, thickness_mm / kThinnestLayer);
+      0.999 * std::min(kWidestContact * ball_radius_mm, thickness_mm / kMinGelThicknessMm);
   // About as wide as the circle that the undeformed surface cuts out of the ball. Depth goes with
-  // the square of the radius, less on a thin layer, so that each step leaves a part of the error.
+  // the square of the radius, less on a thin gel, so that each step leaves a part of the error.
   double radius = std::sqrt(depth_mm * std::max(0.0, 2 * ball_radius_mm - depth_mm));
   for (int i = 0;; ++i) {
     radius = std::clamp(radius, least, most);

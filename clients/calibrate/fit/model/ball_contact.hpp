@@ -4,7 +4,7 @@
 
 namespace dtact::calibration {
 
-/// A rigid ball pressed without friction into a bonded, incompressible, linear-elastic layer: the
+/// A rigid ball pressed without friction into a bonded, incompressible, linear-elastic gel: the
 /// surface about the contact's axis.
 struct BallContact {
   double ball_radius_mm = 0;
@@ -19,8 +19,8 @@ struct BallContact {
 /// Greatest contact radius, of the ball's; and the range of thicknesses in contact radii for which
 /// the matrices were laid out.
 inline constexpr double kWidestContact = 0.97;
-inline constexpr double kThinnestLayer = 0.2;
-inline constexpr double kThickestLayer = 12;
+inline constexpr double kMinGelThicknessMm = 0.2;
+inline constexpr double kMaxGelThicknessMm = 12;
 
 /// The contact of a given radius. The surface answers a pressure p with û(k) = C(k)·p̂(k),
 ///
@@ -36,7 +36,7 @@ inline constexpr double kThickestLayer = 12;
                                      double thickness_mm);
 
 /// The contact of a ball pressed so deep, to 1e-4 mm; at most as wide as
-/// kWidestContact and kThinnestLayer allow.
+/// kWidestContact and kMinGelThicknessMm allow.
 [[nodiscard]] BallContact press_ball_to(double ball_radius_mm, double depth_mm,
                                         double thickness_mm);
 

@@ -11,18 +11,18 @@
 #include <utility>
 #include <vector>
 
-#include "clients/calibrate/fit/model/model_list.hpp"
+#include "clients/calibrate/fit/model/model_lut.hpp"
 #include "daemon/recon/kernels.hpp"
 
 namespace dtact::calibration {
 namespace {
 
-constexpr double kMostResidual = 0.5;  // grey levels
+constexpr double kMaxResidual = 0.5;  // grey levels
 /// Grey levels themselves are taken for shares of the light where that leaves so much less: on
 /// sensor_a 0.7 of the error, on sensor_b 1.02 (half-disc); in the simulator it is a share.
 constexpr double kRounder = 0.8;
-constexpr double kDeepest = 0.92;     // of the thickness
-constexpr double kWorthSaying = 0.5;  // grey levels of a press's offset
+constexpr double kDeepest = 0.92;           // of the thickness
+constexpr double kReportedDarkening = 0.5;  // grey levels of a press's offset
 
 /// Mean of the reference over what is not dark: what GainShape::uniform brings darkening to.
 double light_of(const recon::RectifyTable& table, const image::Grey16& reference_q8) {
@@ -59,14 +59,14 @@ double lopsided(std::span<const SettledPress> presses) {
 }
 
 /// The presses in which a contact is found, and the names of the others with reasons.
-struct Seen {
+struct UsablePresses {
   std::vector<SettledPress> presses;
   std::vector<std::string> names;
   std::vector<std::string> left_out;
 };
 
-Seen look(const recon::Model& model, const BallPresses& set) {
-  Seen seen;
+UsablePresses look(const recon::Model& model, const BallPresses& set) {
+  UsablePresses seen;
   for (const BallPresses::Press& press : set.presses) {
     try {
       seen.presses.push_back(
@@ -80,7 +80,7 @@ Seen look(const recon::Model& model, const BallPresses& set) {
 }
 
 /// A press is found at two places: something dark is taken for the ball.
-bool disagree(const Seen& seen, const Seen& shares, double mm_per_px) {
+bool disagree(const UsablePresses& seen, const UsablePresses& shares, double mm_per_px) {
   for (std::size_t i = 0; i < seen.names.size(); ++i) {
     const auto same = std::ranges::find(shares.names, seen.names[i]);
     if (same == shares.names.end()) continue;
@@ -92,17 +92,17 @@ bool disagree(const Seen& seen, const Seen& shares, double mm_per_px) {
 
 void refuse(const FittedCalibration& made) {
   const double residual = made.fit.residual * made.light_levels;
-  if (residual > kMostResidual) {
+  if (residual > kMaxResidual) {
     throw ModelRefused(fmt::format(
-        "no layer explains the press: what is left is {:.2f} grey levels (at most {}); check the "
+        "no gel explains the press: what is left is {:.2f} grey levels (at most {}); check the "
         "ball's radius and the scale, that the ball was clean and at rest, and that the light is "
         "even",
-        residual, kMostResidual));
+        residual, kMaxResidual));
   }
-  const double thickness = made.fit.layer.thickness_mm;
+  const double thickness = made.fit.gel.thickness_mm;
   if (made.fit.deepest_mm() > kDeepest * thickness) {
     throw ModelRefused(fmt::format(
-        "the press fits only as {:.2f} mm deep in a layer of {:.2f} mm, deeper than can be; check "
+        "the press fits only as {:.2f} mm deep in a gel of {:.2f} mm, deeper than can be; check "
         "the ball's radius and the scale, press lighter, and look for dark corners in the "
         "reference",
         made.fit.deepest_mm(), thickness));
@@ -110,58 +110,57 @@ void refuse(const FittedCalibration& made) {
 }
 
 /// The fit with its errors, carried from logarithms to what they stand for.
-Layer describe(const ModelFit& fit, double light_levels) {
+GelEstimate describe(const ModelFit& fit, double light_levels) {
   const auto deviation = [&](Eigen::Index i) { return std::sqrt(fit.covariance(i, i)); };
-  const recon::Scattering& scattering = fit.layer.scattering;
+  const recon::Scattering& scattering = fit.gel.scattering;
   const double weight = scattering.narrow_weight;
-  Layer layer;
-  layer.thickness_mm = {fit.layer.thickness_mm,
-                        fit.layer.thickness_mm * deviation(ModelFit::kThickness)};
-  // The fit does not mind which of its two widths is the narrow one; layer_of() does.
+  GelEstimate gel;
+  gel.thickness_mm = {fit.gel.thickness_mm, fit.gel.thickness_mm * deviation(ModelFit::kThickness)};
+  // The fit does not mind which of its two widths is the narrow one; gel_of() does.
   const bool crossed = fit.parameters[ModelFit::kNarrow] > fit.parameters[ModelFit::kWide];
   const auto narrow = crossed ? ModelFit::kWide : ModelFit::kNarrow;
   const auto wide = crossed ? ModelFit::kNarrow : ModelFit::kWide;
-  layer.narrow_mm = {scattering.narrow_mm, scattering.narrow_mm * deviation(narrow)};
-  layer.wide_mm = {scattering.wide_mm, scattering.wide_mm * deviation(wide)};
-  layer.narrow_weight = {weight, weight * (1 - weight) * deviation(ModelFit::kOdds)};
-  for (std::size_t i = 0; i < layer.slope.size(); ++i) {
-    const double slope = fit.layer.response.slopes[i];
-    layer.indentation[i] = Response::kKnots[i];
-    layer.slope[i] = {slope, slope * deviation(ModelFit::kSlopes + static_cast<Eigen::Index>(i))};
+  gel.narrow_mm = {scattering.narrow_mm, scattering.narrow_mm * deviation(narrow)};
+  gel.wide_mm = {scattering.wide_mm, scattering.wide_mm * deviation(wide)};
+  gel.narrow_weight = {weight, weight * (1 - weight) * deviation(ModelFit::kOdds)};
+  for (std::size_t i = 0; i < gel.slope.size(); ++i) {
+    const double slope = fit.gel.response.slopes[i];
+    gel.indentation[i] = Response::kKnots[i];
+    gel.slope[i] = {slope, slope * deviation(ModelFit::kSlopes + static_cast<Eigen::Index>(i))};
   }
-  layer.bulge_factor = fit.layer.response.bulge_factor;
-  layer.residual_levels = fit.residual * light_levels;
-  return layer;
+  gel.bulge_factor = fit.gel.response.bulge_factor;
+  gel.residual_levels = fit.residual * light_levels;
+  return gel;
 }
 
 }  // namespace
 
 std::string FittedCalibration::describe_press() const {
-  if (press_gains.size() != 1) return {};
-  std::string text = press_gains.front().describe();
+  if (press_asymmetries.size() != 1) return {};
+  std::string text = press_asymmetries.front().describe();
   const double darker = fit.presses.front().offset * light_levels;
-  if (std::abs(darker) > kWorthSaying) {
+  if (std::abs(darker) > kReportedDarkening) {
     text += fmt::format(
         "\nlight: far from the ball the picture is {:.1f} grey levels {} than untouched, which no "
-        "layer does; the list was made without them",
+        "gel does; the LUT was made without them",
         std::abs(darker), darker > 0 ? "darker" : "brighter");
   }
   return text;
 }
 
-FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& gain) {
+FittedCalibration build_model(const BallPresses& set, const recon::FlatFieldGain& gain) {
   check_sizes(set.ball_radius_mm, set.mm_per_px);
   FittedCalibration made;
   made.calibration = empty_calibration(set.reference_q8, set.crop, set.mm_per_px, set.lens);
   auto model = std::make_shared<recon::Model>(*made.calibration.model);
   model->gain = gain_on_map(gain, made.calibration);
-  Seen seen = look(*model, set);
-  if (!set.gain_told && gain.shape == recon::GainShape::none && gain.polynomial.empty()) {
+  UsablePresses seen = look(*model, set);
+  if (!set.gain_specified && gain.shape == recon::GainShape::none && gain.polynomial.empty()) {
     // The loss is a share of the light. Rings do not tell whether a sensor's picture is one, but
     // where it is not, a share of uneven light makes a round dent lopsided.
     recon::Model uniform = *model;
     uniform.gain.shape = recon::GainShape::uniform;
-    Seen shares = look(uniform, set);
+    UsablePresses shares = look(uniform, set);
     if (shares.presses.size() >= seen.presses.size() && !shares.presses.empty() &&
         !disagree(seen, shares, set.mm_per_px) &&
         (seen.presses.empty() || lopsided(seen.presses) > kRounder * lopsided(shares.presses))) {
@@ -178,10 +177,11 @@ FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& 
   std::vector<PressProfile> profiles;
   profiles.reserve(seen.presses.size());
   for (const SettledPress& press : seen.presses) {
-    made.press_gains.push_back(
-        choose_press_gain(sure_samples(press.map, press.contact), set.ball_radius_mm));
-    profiles.push_back(profile_of(levelled(press.map, press.contact, made.press_gains.back().gain),
-                                  optics.light_levels, optics.smoothing_mm));
+    made.press_asymmetries.push_back(
+        choose_asymmetry(sure_samples(press.map, press.contact), set.ball_radius_mm));
+    profiles.push_back(
+        profile_of(without_asymmetry(press.map, press.contact, made.press_asymmetries.back().gain),
+                   optics.light_levels, optics.smoothing_mm));
   }
   // What does not fit one press fits several even less, and costs as much for each.
   const auto deepest = std::ranges::max_element(
@@ -196,15 +196,15 @@ FittedCalibration build_model(const BallPresses& set, const recon::SpatialGain& 
     made.presses.push_back({seen.names[i], made.fit.presses[i].depth_mm});
   }
 
-  model->scattering = made.fit.layer.scattering;
-  std::array<ListOfModel, kLists> lists = lists_of(made.fit, optics);
-  model->list = std::move(lists.front().list);
-  model->uncertainty = std::move(lists.front().uncertainty);
-  for (std::size_t i = 1; i < lists.size(); ++i) {
+  model->scattering = made.fit.gel.scattering;
+  std::array<ModelLut, kLuts> luts = luts_of(made.fit, optics);
+  model->lut = std::move(luts.front().lut);
+  model->uncertainty = std::move(luts.front().uncertainty);
+  for (std::size_t i = 1; i < luts.size(); ++i) {
     model->sharpened.push_back(
-        {static_cast<int>(i), std::move(lists[i].list), std::move(lists[i].uncertainty)});
+        {static_cast<int>(i), std::move(luts[i].lut), std::move(luts[i].uncertainty)});
   }
-  made.calibration.layer = describe(made.fit, optics.light_levels);
+  made.calibration.gel = describe(made.fit, optics.light_levels);
   made.calibration.model = std::move(model);
   return made;
 }

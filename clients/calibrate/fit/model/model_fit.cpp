@@ -27,23 +27,23 @@ enum Own : int { kRadius, kOffset, kOwnCount };
 constexpr std::array<double, 3> kStartThicknesses = {1.5, 2, 2.8};
 /// What a ring's mean may be off by that no parameter explains: where the fit begins, and the least
 /// that is believed. Shares of the light.
-constexpr double kFirstDoubt = 1e-3;
-constexpr double kLeastDoubt = 6e-5;
-constexpr int kMostIterations = 30;
+constexpr double kFirstUncertainty = 1e-3;
+constexpr double kMinUncertainty = 6e-5;
+constexpr int kMaxIterations = 30;
 
-LayerModel layer_from(std::span<const double> x) {
-  LayerModel layer;
-  layer.thickness_mm = std::exp(x[kThickness]);
+GelModel gel_from(std::span<const double> x) {
+  GelModel gel;
+  gel.thickness_mm = std::exp(x[kThickness]);
   const double narrow = std::exp(x[kNarrow]);
   const double wide = std::exp(x[kWide]);
   const double weight = 1 / (1 + std::exp(-x[kOdds]));
-  layer.scattering = narrow < wide ? recon::Scattering{narrow, wide, weight}
-                                   : recon::Scattering{wide, narrow, 1 - weight};
-  for (std::size_t i = 0; i < layer.response.slopes.size(); ++i) {
-    layer.response.slopes[i] = std::exp(x[kSlopes + i]);
+  gel.scattering = narrow < wide ? recon::Scattering{narrow, wide, weight}
+                                 : recon::Scattering{wide, narrow, 1 - weight};
+  for (std::size_t i = 0; i < gel.response.slopes.size(); ++i) {
+    gel.response.slopes[i] = std::exp(x[kSlopes + i]);
   }
-  layer.response.bulge_factor = std::exp(x[kBulge]);
-  return layer;
+  gel.response.bulge_factor = std::exp(x[kBulge]);
+  return gel;
 }
 
 /// One press's rings against what the model makes of it.
@@ -57,11 +57,11 @@ class RingCost {
         to_rings_(RadialTransform::instance().back_to(press.radius_mm)) {}
 
   bool operator()(const double* const* parameters, double* residuals) const {
-    const LayerModel layer = layer_from(std::span(parameters[0], shared_));
+    const GelModel gel = gel_from(std::span(parameters[0], shared_));
     const double* own = parameters[1];
-    if (!press(std::exp(own[kRadius]), layer)) return false;
+    if (!press(std::exp(own[kRadius]), gel)) return false;
     const Eigen::VectorXd seen =
-        to_rings_ * spectrum_.cwiseProduct(scattered(layer.scattering)).cwiseProduct(smoothing_);
+        to_rings_ * spectrum_.cwiseProduct(scattered(gel.scattering)).cwiseProduct(smoothing_);
     for (std::size_t i = 0; i < press_.radius_mm.size(); ++i) {
       residuals[i] = (seen[static_cast<Eigen::Index>(i)] + own[kOffset] - press_.loss[i]) /
                      std::hypot(doubt_, press_.noise[i]);
@@ -72,20 +72,20 @@ class RingCost {
  private:
   /// The contact is solved anew only when its radius or the thickness moved, and the loss only when
   /// they or the response did: half of the derivatives need neither.
-  bool press(double radius_mm, const LayerModel& layer) const {
+  bool press(double radius_mm, const GelModel& gel) const {
     const bool same_contact = contact_ && contact_->contact_radius_mm == radius_mm &&
-                              pressed_.thickness_mm == layer.thickness_mm;
-    if (same_contact && pressed_.response == layer.response) return true;
+                              pressed_.thickness_mm == gel.thickness_mm;
+    if (same_contact && pressed_.response == gel.response) return true;
     if (!same_contact) {
       try {
-        contact_ = press_ball(press_.ball_radius_mm, radius_mm, layer.thickness_mm);
+        contact_ = press_ball(press_.ball_radius_mm, radius_mm, gel.thickness_mm);
       } catch (const std::invalid_argument&) {
         contact_.reset();
         return false;
       }
     }
-    pressed_ = layer;
-    spectrum_ = imagine(layer, *contact_).spectrum;
+    pressed_ = gel;
+    spectrum_ = predict_press(gel, *contact_).spectrum;
     return true;
   }
 
@@ -95,7 +95,7 @@ class RingCost {
   Eigen::VectorXd smoothing_;
   Eigen::MatrixXd to_rings_;
   mutable std::optional<BallContact> contact_;
-  mutable LayerModel pressed_;
+  mutable GelModel pressed_;
   mutable Eigen::VectorXd spectrum_;
 };
 
@@ -148,7 +148,7 @@ void solve(std::span<const PressProfile> presses, double doubt, State& state) {
   const std::unique_ptr<ceres::Problem> problem = make_problem(presses, doubt, state);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;
-  options.max_num_iterations = kMostIterations;
+  options.max_num_iterations = kMaxIterations;
   options.function_tolerance = 1e-5;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
@@ -176,7 +176,7 @@ double mean_square(std::span<const double> residuals) {
 ModelFit refine(std::span<const PressProfile> presses, State best) {
   if (best.cost == std::numeric_limits<double>::infinity()) {
     throw ModelRefused(
-        "no layer can be fitted to the press: check the ball's radius, the scale, and that "
+        "no gel can be fitted to the press: check the ball's radius, the scale, and that "
         "reference and frame are not exchanged");
   }
   const auto residuals_of = [&](std::size_t p, double doubt) {
@@ -189,25 +189,25 @@ ModelFit refine(std::span<const PressProfile> presses, State best) {
     }
     return residuals;
   };
-  double doubt = kFirstDoubt;
+  double doubt = kFirstUncertainty;
   for (int pass = 0; pass < 2; ++pass) {
     double square = 0;
     for (std::size_t p = 0; p < presses.size(); ++p) square += mean_square(residuals_of(p, doubt));
-    doubt = std::max(kLeastDoubt, std::sqrt(square / static_cast<double>(presses.size())));
+    doubt = std::max(kMinUncertainty, std::sqrt(square / static_cast<double>(presses.size())));
     solve(presses, doubt, best);
   }
 
   ModelFit fit;
   fit.parameters = Eigen::Map<Eigen::VectorXd>(best.shared.data(),
                                                static_cast<Eigen::Index>(best.shared.size()));
-  fit.layer = layer_from(best.shared);
+  fit.gel = gel_from(best.shared);
   double square = 0;
   for (std::size_t p = 0; p < presses.size(); ++p) {
     const double radius = std::exp(best.own[p][kRadius]);
     const double residual = mean_square(residuals_of(p, doubt));
     square += residual;
     fit.presses.push_back(
-        {radius, press_ball(presses[p].ball_radius_mm, radius, fit.layer.thickness_mm).depth_mm,
+        {radius, press_ball(presses[p].ball_radius_mm, radius, fit.gel.thickness_mm).depth_mm,
          best.own[p][kOffset], std::sqrt(residual)});
   }
   fit.residual = std::sqrt(square / static_cast<double>(presses.size()));
@@ -241,13 +241,13 @@ double ModelFit::deepest_mm() const {
   return deepest;
 }
 
-bool ModelFit::explains() const noexcept { return residual <= 2 * kLeastDoubt; }
+bool ModelFit::explains() const noexcept { return residual <= 2 * kMinUncertainty; }
 
-LayerModel layer_of(const Eigen::VectorXd& parameters) {
-  return layer_from(std::span(parameters.data(), static_cast<std::size_t>(parameters.size())));
+GelModel gel_of(const Eigen::VectorXd& parameters) {
+  return gel_from(std::span(parameters.data(), static_cast<std::size_t>(parameters.size())));
 }
 
-PressProfile profile_of(const LevelledPress& press, double light_levels, double smoothing_mm,
+PressProfile profile_of(const SymmetricPress& press, double light_levels, double smoothing_mm,
                         const PixelFilter& use) {
   const Contact& contact = press.contact;
   const double reach = std::min(kFarField * contact.ball_radius_mm, RadialTransform::kReachMm);
@@ -289,16 +289,16 @@ ModelFit fit_model(std::span<const PressProfile> presses) {
   State best;
   for (const double thickness_mm : kStartThicknesses) {
     State state = start(presses, thickness_mm);
-    solve(presses, kFirstDoubt, state);
+    solve(presses, kFirstUncertainty, state);
     if (state.cost < best.cost) best = std::move(state);
   }
   return refine(presses, std::move(best));
 }
 
 ModelFit fit_model(std::span<const PressProfile> presses, const ModelFit& from) {
-  State state = start(presses, from.layer.thickness_mm);
+  State state = start(presses, from.gel.thickness_mm);
   state.shared.assign(from.parameters.begin(), from.parameters.end());
-  solve(presses, kFirstDoubt, state);
+  solve(presses, kFirstUncertainty, state);
   return refine(presses, std::move(state));
 }
 

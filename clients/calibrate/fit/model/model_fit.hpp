@@ -6,13 +6,13 @@
 #include <stdexcept>
 #include <vector>
 
-#include "clients/calibrate/fit/list_fit.hpp"
-#include "clients/calibrate/fit/model/layer_model.hpp"
-#include "clients/calibrate/fit/press_gain.hpp"
+#include "clients/calibrate/fit/lut_fit.hpp"
+#include "clients/calibrate/fit/model/gel_model.hpp"
+#include "clients/calibrate/fit/press_asymmetry.hpp"
 
 namespace dtact::calibration {
 
-/// No layer explains the presses: what() says what to check.
+/// No gel explains the presses: what() says what to check.
 class ModelRefused : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -31,10 +31,10 @@ struct PressProfile {
 /// `light_levels`: the grey level that the press's map counts as all of the light: the mean of the
 /// reference where the gain is uniform. Rings of which the map, or `use`, leaves less than a third
 /// are left out.
-[[nodiscard]] PressProfile profile_of(const LevelledPress& press, double light_levels,
+[[nodiscard]] PressProfile profile_of(const SymmetricPress& press, double light_levels,
                                       double smoothing_mm, const PixelFilter& use = {});
 
-/// A layer fitted to presses.
+/// A gel fitted to presses.
 struct ModelFit {
   /// Places in `parameters`: logarithms of thickness, the two widths, the odds of the narrow one,
   /// five slopes, and the bulge's factor.
@@ -47,7 +47,7 @@ struct ModelFit {
     kBulge = kSlopes + 5
   };
 
-  LayerModel layer;
+  GelModel gel;
   struct Press {
     double contact_radius_mm = 0;
     double depth_mm = 0;
@@ -62,7 +62,7 @@ struct ModelFit {
   Eigen::MatrixXd covariance;
 
   [[nodiscard]] double deepest_mm() const;
-  /// What is left is what a fit leaves whose layer is right: a hundredth of a grey level of 160, of
+  /// What is left is what a fit leaves whose gel is right: a hundredth of a grey level of 160, of
   /// noise and of steps of a pixel. On simulated sensors of the same law that nothing was chosen on
   /// it is half to two of that, on one of another law three to four; on two real presses six and
   /// twenty.
@@ -72,8 +72,8 @@ struct ModelFit {
 /// What a frame's pixels are off by, in grey levels.
 inline constexpr double kFrameNoise = 1;
 
-/// The layer of such parameters.
-[[nodiscard]] LayerModel layer_of(const Eigen::VectorXd& parameters);
+/// The gel of such parameters.
+[[nodiscard]] GelModel gel_of(const Eigen::VectorXd& parameters);
 
 /// Analysis by synthesis: thickness, response and scattering that all presses share, each with its
 /// own contact radius and offset, by Levenberg and Marquardt (Ceres) from several thicknesses. The

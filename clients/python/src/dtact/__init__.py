@@ -24,7 +24,7 @@ from .errors import (
     Refused,
     StorageFailed,
     TimeoutError,
-    Touched,
+    InContact,
     Uncalibrated,
     Unsupported,
 )

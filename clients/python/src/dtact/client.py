@@ -30,7 +30,7 @@ from .values import (
 _Item = TypeVar("_Item")
 
 #: Messages read at one go while more lie ready: the newest frames count, and calls have to end.
-_MOST_AT_ONCE = 64
+_MAX_AT_ONCE = 64
 
 
 class Client(Session):
@@ -108,7 +108,7 @@ class Client(Session):
         return self._ask(requests.set_reconstruction(resolution, sharpen, max_error_um))
 
     def rezero(self, force: bool = False) -> None:
-        """Takes the present picture as untouched; `force`: although something touches."""
+        """Takes the present picture as untouched; `force`: although in contact."""
         self._ask(requests.rezero(force))
 
     def calibration(self, number: int | None = None) -> CalibrationFiles:
@@ -130,7 +130,7 @@ class Client(Session):
         self._ask(requests.activate_calibration(number))
 
     def reference(self) -> ReferenceImage:
-        """The untouched picture that depth is measured against at present."""
+        """The reference image that depth is measured against at present."""
         return self._ask(requests.reference())
 
     def ping(self) -> Pong:
@@ -174,7 +174,7 @@ class Client(Session):
         deadline = math.inf if limit is None else time.monotonic() + limit
         while True:
             # The newest frames count: what lies ready comes first.
-            for _ in range(_MOST_AT_ONCE):
+            for _ in range(_MAX_AT_ONCE):
                 if self._link is None or not self._read(None):
                     break
             item = take(self._conversation)

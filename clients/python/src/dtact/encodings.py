@@ -11,7 +11,7 @@ from .errors import ProtocolError
 from .messages import Message, value_of
 
 # The largest map of a daemon: what a message can hold as int16.
-_MOST_PIXELS = (16 << 20) // 2
+_MAX_PIXELS = (16 << 20) // 2
 
 
 def _unpack(data: bytes, least: int, most: int) -> bytes:
@@ -79,7 +79,7 @@ def depth_values(depth: Message) -> NDArray[np.int16]:
     to be believed. ProtocolError for a map that does not decode."""
     height, width = depth.height, depth.width
     try:
-        if height < 1 or width < 1 or height * width > _MOST_PIXELS:
+        if height < 1 or width < 1 or height * width > _MAX_PIXELS:
             raise ValueError(f"{width} × {height} pixels")
         decoder = _DECODERS.get(depth.encoding)
         if decoder is None:

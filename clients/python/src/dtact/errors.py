@@ -1,4 +1,4 @@
-"""What goes wrong. The text of each error is a sentence for the user and names the remedy."""
+"""What goes wrong. The text of each error is a sentence for the user and names the fix."""
 from __future__ import annotations
 
 import builtins
@@ -61,8 +61,8 @@ class Invalid(Refused, ValueError):
     """A field of the request is out of range; the sentence names it. Nothing has changed."""
 
 
-class Touched(Refused):
-    """Refused while something touches."""
+class InContact(Refused):
+    """Refused during contact."""
 
 
 class DeviceFailed(Refused):
@@ -93,7 +93,7 @@ class Denied(Refused):
 _VERSION = 3
 _TYPES: dict[int, type[Refused]] = {
     4: Invalid,
-    5: Touched,
+    5: InContact,
     6: DeviceFailed,
     7: Busy,
     8: Uncalibrated,

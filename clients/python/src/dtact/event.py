@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from .messages import Message, name_of
-from .values import Contact, Light, Reconstruction, condition_names, wall_time
+from .values import Contact, Light, Reconstruction, health_names, wall_time
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class LightEvent(Event):
 
 @dataclass(frozen=True)
 class ReferenceEvent(Event):
-    """A new untouched picture is in use."""
+    """A new reference image is in use."""
 
     restored: bool  #: the last good one from the daemon's state directory
 
@@ -88,7 +88,7 @@ def event_of(message: Message) -> Event | None:
         return ReferenceEvent(sequence, time, monotonic_s, m.restored)
     if kind == "state":
         return StateEvent(sequence, time, monotonic_s, name_of("State", m.state),
-                          condition_names(m.health))
+                          health_names(m.health))
     if kind == "reconstruction":
         return ReconstructionEvent(sequence, time, monotonic_s, Reconstruction.of(m))
     number = m.number if m.HasField("number") else None

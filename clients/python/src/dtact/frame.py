@@ -11,7 +11,7 @@ from .encodings import depth_values
 from .errors import NotInFrame, ProtocolError
 from .geometry import ObjectPose, PointCloud, Surface
 from .messages import Message, name_of
-from .values import Contact, Light, condition_names, wall_time
+from .values import Contact, Light, health_names, wall_time
 
 
 @lru_cache(maxsize=8)
@@ -81,7 +81,7 @@ class Frame:
 
     @property
     def sharpen_steps(self) -> int:
-        """Steps of the filter that undid the layer's scattering before the list; 0: none."""
+        """Steps of the filter that undid the gel's scattering before the LUT; 0: none."""
         return int(self._depth.sharpen_steps)
 
     @property
@@ -141,7 +141,7 @@ class Frame:
 
     @cached_property
     def surface(self) -> Surface:
-        """The untouched gel's, along whose normal depth is; a plane unless the calibration says
+        """The undeformed gel's, along whose normal depth is; a plane unless the calibration says
         otherwise. A frame without depth does not say."""
         return Surface.of(self.message.surface)
 
@@ -149,20 +149,20 @@ class Frame:
 
     @property
     def has_cloud(self) -> bool:
-        """Whether it holds points: not when none were subscribed or nothing touches."""
+        """Whether it holds points: not when none were subscribed or there is no contact."""
         return bool(self.message.HasField("cloud"))
 
     @cached_property
     def cloud(self) -> PointCloud:
         """The deformed surface as points. NotInFrame without them."""
         if not self.has_cloud:
-            raise NotInFrame(f"frame {self.sequence} has no point cloud: either nothing touches, or "
+            raise NotInFrame(f"frame {self.sequence} has no point cloud: either there is no contact, or "
                              "Subscription(cloud=...) was not asked for; dtact-perceive makes them")
         return PointCloud.of(self.message.cloud)
 
     @cached_property
     def pose(self) -> ObjectPose | None:
-        """How the touched object has moved; None when it was not subscribed or nothing touches,
+        """How the touched object has moved; None when it was not subscribed or there is no contact,
         and until what touches is as large as about half a square millimetre."""
         return ObjectPose.of(self.message.pose) if self.message.HasField("pose") else None
 
@@ -170,8 +170,8 @@ class Frame:
 
     @cached_property
     def contact(self) -> Contact | None:
-        """What touches; None when it was not measured, which is not the same as nothing
-        touching: `contact_absence` says why."""
+        """What touches; None when it was not measured, which is not the same as no
+        contact: `contact_absence` says why."""
         return Contact.of(self.message.contact) if self.message.HasField("contact") else None
 
     @property
@@ -182,7 +182,7 @@ class Frame:
     @cached_property
     def health(self) -> tuple[str, ...]:
         """The conditions that speak against the depth, by name; empty when all is well."""
-        return condition_names(self.message.health)
+        return health_names(self.message.health)
 
     @cached_property
     def light(self) -> Light:

@@ -16,7 +16,7 @@ _HOLE = -32768
 
 @dataclass(frozen=True)
 class Surface:
-    """The untouched gel's surface, in the surface frame: z towards the object, the surface through
+    """The undeformed gel's surface, in the surface frame: z towards the object, the surface through
     the origin. The camera looks along z through air and through the flat back of the gel, where rays
     are refracted."""
 

@@ -19,7 +19,7 @@ from .messages import COMPRESSED_IMAGE, message_class
 _MAGIC = b"\x89MCAP0\r\n"
 _CHANNEL, _MESSAGE, _CHUNK = 0x04, 0x05, 0x06
 # A record, and a chunk once it is decompressed, has at most so many bytes in files of dtactctl.
-_MOST_RECORD = 256 << 20
+_MAX_RECORD = 256 << 20
 _FRAMES, _EVENTS, _JPEGS = "/dtact/frame", "/dtact/event", "/camera/jpeg"
 
 
@@ -54,7 +54,7 @@ def _records(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     """Up to the magic at the end, or where the file was cut off."""
     while len(head := file.read(9)) == 9:
         opcode, size = struct.unpack("<BQ", head)
-        if size > _MOST_RECORD:
+        if size > _MAX_RECORD:
             raise ValueError(f"a record of {size} bytes")
         body = file.read(size)
         if len(body) < size:
@@ -68,7 +68,7 @@ def _in_chunk(body: bytes) -> Iterator[tuple[int, memoryview]]:
     compression = body[32:at].decode()
     (packed_size,) = struct.unpack_from("<Q", body, at)
     packed = body[at + 8 : at + 8 + packed_size]
-    if size > _MOST_RECORD:
+    if size > _MAX_RECORD:
         raise ValueError(f"a chunk of {size} bytes")
     if compression == "zstd":
         packed = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)

@@ -15,9 +15,9 @@ from .frame import Frame
 from .messages import Message, ServerMessage
 
 #: Longest message either way, bytes.
-MOST_BYTES = 16 << 20
-#: Events kept for whoever reads them; the oldest give way.
-MOST_EVENTS = 100_000
+MAX_BYTES = 16 << 20
+#: Events kept for whoever reads them; the oldest yield.
+MAX_EVENTS = 100_000
 
 _T = TypeVar("_T")
 
@@ -55,7 +55,7 @@ class Conversation:
         self._subscribing = 0  # The number of the last request to subscribe.
         self._arrivals = 0
         self._frames: _Numbered[Frame] = _Numbered(kept_frames)
-        self._events: _Numbered[Event] = _Numbered(MOST_EVENTS)
+        self._events: _Numbered[Event] = _Numbered(MAX_EVENTS)
         #: Answers not taken yet, by the request's number.
         self.answers: dict[int, Message] = {}
         #: Why the daemon ends the connection, once it has said so.
@@ -83,8 +83,8 @@ class Conversation:
         number = self._next_id
         message.id = number
         body = message.SerializeToString()
-        if len(body) > MOST_BYTES:
-            raise ValueError(f"the request has {len(body)} bytes, at most {MOST_BYTES} can be sent")
+        if len(body) > MAX_BYTES:
+            raise ValueError(f"the request has {len(body)} bytes, at most {MAX_BYTES} can be sent")
         self._next_id += 1
         self._waiting.add(number)
         if message.HasField("subscribe"):
@@ -113,7 +113,7 @@ class Conversation:
             self._message(bytes(body))
             return
         length = int.from_bytes(self._head, "big")
-        if length > MOST_BYTES:
+        if length > MAX_BYTES:
             raise ProtocolError(f"a length of {length} bytes was received: that is no dtactd, or "
                                 "one of another version")
         if length == 0:

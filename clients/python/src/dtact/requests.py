@@ -21,7 +21,7 @@ from .values import (
 T = TypeVar("T")
 
 MAJOR, MINOR = 1, 1  # kMajor and kMinor of proto/defaults.hpp
-MOST_PROGRAM_BYTES = 64
+MAX_PROGRAM_BYTES = 64
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def _cut(text: str, most: int) -> str:
 def hello(program: str, token: str | None) -> Request[Server]:
     message = ClientMessage()
     message.hello.major, message.hello.minor = MAJOR, MINOR
-    message.hello.program = _cut(program, MOST_PROGRAM_BYTES)
+    message.hello.program = _cut(program, MAX_PROGRAM_BYTES)
     if token is not None:
         message.hello.token = token
     return Request(message, lambda reply: Server.of(reply.hello))

@@ -30,9 +30,9 @@ from .values import Server, Status
 
 #: Calibrations take the daemon seconds.
 _SLOW_S = 30.0
-# What more attempts to connect do not mend.
+# What more attempts to connect do not fix.
 _FINAL = (ProtocolError, IdentityError, Denied)
-_MOST_TOKEN_BYTES = 256
+_MAX_TOKEN_BYTES = 256
 
 
 class BackOff:
@@ -187,7 +187,7 @@ class Session:
 
     def _patience(self, request: Request[T]) -> float:
         if request.averages and self._server is not None:
-            return self._timeout + self._server.rezero_within_s
+            return self._timeout + self._server.rezero_timeout_s
         return max(self._timeout, _SLOW_S) if request.slow else self._timeout
 
     def _subscribe_request(self, subscription: Subscription | None) -> Request[None]:
@@ -267,8 +267,8 @@ def read_token(file: Path) -> str:
         raise Error(f"{file} can be read by others: chmod 600 {file}")
     token = lines[0].rstrip() if lines else ""
     # The daemon's own file has lines like "control TOKEN NAME".
-    if not 1 <= len(token.encode()) <= _MOST_TOKEN_BYTES or " " in token:
-        raise Error(f"the first line of {file} is no token: it has 1 to {_MOST_TOKEN_BYTES} bytes "
+    if not 1 <= len(token.encode()) <= _MAX_TOKEN_BYTES or " " in token:
+        raise Error(f"the first line of {file} is no token: it has 1 to {_MAX_TOKEN_BYTES} bytes "
                     "and no blanks. Of a line for the daemon (dtactctl token) it is the second word")
     return token
 

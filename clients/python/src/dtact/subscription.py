@@ -30,7 +30,7 @@ class Subscription:
     #: "contact": the box around what is pressed, and no map while nothing is.
     region: tuple[int, int, int, int] | Literal["contact"] | None = None
     events: bool = True
-    #: Points of the surface while something touches, of dtact-perceive, which has no depth: "float32",
+    #: Points of the surface during contact, of dtact-perceive, which has no depth: "float32",
     #: or half as large "int16". `decimation` and `region` say which.
     cloud: Literal["float32", "int16"] | None = None
     cloud_hz: float = 0.0

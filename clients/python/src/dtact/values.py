@@ -17,7 +17,7 @@ def wall_time(nanoseconds: int) -> datetime:
     return _EPOCH + timedelta(microseconds=nanoseconds // 1000)
 
 
-def condition_names(health: Iterable[int]) -> tuple[str, ...]:
+def health_names(health: Iterable[int]) -> tuple[str, ...]:
     """The `health` of a message: HEALTH_LIGHT_UNSETTLED → "light_unsettled"."""
     return tuple(name_of("Health", value) for value in health)
 
@@ -26,7 +26,7 @@ def condition_names(health: Iterable[int]) -> tuple[str, ...]:
 class Contact:
     """What touches, in a summary."""
 
-    touching: bool
+    in_contact: bool
     area_mm2: float  #: pressed deeper than the contact threshold
     x_mm: float  #: depth-weighted centroid
     y_mm: float
@@ -34,7 +34,7 @@ class Contact:
     deepest_x_mm: float
     deepest_y_mm: float
     volume_mm3: float
-    #: Newtons along the surface's normal, 0 when nothing touches; None: `force_absence` says why.
+    #: Newtons along the surface's normal, 0 without contact; None: `force_absence` says why.
     force_n: float | None = None
     force_uncertainty_n: float | None = None  #: mean absolute error to expect of it
     force_absence: str = "none"  #: "none", "uncalibrated", "beyond_calibration", "cut_off"
@@ -47,7 +47,7 @@ class Contact:
     @classmethod
     def of(cls, m: Message) -> Contact:
         force = (m.force_n, m.force_uncertainty_n) if m.HasField("force_n") else (None, None)
-        return cls(m.touching, m.area_mm2, m.x_mm, m.y_mm, m.deepest_mm, m.deepest_x_mm,
+        return cls(m.in_contact, m.area_mm2, m.x_mm, m.y_mm, m.deepest_mm, m.deepest_x_mm,
                    m.deepest_y_mm, m.volume_mm3, *force,
                    name_of("ForceAbsence", m.force_absence, "FORCE_ABSENCE_"))
 
@@ -86,7 +86,7 @@ class CalibrationSummary:
     """What a calibration is made for."""
 
     name: str
-    method: str  #: "list" or "published"
+    method: str  #: "lut" or "published"
     mm_per_px: float
     width: int  #: of the depth map at full resolution, pixels
     height: int
@@ -146,7 +146,7 @@ class CalibrationFiles:
 
 @dataclass(frozen=True)
 class ReferenceImage:
-    """The untouched picture that depth is measured against."""
+    """The reference image that depth is measured against."""
 
     png: bytes  #: 16-bit grey, 256 units a grey level, the camera's size
     light: Light
@@ -180,7 +180,7 @@ class Status:
     @classmethod
     def of(cls, m: Message) -> Status:
         calibration = CalibrationSummary.of(m.calibration) if m.HasField("calibration") else None
-        return cls(name_of("State", m.state), condition_names(m.health), m.advice, m.fps,
+        return cls(name_of("State", m.state), health_names(m.health), m.advice, m.fps,
                    Light.of(m.light), calibration, m.version, m,
                    Reconstruction.of(m.reconstruction) if m.HasField("reconstruction") else None)
 
@@ -197,9 +197,9 @@ class Server:
     name: str
     serial: str  #: the camera's, as far as it tells one
     frame_id: str  #: of the surface frame
-    rezero_within_s: float = 0  #: a re-zero is answered within this time
+    rezero_timeout_s: float = 0  #: a re-zero is answered within this time
 
     @classmethod
     def of(cls, m: Message) -> Server:
         return cls(m.program, m.major, m.minor, frozenset(m.features), name_of("Rights", m.rights),
-                   m.name, m.serial, m.surface_frame.frame_id, m.rezero_within_s)
+                   m.name, m.serial, m.surface_frame.frame_id, m.rezero_timeout_s)

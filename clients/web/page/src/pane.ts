@@ -17,7 +17,7 @@ import type { SurfaceView } from "./surface/surface";
 import { RangeForm } from "./view/range_form";
 import { Stage } from "./view/stage";
 import type { Tool, View } from "./view/stage";
-import { fixed } from "./words";
+import { fixed } from "./labels";
 
 /** Numbers that change with every frame are told so often: more cannot be read. */
 const TELL_MS = 100;
@@ -64,7 +64,7 @@ export class Pane {
   private lastStatus: Status | undefined;
   private servesPoints = false;
   private paused = false;
-  private toldAt = 0;
+  private reportedAt = 0;
 
   /** Throws where the browser has no WebGL 2. */
   constructor(readonly name: string) {
@@ -324,10 +324,10 @@ export class Pane {
     if (!this.paused) this.reconstruction.frame(frame);
     if (!this.paused) this.plots.add(frame, this.meter.latencyMs);
     const now = performance.now();
-    if (now - this.toldAt < TELL_MS && !this.paused) return true;
-    this.toldAt = now;
+    if (now - this.reportedAt < TELL_MS && !this.paused) return true;
+    this.reportedAt = now;
     this.contact.show(frame);
-    if (frame.contact?.touching === false) this.light.untouched();
+    if (frame.contact?.inContact === false) this.light.noContact();
     this.quality.show(frame);
     this.element.dataset["sequence"] = String(frame.sequence);
     this.tellRate(frame);

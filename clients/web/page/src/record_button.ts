@@ -2,7 +2,7 @@
 import { button, el, say } from "./dom";
 import type { Recorded } from "./recording/recorder";
 import type { Sensor } from "./session/sensor";
-import { fixed, span } from "./words";
+import { fixed, span } from "./labels";
 
 const MB = 1e6;
 
@@ -16,8 +16,8 @@ export class RecordButton {
     "aria-pressed": "false",
     disabled: "",
   });
-  private readonly told = el("span", { class: "quiet", role: "status", "data-fact": "recording" });
-  readonly element = el("span", { class: "row" }, this.press, this.told);
+  private readonly reported = el("span", { class: "quiet", role: "status", "data-fact": "recording" });
+  readonly element = el("span", { class: "row" }, this.press, this.reported);
   /** Ending: its file is still to come. */
   private state: "idle" | "recording" | "ending" = "idle";
   private allowed = false;
@@ -41,7 +41,7 @@ export class RecordButton {
     if (this.press.disabled) return;
     const begins = this.state === "idle";
     this.show(begins ? "recording" : "ending");
-    if (begins) say(this.told, "");
+    if (begins) say(this.reported, "");
     this.sensor.record(begins);
   }
 
@@ -55,7 +55,7 @@ export class RecordButton {
 
   tell(recorded: Recorded): void {
     const { bytes, seconds, file, why } = recorded;
-    say(this.told, `${span(seconds)} · ${fixed(bytes / MB, 1)} MB · ${missedOf(recorded)}`);
+    say(this.reported, `${span(seconds)} · ${fixed(bytes / MB, 1)} MB · ${missedOf(recorded)}`);
     if (!file && !why) return;
     this.show("idle");
     this.handOver(recorded);
@@ -65,15 +65,15 @@ export class RecordButton {
   private handOver(recorded: Recorded): void {
     const { frames, bytes, seconds, file, why } = recorded;
     const reason = why ? `${why} ` : "";
-    if (!file) return say(this.told, why ?? "");
-    if (frames === 0) return say(this.told, `${reason}Nothing is recorded: no frame came.`);
+    if (!file) return say(this.reported, why ?? "");
+    if (frames === 0) return say(this.reported, `${reason}Nothing is recorded: no frame came.`);
     const time = new Date(Date.now() - 1000 * seconds).toISOString().slice(0, 19);
     const url = URL.createObjectURL(file);
     const name = `${this.sensor.name}-${time.replaceAll(":", "")}Z.mcap`;
     el("a", { href: url, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(url), 60_000);
     say(
-      this.told,
+      this.reported,
       `${reason}${name}: ${frames} frames, ${missedOf(recorded)}, ${fixed(bytes / MB, 1)} MB`,
     );
   }

@@ -3,7 +3,7 @@ import type { Status } from "../gen/dtact_pb";
 import { el } from "./dom";
 import type { Frame } from "./session/messages";
 import type { Stage, View } from "./view/stage";
-import { fixed } from "./words";
+import { fixed } from "./labels";
 
 export async function saveSnapshot(
   sensor: string,

@@ -25,7 +25,7 @@ struct Control {
   bool moves_by_itself;
   int current = initial;
   Fault fault = Fault::none;
-  int told = initial;  // what a lying control says
+  int reported = initial;  // what a lying control says
 };
 
 std::array<Control, 15> table{{
@@ -61,7 +61,7 @@ int value_of(const Control& c, int request) {
     case kDef:
       return c.initial;
     default:
-      return c.fault == Fault::lies ? c.told : c.current;
+      return c.fault == Fault::lies ? c.reported : c.current;
   }
 }
 
@@ -101,7 +101,7 @@ std::optional<int> Controls::handle(int entity, int selector, int request,
   std::fprintf(stderr, "uvcfake: %s = %d\n", c->name, value);
   if (c->fault == Fault::refuses) return std::nullopt;
   if (c->fault == Fault::none) c->current = value;
-  c->told = value;
+  c->reported = value;
   return c->bytes;
 }
 

@@ -3,7 +3,7 @@ import { ObjectPose_Tracking } from "../../gen/dtact_pb";
 import type { ObjectPose, Vector3 } from "../../gen/dtact_pb";
 import { Facts, panel } from "../dom";
 import type { Frame } from "../session/messages";
-import { absence, fixed, forceAbsence, mm } from "../words";
+import { absence, fixed, forceAbsence, mm } from "../labels";
 
 const TRACKING: Record<number, string> = {
   [ObjectPose_Tracking.STARTED]: "from here",
@@ -15,7 +15,7 @@ const TRACKING: Record<number, string> = {
 /** What moved since the contact was made, or where a known object is, as dtact-perceive tells it. */
 function motion(pose: ObjectPose | undefined): { moved: string; turned: string } {
   if (!pose) return { moved: "–", turned: "–" };
-  const told = (vector: Vector3 | undefined, digits: number): string =>
+  const reported = (vector: Vector3 | undefined, digits: number): string =>
     vector ? [vector.x, vector.y, vector.z].map((part) => fixed(part, digits)).join(", ") : "–";
   const how = TRACKING[pose.tracking];
   if (pose.tracking === ObjectPose_Tracking.SEARCHING) {
@@ -23,8 +23,8 @@ function motion(pose: ObjectPose | undefined): { moved: string; turned: string }
   }
   const unseen = pose.unobservable.length;
   return {
-    moved: `${told(pose.translationMm, 2)} mm${how ? `, ${how}` : ""}`,
-    turned: `${told(pose.rotationDeg, 1)}°${unseen > 0 ? `, ${unseen} unseen` : ""}`,
+    moved: `${reported(pose.translationMm, 2)} mm${how ? `, ${how}` : ""}`,
+    turned: `${reported(pose.rotationDeg, 1)}°${unseen > 0 ? `, ${unseen} unseen` : ""}`,
   };
 }
 
@@ -37,7 +37,7 @@ export class ContactPanel {
     },
   });
   private readonly facts = new Facts({
-    touching: { label: "State" },
+    inContact: { label: "State" },
     deepest: { label: "× Deepest", hint: "Indentation along the surface's normal" },
     area: { label: "Area", hint: "Pressed deeper than the daemon's contact threshold" },
     volume: { label: "Volume" },
@@ -67,15 +67,15 @@ export class ContactPanel {
     this.motion.set("moved", moved);
     this.motion.set("turned", turned);
     const contact = frame.contact;
-    const touching = contact?.touching === true;
+    const inContact = contact?.inContact === true;
     this.facts.set(
-      "touching",
-      contact ? (touching ? "touching" : "nothing touches") : absence(frame.contactAbsence),
+      "inContact",
+      contact ? (inContact ? "in contact" : "no contact") : absence(frame.contactAbsence),
     );
-    this.facts.set("deepest", touching ? mm(contact.deepestMm, 3) : "–");
-    this.facts.set("area", touching ? `${fixed(contact.areaMm2, 1)} mm²` : "–");
-    this.facts.set("volume", touching ? `${fixed(contact.volumeMm3, 2)} mm³` : "–");
-    this.facts.set("centroid", touching ? `${fixed(contact.xMm, 2)}, ${mm(contact.yMm)}` : "–");
+    this.facts.set("deepest", inContact ? mm(contact.deepestMm, 3) : "–");
+    this.facts.set("area", inContact ? `${fixed(contact.areaMm2, 1)} mm²` : "–");
+    this.facts.set("volume", inContact ? `${fixed(contact.volumeMm3, 2)} mm³` : "–");
+    this.facts.set("centroid", inContact ? `${fixed(contact.xMm, 2)}, ${mm(contact.yMm)}` : "–");
     this.facts.set("force", this.force(frame));
   }
 

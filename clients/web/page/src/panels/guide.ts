@@ -5,12 +5,12 @@ import { GuidedLineSchema } from "../../gen/guided_pb";
 import type { GuidedAnswer, GuidedPress, GuidedScene } from "../../gen/guided_pb";
 import { button, el, say, svg } from "../dom";
 import type { Sensor } from "../session/sensor";
-import { fixed } from "../words";
+import { fixed } from "../labels";
 
 /** Of the picture's scale bar, mm. */
 const BAR_MM = 5;
 /** Lines that stay; a session says some fifty. */
-const MOST_SAID = 200;
+const MAX_SAID = 200;
 const [DEPTH_WIDTH, DEPTH_HEIGHT] = [280, 46];
 
 /** What the map of a calibration is like. */
@@ -64,7 +64,7 @@ export class Guide {
     viewBox: `0 0 ${DEPTH_WIDTH} ${DEPTH_HEIGHT}`,
     class: "depths",
     role: "img",
-    "aria-label": "Depths of the presses, and how deep the list reaches",
+    "aria-label": "Depths of the presses, and how deep the LUT reaches",
   });
   private readonly session = el(
     "div",
@@ -123,7 +123,7 @@ export class Guide {
       el(
         "p",
         { class: "quiet" },
-        "First the untouched surface is taken, then presses of a ball of known radius at different " +
+        "First the undeformed surface is taken, then presses of a ball of known radius at different " +
           "places and depths. Each is saved on the gateway's machine as soon as it is taken.",
       ),
       field("Ball's radius, mm", this.radius),
@@ -162,8 +162,8 @@ export class Guide {
 
   private take(text: string): void {
     const { line } = fromJsonString(GuidedLineSchema, text);
-    if (line.case === "said") this.tell(line.value);
-    else if (line.case === "begun") this.tell(`Saved in ${line.value.folder}`);
+    if (line.case === "text") this.tell(line.value);
+    else if (line.case === "started") this.tell(`Saved in ${line.value.folder}`);
     else if (line.case === "scene") void this.show(line.value);
     else if (line.case === "ended") this.end(line.value.error);
   }
@@ -171,7 +171,7 @@ export class Guide {
   private tell(text: string): void {
     for (const sentence of text.split("\n").filter((part) => part !== ""))
       this.said.append(el("li", {}, sentence));
-    while (this.said.childElementCount > MOST_SAID) this.said.firstElementChild?.remove();
+    while (this.said.childElementCount > MAX_SAID) this.said.firstElementChild?.remove();
     this.said.scrollTop = this.said.scrollHeight;
   }
 
@@ -227,7 +227,7 @@ export class Guide {
   }
 
   /** Depth from left to right: what the list covers, and each press. */
-  private drawDepths({ presses, coveredMm, pressesWanted }: GuidedScene): void {
+  private drawDepths({ presses, coveredMm, pressesRequired }: GuidedScene): void {
     const most = 1.1 * Math.max(0.5, coveredMm, ...presses.map(({ depthMm }) => depthMm));
     const x = (mm: number): string => String(8 + (mm / most) * (DEPTH_WIDTH - 16));
     const mark = ({ name, depthMm }: GuidedPress, index: number): SVGElement =>
@@ -238,14 +238,14 @@ export class Guide {
         svg("circle", { cx: x(depthMm), cy: "12", r: "4", class: "seen" }),
         svg("text", { x: x(depthMm), y: "30", "text-anchor": "middle" }, String(index + 1)),
       );
-    const told =
-      `${presses.length} of ${pressesWanted} presses` +
-      (coveredMm > 0 ? `; the list reaches ${fixed(coveredMm, 2)} mm` : "; not yet a list");
+    const reported =
+      `${presses.length} of ${pressesRequired} presses` +
+      (coveredMm > 0 ? `; the LUT reaches ${fixed(coveredMm, 2)} mm` : "; not yet a LUT");
     this.depths.replaceChildren(
       svg("line", { x1: x(0), x2: x(most), y1: "12", y2: "12", class: "axis" }),
       svg("line", { x1: x(0), x2: x(coveredMm), y1: "12", y2: "12", class: "covered" }),
       ...presses.map(mark),
-      svg("text", { x: x(0), y: "44", class: "quiet" }, told),
+      svg("text", { x: x(0), y: "44", class: "quiet" }, reported),
     );
   }
 

@@ -109,8 +109,8 @@ export class LightPanel {
     if (selected && document.activeElement !== this.colour) this.colour.value = hex(selected);
   }
 
-  /** Nothing touches any more: there is nothing to do anyway. */
-  untouched(): void {
+  /** There is no contact any more: there is nothing to do anyway. */
+  noContact(): void {
     if (this.anyway.hidden) return;
     this.anyway.hidden = true;
     say(this.answer, "");

@@ -7,7 +7,7 @@ import type { Profile } from "../view/reading";
 const SECONDS = 30;
 const REDRAW_MS = 250;
 /** More frames a second than this are thinned: no screen shows them. */
-const MOST_POINTS = 1800;
+const MAX_POINTS = 1800;
 
 type Value = number | null;
 
@@ -114,7 +114,7 @@ export class Plots {
     if (this.times.length > 0 && now < (this.times.at(-1) as number)) this.clear();
     this.times.push(now);
     for (const entry of this.plots) entry.values.push(entry.of(frame, latencyMs ?? null));
-    while (this.times.length > MOST_POINTS || now - (this.times[0] as number) > 1000 * SECONDS) {
+    while (this.times.length > MAX_POINTS || now - (this.times[0] as number) > 1000 * SECONDS) {
       this.times.shift();
       for (const entry of this.plots) entry.values.shift();
     }

@@ -1,11 +1,11 @@
-// What the depth is worth, and what to do where that is less than it could be.
+// The uncertainty of the depth, and what to do where that is less than it could be.
 import { create } from "@bufbuild/protobuf";
 import { GetReferenceSchema } from "../../gen/dtact_pb";
 import type { Event, Status } from "../../gen/dtact_pb";
 import { el, Facts, panel, say } from "../dom";
 import type { Frame } from "../session/messages";
 import type { Sensor } from "../session/sensor";
-import { conditionName, fixed, signedPercent, span, stateName, um } from "../words";
+import { healthName, fixed, signedPercent, span, stateName, um } from "../labels";
 
 export class QualityPanel {
   private readonly facts = new Facts({
@@ -14,13 +14,13 @@ export class QualityPanel {
       label: "Depth is worth",
       hint: "Mean absolute error to expect inside the contact",
     },
-    untouched: {
+    noContact: {
       label: "Untouched RMS",
-      hint: "In the last frame in which nothing touched; 0 where nothing differs from the reference",
+      hint: "In the last frame in which there was no contact; 0 where nothing differs from the reference",
     },
     reference: {
       label: "Reference's age",
-      hint: "The untouched image that depth is measured against",
+      hint: "The reference image that depth is measured against",
     },
     drift: {
       label: "Light followed",
@@ -30,9 +30,9 @@ export class QualityPanel {
     camera: { label: "Camera" },
     calibration: { label: "Calibration" },
   });
-  private readonly conditions = el("ul", { class: "conditions" });
+  private readonly healthFlags = el("ul", { class: "conditions" });
   private readonly advice = el("p", { class: "advice", role: "status" });
-  readonly element = panel("Quality", this.conditions, this.advice, this.facts.element);
+  readonly element = panel("Quality", this.healthFlags, this.advice, this.facts.element);
   private reference: { sequence: number; restored: boolean } | undefined;
   private fps = 0;
   private sequence = 0;
@@ -47,8 +47,8 @@ export class QualityPanel {
         ["", "full", "half", "", "quarter"][depth.decimation] ?? `1/${depth.decimation}`;
       this.facts.set("map", `${depth.width} × ${depth.height}, ${share}${sharpened}`);
     }
-    if (frame.untouchedRmsUm !== undefined)
-      this.facts.set("untouched", `${fixed(frame.untouchedRmsUm, 1)} µm`);
+    if (frame.noContactRmsUm !== undefined)
+      this.facts.set("noContact", `${fixed(frame.noContactRmsUm, 1)} µm`);
     const reference = this.reference;
     if (reference && this.fps > 0) {
       const age = span(Math.max(0, this.sequence - reference.sequence) / this.fps);
@@ -91,13 +91,13 @@ export class QualityPanel {
         [camera.damaged, "damaged"],
         [camera.disconnects, "unplugged"],
       ] as const;
-      const told = trouble
+      const reported = trouble
         .filter(([count]) => count > 0n)
         .map(([count, name]) => `, ${count} ${name}`);
-      const condition = camera.condition === "streaming" ? "" : `${camera.condition}, `;
+      const condition = camera.state === "streaming" ? "" : `${camera.state}, `;
       this.facts.set(
         "camera",
-        `${condition}${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${told.join("")}`,
+        `${condition}${fixed(status.fps, 1)} of ${fixed(camera.fps, 0)} fps${reported.join("")}`,
       );
     }
     const made = status.calibration;
@@ -107,12 +107,12 @@ export class QualityPanel {
         ? `${made.name}, ${fixed(made.coveredFromMm, 2)} to ${fixed(made.coveredToMm, 2)} mm`
         : "none",
     );
-    const names = status.health.map(conditionName);
-    if ([...this.conditions.children].map((item) => item.textContent).join() !== names.join()) {
-      this.conditions.replaceChildren(...names.map((name) => el("li", {}, name)));
+    const names = status.health.map(healthName);
+    if ([...this.healthFlags.children].map((item) => item.textContent).join() !== names.join()) {
+      this.healthFlags.replaceChildren(...names.map((name) => el("li", {}, name)));
     }
-    const remedy = camera?.remedy || status.ring?.message || "";
-    const advice = status.advice || remedy;
+    const fix = camera?.fix || status.ring?.message || "";
+    const advice = status.advice || fix;
     say(this.advice, advice || "All is well.");
     this.advice.classList.toggle("well", advice === "");
   }

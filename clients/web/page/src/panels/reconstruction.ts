@@ -1,4 +1,4 @@
-// Speed against accuracy: how depth is made, what it takes here and what it is worth, on a chart.
+// Speed against accuracy: how depth is made, what it takes here and its uncertainty, on a chart.
 import { create } from "@bufbuild/protobuf";
 import { SetReconstructionSchema } from "../../gen/dtact_pb";
 import type { Reconstruction } from "../../gen/dtact_pb";
@@ -6,7 +6,7 @@ import { MEASURED } from "../../gen/chart";
 import { Choice, el, say, svg } from "../dom";
 import type { Frame } from "../session/messages";
 import type { Sensor } from "../session/sensor";
-import { fixed, um } from "../words";
+import { fixed, um } from "../labels";
 
 const RESOLUTIONS = { full: "Full", half: "Half", quarter: "Quarter", auto: "Auto" };
 const SHARPEN = { off: "Off", once: "1", twice: "2", auto: "Auto" };
@@ -20,7 +20,7 @@ const [WIDTH, HEIGHT, LEFT, BOTTOM] = [280, 150, 34, 26];
 const WEIGHT = 0.05;
 const REDRAW_MS = 250;
 /** What was seen of ways of making depth, at most. */
-const MOST_SEEN = 12;
+const MAX_SEEN = 12;
 
 interface Change {
   resolution?: Resolution;
@@ -118,16 +118,16 @@ export class ReconstructionPanel {
     this.draw();
   }
 
-  /** Of frames in which something touches: elsewhere there is little to make. */
+  /** Of frames in which there is contact: elsewhere there is little to make. */
   frame(frame: Frame): void {
     const way = wayOf(frame);
-    if (!way || !frame.depth || frame.contact?.touching !== true) return;
+    if (!way || !frame.depth || frame.contact?.inContact !== true) return;
     this.way = way;
     const { uncertaintyUm } = frame.depth;
     const seen = this.seen.get(way) ?? { ms: frame.madeMs, errorUm: uncertaintyUm };
     seen.ms += WEIGHT * (frame.madeMs - seen.ms);
     seen.errorUm += WEIGHT * (uncertaintyUm - seen.errorUm);
-    if (this.seen.size < MOST_SEEN || this.seen.has(way)) this.seen.set(way, seen);
+    if (this.seen.size < MAX_SEEN || this.seen.has(way)) this.seen.set(way, seen);
     if (this.element.hidden || performance.now() - this.drawnAt < REDRAW_MS) return;
     this.drawnAt = performance.now();
     say(this.now, `${way}: ${fixed(seen.ms, 2)} ms, ± ${um(seen.errorUm)}`);
@@ -172,9 +172,9 @@ export class ReconstructionPanel {
       parts.push(svg("line", { x1, y1, x2, y2, class: kind }));
     };
     const dot = ({ ms, errorUm }: Seen, name: string, r: string, kind: string): void => {
-      const told = svg("title", {}, `${name}: ${fixed(ms, 2)} ms, ${fixed(errorUm, 0)} µm`);
+      const reported = svg("title", {}, `${name}: ${fixed(ms, 2)} ms, ${fixed(errorUm, 0)} µm`);
       parts.push(
-        svg("circle", { cx: String(x(ms)), cy: String(y(errorUm)), r, class: kind }, told),
+        svg("circle", { cx: String(x(ms)), cy: String(y(errorUm)), r, class: kind }, reported),
       );
     };
     line([LEFT, HEIGHT - BOTTOM], [WIDTH - 8, HEIGHT - BOTTOM], "axis");

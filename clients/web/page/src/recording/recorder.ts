@@ -7,7 +7,7 @@ import type { Request } from "../session/messages";
 import { Recording } from "./recording";
 
 /** A browser that is to keep more may keep nothing. */
-const MOST_BYTES = 2 ** 30;
+const MAX_BYTES = 2 ** 30;
 const TELL_MS = 250;
 
 /** How far a recording is; with its file once it is over. */
@@ -31,7 +31,7 @@ export interface Source {
 export class Recorder {
   private readonly recording: Recording;
   private began: number | undefined;
-  private toldAt = 0;
+  private reportedAt = 0;
   private over = false;
 
   constructor(
@@ -52,12 +52,12 @@ export class Recorder {
     if (this.over || this.began === undefined) return;
     this.recording.addFrame(frame);
     const now = performance.now();
-    if (this.recording.bytes > MOST_BYTES) {
+    if (this.recording.bytes > MAX_BYTES) {
       void this.finish(
         "1 GB is recorded, which is all that a browser is asked to keep; dtactctl record has no limit.",
       );
-    } else if (now - this.toldAt > TELL_MS) {
-      this.toldAt = now;
+    } else if (now - this.reportedAt > TELL_MS) {
+      this.reportedAt = now;
       this.source.tell(this.state());
     }
   }
@@ -108,6 +108,6 @@ export class Recorder {
     const reference = await this.source.ask({ case: "getReference", value });
     if (reference?.result.case !== "reference" || this.over) return;
     const data = reference.result.value.png;
-    this.recording.attach({ name: "untouched.png", mediaType: "image/png", data });
+    this.recording.attach({ name: "current_reference.png", mediaType: "image/png", data });
   }
 }

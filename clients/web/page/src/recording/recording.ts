@@ -14,7 +14,7 @@ const SECOND_NS = 1_000_000_000n;
 
 /** What describes frames beside themselves. */
 export interface Attachment {
-  name: "calibration.toml" | "reference.png" | "untouched.png";
+  name: "calibration.toml" | "reference.png" | "current_reference.png";
   mediaType: string;
   data: Uint8Array;
 }

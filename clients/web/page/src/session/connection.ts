@@ -30,7 +30,7 @@ export class Connection {
   private timer: ReturnType<typeof setTimeout> | undefined;
   private heardAt = 0;
   private readonly open = new Set<number>();
-  private greeted = false;
+  private ready = false;
   /** Whether the gateway has the sensor itself, and why not. */
   private reached = true;
   private why = "";
@@ -64,7 +64,7 @@ export class Connection {
 
   /** Sends a request; false when there is no connection to send it on. */
   request(id: number, request: Request): boolean {
-    if (!this.greeted) return false;
+    if (!this.ready) return false;
     this.open.add(id);
     this.send(id, request);
     return true;
@@ -95,7 +95,7 @@ export class Connection {
   private drop(): void {
     const socket = this.socket;
     this.socket = undefined;
-    this.greeted = false;
+    this.ready = false;
     this.pending = undefined;
     if (socket) {
       socket.onopen = socket.onmessage = socket.onclose = null;
@@ -106,7 +106,7 @@ export class Connection {
   }
 
   private lost(): void {
-    const was = this.lastWord ?? (this.greeted ? "The connection was lost." : "Nothing answers.");
+    const was = this.lastWord ?? (this.ready ? "The connection was lost." : "Nothing answers.");
     this.drop();
     const seconds = this.waitMs / 1000;
     this.listener.link({
@@ -141,7 +141,7 @@ export class Connection {
   }
 
   private tell(): void {
-    if (!this.greeted) return;
+    if (!this.ready) return;
     const why = this.why && `: ${this.why}`;
     const away = `The sensor is away${why}. It goes on by itself when it is back.`;
     this.listener.link(
@@ -170,7 +170,7 @@ export class Connection {
   private takePending(): void {
     const message = this.pending;
     this.pending = undefined;
-    if (message && this.greeted) this.deliver(message);
+    if (message && this.ready) this.deliver(message);
   }
 
   private deliver(message: Uint8Array): void {
@@ -190,14 +190,14 @@ export class Connection {
 
   private takeGreeting(reply: Reply): void {
     if (reply.result.case === "hello") {
-      this.greeted = true;
+      this.ready = true;
       this.waitMs = FIRST_WAIT_MS;
       this.tell();
       return this.listener.hello(reply.result.value);
     }
     if (reply.result.case !== "error") return;
     const { code, message } = reply.result.value;
-    if (code === ErrorCode.ERROR_DENIED && !this.greeted) {
+    if (code === ErrorCode.ERROR_DENIED && !this.ready) {
       this.drop();
       this.listener.link({ state: "token", sentence: message });
     } else if (code === ErrorCode.ERROR_VERSION) {

@@ -70,8 +70,8 @@ export interface Frame {
   /** What making the depth took, milliseconds, and at which share of the resolution: 1, 2 or 4. */
   madeMs: number;
   madeDecimation: number;
-  /** Root mean square of trusted depth, micrometres, while nothing touches; not of every frame. */
-  untouchedRmsUm: number | undefined;
+  /** Root mean square of trusted depth, micrometres, without contact; not of every frame. */
+  noContactRmsUm: number | undefined;
   /** Frames that were missed since the connection was made: by the daemon's count, and here. */
   dropped: number;
   /** How far behind the newest one that is kept, of a paused view; undefined of a live one. */

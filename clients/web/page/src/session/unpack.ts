@@ -95,7 +95,7 @@ export function unpack(
   behind: number | undefined,
 ): Frame {
   const depth = frame.depth && unpackDepth(frame.depth, spare);
-  const untouched = frame.contact?.touching === false;
+  const noContact = frame.contact?.inContact === false;
   return {
     sequence: Number(frame.sequence),
     wallMs: Number(frame.wallNs / 1000n) / 1000,
@@ -110,10 +110,10 @@ export function unpack(
     pose: frame.pose,
     cloud: frame.cloud && unpackCloud(frame.cloud),
     madeMs: frame.times
-      ? (frame.times.rectifyNs + frame.times.smoothNs + frame.times.listNs) / 1e6
+      ? (frame.times.rectifyNs + frame.times.smoothNs + frame.times.lutNs) / 1e6
       : 0,
     madeDecimation: frame.depth?.madeDecimation || frame.depth?.decimation || 1,
-    untouchedRmsUm: untouched && depth ? rootMeanSquareUm(depth) : undefined,
+    noContactRmsUm: noContact && depth ? rootMeanSquareUm(depth) : undefined,
     dropped,
     behind,
   };

@@ -63,11 +63,11 @@ export class CloudView {
   });
   private readonly points = new Points(new BufferGeometry(), this.material);
   private readonly axes = new AxesHelper(AXES_MM);
-  private readonly told = el("output", { class: "row corner", "data-fact": "points" });
+  private readonly reported = el("output", { class: "row corner", "data-fact": "points" });
 
   constructor(host: HTMLElement) {
     this.space = new Space(host, "The touched points in space; drag to turn, wheel to come closer");
-    host.append(this.told);
+    host.append(this.reported);
     // Their true extent is the shader's to know.
     this.points.frustumCulled = false;
     this.space.scene.add(this.points, this.axes);
@@ -75,7 +75,7 @@ export class CloudView {
   }
 
   show(frame: Frame): void {
-    if (frame.contact?.touching === false) return this.clear();
+    if (frame.contact?.inContact === false) return this.clear();
     if (frame.cloud) this.draw(frame.cloud);
     placeAxes(this.axes, frame.pose);
     this.space.render();
@@ -87,7 +87,7 @@ export class CloudView {
 
   private clear(): void {
     this.points.visible = this.axes.visible = false;
-    say(this.told, "Nothing touches: there are no points.");
+    say(this.reported, "There is no contact: there are no points.");
     this.space.render();
   }
 
@@ -105,7 +105,7 @@ export class CloudView {
     const apartMm = this.apartMm(cloud);
     this.uniforms.mmPerUnit.value = cloud.mmPerUnit;
     this.uniforms.pixels.value = 1.5 * apartMm * this.space.pixelsPerMm;
-    say(this.told, `${cloud.points} points, ${apartMm.toFixed(3)} mm apart`);
+    say(this.reported, `${cloud.points} points, ${apartMm.toFixed(3)} mm apart`);
   }
 
   /** From one point to the next in a row, by the first that has a neighbour. */

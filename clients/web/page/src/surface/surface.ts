@@ -120,7 +120,7 @@ export class SurfaceView {
     value: "3",
     "aria-label": "Exaggeration of depth",
   });
-  private readonly told = el("output", {}, "3 ×");
+  private readonly reported = el("output", {}, "3 ×");
 
   constructor(private readonly host: HTMLElement) {
     const colours = new DataTexture(colourMap, COLOURS, 1, RGBAFormat);
@@ -142,10 +142,10 @@ export class SurfaceView {
     });
     this.space = new Space(host, "The surface in space; drag to turn, wheel to come closer");
     const full = el("span", {}, "Depth");
-    host.append(el("label", { class: "row corner exaggeration" }, full, this.scale, this.told));
+    host.append(el("label", { class: "row corner exaggeration" }, full, this.scale, this.reported));
     this.scale.addEventListener("input", () => {
       const times = Number(this.scale.value);
-      say(this.told, times === 1 ? "true scale" : `${times} ×`);
+      say(this.reported, times === 1 ? "true scale" : `${times} ×`);
       this.uniform("exaggeration", times);
       this.space.render();
     });

@@ -88,7 +88,7 @@ export function drawMarks(
   context.textBaseline = "alphabetic";
   context.lineCap = "round";
 
-  if (marks.contact?.touching) {
+  if (marks.contact?.inContact) {
     const [cx, cy] = at({ xMm: marks.contact.xMm, yMm: marks.contact.yMm });
     stroke(() => context.arc(cx, cy, 6, 0, 2 * Math.PI));
     const [dx, dy] = at({ xMm: marks.contact.deepestXMm, yMm: marks.contact.deepestYMm });

@@ -1,6 +1,6 @@
 // Values of a depth map in words: at a pixel, and along the drawn line.
 import type { DepthMap } from "../session/messages";
-import { mm, um } from "../words";
+import { mm, um } from "../labels";
 import { pixelOf } from "./overlay";
 import type { Line, Place } from "./overlay";
 

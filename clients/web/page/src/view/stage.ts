@@ -1,7 +1,7 @@
 // The picture: map or camera, what is drawn over it, and the value under the cursor.
 import { el, say } from "../dom";
 import type { DepthMap, Frame, LumaMap } from "../session/messages";
-import { mm, um } from "../words";
+import { mm, um } from "../labels";
 import { drawColourBar } from "./colour_bar";
 import { MapCanvas } from "./map_canvas";
 import type { Range } from "./map_canvas";
@@ -295,9 +295,9 @@ export class Stage {
     if ("mmPerPx" in map) {
       const value = valueUm(map, pixel.column, pixel.row);
       const place = `x ${mm(this.cursor.xMm)}, y ${mm(this.cursor.yMm)}`;
-      const told = value === null ? "untrusted" : um(value);
+      const reported = value === null ? "untrusted" : um(value);
       const line = this.line ? ` · ${lineText(this.depth, this.line)}` : "";
-      say(this.readout, `${told} · ${where} · ${place}${line}`);
+      say(this.readout, `${reported} · ${where} · ${place}${line}`);
     } else {
       say(
         this.readout,

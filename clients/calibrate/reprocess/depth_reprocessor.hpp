@@ -1,0 +1,78 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "daemon/calibration/calibration.hpp"
+#include "daemon/pipeline/depth/contact.hpp"
+#include "daemon/pipeline/depth/resolutions.hpp"
+#include "daemon/pipeline/reference/calibrated_image.hpp"
+#include "daemon/pipeline/reference/light_follower.hpp"
+#include "hal/frame.hpp"
+#include "proto/depth_encoding.hpp"
+#include "proto/dtact.pb.h"
+
+namespace dtact::reprocess {
+
+/// Whether the frame was recorded under that condition.
+[[nodiscard]] bool has(const v1::Frame& frame, v1::Health flag);
+
+/// Makes the depth of recorded frames anew, by the parts that make it in the daemon with its
+/// default settings: where the image differs from the untouched one, the light followed, the
+/// reconstruction, the contact. Frames come in their order.
+class DepthReprocessor {
+ public:
+  /// Throws std::invalid_argument when the calibration covers too little of the frame.
+  explicit DepthReprocessor(std::shared_ptr<const calibration::Calibration> calibration);
+
+  /// The reference image from here on, Q8 luma of the frame's size; its light was followed by a
+  /// factor already.
+  void set_reference(std::span<const std::uint16_t> reference_q8, double light = 1);
+
+  /// Replaces `frame`'s depth, contact and what follows from them. The map has the resolution that
+  /// the frame's own had and is sharpened by as many steps; full resolution and none where it had
+  /// no map, and no steps where the calibration has no LUT for so many.
+  void remake(const hal::LumaView& luma, v1::Frame& frame);
+
+  /// Frames so far whose own map was sharpened by steps that the calibration has no LUT for.
+  [[nodiscard]] std::uint64_t unsharpened() const noexcept { return unsharpened_; }
+
+  [[nodiscard]] bool in_contact() const noexcept { return contact_.in_contact(); }
+
+ private:
+  /// Of a map: 1/decimation of the calibration's resolution, sharpened by so many steps.
+  struct MapVariant {
+    int decimation = 1;
+    int steps = 0;
+    auto operator<=>(const MapVariant&) const = default;
+  };
+
+  void follow_light(const pipeline::LightSeen& light, std::int64_t timestamp_ns);
+  void set_light(double factor);
+  /// What makes such maps, for the reference and the light of now.
+  [[nodiscard]] pipeline::Resolutions& maps_for(const MapVariant& variant);
+  void describe(const recon::DepthSums& sums, const pipeline::Resolutions& maps,
+                pipeline::Resolution& resolution, v1::Frame& frame);
+
+  std::shared_ptr<const calibration::Calibration> calibration_;
+  pipeline::CalibratedImage image_;
+  std::vector<int> steps_;  ///< That the calibration has LUTs for.
+  std::map<MapVariant, pipeline::Resolutions> maps_;
+  std::vector<std::uint16_t> reference_q8_;
+  pipeline::LightFollower follower_;
+  pipeline::ContactDetector contact_;
+  pipeline::ContactSummary summary_;
+  double light_ = 1;      // followed before the recording
+  double light_now_ = 1;  // and since
+  std::vector<std::int16_t> depth_um_;
+  recon::DrawnTiles drawn_;
+  MapVariant drawn_variant_;
+  std::uint64_t unsharpened_ = 0;
+  wire::PredictZstdEncoder encoder_;
+};
+
+}  // namespace dtact::reprocess

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "clients/geometry/point_cloud.hpp"
+#include "daemon/serve/frame_kind.hpp"
+
+namespace dtact::v1 {
+class DepthMap;
+}
+
+namespace dtact::perceive {
+
+/// The depth map of a frame and the parts of it that clients ask for.
+class DepthCrop {
+ public:
+  /// Throws client::ProtocolError for a damaged map.
+  explicit DepthCrop(const v1::DepthMap& map);
+
+  [[nodiscard]] const DepthGrid& whole() const noexcept { return whole_; }
+  /// The daemon sent all of the map.
+  [[nodiscard]] bool is_whole() const noexcept {
+    return whole_.width == whole_.full_width && whole_.height == whole_.full_height;
+  }
+  [[nodiscard]] int decimation() const noexcept { return decimation_; }
+
+  /// The pixels of a region, grown outward to whole pixels of the map; nothing when the region lies
+  /// beside it. The values are valid until the next call.
+  [[nodiscard]] std::optional<DepthGrid> cut(const net::DepthRegion& region);
+  /// The same of the box around what is pressed deeper than kContactUm, or than half of
+  /// `deepest_mm` where that is less, kMarginPx around it.
+  [[nodiscard]] std::optional<DepthGrid> contact(double deepest_mm);
+
+  /// The daemon's own threshold unless it is configured otherwise; one that lets lighter presses
+  /// count is not told.
+  static constexpr double kContactUm = 100;
+  static constexpr int kMarginPx =
+      16;  ///< As the daemon's, pixels of the calibration's resolution.
+
+ private:
+  [[nodiscard]] std::optional<DepthGrid> crop(int left, int top, int right, int bottom);
+
+  std::vector<std::int16_t> values_;
+  std::vector<std::int16_t> cut_;
+  DepthGrid whole_;
+  int decimation_ = 1;
+};
+
+}  // namespace dtact::perceive

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "clients/web/foxglove/foxglove_client.hpp"
+#include "clients/web/foxglove/sensor_topics.hpp"
+#include "clients/web/request.hpp"
+#include "daemon/serve/admission.hpp"
+#include "daemon/serve/net_config.hpp"
+
+namespace dtact::web::foxglove {
+
+/// Where Foxglove's clients come in: /foxglove for all sensors, /sensors/NAME/foxglove for one.
+class FoxgloveEndpoint {
+ public:
+  /// What is passed by reference must outlive it.
+  FoxgloveEndpoint(const std::vector<std::shared_ptr<Source>>& sources,
+                   const net::NetConfig& config, net::Admission& admission);
+
+  void start();
+  void stop();
+  /// Whether a path is one of this door's.
+  [[nodiscard]] bool knows(std::string_view path) const { return !mounts(path).empty(); }
+  [[nodiscard]] Upgrade upgrade(const Request& request);
+
+ private:
+  [[nodiscard]] std::vector<Mount> mounts(std::string_view path) const;
+  void admit(std::shared_ptr<WebSocket> socket, const net::Peer& peer, const std::string& token,
+             std::vector<Mount> mounts);
+
+  const net::NetConfig& config_;
+  net::Admission& admission_;
+  std::vector<std::shared_ptr<SensorTopics>> sensors_;
+  std::vector<std::weak_ptr<FoxgloveClient>> clients_;
+};
+
+}  // namespace dtact::web::foxglove

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "clients/web/foxglove/topics.hpp"
+#include "clients/web/source.hpp"
+
+namespace dtact::web::foxglove {
+
+/// One daemon's channels: makes each message once for all who want it, and asks the daemon for what
+/// somebody wants. On the thread that runs the gateway's `io`.
+class SensorTopics {
+ public:
+  class Listener {
+   public:
+    Listener() = default;
+    Listener(const Listener&) = delete;
+    Listener& operator=(const Listener&) = delete;
+    virtual ~Listener() = default;
+
+    virtual void on_message(const SensorTopics& sensor, Topic topic,
+                            const std::shared_ptr<const Message>& message) = 0;
+    /// A sentence on why nothing comes, or that it does again.
+    virtual void on_state(bool well, const std::string& sentence) = 0;
+  };
+
+  explicit SensorTopics(std::shared_ptr<Source> source);
+
+  void start();
+  void stop();
+  /// What a listener wants from now on. It is told how the daemon is from its first call, also when
+  /// it wants nothing.
+  void want(Listener& listener, Topics wanted);
+  void forget(Listener& listener);
+  [[nodiscard]] Source& source() const noexcept { return *source_; }
+  /// The light as it is, for who has just asked; null while it is not known.
+  [[nodiscard]] const std::shared_ptr<const Message>& light() const noexcept { return light_; }
+
+ private:
+  void on_changed();
+  void on_event(const v1::Event& event);
+  void on_frame(const RelayedFrame& frame);
+  void publish(Topic topic, const std::shared_ptr<const Message>& message);
+  void publish_state(bool well, const std::string& sentence);
+  void update();
+  [[nodiscard]] Topics wanted() const;
+
+  std::shared_ptr<Source> source_;
+  std::map<Listener*, Topics> listeners_;
+  std::string asked_;  ///< The Subscribe that the daemon knows, serialized.
+  std::shared_ptr<const Message> light_;
+};
+
+}  // namespace dtact::web::foxglove

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <memory>
+
+#include "daemon/calibration/calibration.hpp"
+#include "daemon/pipeline/reference/cells.hpp"
+#include "daemon/pipeline/reference/gel_marks.hpp"
+#include "daemon/pipeline/reference/luma_grid.hpp"
+#include "hal/light_ring.hpp"
+
+namespace dtact::pipeline {
+
+/// What a calibration says of the reference image, with the memory to compare frames with it: made
+/// on the network's side, used on the capture thread.
+struct CalibratedImage {
+  /// Throws std::invalid_argument, saying what to do, when the calibration covers too little of the
+  /// frame to tell light from touch.
+  explicit CalibratedImage(std::shared_ptr<const calibration::Calibration> of);
+
+  std::shared_ptr<const calibration::Calibration> calibration;
+  LumaGrid grid;      ///< Of the calibration's reference.
+  CellRegion region;  ///< Cells that lie wholly in the calibrated part of the frame.
+  Cells cells;
+  std::shared_ptr<const GelMarks> marks;  ///< Of the gel, within the region.
+};
+
+/// The ring emits another light than at calibration: any channel, after brightness and gamma, off
+/// by more than one step. False when the calibration did not record its light. Does not allocate.
+[[nodiscard]] bool light_differs(const calibration::Calibration& calibration,
+                                 const hal::Light& light) noexcept;
+
+}  // namespace dtact::pipeline

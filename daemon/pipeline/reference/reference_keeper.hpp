@@ -1,0 +1,156 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "daemon/pipeline/health.hpp"
+#include "daemon/pipeline/pipeline_config.hpp"
+#include "daemon/pipeline/port.hpp"
+#include "daemon/pipeline/reference/contact_check.hpp"
+#include "daemon/pipeline/reference/luma_grid.hpp"
+#include "daemon/pipeline/reference/reference_average.hpp"
+
+namespace dtact::pipeline {
+
+/// Says when the mean grey has stopped moving: over the last `settle_frames` frames it stayed
+/// within `settle_grey` grey levels.
+class SettleDetector {
+ public:
+  /// Throws std::invalid_argument when settle_frames is not 2 … 64.
+  explicit SettleDetector(const ReferenceRules& rules);
+
+  void reset() noexcept { count_ = 0; }
+  /// Takes the next frame's mean; true once settled.
+  [[nodiscard]] bool add(float mean_grey) noexcept;
+
+ private:
+  static constexpr std::size_t kMax = 64;
+  std::size_t frames_;
+  double grey_;
+  std::array<float, kMax> means_{};
+  std::size_t count_ = 0;
+};
+
+/// What the reference in use stands on.
+enum class ReferenceQuality : std::uint8_t {
+  none,      ///< There is none yet: no depth.
+  fresh,     ///< Averaged under the present light without contact.
+  restored,  ///< There is contact: the last good one, made under the same light.
+  stale      ///< There is contact: an older one brought to the present light as well as it goes.
+};
+
+struct ReferenceStep {
+  bool reference_changed = false;  ///< reference() is another from now on.
+  std::optional<Outcome> answer;   ///< To the re-zero that was asked for.
+};
+
+/// Decides when the reference image may be taken and what stands in until then. The sequence: wait
+/// until the mean grey settles, average, compare with what is known to be untouched, and only then
+/// take it. While a fallback reference is in use it looks every few frames whether there is no
+/// contact any more. All memory is taken at construction; one thread.
+class ReferenceKeeper {
+ public:
+  ReferenceKeeper(int width, int height, const ReferenceRules& rules);
+
+  /// The last good reference of an earlier run (Q8, frame sized). `same_light`: made under the
+  /// light of now; `same_shape`: under the same colours, whatever the brightness.
+  void restore(std::span<const std::uint16_t> reference_q8, bool same_light, bool same_shape);
+  /// What the calibration knows; the span and the grid must outlive their use here. `same_light`:
+  /// as restore()'s. A fresh reference stays, whatever else is known is forgotten and the sequence
+  /// begins again.
+  void use_calibration(std::span<const std::uint16_t> reference_q8, const LumaGrid& grid,
+                       const CellRegion& region, bool same_light) noexcept;
+  /// The camera has (re)started: begins the sequence.
+  void begin() noexcept;
+  /// The light is about to change or has just changed: no depth until the next reference.
+  /// `in_contact`: what the depth said last; `same_shape`: only the brightness changes.
+  void light_changed(bool in_contact, bool same_shape) noexcept;
+  /// Asks for the present image as reference. An answer means that it is refused at once, else it
+  /// comes out of step().
+  [[nodiscard]] std::optional<Outcome> rezero(bool force, bool in_contact) noexcept;
+  void cancel_rezero() noexcept {
+    request_.reset();
+    if (phase_ == Phase::holding) averaging_ = false;
+  }
+
+  /// The next frame under settled light. Mostly cheap; a decision takes about two frames' time.
+  [[nodiscard]] ReferenceStep step(const hal::LumaView& luma) noexcept;
+
+  /// The next image counts for a reference, all of it. Else step() does not look.
+  [[nodiscard]] bool looks() const noexcept;
+  [[nodiscard]] State state() const noexcept;
+  [[nodiscard]] ReferenceQuality quality() const noexcept { return quality_; }
+  /// False from a start or a light change until a reference or a fallback reference is there.
+  [[nodiscard]] bool ready() const noexcept { return phase_ == Phase::holding; }
+  /// The sequence runs because the camera (re)started, not because of the light.
+  [[nodiscard]] bool starting() const noexcept { return !ready() && starting_; }
+  /// No reference can be taken: the picture has been too dark for settle_frames frames.
+  [[nodiscard]] bool dark() const noexcept { return dark_frames_ >= rules_.settle_frames; }
+  /// Q8 luma, frame sized. Only when ready().
+  [[nodiscard]] std::span<const std::uint16_t> reference() const noexcept;
+  /// The reference in use is worth keeping for the next start: taken without contact.
+  [[nodiscard]] bool storable() const noexcept {
+    return quality_ == ReferenceQuality::fresh && !forced_;
+  }
+
+ private:
+  enum class Phase : std::uint8_t { settling, averaging, holding };
+  struct Known {
+    std::span<const std::uint16_t> reference_q8;
+    const LumaGrid* grid = nullptr;
+  };
+
+  struct Request {
+    bool force = false;
+  };
+
+  void start_average() noexcept;
+  ReferenceStep settle(const hal::LumaView& luma) noexcept;
+  ReferenceStep gather(const hal::LumaView& luma) noexcept;
+  void watch(const hal::LumaView& luma) noexcept;
+  ReferenceStep decide(Outcome obstacle) noexcept;
+  ReferenceStep take() noexcept;
+  ReferenceStep use_fallback() noexcept;
+  [[nodiscard]] bool shows_contact(const LumaGrid& now) noexcept;
+  [[nodiscard]] Known best_known() const noexcept;
+
+  int width_;
+  int height_;
+  ReferenceRules rules_;
+  SettleDetector settle_;
+  ReferenceAverage average_;
+  ContactCheck check_;
+  CellRegion region_;
+  Known calibration_;
+
+  Phase phase_ = Phase::settling;
+  ReferenceQuality quality_ = ReferenceQuality::none;
+  bool starting_ = true;
+  bool averaging_ = false;          // while holding: a new reference is being gathered
+  bool no_contact_before_ = false;  // there was no contact right before the light changed
+  bool other_light_ = false;        // than what is known was made under
+  bool same_shape_ = true;          // the light differs from it by a factor only
+  bool forced_ = false;
+  std::optional<Request> request_;
+  int waited_ = 0;       // frames since the sequence or the average began
+  int dark_frames_ = 0;  // in a row, while no reference is in use
+  int watched_ = 0;      // frames since the last look
+  int clear_ = 0;        // looks in a row that saw nothing touch
+
+  std::vector<std::uint16_t> good_;  // the last good reference
+  LumaGrid good_grid_;
+  bool have_good_ = false;
+  bool good_same_light_ = false;
+  std::vector<std::uint16_t> candidate_;
+  LumaGrid candidate_grid_;
+  std::vector<std::uint16_t> fallback_;
+  LumaGrid first_;  // of the average being gathered
+  LumaGrid now_;
+  LightField field_{};
+};
+
+}  // namespace dtact::pipeline

@@ -1,0 +1,71 @@
+// dtact-calibrate reprocess: a recorded frame's depth as it was made, by another calibration.
+#include "clients/calibrate/reprocess/depth_reprocessor.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/fakes/scattering_toy.hpp"
+
+namespace dtact::reprocess {
+namespace {
+
+/// A frame of the toy, pressed by 0.8 mm, whose recorded map was made so.
+v1::Frame recorded(std::uint32_t decimation, std::uint32_t sharpen_steps) {
+  v1::Frame frame;
+  frame.set_monotonic_ns(1);
+  frame.mutable_depth()->set_decimation(decimation);
+  frame.mutable_depth()->set_sharpen_steps(sharpen_steps);
+  return frame;
+}
+
+v1::Frame remade(DepthReprocessor& remaker, v1::Frame frame) {
+  const fakes::ToyFrame pressed({.press_mm = 0.8});
+  remaker.remake(pressed.view(), frame);
+  return frame;
+}
+
+// The toy's map has 144 x 104 pixels of 0.2 mm; levels are sharpened at a quarter of that.
+TEST(DepthReprocessor, SharpensWhatWasSharpened) {
+  DepthReprocessor remaker(fakes::scattering_toy_calibration(15));
+  remaker.set_reference(fakes::toy_reference_q8());
+  const v1::Frame plain = remade(remaker, recorded(1, 0));
+  EXPECT_EQ(plain.depth().sharpen_steps(), 0U);
+  EXPECT_EQ(plain.depth().made_decimation(), 0U);
+  double deepest_mm = plain.contact().deepest_mm();
+  for (const std::uint32_t steps : {1U, 2U}) {
+    const v1::Frame sharp = remade(remaker, recorded(1, steps));
+    EXPECT_EQ(sharp.depth().sharpen_steps(), steps);
+    EXPECT_EQ(sharp.depth().made_decimation(), 4U);
+    EXPECT_EQ(sharp.depth().decimation(), 1U);
+    EXPECT_EQ(sharp.depth().width(), 144U);
+    EXPECT_DOUBLE_EQ(sharp.depth().mm_per_px(), 0.2);
+    // What scattering would have taken off the spot's peak is put back, the more the more steps.
+    EXPECT_GT(sharp.contact().deepest_mm(), 1.02 * deepest_mm) << steps;
+    deepest_mm = sharp.contact().deepest_mm();
+  }
+  const v1::Frame quarter = remade(remaker, recorded(4, 2));
+  EXPECT_EQ(quarter.depth().width(), 36U);
+  EXPECT_EQ(quarter.depth().made_decimation(), 0U) << "no coarser than itself";
+  EXPECT_EQ(remaker.unsharpened(), 0U);
+}
+
+TEST(DepthReprocessor, CountsWhatTheCalibrationCannotSharpen) {
+  DepthReprocessor remaker(fakes::toy_calibration());
+  remaker.set_reference(fakes::toy_reference_q8());
+  (void)remade(remaker, recorded(2, 0));
+  EXPECT_EQ(remaker.unsharpened(), 0U);
+  const v1::Frame plain = remade(remaker, recorded(2, 1));
+  EXPECT_EQ(plain.depth().sharpen_steps(), 0U);
+  EXPECT_EQ(plain.depth().width(), 72U);
+  EXPECT_EQ(remaker.unsharpened(), 1U);
+}
+
+// What is not of the daemon's kind is made at full resolution.
+TEST(DepthReprocessor, TakesNoResolutionThatThereIsNot) {
+  DepthReprocessor remaker(fakes::toy_calibration());
+  remaker.set_reference(fakes::toy_reference_q8());
+  EXPECT_EQ(remade(remaker, recorded(3, 0)).depth().decimation(), 1U);
+  EXPECT_EQ(remade(remaker, recorded(0, 0)).depth().width(), 144U);
+}
+
+}  // namespace
+}  // namespace dtact::reprocess

@@ -1,0 +1,184 @@
+#include "daemon/pipeline/reference/reference_tracker.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "daemon/pipeline/reference/reference_store.hpp"
+#include "tests/fakes/own_path.hpp"
+#include "tests/fakes/toy_sensor.hpp"
+
+namespace dtact::pipeline {
+namespace {
+
+constexpr int kReferenceFrames = 16;
+constexpr FrameState kUnsettled{.settled = false, .whole = true};
+
+PipelineConfig config() {
+  PipelineConfig made;
+  made.reference.frames = kReferenceFrames;
+  made.state_folder = fakes::own_path();
+  return made;
+}
+
+/// The reference image of a toy sensor, whose gel has marks.
+class ReferenceTrackerTest : public ::testing::Test {
+ protected:
+  ReferenceTrackerTest() {
+    std::filesystem::remove_all(folder_);
+    image_.start();
+    image_.use(&calibrated_);
+  }
+
+ public:
+  ~ReferenceTrackerTest() override {
+    image_.stop();
+    std::filesystem::remove_all(folder_);
+  }
+
+ protected:
+  Observation look(const fakes::ToyFrame& frame,
+                   FrameState moment = {.settled = true, .whole = true}) {
+    now_ns_ += 16'666'667;
+    moment.timestamp_ns = moment.now_ns = now_ns_;
+    const Observation seen = image_.look(frame.view(), moment);
+    image_.settle();
+    return seen;
+  }
+  void show(int frames) {
+    for (int i = 0; i < frames; ++i) (void)look(next());
+  }
+  /// Whether depth can be measured after so many frames, and with nothing to complain of.
+  bool settles() {
+    show(3 * kReferenceFrames);
+    return image_.quality() == ReferenceQuality::fresh && image_.health_flags().empty();
+  }
+  fakes::ToyFrame next() { return fakes::ToyFrame(scene_, sequence_++); }
+  [[nodiscard]] bool has(Health health) const { return image_.health_flags().has(health); }
+
+  PipelineConfig config_ = config();
+  fakes::ToyScene scene_{.marks = 2};
+  CalibratedImage calibrated_{fakes::toy_calibration(scene_)};
+  std::filesystem::path folder_ = fakes::own_path();
+  ReferenceTracker image_{fakes::kToyWidth, fakes::kToyHeight, config_.light, config_};
+  std::uint64_t sequence_ = 0;
+  std::int64_t now_ns_ = 0;
+};
+
+TEST_F(ReferenceTrackerTest, AnotherLightThanAtCalibrationIsReportedFromTheStart) {
+  hal::Light dim = config_.light;
+  dim.brightness = 128;
+  ReferenceTracker dimmed(fakes::kToyWidth, fakes::kToyHeight, dim, config_);
+  dimmed.use(&calibrated_);
+  EXPECT_TRUE(dimmed.health_flags().has(Health::light_mismatch));
+  EXPECT_FALSE(has(Health::light_mismatch));
+}
+
+TEST_F(ReferenceTrackerTest, TheLightThatIsFollowedOutlivesTheCalibration) {
+  ASSERT_TRUE(settles());
+  CalibratedImage next{fakes::toy_calibration(scene_)};
+  constexpr int kDriftFrames = 1200;  // half a percent in twenty seconds
+  for (int i = 1; i <= kDriftFrames; ++i) {
+    scene_.light = 1 - 0.005 * i / kDriftFrames;
+    show(1);
+  }
+  ASSERT_NEAR(image_.light(), 0.995, 0.001);
+  image_.use(&next);
+  EXPECT_NEAR(image_.light(), 0.995, 0.001);
+  show(2 * kReferenceFrames);
+  EXPECT_NEAR(image_.light(), 0.995, 0.001);
+  EXPECT_FALSE(has(Health::light_drifted));
+  EXPECT_FALSE(image_.any_active());
+}
+
+// What is held drags the gel along, and its marks with it.
+TEST_F(ReferenceTrackerTest, TheCamerasShiftIsNotJudgedByAGelInContact) {
+  ASSERT_TRUE(settles());
+  now_ns_ += CameraShiftDetector::kPauseNs;
+  scene_.marks_px = 4;
+  image_.set_in_contact(true);
+  show(2 * kReferenceFrames);
+  EXPECT_FALSE(has(Health::camera_shifted));
+  image_.set_in_contact(false);
+  show(2 * kReferenceFrames);
+  EXPECT_TRUE(has(Health::camera_shifted));
+}
+
+TEST_F(ReferenceTrackerTest, AFrameReadInPartIsNoPartOfAReference) {
+  ASSERT_TRUE(settles());
+  ASSERT_EQ(image_.rezero(true), std::nullopt);
+  fakes::ToyFrame part = next();
+  std::fill_n(part.pixels.begin(), std::ptrdiff_t{8} * fakes::kToyWidth, std::uint8_t{0});
+  EXPECT_EQ(look(part, {.settled = true, .whole = false}).rezeroed, std::nullopt);
+  std::optional<Outcome> answer;
+  for (int i = 0; i < kReferenceFrames; ++i) answer = look(next()).rezeroed;
+  EXPECT_EQ(answer, Outcome::done);
+  // 103 levels; with a sixteenth of nothing in it, 97.
+  EXPECT_NEAR(image_.reference()[0], fakes::toy_reference_q8(scene_)[0], 256);
+}
+
+TEST_F(ReferenceTrackerTest, AReferenceForcedInContactIsNotKeptForTheNextStart) {
+  ASSERT_TRUE(settles());
+  scene_.press_mm = 1;
+  ASSERT_EQ(image_.rezero(true), std::nullopt);
+  show(3 * kReferenceFrames);
+  constexpr std::size_t kMiddle = 60 * fakes::kToyWidth + 80;
+  EXPECT_NEAR(image_.reference()[kMiddle], 119 * 256, 3 * 256);
+  image_.stop();
+  const auto kept =
+      load_reference(*calibrated_.calibration, fakes::kToyWidth, fakes::kToyHeight, folder_);
+  ASSERT_TRUE(kept.has_value());
+  EXPECT_NEAR(kept->image_q8[kMiddle], 150 * 256, 3 * 256);
+}
+
+// The ring writes again what it shows, say, and flickers.
+TEST_F(ReferenceTrackerTest, NoDepthIsMeasuredBeforeTheLightHasSettled) {
+  ASSERT_TRUE(settles());
+  EXPECT_TRUE(look(next()).measurable);
+  EXPECT_FALSE(look(next(), kUnsettled).measurable);
+  EXPECT_TRUE(image_.ready());
+  EXPECT_TRUE(look(next()).measurable);
+}
+
+// The ring has no power, say. A camera's first pictures may be dark.
+TEST_F(ReferenceTrackerTest, ReportsADarkPictureBeforeTheFirstReference) {
+  scene_.light = 0.04;  // 6 levels
+  show(config_.reference.settle_frames - 1);
+  EXPECT_FALSE(has(Health::image_dark));
+  show(1);
+  EXPECT_TRUE(has(Health::image_dark));
+  EXPECT_TRUE(has(Health::starting));
+  scene_.light = 1;
+  show(1);
+  EXPECT_FALSE(has(Health::image_dark));
+  EXPECT_TRUE(settles());
+}
+
+TEST_F(ReferenceTrackerTest, ReportsADarkPictureAfterTheLightIsSwitchedOff) {
+  ASSERT_TRUE(settles());
+  image_.light_changes({.brightness = 0});
+  scene_.light = 0.04;
+  show(config_.reference.settle_frames);
+  EXPECT_TRUE(has(Health::image_dark));
+  image_.light_changes(config_.light);
+  EXPECT_FALSE(has(Health::image_dark));
+}
+
+TEST_F(ReferenceTrackerTest, WhatWasWrongWithThePictureIsNotReportedWhileTheLightChanges) {
+  ASSERT_TRUE(settles());
+  scene_.light = 0.12;  // 17 levels
+  show(1);
+  EXPECT_TRUE(has(Health::image_dark));
+  scene_.light = 1;
+  (void)look(next(), kUnsettled);
+  EXPECT_FALSE(has(Health::image_dark));
+  EXPECT_TRUE(has(Health::light_unsettled));
+}
+
+}  // namespace
+}  // namespace dtact::pipeline
