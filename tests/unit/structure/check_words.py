@@ -16,7 +16,7 @@ LEFT_OUT = ("clients/web/page/package-lock.json", "clients/web/page/gen/", "debi
 
 
 def words_of(identifier):
-    """"kTouchedDarkening" and "touched_darkening" → "touched darkening"."""
+    """"kPinDarkening" and "pin_darkening" → "pin darkening"."""
     parts = [part.lower() for part in PART.findall(identifier)]
     return " ".join(parts[1:] if len(parts) > 1 and parts[0] == "k" else parts)
 
