@@ -33,9 +33,9 @@ struct CameraInfo {
   std::string pixel_format;  ///< "GREY", "YUYV", "MJPEG", ... as it comes from the device.
   int width = 0;             ///< Pixels.
   int height = 0;            ///< Pixels.
-  double fps = 0;            ///< Frames a second that the mode promises.
-  /// A light change is complete in the frames whose exposure began at least so many periods after
-  /// it, as well as their timestamps tell (exposure plus the camera's queue).
+  double fps = 0;            ///< The mode's nominal frames per second.
+  /// A light change is complete in frames whose exposure began at least this number of periods
+  /// after it, according to their timestamps (exposure plus the camera's queue).
   int light_delay_frames = 2;
   std::vector<CameraControl> controls;
 };
@@ -55,7 +55,7 @@ struct DamageCounts {
   std::uint64_t undecodable = 0;  ///< Whole, but broken inside or another size.
 };
 
-/// Run-time condition of a camera. Any thread may ask.
+/// Run-time state of a camera. Any thread may ask.
 struct CameraReport {
   CameraState state = CameraState::streaming;
   std::string fix;              ///< A sentence saying what to do; empty while streaming.

@@ -48,12 +48,12 @@ inline constexpr std::array kLibcameraControls{"auto_exposure", "auto_white_bala
 
 /// A camera behind a V4L2 driver, as USB cameras are.
 struct V4l2Config {
-  /// Which camera: a path below /dev/v4l/by-path or by-id, "serial:NUMBER", "bus:NAME" (the
-  /// driver's bus_info), or a node such as /dev/video0, whose number may change at every plug.
+  /// The camera: a path below /dev/v4l/by-path or by-id, "serial:NUMBER", "bus:NAME" (the
+  /// driver's bus_info), or a node like /dev/video0, whose number may change at every plug.
   /// Empty = the only camera on USB, or the only other one that delivers the size.
   std::string device;
   std::string pixel_format = "auto";  ///< "auto", "grey", "nv12", "yuyv" or "mjpeg".
-  std::string range = "auto";  ///< Of raw luma: "full", "limited", or "auto" = as the driver says.
+  std::string range = "auto";  ///< For raw luma: "full", "limited", or "auto" = the driver's value.
   double exposure_us = 0;      ///< 0 = the camera's default.
   int exposure_pwm_periods = 0;  ///< Exposure as whole periods of the LEDs' PWM; 0 = not used.
   double pwm_hz = 0;             ///< The LEDs' PWM frequency, for exposure_pwm_periods.
@@ -111,7 +111,7 @@ struct Ws2812Config {
   int spi_bits = 4;            ///< SPI bits for each WS2812B bit: 3, 4 or 8.
   bool spi_check_rate = true;  ///< Measure the rate, time every transfer, refuse.
 
-  std::string pio_device = "/dev/leds0";  ///< Of a Raspberry Pi 5's ws2812-pio driver.
+  std::string pio_device = "/dev/leds0";  ///< Device of a Raspberry Pi 5's ws2812-pio driver.
 
   GpioLineConfig power;      ///< Switches the ring's supply.
   int power_settle_ms = 50;  ///< From power on to the first write.

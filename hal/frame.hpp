@@ -65,7 +65,7 @@ struct FrameInfo {
   std::uint32_t flags = kFrameNormal;
 };
 
-/// Whoever lends frames. `index` is the lender's own name for the buffer.
+/// The owner of frame buffers. `index` is the owner's number of the buffer.
 class FrameOwner {
  public:
   virtual void give_back(int index) noexcept = 0;

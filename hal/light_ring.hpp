@@ -19,7 +19,7 @@ struct Rgb {
   bool operator==(const Rgb&) const = default;
 };
 
-/// What the ring is told to show: LED 0 is at the image's right (3 o'clock), the others follow
+/// The requested light. LED 0 is at the image's right (3 o'clock), the others follow
 /// clockwise as the camera sees them. Each LED emits its colour scaled by
 /// (brightness / 255)^gamma.
 struct Light {
@@ -61,15 +61,15 @@ struct ShowResult {
   bool away = false;     ///< When not ok: there is no ring to write to now; attend() looks for it.
 };
 
-/// Run-time condition of a ring.
+/// Run-time state of a ring.
 struct RingReport {
   bool ok = true;              ///< The ring is there and the last write worked.
   bool away = false;           ///< It is looked for; once it is there, show() it its light again.
   std::string message;         ///< When not ok: what failed and the fix.
-  std::string note;            ///< Worth knowing, not wrong. Empty = nothing.
+  std::string note;            ///< information that is not an error; empty = none
   std::uint64_t writes = 0;    ///< Tried, re-sends included.
-  std::uint64_t failures = 0;  ///< Of these.
-  /// attend() is to be called again after at most this time.
+  std::uint64_t failures = 0;  ///< failed writes among them
+  /// The longest time until the next call of attend().
   std::chrono::nanoseconds due = std::chrono::milliseconds(250);
 };
 

@@ -19,7 +19,7 @@ inline constexpr std::uint16_t kPerceivePort = 7378;
 /// dtact-web's own, which browsers are pointed at: from the same range.
 inline constexpr std::uint16_t kWebPort = 7380;
 
-/// Where the daemon listens, and clients connect to, unless told otherwise: this machine only.
+/// Default address of the daemon, for listening and connecting: this machine only.
 inline constexpr const char* kDefaultAddress = "127.0.0.1";
 
 /// What the daemon is announced as in multicast DNS (RFC 6763).

@@ -29,7 +29,7 @@ class DepthEncoder {
   PredictZstdEncoder predict_zstd_;
 };
 
-/// The reverse, of foreign bytes. False for an unknown encoding, a map without pixels or with too
+/// The reverse, for untrusted bytes. False for an unknown encoding, a map with no pixels or too
 /// many, or `bytes` that are not exactly a map of this size; `depth` is then unspecified. Never
 /// allocates more than some bytes for each pixel of the announced size.
 [[nodiscard]] bool decode_depth(v1::DepthEncoding encoding, std::string_view bytes,

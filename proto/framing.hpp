@@ -37,7 +37,7 @@ class MessageDecoder {
 
   /// The message that feed() completed; empty is a valid message. Valid until the next feed().
   [[nodiscard]] const std::string& message() const noexcept { return message_; }
-  /// Lets go of the message that feed() completed, and of its memory when it was a large one.
+  /// Releases the message that feed() completed, and its memory when it was large.
   void release();
   /// For the messages that begin from here on.
   void set_cap(std::size_t cap) noexcept { cap_ = cap; }

@@ -14,8 +14,8 @@ struct Colour {
   bool operator==(const Colour&) const = default;
 };
 
-/// From dark violet (0) over green to pale yellow (1): lightness grows all the way, so the order is
-/// seen without telling hues apart. Green's cubehelix (Bull. Astr. Soc. India 39, 289, 2011).
+/// From dark violet (0) over green to pale yellow (1). Lightness increases throughout, so the order
+/// shows without distinct hues. Green's cubehelix (Bull. Astr. Soc. India 39, 289, 2011).
 [[nodiscard]] Colour colour_of(double share);
 
 /// An untrusted pixel; none of the scale's colours is grey.

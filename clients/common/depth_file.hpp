@@ -18,7 +18,7 @@ struct DepthImage {
   int y = 0;
   int full_width = 0;  ///< 0: it is the whole.
   int full_height = 0;
-  recon::Surface surface = {};  ///< That it is measured from.
+  recon::Surface surface = {};  ///< Surface that depth is measured from.
 };
 
 /// The head of NumPy's .npy, format 1.0, for float32 little-endian: 128 bytes. `shape`: "(2, 3)".

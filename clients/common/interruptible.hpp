@@ -4,8 +4,8 @@
 
 namespace dtact::cli {
 
-/// While one of these lasts, Ctrl-C and SIGTERM do not end the program; happened() tells that one
-/// came. One at a time.
+/// While an object of this class lives, Ctrl-C and SIGTERM do not end the program; happened()
+/// reports whether one came. One object at a time.
 class Interruptible {
  public:
   Interruptible() {

@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 /// Between attempts to reach a daemon that is not there: one that restarts is back within a second.
 constexpr client::Reconnect kPauses{std::chrono::milliseconds(200),
                                     std::chrono::milliseconds(2000)};
-/// As long as it takes: whoever has something to say wakes the thread.
+/// Longest wait; other threads wake this one when there is work.
 constexpr std::chrono::hours kForever{24};
 constexpr std::uint64_t kHelloId = 1;
 
@@ -125,7 +125,7 @@ v1::HelloReply Link::greet(client::Connection& connection) const {
 
 void Link::serve(client::Connection& connection) {
   for (;;) {
-    // First, so that the word of stop() is not taken without being heeded.
+    // First, so that a wake-up by stop() is not consumed unnoticed.
     drain();
     if (stopping_) return;
     std::vector<std::string> outgoing;

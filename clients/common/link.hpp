@@ -14,21 +14,21 @@
 
 namespace dtact::cli {
 
-/// A connection to a daemon that carries its messages as they are, on a thread of its own; made
-/// again whenever it is lost.
+/// A connection to a daemon that passes its messages on unchanged, on a thread of its own. It
+/// reconnects whenever the connection is lost.
 class Link {
  public:
-  /// All on the link's own thread. What one throws ends the connection, and the next one begins.
+  /// Called on the link's own thread. An exception ends the connection; the next one begins.
   struct Handlers {
-    /// The daemon greeted; whether it is on this machine.
+    /// The daemon answered Hello; the bool: it is on this machine.
     std::function<void(v1::HelloReply, bool)> up;
     std::function<void(std::string)> down;  ///< Why it is away; again with another reason.
     std::function<void(const std::string&)> message;  ///< A ServerMessage as it came.
   };
 
   Link(client::Options options, Handlers handlers);
-  /// Waits for the thread, which looking up a host's name may hold up: stop() and ended() tell when
-  /// it does not.
+  /// Joins the thread, which a host name lookup may delay. After stop(), ended() reports when this
+  /// no longer blocks.
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;

@@ -16,9 +16,9 @@ struct Context {
   std::ostream& out;
 };
 
-/// The daemon's address, token and certificate and --version, allowed before and behind the
-/// command, of which there has to be one; the exit codes below the help. The daemon knows the
-/// program by its name and version.
+/// Adds the options for the daemon's address, token and certificate, and --version, before and
+/// after the command. A command is required. Lists the exit codes below the help. The daemon sees
+/// the program's name and version.
 void add_global_options(CLI::App& app, Context& context);
 
 /// --json, of a command that prints what it was asked for.

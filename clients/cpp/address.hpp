@@ -17,7 +17,7 @@ struct Address {
 };
 
 /// Reads "gripper", "gripper:7377", "192.0.2.7", "fe80::1%eth0", "[::1]:7377" and "unix:/PATH";
-/// `port` stands in where the text has none. Throws Error naming the forms.
+/// `port` is the default where the text has none. Throws Error naming the forms.
 [[nodiscard]] Address parse_address(const std::string& text, std::uint16_t port);
 
 }  // namespace dtact::client

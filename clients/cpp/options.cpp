@@ -14,9 +14,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// The permissions that a token's file may not have. Of a credential (systemd.exec(5)), which may
-/// be root's and readable to the service by an access control list, the mode shows the list's mask
-/// as the rights of root's group.
+/// The permissions that a token's file must not have. A systemd credential (systemd.exec(5)) may
+/// belong to root and be readable to the service by an access control list; its mode then shows the
+/// list's mask as the rights of root's group.
 mode_t forbidden(const fs::path& file, const struct stat& status) {
   const char* folder = std::getenv("CREDENTIALS_DIRECTORY");
   const bool credential =
@@ -39,7 +39,7 @@ std::string read_token(const fs::path& file) {
                             file.string()));
   }
   token.erase(token.find_last_not_of(" \t\r") + 1);
-  // Of the daemon's own file it would be a line like "control TOKEN NAME".
+  // The daemon's own file has lines like "control TOKEN NAME".
   if (token.empty() || token.size() > wire::kMaxToken || token.find(' ') != std::string::npos) {
     throw Error(fmt::format(
         "the first line of {} is no token: it has 1 to {} bytes and no blanks. Of a line for the "

@@ -11,8 +11,8 @@
 
 namespace dtact::client {
 
-/// How the daemon proves over TCP that it is the one meant. At least one is needed; what is given
-/// has to hold. TLS 1.3.
+/// How the daemon proves its identity over TCP, with TLS 1.3. At least one of the two is required;
+/// if both are set, both must hold.
 struct Tls {
   /// SHA-256 of its certificate (DER): 64 hexadecimal digits in either case, with or without
   /// colons. `dtactctl cert --show` prints it on the daemon's machine.
@@ -21,8 +21,8 @@ struct Tls {
   std::filesystem::path ca_file;
 };
 
-/// How long to wait between attempts to get a lost connection back: each twice as long as the one
-/// before, less a random part of up to a half, so that the clients of a daemon do not all come at
+/// Back-off between attempts to restore a lost connection. Each wait is twice as long as the one
+/// before, less a random part of up to a half. So the clients of a daemon do not all reconnect at
 /// once.
 struct Reconnect {
   std::chrono::milliseconds min{100};
@@ -34,19 +34,19 @@ struct Options {
   std::string host = wire::kDefaultAddress;
   std::uint16_t port = wire::kDefaultPort;   ///< Where `host` names none.
   std::string program = "dtact C++ client";  ///< Shown by dtactctl status; at most 64 bytes.
-  std::chrono::milliseconds timeout{5000};   ///< Of the connection and of each request.
-  /// What the daemon asks for, if it does: at most 256 bytes, see read_token(). Sent once the other
-  /// end is known: over TLS, on this machine, or where `insecure` says so.
+  std::chrono::milliseconds timeout{5000};   ///< For the connection and each request.
+  /// The token, if the daemon requires one: at most 256 bytes, see read_token(). Sent only over
+  /// TLS, on this machine, or if `insecure` is set.
   std::string token{};
   std::optional<Tls> tls{};  ///< Unset: plain TCP. Socket files need none and use none.
-  /// Sends the token over plain TCP to other machines too: whoever hears it there may use it.
+  /// Sends the token over plain TCP to other machines too, where eavesdroppers can read it.
   bool insecure = false;
-  /// Unset: a lost connection is an error, and the client of no further use.
+  /// Unset: a lost connection is an error and makes the client unusable.
   std::optional<Reconnect> reconnect{};
 };
 
-/// The first line of a file. Throws Error when it cannot be read, is empty, holds blanks or more
-/// than 256 bytes, or when users other than its owner may read it.
+/// Returns the first line of a file. Throws Error if other users may read the file, or if the line
+/// is unreadable, empty, contains blanks or exceeds 256 bytes.
 DTACT_EXPORT [[nodiscard]] std::string read_token(const std::filesystem::path& file);
 
 }  // namespace dtact::client

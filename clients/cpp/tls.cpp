@@ -79,7 +79,7 @@ void TlsChannel::prepare(const Tls& tls, const std::string& host) {
   context_.reset(::SSL_CTX_new(::TLS_client_method()));
   require(context_ != nullptr &&
           ::SSL_CTX_set_min_proto_version(context_.get(), TLS1_3_VERSION) == 1);
-  // A message's length tells whether it is whole, so an end without TLS's own farewell is one too.
+  // Messages carry their length, so a connection may end without TLS's close_notify.
   ::SSL_CTX_set_options(context_.get(), SSL_OP_IGNORE_UNEXPECTED_EOF);
   ::SSL_CTX_set_mode(context_.get(),
                      SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);

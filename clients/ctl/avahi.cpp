@@ -63,7 +63,7 @@ struct Instance {
   std::string domain;
 };
 
-/// What the browser has told.
+/// Results from the browser.
 struct Received {
   std::vector<Instance> instances;
   bool all = false;
@@ -106,7 +106,7 @@ Bus open_bus() {
 std::vector<Instance> list_instances(sd_bus* bus, std::chrono::milliseconds timeout) {
   Received received;
   Error error;
-  // Before the browser, which tells at once what it knows.
+  // Before the browser, which reports known services at once.
   int result =
       sd_bus_match_signal(bus, nullptr, kAvahi, nullptr, kBrowser, nullptr, on_signal, &received);
   if (result >= 0) {

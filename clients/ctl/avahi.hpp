@@ -12,9 +12,9 @@ namespace dtact::ctl {
 /// over.
 void read_txt(const std::vector<std::string>& txt, cli::FoundDaemon& to);
 
-/// Every dtactd that this machine's avahi-daemon knows of, one for each address, by name; looks
-/// until Avahi says that it has all for now, at most for so long. Throws cli::Failure with a
-/// sentence when there is no avahi-daemon to ask.
+/// Every dtactd that this machine's avahi-daemon knows, one for each address, sorted by name. Ends
+/// when Avahi reports all known ones, or at the time limit. Throws cli::Failure with a sentence
+/// when no avahi-daemon runs.
 [[nodiscard]] std::vector<cli::FoundDaemon> browse(std::chrono::milliseconds timeout);
 
 }  // namespace dtact::ctl

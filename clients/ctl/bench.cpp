@@ -20,7 +20,7 @@
 namespace dtact::ctl {
 namespace {
 
-/// Of which the shortest counts: enough that one falls between two frames.
+/// The shortest ping counts; with this many, one falls between two frames.
 constexpr int kPings = 24;
 /// Passed over at the start: what was on the way, and a congestion window that still grows.
 constexpr double kWarmUpSeconds = 0.5;

@@ -26,7 +26,7 @@ constexpr const char* kPng = "reference.png";
 /// One number, or none for the current calibration.
 using Id = std::optional<std::uint64_t>;
 
-/// Of the folder itself, also for "cal/" and ".".
+/// Name of the folder itself, also for "cal/" and ".".
 std::string name_of(const fs::path& folder) {
   const fs::path path = fs::canonical(folder);
   return path.filename().string();

@@ -20,7 +20,7 @@ using hal::v4l2::Mode;
 using hal::v4l2::OfferedControl;
 using hal::v4l2::SurveyedCamera;
 
-/// Drivers' rates are fractions; 60.00024 is told as 60.
+/// Drivers' rates are fractions; 60.00024 is shown as 60.
 double rounded(double fps) { return std::round(fps * 100) / 100; }
 
 void print_text(const SurveyedCamera& camera, std::ostream& out) {

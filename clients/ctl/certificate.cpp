@@ -50,7 +50,7 @@ bool is_address(const std::string& name) {
          ::inet_pton(AF_INET6, name.c_str(), bytes.data()) == 1;
 }
 
-/// As an entry of subjectAltName. Nothing else may be in it, since OpenSSL takes a list apart.
+/// An entry of subjectAltName. It must contain nothing else, because OpenSSL splits lists.
 std::string entry_of(const std::string& name) {
   if (is_address(name)) return "IP:" + name;
   const bool fits = !name.empty() && name.size() <= kLongestName &&
@@ -116,7 +116,7 @@ std::string pem(Write write) {
   return {text, static_cast<std::size_t>(size)};
 }
 
-/// As text; empty for what is no IP address, or one that only its link knows.
+/// The address as text; empty for other families and for link-local addresses.
 std::string text_of(const sockaddr* address) {
   if (address == nullptr) return {};
   std::array<char, INET6_ADDRSTRLEN> text{};

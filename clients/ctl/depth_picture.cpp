@@ -20,7 +20,7 @@ int nearest_of_256(Colour colour) {
   return 16 + 36 * level(colour.r) + 6 * level(colour.g) + level(colour.b);
 }
 
-/// Lines with colours, each told only where it changes.
+/// Writes lines with colours; each colour only where it changes.
 class Pen {
  public:
   explicit Pen(Palette palette) : palette_(palette) {}

@@ -11,7 +11,7 @@ namespace dtact::ctl {
 
 using cli::Colour;
 
-/// How a terminal is told a colour.
+/// Colour codes of the terminal.
 enum class Palette : std::uint8_t { xterm256, rgb };
 
 /// What there is to draw on.

@@ -7,9 +7,9 @@
 namespace dtact::ctl {
 namespace {
 
-/// Of the step: what is nearer than this to where the mean comes to rest is complete.
+/// Share of the step: a mean this near to its final value counts as complete.
 constexpr double kComplete = 0.02;
-/// Grey levels that a mean at rest may wander by, however small the step.
+/// Grey levels by which a mean at rest may vary, for any size of the step.
 constexpr double kMaxWander = 0.25;
 
 }  // namespace

@@ -6,8 +6,8 @@
 
 namespace dtact::ctl {
 
-/// One step of the light as the frames' mean grey shows it, from the first frame that the daemon
-/// says was exposed under the new light.
+/// One step of the light in the frames' mean grey, from the first frame that was exposed under the
+/// new light according to the daemon.
 class LightStep {
  public:
   enum class Verdict : std::uint8_t {
@@ -25,13 +25,13 @@ class LightStep {
   /// The next frame. `lit`: the ring showed the new light when its exposure began.
   [[nodiscard]] Verdict add(std::uint64_t sequence, bool lit, double mean_grey);
 
-  /// So many frames were exposed under the new light and still showed some of the old one.
+  /// Number of frames exposed under the new light that still showed some of the old one.
   [[nodiscard]] int frames() const noexcept { return frames_; }
   /// The mean grey at rest under the new light, once settled.
   [[nodiscard]] double grey() const noexcept { return grey_; }
 
   static constexpr std::size_t kRest = 8;  ///< Frames that the mean has to stay where it is.
-  /// Grey levels: less is no step, as noise and light that wanders do as much.
+  /// Smallest step, grey levels: noise and drift of the light reach less.
   static constexpr double kMinStep = 4;
   static constexpr std::size_t kMaxFrames = 120;
 

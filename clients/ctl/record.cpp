@@ -112,7 +112,7 @@ class Recording {
       put(recording::kCalibrationToml, "application/toml", files.calibration_toml());
       put(recording::kReferencePng, "image/png", files.reference_png());
     } catch (const client::Refused&) {  // NOLINT(bugprone-empty-catch)
-      // Uncalibrated, or busy with another one, which an event will tell.
+      // Uncalibrated, or busy with another one, which an event will report.
     }
     try {
       put(recording::kCurrentReferencePng, "image/png", client_.reference().png());
@@ -166,7 +166,7 @@ void print(const Context& context, const cli::RecordReport& report) {
 }
 
 void run_record(const Context& context, const RecordOptions& options) {
-  // A limit on the file's size is told by write(), as a full disk is.
+  // write() then reports a limit on the file's size, like a full disk.
   (void)std::signal(SIGXFSZ, SIG_IGN);
   if (!options.force && std::filesystem::exists(options.output)) {
     throw std::runtime_error(options.output + " exists: name another file, or add --force");

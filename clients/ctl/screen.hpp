@@ -20,7 +20,7 @@ class Screen {
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
-  /// As large as it is now.
+  /// A canvas of the screen's present size.
   [[nodiscard]] Canvas canvas() const;
   /// Replaces all that is shown.
   void show(const std::vector<std::string>& lines);

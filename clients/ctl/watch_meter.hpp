@@ -26,7 +26,7 @@ class WatchMeter {
   [[nodiscard]] double rate_until(std::int64_t end_ns) const noexcept;
   [[nodiscard]] const LatencyHistogram& latency() const noexcept { return latency_; }
   [[nodiscard]] double deepest_mm() const noexcept { return deepest_mm_; }
-  /// Every condition that a frame had.
+  /// All health flags of the frames.
   [[nodiscard]] const std::set<v1::Health>& health() const noexcept { return health_; }
 
  private:

@@ -12,7 +12,7 @@ namespace dtact::perceive {
 /// from outside or, where there are none, points with outward normals.
 struct Mesh {
   std::vector<std::array<double, 3>> points;
-  std::vector<std::array<double, 3>> normals;  ///< Of a cloud's points, of any length but 0.
+  std::vector<std::array<double, 3>> normals;  ///< Normals of a cloud's points, any length but 0.
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 

@@ -31,7 +31,7 @@ enum class Format : std::uint8_t { ascii, little, big };
 struct Property {
   std::string_view name;
   Type type = Type::float32;
-  std::optional<Type> count;  ///< Of a list.
+  std::optional<Type> count;  ///< Type of a list's length.
 };
 struct Element {
   std::string_view name;
@@ -214,7 +214,7 @@ class Body {
     for (std::size_t i = 0; i < values; ++i) (void)value_of(property.type, format_, reader_);
   }
 
-  /// Of a list; 1 of what is none.
+  /// Number of values: a list's length, else 1.
   std::size_t length(const Property& property) {
     if (!property.count) return 1;
     return whole(value_of(*property.count, format_, reader_), static_cast<double>(reader_.left()),

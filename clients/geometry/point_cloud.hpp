@@ -30,15 +30,15 @@ struct DepthGrid {
 struct PointCloud {
   int width = 0;
   int height = 0;
-  /// Of the first point and from one to the next, in pixels of the whole depth map.
+  /// Position of the first point and step to the next, in pixels of the whole depth map.
   int x = 0;
   int y = 0;
   int stride = 1;
   /// x, y, z (metres), then the normal's x, y, z: six arrays of width · height, row-major. Where
   /// there is no point all six are NaN.
   std::vector<float> values;
-  /// CloudMaker's own: what of `values` its next call may leave as it is. Whoever changes the
-  /// values empties it.
+  /// For CloudMaker: the part of `values` that its next call may leave unchanged. Code that
+  /// changes `values` must clear it.
   struct Drawn {
     std::uint64_t tables = 0;  ///< Which surface and whole map; 0: nothing is known.
     /// Bits of a row's tiles: which hold the undeformed surface's …
@@ -62,24 +62,24 @@ struct PointCloud {
   }
 };
 
-/// Makes point clouds of depth maps that belong to one surface. A table is made at the first map of
-/// a size and kept for the next ones, of the three sizes seen last: a sensor's full, half and
-/// quarter resolution, which it may change between two frames. Outside the contact, now and when
-/// `out` was made before of the same part of a map, `out` is left as it is.
+/// Makes point clouds from depth maps of one surface. The first map of each size makes a table.
+/// Tables of the last three sizes are kept: a sensor's full, half and quarter resolution, which may
+/// change between two frames. Points that are outside the contact, and were so in the last call for
+/// the same part of a map, stay unchanged in `out`.
 class CloudMaker {
  public:
   explicit CloudMaker(const recon::Surface& surface = {}) : surface_(surface) {}
 
-  /// Every `stride`-th pixel of the whole map along both sides, the same ones whatever part of it
-  /// `depth` is. A point is the surface's less indentation · normal; its own normal is the cross
-  /// product of the differences over kReachMm on both sides, or as far as there are trusted pixels
-  /// of the map. A pixel that has no such neighbour in its row, or none in its column, is left out,
-  /// and so is an untrusted one. Throws std::invalid_argument for sizes that contradict each other
-  /// and for a stride below 1.
+  /// Takes every `stride`-th pixel of the whole map along both sides, independent of the part that
+  /// `depth` covers. A point is the surface point − indentation · normal. Its normal is the cross
+  /// product of the differences over kReachMm on both sides, or to the last trusted pixel.
+  /// Untrusted pixels, and those without a trusted neighbour in their row or in their column, are
+  /// left out. Throws std::invalid_argument for sizes that contradict each other and for a stride
+  /// below 1.
   void make(const DepthGrid& depth, int stride, PointCloud& out);
 
   [[nodiscard]] const recon::Surface& surface() const noexcept { return surface_; }
-  /// Of the maps made last, until the next of another size; null for a plane.
+  /// Table of the last map, valid until a map of another size; null for a plane.
   [[nodiscard]] const SurfaceTable* table() const noexcept {
     return flat() || tables_.empty() ? nullptr : &tables_.front().table;
   }
@@ -91,7 +91,7 @@ class CloudMaker {
   /// A cloud that is being made.
   struct Work;
   struct Numbered {
-    SurfaceTable table;        ///< Of a plane the sizes alone.
+    SurfaceTable table;        ///< For a plane only the sizes.
     std::uint64_t number = 0;  ///< As PointCloud::Drawn says it.
   };
 
@@ -108,10 +108,10 @@ class CloudMaker {
   [[nodiscard]] Vector point(const Work& work, int row, int column) const;
 
   recon::Surface surface_;
-  std::vector<Numbered> tables_;        ///< Begins with that of the maps made last.
-  std::vector<std::uint64_t> pressed_;  ///< Of a row: bits of the tiles with a depth but 0.
+  std::vector<Numbered> tables_;        ///< The first is that of the last map.
+  std::vector<std::uint64_t> pressed_;  ///< For each row: bits of the tiles with depth ≠ 0.
   std::vector<std::size_t> lone_;       ///< Points that turned out to have no normal.
-  PointCloud whole_;                    ///< That a stride takes some of.
+  PointCloud whole_;                    ///< The cloud before the stride is applied.
 };
 
 /// Calls back(a, b, c) with the indices of each triangle, counter-clockwise as seen from outside:

@@ -32,8 +32,8 @@ void quantise(const float* values, std::size_t count, float per_unit, std::int16
 void press(const float* point, const float* normal, const std::int16_t* depth, DepthUnit unit,
            int count, float* out) noexcept;
 
-/// A row and the pixels of it that are to be made. Neighbours lie `reach` pixels away along it, or
-/// at its ends; the one above and the one below so many values away.
+/// A row and the range of its pixels to compute. Neighbours are `reach` pixels away along the row,
+/// or at its ends; `above` and `below` are the offsets to the others, in values.
 struct RowPart {
   int width = 0;
   int reach = 0;
@@ -46,13 +46,13 @@ struct RowPart {
 // Outward unit normals by the differences of the neighbours. NaN where the pixel or a neighbour is
 // none, and where there is no neighbour to either side.
 
-/// Of a flat surface: z = −depth, and the normal (d depth/dx, d depth/dy, 1), normalised. All
-/// pointers are to the row's begin.
+/// Computes a flat surface: z = −depth, and the normal (d depth/dx, d depth/dy, 1), normalised. All
+/// pointers are to the start of the row.
 void flat_points(const std::int16_t* depth, DepthUnit unit, float px_metres, const RowPart& part,
                  float* z, float* nx, float* ny, float* nz) noexcept;
 
-/// Of points anywhere, whose y lie `apart` values after their x, and z after y. NaN too where the
-/// neighbours' differences are parallel.
+/// Computes normals of arbitrary points; y follows x by `apart` values, and z follows y. Also NaN
+/// where the neighbours' differences are parallel.
 void curved_normals(const float* x, std::size_t apart, const RowPart& part, float* nx, float* ny,
                     float* nz) noexcept;
 

@@ -35,12 +35,12 @@ struct SurfaceTable {
 
 /// The place of a depth map whose normal goes through a point, above or below the surface.
 struct SurfaceProjection {
-  double column = 0;  ///< Of the whole map; between pixels.
+  double column = 0;  ///< In the whole map; fractional.
   double row = 0;
-  Vector normal = {};  ///< Of the undeformed surface there, of length 1 but for the interpolation.
+  Vector normal = {};  ///< Normal of the undeformed surface; length 1 before interpolation.
 };
-/// The inverse of a table, for points (metres) that are much nearer to the surface than its radius
-/// of curvature; to a fiftieth of a pixel. Nothing for a point beside the table.
+/// Inverts a table for points (metres) much nearer to the surface than its radius of curvature.
+/// Accurate to a fiftieth of a pixel. Nothing for a point outside the table.
 [[nodiscard]] std::optional<SurfaceProjection> project_to_surface(const SurfaceTable& table,
                                                                   const Vector& point);
 

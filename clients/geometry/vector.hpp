@@ -7,7 +7,7 @@ namespace dtact::perceive {
 /// A point or direction of the surface frame.
 using Vector = std::array<double, 3>;
 
-constexpr double kMetre = 1e-3;  ///< Of a millimetre.
+constexpr double kMetre = 1e-3;  ///< Metres per millimetre.
 
 /// `t` times `direction` further than `from`.
 inline Vector along(const Vector& from, double t, const Vector& direction) {

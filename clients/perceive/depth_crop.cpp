@@ -14,8 +14,8 @@ namespace dtact::perceive {
 
 namespace {
 
-/// As client::values_of(), which looks at no more than the values; throws client::ProtocolError
-/// also where the map contradicts itself.
+/// Like client::values_of(), which checks only the values. Throws client::ProtocolError also where
+/// the map contradicts itself.
 std::vector<std::int16_t> values_of(const v1::DepthMap& map) {
   const std::uint64_t full_width = map.full_width();
   const std::uint64_t full_height = map.full_height();

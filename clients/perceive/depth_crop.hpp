@@ -33,11 +33,11 @@ class DepthCrop {
   /// `deepest_mm` where that is less, kMarginPx around it.
   [[nodiscard]] std::optional<DepthGrid> contact(double deepest_mm);
 
-  /// The daemon's own threshold unless it is configured otherwise; one that lets lighter presses
-  /// count is not told.
+  /// The daemon's default contact threshold. A lower threshold in its configuration is unknown
+  /// here.
   static constexpr double kContactUm = 100;
   static constexpr int kMarginPx =
-      16;  ///< As the daemon's, pixels of the calibration's resolution.
+      16;  ///< Same as the daemon's, pixels of the calibration's resolution.
 
  private:
   [[nodiscard]] std::optional<DepthGrid> crop(int left, int top, int right, int bottom);

@@ -16,18 +16,18 @@
 
 namespace dtact::perceive {
 
-/// Makes of a frame of the daemon what each kind of subscription is sent: once for each kind, and
-/// nothing that nobody is due.
+/// Makes the frames for the subscriptions from one frame of the daemon: once for each kind, and
+/// only kinds that clients need.
 class FrameMaker {
  public:
-  /// `object`: whose pose is told; null: the motion of whatever is touched.
+  /// `object`: the known object to locate; null: track any object in contact.
   explicit FrameMaker(const std::shared_ptr<const ObjectModel>& object = nullptr) {
     if (object) object_.emplace(object);
   }
   /// Begins another frame; with `pose` the object's motion is followed. Throws
   /// client::ProtocolError for a damaged map.
   void begin(v1::Frame frame, bool pose);
-  /// What touches from now on is another contact.
+  /// Ends the contact: the next frame begins another one.
   void release();
   /// The frame as `kind`; the same buffer when asked again. Null when it would exceed the wire's
   /// cap.
@@ -38,12 +38,12 @@ class FrameMaker {
  private:
   void add_cloud(DepthCrop& depth, const net::FrameKind& kind, v1::PointCloud& out);
   void follow(DepthCrop& depth, double uncertainty_um);
-  /// Lets go of what was measured by another calibration or on another surface.
+  /// Discards state measured by another calibration or on another surface.
   void follow_sensor();
 
   v1::Frame frame_;  ///< Without what is made here, and without the depth map.
   std::optional<DepthCrop> depth_;
-  std::optional<std::uint64_t> calibration_;  ///< Of the depth before.
+  std::optional<std::uint64_t> calibration_;  ///< Number of the last depth's.
   CloudMaker clouds_;
   PointCloud cloud_;
   PointCloud contact_;  ///< Its own: what is as it was in cloud_ is not made again.

@@ -7,14 +7,14 @@
 
 namespace dtact::perceive {
 
-/// The newest of the frames that come, until it is taken, and what the ones said that it replaced.
+/// Keeps the newest frame until it is taken, and a summary of the frames that it replaced.
 class NewestFrame {
  public:
   struct Taken {
     v1::Frame frame;
-    std::uint64_t missed = 0;  ///< That came after the one before and were replaced.
-    /// What touches may be another contact than in the frame taken before: there was no contact in
-    /// one of those that were missed, or they came by another connection.
+    std::uint64_t missed = 0;  ///< Frames replaced since the one taken before.
+    /// The contact may differ from that of the frame taken before: one of the missed frames had no
+    /// contact, or the connection was lost in between.
     bool parted = false;
   };
 

@@ -41,7 +41,7 @@ class Server : public net::SessionHost, public std::enable_shared_from_this<Serv
   void update_want();
   void subscribe(const std::shared_ptr<net::Session>& session, std::uint64_t id,
                  const v1::Subscribe& request);
-  /// The camera's, as far as the daemon tells one.
+  /// The camera's serial number; empty if the daemon has none.
   [[nodiscard]] std::string serial() const;
   void fill(v1::Status& status) const;
 

@@ -38,7 +38,7 @@ class Upstream {
 
   const Handlers handlers_;
   const std::string host_;
-  mutable std::mutex mutex_;  ///< Of all that follows but the link.
+  mutable std::mutex mutex_;  ///< Guards all members below but the link.
   v1::Subscribe wanted_;
   bool compressed_ = false;  ///< Depth, since it travels.
   NewestFrame newest_;

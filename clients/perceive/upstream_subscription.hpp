@@ -5,8 +5,8 @@
 
 namespace dtact::perceive {
 
-/// What all clients together need of the daemon, and nothing more: without contact no whole
-/// map, of whose points nobody is sent any.
+/// The union of what all clients need from the daemon. Without contact it has no whole map,
+/// because no client then receives points.
 class UpstreamSubscription {
  public:
   explicit UpstreamSubscription(bool in_contact) : in_contact_(in_contact) {}
@@ -15,7 +15,7 @@ class UpstreamSubscription {
   void add(const net::Subscription& subscription);
 
   [[nodiscard]] v1::Subscribe subscription() const;
-  /// The touched object's motion is to be followed.
+  /// A client needs the pose of the object in contact.
   [[nodiscard]] bool pose() const noexcept { return pose_; }
 
  private:

@@ -15,7 +15,7 @@
 namespace dtact::recording {
 namespace {
 
-/// Of the camera's own image.
+/// Frame id of the camera image.
 constexpr const char* kCameraFrame = "dtact_camera";
 
 constexpr std::array<const char*, 6> kPointParts{"x", "y", "z", "normal_x", "normal_y", "normal_z"};

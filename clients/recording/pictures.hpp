@@ -15,18 +15,18 @@ namespace dtact::recording {
 /// file and all that this imports.
 [[nodiscard]] std::string schema_of(const google::protobuf::Descriptor& type);
 
-// Of a frame that has the part, at `time_ns` since 1970.
+// The frame must have the part. `time_ns`: nanoseconds since 1970.
 
-/// Depth as 16UC1: micrometres, 0 where less or not to be believed. Throws client::ProtocolError
+/// Depth as 16UC1: micrometres, 0 where not pressed or untrusted. Throws client::ProtocolError
 /// for a damaged map.
 [[nodiscard]] foxglove::RawImage depth_picture(const v1::Frame& frame, std::uint64_t time_ns);
 [[nodiscard]] foxglove::CompressedImage jpeg_picture(const v1::Frame& frame, std::uint64_t time_ns);
 /// The luma as mono8.
 [[nodiscard]] foxglove::RawImage luma_picture(const v1::Frame& frame, std::uint64_t time_ns);
 
-/// The points that are there, metres in the surface frame, with their normals: float32 x, y, z,
-/// normal_x, normal_y, normal_z. Of a cloud in CLOUD_FLOAT32; throws client::ProtocolError for any
-/// other and for a damaged one.
+/// The valid points in the surface frame, metres, with their normals: float32 x, y, z, normal_x,
+/// normal_y, normal_z. The cloud must be CLOUD_FLOAT32; throws client::ProtocolError for any other
+/// and for a damaged one.
 [[nodiscard]] foxglove::PointCloud point_cloud(const v1::Frame& frame, std::uint64_t time_ns);
 
 }  // namespace dtact::recording

@@ -13,7 +13,7 @@ namespace dtact::recording {
 /// What to do with each message of a recording; what is unset is passed over. They return false for
 /// enough. Times are the file's, nanoseconds since 1970.
 struct RecordingHandlers {
-  /// As the daemon sent it, with its JPEG.
+  /// The frame as sent by the daemon, with its JPEG.
   std::function<bool(const v1::Frame& frame, std::uint64_t log_time)> frame;
   std::function<bool(const v1::Event& event, std::uint64_t log_time)> event;
   std::function<bool(const v1::Status& status, std::uint64_t log_time)> status;

@@ -16,18 +16,18 @@
 
 namespace dtact::recording {
 
-/// Writes a recording on a thread of its own, so that a slow disk does not hold up who reads from
-/// the daemon. What waits is bounded: beyond it frames are dropped and counted; events and what is
-/// attached never are. The open chunk is written at least once a second.
+/// Writes a recording on a thread of its own, so that a slow disk does not delay reading from the
+/// daemon. The queue is bounded: beyond it frames are dropped and counted, but never events and
+/// attachments. The open chunk is written at least once a second.
 ///
-/// When the sink refuses, the recording is over: the file is closed as well as it can be, what
-/// comes after is dropped, failed() tells, and finish() throws.
+/// When the sink fails, the recording ends: the file is closed if possible, later items are
+/// dropped, failed() returns true, and finish() throws.
 class Recorder {
  public:
   struct Counts {
     std::uint64_t frames = 0;   ///< Written or waiting to be.
-    std::uint64_t dropped = 0;  ///< Because too much waited.
-    std::uint64_t bytes = 0;    ///< Of the file.
+    std::uint64_t dropped = 0;  ///< Because the queue was full.
+    std::uint64_t bytes = 0;    ///< File size.
   };
 
   static constexpr std::size_t kMaxWaiting = std::size_t{64} << 20U;  ///< Bytes.

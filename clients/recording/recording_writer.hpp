@@ -11,14 +11,14 @@ namespace dtact::recording {
 
 struct RecordingOptions {
   std::string program;      ///< Who records: "dtactctl 0.1.0".
-  double pictures_hz = 10;  ///< Depth pictures for eyes a second; 0: none.
+  double pictures_hz = 10;  ///< Depth images for viewing, per second; 0: none.
 };
 
-/// Writes what the daemon sends as an MCAP file (README.md beside this file). What the sink throws
-/// comes out; see mcap::Writer for what the file is worth then. One thread.
+/// Writes the daemon's messages as an MCAP file (see README.md in this folder). Passes on
+/// exceptions of the sink; mcap::Writer explains the state of the file then. One thread.
 ///
-/// All times in the file run with CLOCK_MONOTONIC from the first frame's wall time on: a wall clock
-/// that is set during the recording does not reorder it.
+/// All times in the file start at the first frame's wall time and continue with CLOCK_MONOTONIC, so
+/// that setting the wall clock during the recording does not reorder it.
 class RecordingWriter {
  public:
   RecordingWriter(mcap::Sink& sink, const RecordingOptions& options);
@@ -26,7 +26,7 @@ class RecordingWriter {
   /// With its JPEG, if it has one, which is stored on a channel of its own.
   void add(v1::Frame frame);
   void add(const v1::Event& event);
-  /// As of the last frame or event, of which there has to be one; so for attach().
+  /// Stored with the time of the last frame or event; there must be one. attach() likewise.
   void add(const v1::Status& status);
   void attach(const std::string& name, const std::string& media_type, const std::string& data);
 
@@ -38,7 +38,7 @@ class RecordingWriter {
   struct Moment {
     std::uint64_t log_time = 0;
     std::uint64_t publish_time = 0;  ///< The daemon's wall clock.
-    std::uint64_t sequence = 0;      ///< Of the frame, or of the last one before an event.
+    std::uint64_t sequence = 0;      ///< The frame's, or the last one's before an event.
   };
   [[nodiscard]] Moment moment_of(std::uint64_t sequence, std::int64_t monotonic_ns,
                                  std::int64_t wall_ns);

@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kForm =
     "NAME=ADDRESS[,fingerprint=SHA256][,ca-file=FILE][,token-file=FILE][,insecure]";
 
-/// It stands in addresses of the page and in Foxglove's topics.
+/// It is part of the page's addresses and of Foxglove's topics.
 bool is_name(const std::string& name) {
   return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, [](unsigned char sign) {
     return std::isalnum(sign) != 0 || sign == '-' || sign == '_';

@@ -12,8 +12,8 @@
 
 namespace dtact::web {
 
-/// One subscription at a daemon over a connection of its own. Of the frames that come while nobody
-/// takes them the newest is kept.
+/// One subscription at a daemon over a connection of its own. Keeps only the newest frame until it
+/// is taken.
 class Feed {
  public:
   /// All on the feed's own thread.
@@ -40,7 +40,7 @@ class Feed {
 
   Handlers handlers_;
   std::string request_;  ///< Subscribe, serialized.
-  std::mutex mutex_;     ///< Of the next two.
+  std::mutex mutex_;     ///< Guards the next two.
   std::optional<RelayedFrame> newest_;
   std::uint64_t missed_ = 0;
   std::uint64_t dropped_ = 0;  ///< By the daemon, on this connection.

@@ -99,7 +99,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
                             "the request's head is longer than 8192 bytes"),
                     true);
     }
-    // The peer left, or it is no HTTP: nobody would read an answer.
+    // The peer left, or it is no HTTP: an answer would not be read.
     if (error) return;
     const Request& request = parser.get();
     const auto site = site_.lock();
@@ -194,7 +194,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
   std::shared_ptr<void> ticket_;
   std::chrono::milliseconds peer_timeout_;
   beast::flat_buffer buffer_{kMaxHead};
-  std::optional<Parser> parser_;  ///< Of the request at hand.
+  std::optional<Parser> parser_;  ///< For the current request.
   Answer answer_;
   Response response_;
 };

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of one file of a page, bytes.
+/// Largest file of a page, bytes.
 constexpr std::size_t kMaxFile = std::size_t{64} << 20U;
 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 12> kTypes{{
@@ -44,7 +44,7 @@ std::string_view type_of(const std::string& name) {
                   name));
 }
 
-/// FNV-1a: tells versions of a file apart, nothing more.
+/// FNV-1a: distinguishes versions of a file, nothing more.
 std::string tag_of(std::string_view bytes) {
   std::uint64_t hash = 0xcbf29ce484222325;
   for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3;

@@ -12,7 +12,7 @@ namespace {
 
 using google::protobuf::io::CodedInputStream;
 
-// Of the protobuf encoding.
+// Wire types of protobuf.
 constexpr std::uint32_t kVarint = 0;
 constexpr std::uint32_t kFixed64 = 1;
 constexpr std::uint32_t kBytes = 2;  // length-delimited

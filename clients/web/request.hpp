@@ -22,7 +22,7 @@ struct Answer {
   std::string_view type = "text/plain; charset=utf-8";
   std::string text = {};        ///< The body, …
   std::string_view bytes = {};  ///< … unless this is it, which lives as long as the program.
-  std::string tag = {};         ///< Of its version; empty: it is not kept.
+  std::string tag = {};         ///< ETag; empty: browsers must not cache it.
 };
 
 inline Answer refusal(boost::beast::http::status status, std::string sentence) {
@@ -32,8 +32,8 @@ inline Answer refusal(boost::beast::http::status status, std::string sentence) {
 /// What becomes of a WebSocket, or why there is none.
 struct Upgrade {
   Answer refusal = {};           ///< Where `open` is null.
-  std::string subprotocol = {};  ///< That was chosen; empty: none was offered.
-  std::size_t max_message = 0;   ///< Of the peer's, bytes.
+  std::string subprotocol = {};  ///< The chosen one; empty: none was offered.
+  std::size_t max_message = 0;   ///< From the peer, bytes.
   std::function<void(std::shared_ptr<WebSocket>, net::Peer)> open = {};
 };
 

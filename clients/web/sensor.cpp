@@ -63,14 +63,14 @@ void Sensor::admit(std::shared_ptr<WebSocket> socket, net::Peer peer) {
       std::make_shared<net::Session>(std::move(transport), config_, admission_, weak_from_this());
   viewers_[session.get()].transport = there;
   session_list_.admit(session);
-  there->tell(entry());
+  there->send_text(entry());
 }
 
 std::string Sensor::entry() const {
   std::string text = fmt::format(R"({{"name":{},"connected":{})", cli::json_string(source_->name()),
                                  source_->connected());
   if (!source_->connected()) {
-    // Whoever has shown no token is not told of addresses.
+    // Clients without a token must not learn addresses.
     const std::string error = config_.token_file.empty()
                                   ? source_->reason()
                                   : "its daemon is away: dtact-web's log says why";
@@ -89,7 +89,7 @@ void Sensor::on_changed() {
   const std::string text = entry();
   for (const auto& session : session_list_.all()) {
     if (!source_->connected()) session->subscribe(Subscription());
-    viewers_[session.get()].transport->tell(text);
+    viewers_[session.get()].transport->send_text(text);
   }
 }
 

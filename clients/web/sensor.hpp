@@ -27,7 +27,7 @@ class Sensor : public net::SessionHost, public std::enable_shared_from_this<Sens
   void stop();
   /// A new viewer.
   void admit(std::shared_ptr<WebSocket> socket, net::Peer peer);
-  /// As an entry of /sensors, see README.md beside this file.
+  /// The sensor's entry of /sensors, see README.md in this folder.
   [[nodiscard]] std::string entry() const;
   [[nodiscard]] Source& source() const noexcept { return *source_; }
   [[nodiscard]] const std::shared_ptr<Source>& shared_source() const noexcept { return source_; }

@@ -58,8 +58,8 @@ Server::Server(asio::io_context& io, Settings settings, const Page& page)
   guided_ = std::make_unique<guided::GuidedEndpoint>(
       std::move(calibrated), std::move(settings.work_folder), config_, admission_);
   listener_ = net::listen_tcp(io, config_, [this](asio::ip::tcp::socket socket, net::Peer peer) {
-    // One too many is let go of without a word, as any of HTTP would cost what there is too little
-    // of.
+    // A connection beyond the limit is closed without an HTTP reply, which would cost the resources
+    // that are short.
     if (auto ticket = limits_.admit(peer.host)) {
       serve_http(std::move(socket), std::move(peer), tls_ ? &tls_->context : nullptr,
                  weak_from_this(), std::move(ticket), config_.peer_timeout);

@@ -32,7 +32,7 @@ struct Settings {
   std::vector<NamedDaemon> daemons;
   /// By which browsers may name this machine, besides its addresses.
   std::vector<std::string> host_names;
-  /// Whose pages may open Foxglove's WebSocket, besides our own: Foxglove's, and its programs'.
+  /// Origins that may open Foxglove's WebSocket besides our own: Foxglove's site and programs.
   std::vector<std::string> foxglove_origins{"https://app.foxglove.dev", "file://"};
   /// Below it guided calibrations save what they take.
   std::filesystem::path work_folder;

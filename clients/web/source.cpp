@@ -198,7 +198,7 @@ void Source::settle(Stream& stream, const v1::Reply& reply) {
   for (const Member& member : stream.members) {
     if (waits(member) && joins(member)) joined.emplace_back(member.who, member.serial);
   }
-  // Of the one before comes no frame after the answer.
+  // The previous stream sends no frame after the answer.
   for (Stream& other : streams_) {
     for (const auto& mover : joined) {
       std::erase_if(other.members, [&](const Member& member) {

@@ -31,7 +31,7 @@ class Source : public std::enable_shared_from_this<Source> {
   using Answered = std::function<void(v1::Reply)>;
   using OnFrame = std::function<void(const RelayedFrame&, std::uint64_t missed)>;
 
-  /// Whoever follows the daemon's life.
+  /// Callbacks for the daemon's connection state.
   struct Follower {
     std::function<void()> changed;  ///< It went away, for another reason, or is there again.
     std::function<void(const v1::ServerMessage&)> event;
@@ -40,7 +40,7 @@ class Source : public std::enable_shared_from_this<Source> {
   Source(boost::asio::io_context& io, std::string name, client::Options daemon);
 
   void start();
-  /// Nobody is called any more.
+  /// No callback is called afterwards.
   void stop();
   /// One for each `who`, until unfollow().
   void follow(const void* who, Follower follower) { followers_[who] = std::move(follower); }
@@ -66,7 +66,7 @@ class Source : public std::enable_shared_from_this<Source> {
  private:
   struct Member {
     const void* who = nullptr;
-    std::uint64_t serial = 0;  ///< Of its subscribe().
+    std::uint64_t serial = 0;  ///< Its subscribe() call.
     Answered answered;         ///< Null once it was called.
     OnFrame frame;
   };
@@ -104,7 +104,7 @@ class Source : public std::enable_shared_from_this<Source> {
   std::map<std::uint64_t, Answered> pending_;
   std::vector<Stream> streams_;
   std::map<const void*, std::uint64_t> newest_;  ///< The serial of each one's last subscribe().
-  std::uint64_t next_serial_ = 1;                ///< Of members and streams.
+  std::uint64_t next_serial_ = 1;                ///< For members and streams.
   std::vector<std::shared_ptr<Feed>> retired_;   ///< Until their threads have ended.
 };
 

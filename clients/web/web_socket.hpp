@@ -11,14 +11,14 @@
 
 namespace dtact::web {
 
-/// An open WebSocket, over TCP or TLS. As net::Transport: at most one read and one write at a time,
-/// each handler is called once, with an error after close(), and it must outlive them.
+/// An open WebSocket over TCP or TLS. Like net::Transport, it has at most one read and one write at
+/// a time. Each handler is called once, with an error after close(). It must outlive the calls.
 class WebSocket {
  public:
   struct Received {
     std::size_t bytes = 0;
     bool text = false;  ///< Else binary.
-    bool end = false;   ///< Of a message.
+    bool end = false;   ///< Message ends.
   };
   using OnRead = std::function<void(const boost::system::error_code&, Received)>;
   using Parts = net::Transport::Parts;

@@ -11,7 +11,7 @@ using boost::system::error_code;
 WireTransport::WireTransport(std::shared_ptr<WebSocket> socket, net::Peer peer)
     : Transport(std::move(peer)), socket_(std::move(socket)) {}
 
-void WireTransport::tell(std::string text) {
+void WireTransport::send_text(std::string text) {
   text_ = std::move(text);
   if (!writing_) write_text();
 }
@@ -19,7 +19,7 @@ void WireTransport::tell(std::string text) {
 void WireTransport::write_text() {
   writing_ = true;
   const auto text = std::make_shared<const std::string>(std::exchange(text_, {}).value_or(""));
-  // Nobody else waits for this, so it keeps what it needs itself.
+  // No one else waits for this write, so it owns what it needs.
   socket_->write(
       {asio::buffer(*text)}, true,
       [weak = std::weak_ptr(self_), socket = socket_, text](const error_code&, std::size_t) {

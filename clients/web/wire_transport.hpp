@@ -17,7 +17,7 @@ class WireTransport : public net::Transport {
   WireTransport(std::shared_ptr<WebSocket> socket, net::Peer peer);
 
   /// Sends a text as soon as what is being written is through, in place of one that waits.
-  void tell(std::string text);
+  void send_text(std::string text);
 
   void handshake(std::function<void(const boost::system::error_code&)> done) override { done({}); }
   void read_some(boost::asio::mutable_buffer into, Done done) override;

@@ -237,7 +237,7 @@ void Announcer::Impl::add_service(const char* path) {
   sd_bus_message* made = nullptr;
   check(sd_bus_message_new_method_call(bus.get(), &made, kAvahi, path, kGroup, "AddService"));
   const Message message(made);
-  // Interface, protocol, flags; name, type; domain and host: avahi's own.
+  // Interface, protocol, flags. Name, type. Domain and host, both empty: avahi's own.
   check(sd_bus_message_append(made, "iiussssq", published.interface, published.protocol, 0U,
                               name.c_str(), wire::kServiceType, "", "", published.port));
   check(sd_bus_message_open_container(made, 'a', "ay"));

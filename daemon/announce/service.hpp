@@ -8,7 +8,7 @@ namespace dtact::announce {
 
 /// What is said of a daemon in the network (RFC 6763).
 struct Service {
-  std::string name;  ///< Of this daemon among all; at most 63 bytes go out.
+  std::string name;  ///< This daemon's; at most 63 bytes are sent.
   std::uint16_t port = 0;
   int interface = -1;            ///< The kernel's index; −1 = every one.
   int protocol = -1;             ///< Avahi's: 0 = IPv4, 1 = IPv6, −1 = both.
@@ -25,8 +25,8 @@ struct Facts {
 };
 [[nodiscard]] std::vector<std::string> txt_of(const Facts& facts);
 
-/// Whether somebody on another machine can connect to a daemon that listens on `address` (IPv4 or
-/// IPv6): not when it is loopback.
+/// Whether another machine can connect to a daemon that listens on `address` (IPv4 or
+/// IPv6): false for loopback.
 [[nodiscard]] bool is_reachable(const std::string& address);
 /// Restricts `service` to where `address` is: the family that is served, and the one interface that
 /// has it, if one has it now.

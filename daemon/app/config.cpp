@@ -61,7 +61,7 @@ class Assembly {
                        [&](const Key& k) { return k.path.starts_with(path + "."); });
   }
 
-  /// The names that may stand in the table `prefix`.
+  /// The valid names in the table `prefix`.
   [[nodiscard]] std::vector<std::string> siblings(const std::string& prefix) const {
     std::vector<std::string> names;
     for (const Key& key : keys_) {

@@ -100,11 +100,11 @@ net::NetConfig make_net_config(const Config& config) {
   return net;
 }
 
-/// Memory of large messages and of frames goes back when they are done with, be it in the middle of
-/// the heap. Without this glibc keeps up to twice the largest block that ever came (mallopt(3),
-/// dynamic mmap threshold), locked into memory with the rest. Frames' buffers are used again, so
-/// that a frame costs no page faults. What is free in one thread's arena is of no use to another's;
-/// two are enough, as the capture thread, which must not wait for another's lock, allocates
+/// Returns memory of large messages and of frames to the system after use, even from the middle of
+/// the heap. Without this glibc keeps up to twice the largest block ever used (mallopt(3),
+/// dynamic mmap threshold), locked into memory with the rest. Frames' buffers are reused, so
+/// a frame costs no page faults. Free memory in one thread's arena is of no use to another thread.
+/// Two arenas are enough: the capture thread, which must not wait for another's lock, allocates
 /// nothing.
 void keep_little_memory() {
   constexpr int kLarge = 256 << 10;

@@ -19,9 +19,9 @@ void check_camera_files(const hal::CameraConfig& camera);
 /// "credential:NAME". Throws as resolve_credential().
 void resolve_credentials(net::NetConfig& config);
 
-/// Reads certificate, key and token file and lets go of them. Throws std::runtime_error with file
-/// and fix where a start would, and a reload keep what it has. A credential is looked at where
-/// this process has the unit's.
+/// Reads certificate, key and token file and discards them. Throws std::runtime_error with file
+/// and fix where a start would throw and a reload would keep the old ones. Checks a credential if
+/// this process has those of the unit.
 void check_net_files(net::NetConfig config);
 
 }  // namespace dtact::app

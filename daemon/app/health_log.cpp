@@ -11,7 +11,7 @@ namespace {
 
 using pipeline::Health;
 
-/// What to do about this condition alone.
+/// The fix for this health flag alone.
 std::string fix(const pipeline::Status& status, Health health) {
   pipeline::Status only = status;
   only.state = pipeline::State::serving;

@@ -9,9 +9,9 @@
 
 namespace dtact::app {
 
-/// What to log of the conditions under which depth deserves less trust: a line when one begins,
-/// with what to do, and one when it is over. One that comes and goes is told once a minute, with
-/// how often it came.
+/// The log's lines about health flags: one when a flag is set, with the fix, and one when it is
+/// cleared. A flag that comes and goes is logged once a minute, with the number of
+/// times.
 class HealthLog {
  public:
   using Time = std::chrono::steady_clock::time_point;
@@ -23,16 +23,16 @@ class HealthLog {
     std::string text;
   };
 
-  /// `reported`: what the log has been told already, by a line that knows more.
+  /// `reported`: flags already logged in a more detailed line.
   explicit HealthLog(pipeline::HealthSet reported);
   /// The lines that are due, from what the pipeline says at `now`.
   [[nodiscard]] std::vector<Line> step(const pipeline::Status& status, Time now);
 
  private:
   struct Condition {
-    bool known = false;  ///< The log has been told that it is about to begin.
+    bool known = false;  ///< The log has announced its start.
     bool on = false;
-    bool reported = false;  ///< That it began, and not yet that it is over.
+    bool reported = false;  ///< Its start has been logged, its end not yet.
     unsigned times = 0;     ///< It began, untold.
     Time last = Time::min();
   };

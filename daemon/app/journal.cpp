@@ -48,9 +48,9 @@ bool is_journal(int fd) {
 constexpr std::array<int, spdlog::level::n_levels> kPriorities = {
     LOG_DEBUG, LOG_DEBUG, LOG_INFO, LOG_WARNING, LOG_ERR, LOG_CRIT, LOG_INFO};
 
-/// As spdlog's own systemd_sink, with fields; but the last words of a process go to its standard
-/// error, which the journal knows from the start as the unit's: whose the entry is that comes
-/// through the socket, it looks up then, and in vain when the process has ended.
+/// Like spdlog's own systemd_sink, with fields. But the last messages of a process go to standard
+/// error, which the journal always attributes to the unit. For an entry from the
+/// socket it looks up the unit on arrival, which fails when the process has ended.
 class JournalSink final : public spdlog::sinks::base_sink<std::mutex> {
   void sink_it_(const spdlog::details::log_msg& msg) override {
     const std::string_view text(msg.payload.data(), msg.payload.size());

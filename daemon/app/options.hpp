@@ -15,7 +15,7 @@ struct Options {
   bool check_config = false;
   bool print_config = false;
   bool doctor = false;  ///< --doctor: check the machine instead of running.
-  bool report = false;  ///< --report: the same for somebody else to read.
+  bool report = false;  ///< --report: the same for other readers
 };
 
 /// What does something else with the same configuration: "dtactd --config FILE --doctor".

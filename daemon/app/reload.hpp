@@ -12,8 +12,8 @@ struct Reload {
   Config config;                     ///< To run with from now on.
   std::vector<std::string> changed;  ///< Keys that take their new value in it, …
   std::vector<std::string> restart;  ///< … and those that keep the old one until a restart.
-  std::vector<std::string> files;    ///< Keys whose files are read again with the configuration, …
-  /// … and those that systemd hands in, which it need not do anew before a restart.
+  std::vector<std::string> files;    ///< Keys whose files are reloaded with the configuration, …
+  /// … and those passed in by systemd, which may not pass them again before a restart.
   std::vector<std::string> credentials;
 };
 

@@ -5,11 +5,11 @@
 
 namespace dtact::app {
 
-/// What systemd is told (sd_notify(3)). Every call is a no-op when no service manager listens.
-/// None waits longer than five seconds for a manager that does not read; what is told again and
-/// again, status and sign of life, does not wait at all.
+/// Notifications to systemd (sd_notify(3)). Every call is a no-op without a service manager.
+/// None waits longer than five seconds for a manager that does not read. Repeated notifications
+/// (status and sign of life) do not wait at all.
 void notify_ready(const std::string& status);
-/// False when it could not be told now.
+/// False when it could not be sent now.
 bool notify_status(const std::string& status);
 void notify_stopping();
 /// The configuration is being read again; notify_ready() ends it. Type=notify-reload (systemd 253)

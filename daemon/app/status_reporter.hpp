@@ -17,11 +17,11 @@ namespace dtact::app {
 [[nodiscard]] std::string status_text(const pipeline::Status& status, const std::string& note,
                                       const std::string& listening);
 
-/// Tells the service manager and the log once a second how the sensor fares, where that has
-/// changed. On the thread that runs `io`.
+/// Reports changes of the sensor's status to the service manager and the log, once a second.
+/// Runs on the thread that runs `io`.
 class StatusReporter {
  public:
-  /// Conditions of which the log has been told already are `reported`.
+  /// `reported`: health flags that have already been logged.
   StatusReporter(boost::asio::io_context& io, std::function<pipeline::Status()> status,
                  std::string listening, pipeline::HealthSet reported);
   /// The text at this moment.

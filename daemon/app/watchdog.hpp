@@ -11,9 +11,9 @@ class io_context;
 
 namespace dtact::app {
 
-/// Tells systemd's watchdog (WatchdogSec= of the unit) that the daemon is alive: twice an interval,
-/// and only when the heartbeat has moved since the last time. A thread that hangs inside a driver
-/// so ends the daemon, and systemd starts it anew. Does nothing where no watchdog is set. On the
+/// Notifies systemd's watchdog (WatchdogSec= of the unit) that the daemon is alive: twice a period,
+/// and only when the heartbeat has advanced since the last time. So when a thread hangs inside a
+/// driver, systemd restarts the daemon. Does nothing where no watchdog is set. Runs on the
 /// thread that runs `io`.
 class Watchdog {
  public:

@@ -25,9 +25,9 @@ struct AttachedCamera {
 [[nodiscard]] std::vector<std::string> camera_mismatches(const Calibration& calibration,
                                                          const AttachedCamera& now);
 
-/// One sentence for each LED (numbered from 0) that shows another colour than at calibration; empty
-/// when they agree or the calibration did not record the light. `leds`: r, g, b that each
-/// LED emits.
+/// One sentence for each LED (numbered from 0) whose colour differs from that at calibration; empty
+/// when all agree or the calibration did not record the light. `leds`: r, g, b of each
+/// LED.
 [[nodiscard]] std::vector<std::string> light_mismatches(const Calibration& calibration,
                                                         std::span<const std::uint8_t> leds);
 

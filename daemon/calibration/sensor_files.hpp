@@ -28,7 +28,7 @@ void read_camera_and_light(tomlfile::KeyReader& top, Origin& origin);
 /// file, line, key and fix.
 [[nodiscard]] Origin load_sensor(const std::filesystem::path& path);
 
-/// A lens and the camera frame it was measured in, and what the same images told of the gain: what
+/// A lens, the camera frame it was measured in, and the gain measured from the same images: what
 /// `dtact-calibrate lens` writes.
 struct LensFile {
   int frame_width = 0;

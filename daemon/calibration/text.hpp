@@ -6,7 +6,7 @@
 
 namespace dtact::calibration {
 
-/// Of a side of any image; keeps every index within int.
+/// Limit for a side of any image; keeps every index within int.
 inline constexpr int kMaxPixels = 16384;
 /// Version of the files. Another one is refused, whatever its keys.
 inline constexpr int kFormatVersion = 1;

@@ -23,7 +23,7 @@ namespace http = beast::http;
 using boost::system::error_code;
 using tcp = asio::ip::tcp;
 
-/// Scrapers come one after another; whoever opens more is closed at once.
+/// Scrapers connect one after another; more connections are closed at once.
 constexpr std::size_t kMaxConnections = 8;
 constexpr std::size_t kMaxHeader = 8192;  // bytes
 constexpr std::chrono::seconds kTimeout{5};

@@ -18,7 +18,7 @@ struct EndpointConfig {
 };
 
 /// Answers GET /metrics over HTTP, one request a connection. Works on the thread that runs `io`,
-/// and only while somebody asks: at most a few connections at a time, each for a few seconds.
+/// and only on requests: at most a few connections at a time, each for a few seconds.
 class Endpoint {
  public:
   /// Listens from here on. `text` makes the answer. Throws std::runtime_error naming address, port

@@ -12,7 +12,7 @@ namespace dtact::metrics {
 struct Heap {
   std::size_t used = 0;    ///< Blocks in use, those that were mapped one by one included.
   std::size_t free = 0;    ///< Kept for later blocks, whether its pages are resident or not.
-  std::size_t mapped = 0;  ///< Of `used`, blocks mapped one by one: the large ones.
+  std::size_t mapped = 0;  ///< the large blocks, mapped one by one; part of `used`
 };
 
 /// By mallinfo2(3). Holds each arena's lock while its free blocks are counted. Under sanitizers,

@@ -6,7 +6,7 @@
 
 namespace dtact::net {
 
-/// What the user should do about the state and the health conditions: a sentence for each, with
+/// What the user should do about the state and the health flags: a sentence for each, with
 /// its fix, the most urgent first. Empty when all is well.
 [[nodiscard]] std::string advice(const pipeline::Status& status);
 

@@ -209,7 +209,7 @@ void CalibrationCommands::keep(const WeakWho& requester, const Change& change) {
     in_use_ = change.number;
     hub_.number_calibration(change.key, change.number);
   }
-  // It is kept only now that the pipeline has taken it, so that a calibration that does not fit
+  // Stored only after the pipeline has accepted it, so that a calibration that does not fit
   // this camera never replaces one that does.
   on_worker(
       [&store = store_, change] {
@@ -225,8 +225,8 @@ void CalibrationCommands::keep(const WeakWho& requester, const Change& change) {
           self.in_use_ = kept.value;
           self.hub_.number_calibration(change.key, kept.value);
         }
-        self.tell(change, self.in_use_);
-        // The client may be gone before somebody wonders why the change did not outlive a restart.
+        self.report(change, self.in_use_);
+        // The client may be gone when the change turns out to be lost after a restart.
         if (kept.failed()) {
           self.config_.log({LogLevel::warning,
                             fmt::format("calibration {} is in use, but the daemon will start with "
@@ -250,7 +250,7 @@ void CalibrationCommands::keep(const WeakWho& requester, const Change& change) {
       });
 }
 
-void CalibrationCommands::tell(const Change& change, std::optional<std::uint64_t> number) {
+void CalibrationCommands::report(const Change& change, std::optional<std::uint64_t> number) {
   v1::ServerMessage message;
   auto& event = *message.mutable_event();
   fill(change.at, event);

@@ -55,7 +55,7 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   void keep(const WeakWho& requester, const Change& change);
   void send_reference(const Requester& requester,
                       const std::shared_ptr<const pipeline::ReferenceCopy>& reference);
-  void tell(const Change& change, std::optional<std::uint64_t> number);
+  void report(const Change& change, std::optional<std::uint64_t> number);
   /// Runs `work` on the worker and then `done`(*this, its result) here.
   template <typename Work, typename Done>
   void on_worker(Work work, Done done);
@@ -66,7 +66,7 @@ class CalibrationCommands : public std::enable_shared_from_this<CalibrationComma
   Hub& hub_;
   pipeline::Port& port_;
   CalibrationStore& store_;
-  /// Of the calibration that the pipeline uses, if it uses one; nothing when that has no number or
+  /// Number of the calibration in use; nothing when there is none, it has no number or
   /// the store failed to keep it.
   std::optional<std::uint64_t> in_use_;
   /// A calibration or the reconstruction. One at a time: an upload may be as large as a message,

@@ -99,7 +99,7 @@ std::string time_of(const fs::path& folder) {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(about.st_mtim.tv_sec));
 }
 
-/// Of the folder itself, also for "cal/".
+/// The folder's name, also for "cal/".
 std::string name_of(const fs::path& folder) {
   return fs::weakly_canonical(folder).filename().string();
 }
@@ -196,7 +196,7 @@ std::vector<StoredCalibration> FolderCalibrationStore::list() {
 
 FolderCalibrationStore::Stamp FolderCalibrationStore::stamp_of(const fs::path& file) {
   struct stat about{};
-  if (::stat(file.c_str(), &about) != 0) return {};  // whoever reads it says why not
+  if (::stat(file.c_str(), &about) != 0) return {};  // a reader of the file reports the error
   const auto ns_of = [](const timespec& time) {
     return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
   };

@@ -23,13 +23,13 @@ struct CalibrationFiles {
   std::string name;
   std::string toml;                               ///< calibration.toml
   std::string png;                                ///< reference.png, 16-bit grey
-  std::uint64_t number = kConfiguredCalibration;  ///< Of no meaning in an upload.
+  std::uint64_t number = kConfiguredCalibration;  ///< Ignored in an upload.
 };
 
 /// One of those that a store has.
 struct StoredCalibration {
   std::uint64_t number = kConfiguredCalibration;
-  std::string name;                           ///< Of its folder.
+  std::string name;                           ///< The folder's name.
   std::string uploaded;                       ///< ISO 8601, UTC; empty for the configured one.
   bool current = false;                       ///< The daemon starts with it.
   std::optional<CalibrationSummary> summary;  ///< None when it cannot be read, …
@@ -72,14 +72,14 @@ class CalibrationStore {
   [[nodiscard]] virtual CalibrationFiles read(std::optional<std::uint64_t> number) = 0;
 };
 
-/// Keeps them in the state directory:
+/// Keeps calibrations in the state directory:
 ///
 ///     STATE/calibrations/1/ball/calibration.toml, reference.png
 ///     STATE/calibrations/2/ball/…                                 the current one
 ///     STATE/calibration → calibrations/2/ball
 ///
 /// Without the link the configured folder is current. A number's folder is written and synced as a
-/// whole beside the others and takes its name by a rename; then the link moves by a rename. So at
+/// whole beside the others and renamed into place; then the link moves by a rename. So at
 /// any moment, also after a power cut, there is one whole current calibration.
 class FolderCalibrationStore : public CalibrationStore {
  public:
@@ -105,7 +105,7 @@ class FolderCalibrationStore : public CalibrationStore {
   [[nodiscard]] CalibrationFiles read(std::optional<std::uint64_t> number) override;
 
  private:
-  /// By what a change of a file is told without reading it. Nanoseconds are the system clock's.
+  /// Identifies a change of a file without reading it. Nanoseconds of the system clock.
   struct Stamp {
     std::uint64_t inode = 0;
     std::int64_t size = 0;
@@ -113,8 +113,8 @@ class FolderCalibrationStore : public CalibrationStore {
     std::int64_t changed_ns = 0;  ///< Cannot be set back by a program.
     bool operator==(const Stamp&) const = default;
   };
-  using Stamps = std::array<Stamp, 2>;  ///< Of the two files of a calibration.
-  /// What list() has read and found good.
+  using Stamps = std::array<Stamp, 2>;  ///< for the two files of a calibration
+  /// A calibration that list() has read without error.
   struct Known {
     std::filesystem::path folder;
     Stamps stamps{};
@@ -124,7 +124,7 @@ class FolderCalibrationStore : public CalibrationStore {
   [[nodiscard]] static Stamp stamp_of(const std::filesystem::path& file);
   /// STATE/calibrations/NUMBER/NAME of an uploaded one, or the configured folder.
   [[nodiscard]] std::filesystem::path folder_of(std::uint64_t number) const;
-  /// As load() finds it, which takes tens of milliseconds; a copy when nothing has changed since.
+  /// As from load(), which takes tens of milliseconds; a copy when nothing has changed since.
   [[nodiscard]] CalibrationSummary summary_of(std::uint64_t number,
                                               const std::filesystem::path& folder);
 

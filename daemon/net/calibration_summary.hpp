@@ -12,14 +12,14 @@ struct CalibrationSummary {
   std::string name;
   std::string method;  ///< "lut" or "published".
   double mm_per_px = 0;
-  int width = 0;  ///< Of the depth map at full resolution, pixels.
+  int width = 0;  ///< The depth map's at full resolution, pixels.
   int height = 0;
   double covered_from_mm = 0;
   double covered_to_mm = 0;
   std::string created;  ///< ISO 8601, or empty.
-  int frame_width = 0;  ///< Of the camera's image, pixels.
+  int frame_width = 0;  ///< The camera image's, pixels.
   int frame_height = 0;
-  std::vector<int> sharpen_steps;  ///< As recon::sharpening_steps().
+  std::vector<int> sharpen_steps;  ///< As from recon::sharpening_steps().
   bool operator==(const CalibrationSummary&) const = default;
 };
 

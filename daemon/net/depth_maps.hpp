@@ -52,7 +52,7 @@ class DepthMaps {
   void encode(const DepthView& view, int encoding, Map& map);
 
   const pipeline::DepthFrame* frame_ = nullptr;
-  // The first so many of each are this frame's; a deque, so that they stay where they are.
+  // The first ones of each hold this frame's; a deque, so that they do not move.
   std::deque<View> views_;
   std::size_t views_made_ = 0;
   std::deque<Encoded> encoded_;

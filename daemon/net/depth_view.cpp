@@ -14,7 +14,7 @@ void require(bool holds, const char* sentence) {
   if (!holds) throw std::invalid_argument(sentence);
 }
 
-/// Of one axis of the map, in pixels of the decimation that is sent.
+/// The range along one axis of the map, in pixels of the decimation sent.
 struct Extent {
   int begin = 0;
   int end = 0;
@@ -67,8 +67,8 @@ void add_row(const std::int16_t* row, std::size_t columns, std::int32_t* sums,
   }
 }
 
-/// sum / divisor, rounded half away from zero. Exact: 2 |sum| + divisor stays below 2²², and a
-/// quotient of two such numbers that is no whole one lies further below the next whole one than a
+/// sum / divisor, rounded half away from zero. Exact: 2 |sum| + divisor stays below 2²². A
+/// quotient of two of these numbers that is not whole lies further below the next whole one than a
 /// float's rounding reaches.
 std::int32_t rounded(std::int32_t sum, std::int32_t divisor) noexcept {
   const auto quotient = static_cast<std::int32_t>(static_cast<float>(2 * std::abs(sum) + divisor) /

@@ -13,7 +13,7 @@ namespace dtact::net {
 
 /// The map as dtact.v1.DepthMap says it.
 struct DepthView {
-  int x = 0;  ///< Of the first column, in pixels of this decimation; so are all sizes.
+  int x = 0;  ///< First column, in pixels of this decimation; so are all sizes.
   int y = 0;
   int width = 0;
   int height = 0;
@@ -29,14 +29,14 @@ struct DepthView {
 /// can be sent as they are, and the buffers are used again.
 class DepthViewer {
  public:
-  /// A frame that is coarser than asked is not refined. Coarser pixels are means over the trusted
-  /// pixels of their block, and untrusted when half of it or more is; columns and rows that fill no
-  /// block are left out on both sides alike, as recon::decimate does. The one rounding, to units,
-  /// is half away from zero. A frame that came coarse does not say which columns were left out of
-  /// it, so there a region may lie one pixel of full resolution beside.
+  /// A frame that is coarser than requested is not refined. Coarser pixels are means over trusted
+  /// pixels of their block, untrusted when at least half of it is. Columns and rows that fill no
+  /// block are left out on both sides alike, as in recon::decimate. The only rounding, to units,
+  /// is half away from zero. A frame that was made coarse does not record which columns were left
+  /// out, so a region in it may be off by one pixel of full resolution.
   ///
-  /// Nothing when the region lies outside of the map, or the map has no whole block. The values are
-  /// valid until the next call and while the frame stays as it is. Throws std::invalid_argument for
+  /// Empty when the region lies outside the map, or the map has no whole block. The values are
+  /// valid until the next call and while the frame is unchanged. Throws std::invalid_argument for
   /// another decimation or unit.
   [[nodiscard]] std::optional<DepthView> view(const pipeline::DepthFrame& frame,
                                               const DepthSpec& spec);
@@ -48,7 +48,7 @@ class DepthViewer {
 
   std::vector<std::int16_t> values_;
   std::vector<std::int32_t> sums_;    ///< A column each, over the rows of a block.
-  std::vector<std::int32_t> counts_;  ///< Of trusted pixels.
+  std::vector<std::int32_t> counts_;  ///< counts of trusted pixels
 };
 
 }  // namespace dtact::net

@@ -12,8 +12,8 @@
 
 namespace dtact::net {
 
-/// Encodes a frame once for each kind that is asked for, and its maps once for each choice among
-/// them, whatever else is in the message. `times.encode_ns` is this very encoding's own time:
+/// Encodes a frame once for each requested kind, and its maps once for each choice among
+/// them, whatever else is in the message. `times.encode_ns` is the time of this encoding itself:
 /// `times` is written last.
 class FrameEncoder {
  public:
@@ -30,7 +30,7 @@ class FrameEncoder {
   /// out. Null when it would exceed the wire's cap.
   [[nodiscard]] std::shared_ptr<const EncodedFrame> encode(const FrameKind& kind);
 
-  /// What clients want has changed: gives back the memory of maps that nobody may want any more.
+  /// The clients' subscriptions have changed: frees memory of maps that may no longer be needed.
   /// Between two frames only.
   void forget() noexcept;
 

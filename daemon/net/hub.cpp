@@ -138,7 +138,7 @@ void Hub::update_want() {
     if (!session->ready()) continue;
     wanted.contact = true;
     const auto parts = session->subscription().parts();
-    // A summary tells of the contact, which comes from the depth.
+    // A summary includes the contact, which needs the depth.
     wanted.depth |= (parts & (Subscription::kDepth | Subscription::kSummary)) != 0;
     wanted.luma |= (parts & Subscription::kLuma) != 0;
     wanted.jpeg |= (parts & Subscription::kJpeg) != 0;
@@ -159,7 +159,7 @@ std::vector<pipeline::StageStatistics> Hub::stages() const {
           pipeline::summarise("encode", encoder_.times())};
 }
 
-// What it is told by is all that every camera has: a USB camera's port, a sensor's place on its
+// Identified by what every camera has: a USB camera's port, a sensor's place on its
 // bus.
 std::string Hub::serial() const { return port_.status().camera.identity; }
 

@@ -20,8 +20,8 @@ namespace dtact::net {
 
 class Commands;
 
-/// Where the pipeline meets the clients: fetches events and frames when the pipeline says that
-/// there are any, encodes each frame once for each kind some client is due, and hands every client
+/// Connects the pipeline with the clients: fetches events and frames when the pipeline signals
+/// them, encodes each frame once for each kind that is due to a client, and sends every client
 /// the same buffer. Also keeps the list of clients. All on the network thread.
 class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
  public:
@@ -41,8 +41,8 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   void number_calibration(std::uint64_t key, std::uint64_t number) { numbers_[key] = number; }
   [[nodiscard]] std::optional<std::uint64_t> calibration_number(
       std::optional<std::uint64_t> key) const;
-  /// After a client's subscription changed: tells the pipeline what all of them together want, and
-  /// lets go of what nobody wants any more.
+  /// Call after a client's subscription changed. Requests from the pipeline what all clients need,
+  /// and frees what is no longer needed.
   void update_want();
   [[nodiscard]] const std::vector<std::shared_ptr<Session>>& sessions() const noexcept {
     return session_list_.all();
@@ -66,7 +66,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
 
   void on_request(const std::shared_ptr<Session>& session,
                   const v1::ClientMessage& message) override;
-  /// The camera's, as far as it tells one.
+  /// The camera's serial, if known.
   [[nodiscard]] std::string serial() const;
   void introduce(v1::HelloReply& reply) const override;
   void on_authenticated() override { update_want(); }
@@ -90,7 +90,7 @@ class Hub : public SessionHost, public std::enable_shared_from_this<Hub> {
   std::map<std::uint64_t, std::uint64_t> numbers_;  ///< By key, of those still in use.
   std::uint64_t number_ = 0;  ///< DepthFrame::number of the last frame; 0: none came yet.
   bool reported_too_large_ = false;
-  Traffic gone_;  ///< Of the clients that left, and all connections.
+  Traffic gone_;  ///< Traffic of closed sessions, and the count of all connections.
   std::optional<std::int64_t> reference_taken_ns_;
 };
 

@@ -12,7 +12,7 @@ namespace dtact::net {
 /// What came of clients and went to them since start.
 struct Traffic {
   std::uint64_t connections = 0;  ///< Accepted.
-  std::uint64_t refused = 0;      ///< Of those, gone without being let in.
+  std::uint64_t refused = 0;      ///< closed before authentication, part of the above
   std::uint64_t frames = 0;       ///< Sent.
   std::uint64_t dropped = 0;      ///< Frames that a client missed because it was slow.
   std::uint64_t bytes = 0;

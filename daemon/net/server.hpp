@@ -29,7 +29,7 @@ class Server {
   /// fix.
   Server(boost::asio::io_context& io, NetConfig config, pipeline::Port& port,
          CalibrationStore& store);
-  /// As stop(). `io` must not be running.
+  /// Calls stop(). `io` must not be running.
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -40,9 +40,9 @@ class Server {
   [[nodiscard]] std::vector<std::string> addresses() const;
   /// The TCP port it listens on; 0 without TCP.
   [[nodiscard]] std::uint16_t port() const;
-  /// Reads certificate, key and tokens again, whether their names have changed or not, and takes
-  /// the limits of `fresh`, all for clients that come from now on. Whether there are TLS and
-  /// tokens, and everything else, stays. Throws as the constructor, and changes nothing then. On
+  /// Reloads certificate, key and tokens, even if their file names are unchanged, and takes
+  /// the limits of `fresh`; all for future clients. Whether TLS and tokens are in use, and
+  /// everything else, stays. Throws as the constructor, then without any change. On
   /// the thread that runs `io`.
   void reload(const NetConfig& fresh);
   /// Takes no more clients and ends every connection; then `io` has no work of ours left and run()

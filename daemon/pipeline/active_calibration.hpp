@@ -10,7 +10,7 @@
 
 namespace dtact::pipeline {
 
-/// A calibration ready for the capture thread: all that takes memory or time is done. Made on a
+/// A calibration ready for the capture thread: needs no more memory and no slow work. Made on a
 /// worker thread, used on the capture thread, freed on the network thread.
 struct ActiveCalibration {
   CalibratedImage image;
@@ -18,8 +18,8 @@ struct ActiveCalibration {
   bool camera_mismatch = false;
 };
 
-/// Throws std::invalid_argument, saying what to do, when the calibration cannot be used with frames
-/// of this camera at all (other differences are a health condition) or by these rules.
+/// Throws std::invalid_argument with the fix when the calibration cannot be used with frames of
+/// this camera at all (other differences set a health flag) or with these rules.
 [[nodiscard]] std::unique_ptr<ActiveCalibration> activate(
     const std::shared_ptr<const calibration::Calibration>& calibration,
     const hal::CameraInfo& camera, const ReconstructionRules& rules);

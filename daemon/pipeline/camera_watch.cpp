@@ -7,7 +7,7 @@ namespace dtact::pipeline {
 
 void RateWatch::add(const hal::FrameInfo& info) noexcept {
   const std::int64_t passed_ns = info.timestamp_ns - timestamp_ns_;
-  // A number or a stamp that does not go on says nothing of the rate.
+  // A sequence number or a timestamp that does not increase says nothing about the rate.
   const bool goes_on = have_before_ && info.sequence > sequence_ && passed_ns > 0;
   const auto frames = static_cast<std::int64_t>(info.sequence - sequence_);
   have_before_ = true;

@@ -9,20 +9,20 @@
 
 namespace dtact::pipeline {
 
-/// How fast a camera really takes frames, whatever its driver promises: the median interval of
-/// their timestamps over about a second. An interval is shared among the frames that it spans, so
-/// that lost frames are no slow camera. One thread; does not allocate.
+/// The camera's real frame rate, whatever its driver promises: the median interval of the frame
+/// timestamps over about a second. An interval is divided by the number of frames that it spans, so
+/// lost frames do not look like a slow camera. One thread; does not allocate.
 class RateWatch {
  public:
   explicit RateWatch(std::int64_t promised_ns) noexcept : promised_ns_(promised_ns) {}
 
   void add(const hal::FrameInfo& info) noexcept;
-  /// The camera was opened anew: its numbers and its rate begin again.
+  /// The camera was reopened: sequence numbers and rate start again.
   void forget() noexcept;
 
-  /// Frames a second, as last measured; 0 before the first second is over.
+  /// Frames per second, as last measured; 0 during the first second.
   [[nodiscard]] double fps() const noexcept;
-  /// It is less than kSlow of what was promised.
+  /// The rate is below kSlow of the promised one.
   [[nodiscard]] bool slow() const noexcept;
 
   /// Cameras that lengthen the exposure leave out whole frames, halving the rate, or stretch them;
@@ -31,37 +31,37 @@ class RateWatch {
 
  private:
   static constexpr std::size_t kMax = 256;
-  static constexpr std::size_t kMin = 5;  // for a median worth the name, however slow they come
+  static constexpr std::size_t kMin = 5;  // for a meaningful median, even of a slow camera
   static constexpr std::int64_t kWindowNs = 1'000'000'000;
 
   std::int64_t promised_ns_;
   std::int64_t median_ns_ = 0;  // 0: not measured
   std::array<std::int64_t, kMax> intervals_{};
   std::size_t count_ = 0;
-  std::int64_t span_ns_ = 0;  // of the intervals gathered
+  std::int64_t span_ns_ = 0;  // total of the gathered intervals
   bool have_before_ = false;
-  std::uint64_t sequence_ = 0;  // of the frame before
+  std::uint64_t sequence_ = 0;  // the previous frame's
   std::int64_t timestamp_ns_ = 0;
 };
 
-/// What grab() said lately, as conditions. One thread.
+/// The health flags that follow from the latest grab() results. One thread.
 class CameraWatch {
  public:
   explicit CameraWatch(std::int64_t period_ns) noexcept : period_ns_(period_ns), rate_(period_ns) {}
 
-  /// Silence is counted from here.
+  /// Starts the time-out for missing frames.
   void started(std::int64_t now_ns) noexcept { last_ns_ = now_ns; }
-  /// A frame came. True when the camera had been away or was opened anew (a stalled one is, without
-  /// ever having been away): what was known of its image is in doubt.
+  /// A frame arrived. Returns true when the camera had been away or was reopened (a stalled one is
+  /// reopened without having been away): what was known of its image is in doubt.
   bool arrived(const hal::FrameInfo& info, std::int64_t now_ns) noexcept;
-  /// grab() came back without one.
+  /// grab() returned without a frame.
   void missed(hal::GrabStatus status, std::int64_t now_ns) noexcept;
 
-  /// Unplugged or ended: no frame comes unless the device returns.
+  /// Unplugged or ended: no frame arrives until the device returns.
   [[nodiscard]] bool away() const noexcept { return away_; }
   /// Away, or without a usable frame for longer than hal::stall_ns().
   [[nodiscard]] bool trouble() const noexcept { return away_ || stalled_; }
-  /// What came last was a damaged frame.
+  /// The latest grab() returned a damaged frame.
   [[nodiscard]] bool damaged() const noexcept { return damaged_; }
   [[nodiscard]] std::int64_t silent_ns(std::int64_t now_ns) const noexcept {
     return now_ns - last_ns_;

@@ -10,7 +10,7 @@ namespace {
 constexpr std::int64_t kSecond = 1'000'000'000;
 /// The longest wait for one frame, so that commands and stop are noticed however slow the camera.
 constexpr std::chrono::milliseconds kLongestGrab{100};
-/// Pause before a camera that is away is asked again.
+/// Pause before the next grab() from a camera that is away.
 constexpr std::int64_t kAwayPauseNs = 20'000'000;
 
 }  // namespace
@@ -37,7 +37,7 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
   const std::int64_t now_ns = clock_.monotonic_ns();
   watch_.started(now_ns);
   executor_.begin(std::move(active));
-  // What the status says until the first frame.
+  // The status until the first frame.
   exchange_.state = state();
   exchange_.health = health(now_ns).bits();
 }
@@ -68,7 +68,7 @@ void CaptureLoop::take_notes() noexcept {
   LightNote note;
   while (light_.next_note(note)) {
     tracker_.light_changes(note.light);
-    // What was seen under no light, or an unknown one, counts no more than before a start.
+    // What was seen under no light or an unknown one counts no more than before a start.
     if (note.returned) tracker_.camera_began();
     if (note.begins) {
       timeline_.change_begins(note.light, note.at_ns);
@@ -78,7 +78,7 @@ void CaptureLoop::take_notes() noexcept {
   }
 }
 
-// Decoding is most of the work on a frame: no more than somebody reads.
+// Decoding is most of the work on a frame, so decodes only the area that is used.
 void CaptureLoop::choose_area() noexcept {
   hal::Area area = whole_;
   if (executor_.active() != nullptr && !tracker_.needs_whole_frame() &&
@@ -117,8 +117,8 @@ void CaptureLoop::process(std::int64_t now_ns) noexcept {
   out.health = health_flags;
   reporter_.contact(out);
   reporter_.flush();
-  publish(out);  // from here on `out` is the network's
-  set_left(health_flags, now_ns);
+  publish(out);  // from here on the network owns `out`
+  emit(health_flags, now_ns);
   frame_.reset();
 }
 
@@ -134,7 +134,7 @@ void CaptureLoop::label(DepthFrame& out, std::int64_t exposure_ns) noexcept {
   out.times.decode_ns = out.camera.decode_ns;
 }
 
-/// What the frame shows: first of the reference image, then, against that, of depth.
+/// Updates the reference image from the frame, then measures depth against it.
 void CaptureLoop::look(DepthFrame& out, const FrameState& moment) noexcept {
   const std::int64_t began_ns = clock_.monotonic_ns();
   const Observation look = tracker_.look(frame_.luma(), moment);
@@ -168,7 +168,7 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
   const bool made = out.has_depth;
   const bool want_luma = exchange_.want_luma.load(std::memory_order_relaxed);
   out.has_depth = made && want_depth_;
-  out.has_luma = want_luma && area_ == whole_;  // not the frame before the one asked for
+  out.has_luma = want_luma && area_ == whole_;  // not when only the previous frame was asked for
   if (out.has_luma) {
     const hal::LumaView& luma = frame_.luma();
     const auto width = static_cast<std::size_t>(luma.width);
@@ -180,7 +180,7 @@ void CaptureLoop::publish(DepthFrame& out) noexcept {
     }
   }
   const bool want_jpeg = exchange_.want_jpeg.load(std::memory_order_relaxed);
-  // Room was made for as much as the picture takes without compression.
+  // The buffer holds a picture of this size without compression.
   out.has_jpeg = want_jpeg && !frame_.jpeg().empty() && frame_.jpeg().size() <= out.jpeg.capacity();
   if (out.has_jpeg) {
     out.jpeg_width = frame_.luma().width;
@@ -201,15 +201,15 @@ void CaptureLoop::without_frame(hal::GrabStatus status, std::int64_t asked_ns,
   watch_.missed(status, now_ns);
   exchange_.camera_damaged.store(watch_.damaged(), std::memory_order_relaxed);
   if (watch_.away() || watch_.silent_ns(now_ns) > kSecond) executor_.abort_rezero();
-  set_left(health(now_ns), now_ns);
+  emit(health(now_ns), now_ns);
   reporter_.flush();
-  // A camera that answers at once is not asked again at once, unless it had a frame.
+  // A camera that fails at once is not retried at once, unless it had a frame.
   if (status != hal::GrabStatus::damaged && now_ns - asked_ns < kAwayPauseNs) {
     clock_.sleep_until(asked_ns + kAwayPauseNs);
   }
 }
 
-void CaptureLoop::set_left(HealthSet health, std::int64_t now_ns) noexcept {
+void CaptureLoop::emit(HealthSet health, std::int64_t now_ns) noexcept {
   reporter_.state(state(), health, stamp(now_ns));
 }
 

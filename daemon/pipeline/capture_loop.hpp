@@ -26,9 +26,9 @@ struct CaptureParts {
   base::Clock& clock;
 };
 
-/// The capture thread: grab, look at the reference image, make depth, publish, tell. Depth is made
-/// while anybody listens, and published, with its maps, when it is wanted. Never waits for another
-/// thread; in steady state it does not allocate, log or touch a socket.
+/// The capture thread: grabs, updates the reference image, makes depth, publishes, reports events.
+/// Makes depth while any client is subscribed; publishes it, with its maps, when requested. Never
+/// waits for another thread; in steady state it does not allocate, log or use a socket.
 class CaptureLoop {
  public:
   /// `active` may be null: uncalibrated. `unusable`: there is a calibration, but for another camera
@@ -36,13 +36,13 @@ class CaptureLoop {
   CaptureLoop(const CaptureParts& parts, const PipelineConfig& config,
               std::shared_ptr<ActiveCalibration> active, bool unusable);
 
-  /// For what is not the loop's: its threads, what they say, and what is restored before the first
+  /// For owners outside the loop: its threads and messages, and what is restored before the first
   /// step.
   [[nodiscard]] ReferenceTracker& tracker() noexcept { return tracker_; }
-  /// Steps until Exchange::stop; notices it within a tenth of a second unless the camera blocks
-  /// longer than it was asked to.
+  /// Steps until Exchange::stop; notices it within 0.1 s unless the camera blocks longer than the
+  /// requested time-out.
   void run() noexcept;
-  /// One turn: waits for a frame for a tenth of a second at most, and does all that it takes.
+  /// One step: waits at most 0.1 s for a frame and processes it.
   void step() noexcept;
 
  private:
@@ -53,7 +53,7 @@ class CaptureLoop {
   void look(DepthFrame& out, const FrameState& moment) noexcept;
   void publish(DepthFrame& out) noexcept;
   void without_frame(hal::GrabStatus status, std::int64_t asked_ns, std::int64_t now_ns) noexcept;
-  void set_left(HealthSet health, std::int64_t now_ns) noexcept;
+  void emit(HealthSet health, std::int64_t now_ns) noexcept;
   [[nodiscard]] Stamp stamp(std::int64_t at_ns) const noexcept;
   [[nodiscard]] State state() const noexcept;
   [[nodiscard]] HealthSet health(std::int64_t now_ns) const noexcept;
@@ -73,10 +73,10 @@ class CaptureLoop {
   CommandExecutor executor_;
   hal::Frame frame_;
   const hal::Area whole_;        // frame
-  hal::Area area_;               // of the frame that is asked for
-  const bool unusable_;          // the calibration to start with is for another camera mode
-  bool want_depth_ = false;      // somebody does, since before the newest frame was worked on
-  bool controls_moved_ = false;  // as the newest frame says
+  hal::Area area_;               // the requested part of the frame
+  const bool unusable_;          // the first calibration is for another camera mode
+  bool want_depth_ = false;      // requested before the newest frame was processed
+  bool controls_moved_ = false;  // according to the newest frame
 };
 
 }  // namespace dtact::pipeline

@@ -14,7 +14,7 @@ void CommandExecutor::begin(std::shared_ptr<ActiveCalibration> active) noexcept 
 }
 
 void CommandExecutor::take(bool camera_away, const Stamp& now) noexcept {
-  // One at a time, and only while its answer has somewhere to go.
+  // One at a time, and only while there is room for its result.
   Command command;
   while (!rezero_ && !reporter_.answer_due() && exchange_.commands.pop(command)) {
     std::optional<Outcome> outcome;

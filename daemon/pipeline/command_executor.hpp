@@ -20,17 +20,17 @@ class CommandExecutor {
                   DepthMaker& depth)
       : exchange_(exchange), reporter_(reporter), tracker_(tracker), depth_(depth) {}
 
-  /// The calibration to begin with; null: uncalibrated.
+  /// The first calibration; null: uncalibrated.
   void begin(std::shared_ptr<ActiveCalibration> active) noexcept;
   void take(bool camera_away, const Stamp& now) noexcept;
-  /// The reference is another, whose last frame this was.
+  /// A new reference is in use; `sequence` is that of its last frame.
   void reference_taken(std::uint64_t sequence) noexcept { reference_sequence_ = sequence; }
-  /// Answers the re-zero in progress, if any.
+  /// Reports the outcome of the re-zero in progress, if any.
   void answer(Outcome outcome) noexcept;
-  /// No frames come: gives up the re-zero in progress, if any.
+  /// No frames arrive: aborts the re-zero in progress, if any.
   void abort_rezero() noexcept;
 
-  /// What a frame is measured by; null: uncalibrated.
+  /// The calibration in use; null: uncalibrated.
   [[nodiscard]] const ActiveCalibration* active() const noexcept { return active_.get(); }
   /// UseCalibration::key of active().
   [[nodiscard]] std::uint64_t key() const noexcept { return key_; }

@@ -24,7 +24,7 @@ struct StageTimes {
   std::int64_t publish_ns = 0;  ///< Copies of what subscribers want, until done_ns.
 };
 
-/// What touches, in the depth map's coordinates (origin at its centre, x right, y down).
+/// The contact, in the depth map's coordinates (origin at its centre, x right, y down).
 struct ContactSummary {
   bool in_contact = false;
   double area_mm2 = 0;  ///< Area pressed deeper than the contact threshold.
@@ -38,12 +38,12 @@ struct ContactSummary {
   recon::ForceAbsence force_absence = recon::ForceAbsence::none;  ///< Why there is none.
 };
 
-/// Why a frame says nothing of contact: what is not measured may touch all the same.
+/// Why a frame has no contact summary. The sensor may be in contact all the same.
 enum class ContactAbsence : std::uint8_t {
   none,          ///< It was measured.
   uncalibrated,  ///< There is nothing to measure by.
   referencing,   ///< The light settles or the reference image is being taken.
-  unasked        ///< Nobody wanted it when the frame was captured.
+  unasked        ///< Not requested when the frame was captured.
 };
 
 /// One frame's result, in buffers that are allocated once and used again.
@@ -51,7 +51,7 @@ struct DepthFrame {
   hal::FrameInfo camera;
   std::int64_t wall_ns = 0;  ///< CLOCK_REALTIME at camera.timestamp_ns, nanoseconds since 1970.
   std::int64_t done_ns = 0;  ///< CLOCK_MONOTONIC when the result was published.
-  std::uint64_t number = 0;  ///< Of the results since start, from 1, fetched or not.
+  std::uint64_t number = 0;  ///< Number of the result since start, from 1, fetched or not.
   hal::Light light;          ///< What the ring showed when the frame was exposed.
   /// Frames whose timestamp is not before it are exposed under `light` alone; none: not known.
   std::optional<std::int64_t> light_since_ns;
@@ -68,8 +68,8 @@ struct DepthFrame {
   double mm_per_px = 0;
   int decimation = 1;         ///< The map has 1/decimation of the calibration's resolution.
   int made_decimation = 1;    ///< It was made at 1/made_decimation of it, …
-  int sharpen_steps = 0;      ///< … sharpened by so many steps, and interpolated.
-  recon::Surface surface;     ///< That depth_um is measured from.
+  int sharpen_steps = 0;      ///< … sharpened by this number of steps, and interpolated.
+  recon::Surface surface;     ///< The surface that depth_um is measured from.
   double uncertainty_um = 0;  ///< Mean absolute error to expect inside the contact.
   int contact_um = 0;         ///< What is deeper belongs to the contact.
   std::vector<std::int16_t>
@@ -88,7 +88,7 @@ struct DepthFrame {
   bool has_jpeg = false;
   int jpeg_width = 0;  ///< Pixels of the camera frame.
   int jpeg_height = 0;
-  std::vector<std::uint8_t> jpeg;  ///< As the camera sent it.
+  std::vector<std::uint8_t> jpeg;  ///< As received from the camera.
 };
 
 }  // namespace dtact::pipeline

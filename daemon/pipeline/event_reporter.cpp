@@ -28,7 +28,7 @@ void EventReporter::contact(const DepthFrame& frame) noexcept {
 void EventReporter::state(State state, HealthSet health, const Stamp& now) noexcept {
   if (health.has(Health::beyond_calibration)) beyond_until_ns_ = now.monotonic_ns + kLastsNs;
   health.set(Health::beyond_calibration, now.monotonic_ns < beyond_until_ns_);
-  // Before the event: whoever has read that asks for the status.
+  // Before the event: a client that receives it may ask for the status at once.
   exchange_.state.store(state, std::memory_order_relaxed);
   exchange_.health.store(health.bits(), std::memory_order_relaxed);
   if (state_ && state_->state == state && state_->health == health) return;

@@ -8,9 +8,9 @@
 
 namespace dtact::pipeline {
 
-/// Tells the network what changed. What does not fit into the queue stays due and is told with a
-/// later frame, with that frame's numbers: a change that has been undone by then is not told.
-/// Answers to commands are all told. Capture thread only.
+/// Reports changes to the network thread. What does not fit into the queue stays due until a later
+/// frame and is reported with that frame's numbers, unless the change has been reversed by then.
+/// Results of commands are always reported. Capture thread only.
 class EventReporter {
  public:
   explicit EventReporter(Exchange& exchange) : exchange_(exchange) {}
@@ -20,10 +20,10 @@ class EventReporter {
   void answer(CommandDone&& answer) noexcept { answer_ = std::move(answer); }
   [[nodiscard]] bool answer_due() const noexcept { return answer_.has_value(); }
 
-  /// A frame that was not measured changes nothing: what touched before it counts as held.
+  /// A frame that was not measured changes nothing: the earlier contact counts as held.
   void contact(const DepthFrame& frame) noexcept;
-  /// For the status, and as an event where it changed. A press at the list's end would send one
-  /// with every frame: Health::beyond_calibration is told to last a second longer than it does.
+  /// For the status, and as an event on a change. A press at the LUT's end would cause one with
+  /// every frame, so the report keeps Health::beyond_calibration a second longer than it lasts.
   void state(State state, HealthSet health, const Stamp& now) noexcept;
   /// Tries what is due.
   void flush() noexcept;
@@ -33,8 +33,8 @@ class EventReporter {
   [[nodiscard]] bool push(T&& event) noexcept;
 
   Exchange& exchange_;
-  bool in_contact_ = false;            // as told
-  std::optional<StateChanged> state_;  // as told
+  bool in_contact_ = false;            // as last reported
+  std::optional<StateChanged> state_;  // as last reported
   std::int64_t beyond_until_ns_ = INT64_MIN;
   std::optional<ReferenceTaken> reference_;
   std::optional<CommandDone> answer_;

@@ -36,10 +36,10 @@ struct Exchange {
   std::atomic<State> state{State::settling};
   std::atomic<std::uint32_t> health{0};  ///< HealthSet::bits()
   std::atomic<std::uint64_t> frames{0};
-  std::atomic<std::uint64_t> sequence{0};  ///< Of the newest frame.
-  /// From a write to the ring until the timestamps of frames exposed under it; -1: not known yet.
+  std::atomic<std::uint64_t> sequence{0};  ///< The newest frame's.
+  /// Time from a write to the ring to the timestamps of frames exposed under it; -1: unknown.
   std::atomic<std::int64_t> light_lag_ns{-1};
-  std::atomic<std::uint64_t> turns{0};    ///< Of the capture loop.
+  std::atomic<std::uint64_t> turns{0};    ///< Steps of the capture loop.
   std::atomic<double> camera_fps{0};      ///< By the frames' timestamps; 0 = not known yet.
   std::atomic<double> light_followed{0};  ///< Share of the reference's light, ±.
 };

@@ -14,14 +14,14 @@ enum class State : std::uint8_t {
   camera_lost    ///< The camera is away; the report says why.
 };
 
-/// Named conditions under which depth deserves less trust. The values are those of the wire
-/// (dtact.proto, Health); a set is carried by every frame.
+/// Health flags: reasons why depth deserves less trust. The values are those of the wire
+/// (dtact.proto, Health); every frame carries a set.
 enum class Health : std::uint8_t {
   uncalibrated = 0,        ///< No calibration: luma only.
   starting = 1,            ///< Start-up is not through: no reference yet.
   light_unsettled = 2,     ///< A light change is under way; depth is off until the next reference.
   reference_stale = 3,     ///< The reference does not belong to the present light.
-  reference_restored = 4,  ///< Touched at start: the last good reference is used.
+  reference_restored = 4,  ///< In contact at start: the last good reference is used.
   light_mismatch = 5,      ///< The ring shows another light than at calibration.
   camera_mismatch = 6,     ///< Camera, mode, format or controls differ from the calibration's, or a
                            ///< control moved by itself.
@@ -32,7 +32,7 @@ enum class Health : std::uint8_t {
   not_realtime = 11,       ///< The capture thread runs without real-time scheduling.
   // What the picture itself shows (image_watch.hpp).
   light_drifted = 12,    ///< The light is not the reference's, or most of the field is pressed.
-  light_banded = 13,     ///< Bands wander over the picture: PWM against the rolling shutter.
+  light_banded = 13,     ///< Moving bands in the picture: PWM against the rolling shutter.
   image_saturated = 14,  ///< Too much of the picture is white.
   image_dark = 15,       ///< The picture is too dark to measure in.
   image_noisy = 16,      ///< Pixels are noisier than smoothing makes up for, or many are dead.

@@ -17,8 +17,8 @@ class Histogram {
   void add(std::int64_t ns) noexcept;
 
   [[nodiscard]] std::uint64_t count() const noexcept;
-  /// Upper end of the bucket that `share` (0 … 1) of all values do not exceed, but never more than
-  /// the greatest value; 0 while empty.
+  /// Upper end of the bucket below which `share` (0 … 1) of all values lie, but at most the
+  /// greatest value; 0 while empty.
   [[nodiscard]] std::int64_t percentile_ns(double share) const noexcept;
   [[nodiscard]] std::int64_t max_ns() const noexcept {
     return max_.load(std::memory_order_relaxed);

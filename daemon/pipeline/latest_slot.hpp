@@ -20,7 +20,7 @@ class LatestSlot {  // NOLINT(clang-analyzer-optin.performance.Padding): see the
   /// Writer: the one to fill. The same object until publish().
   [[nodiscard]] T& back() noexcept { return pool_[back_]; }
 
-  /// Writer: what back() was is now the newest. True when that replaced one nobody fetched.
+  /// Writer: publishes back() as the newest. True when that replaced a value that was not fetched.
   bool publish() noexcept {
     // Release: the reader that takes this index sees what was written. Acquire: what the reader
     // read from the buffer that comes back is over.

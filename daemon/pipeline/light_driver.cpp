@@ -90,11 +90,11 @@ void LightDriver::serve(Command command) {
   } else {
     done.light_since_ns = light_since_ns();
   }
-  set_left(std::move(done));
-  if (result.ok && wanted != before) set_left(changed());
+  emit(std::move(done));
+  if (result.ok && wanted != before) emit(changed());
 }
 
-/// Of the write that has just worked.
+/// The event for the write that has just succeeded.
 LightChanged LightDriver::changed() const {
   const std::int64_t passed_ns = clock_.monotonic_ns() - shown_ns_.value_or(0);
   return {.light = light_,
@@ -133,7 +133,7 @@ void LightDriver::come_back() {
   if (!write(kept).ok) {
     away_ = true;  // so that it is tried again
   } else if (kept != before) {
-    set_left(changed());
+    emit(changed());
   }
 }
 
@@ -162,7 +162,7 @@ void LightDriver::note(const LightNote& note) {
   }
 }
 
-void LightDriver::set_left(Event event) {
+void LightDriver::emit(Event event) {
   while (!events_.push(std::move(event)) && !stop_) {
     clock_.sleep_until(clock_.monotonic_ns() + kRetryNs);
   }

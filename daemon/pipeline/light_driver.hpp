@@ -26,13 +26,13 @@ struct LightNote {
   bool failed = false;     ///< The write did not work.
 };
 
-/// Owns the ring and the one thread that uses it: it writes, re-sends and answers commands, since a
-/// write blocks for a millisecond and more.
-/// Commands come from the network thread, events go back there, notes go to the capture thread;
-/// each way is a queue of its own and none ever drops (a full one makes this thread wait).
+/// Owns the ring and the one thread that uses it: it writes, re-sends and executes commands, since
+/// a write blocks for at least a millisecond.
+/// Commands come from the network thread, events return there, notes go to the capture thread.
+/// Each has a queue of its own that never drops (a full one makes this thread wait).
 ///
-/// A light that is asked for while the ring is away is an error to who asked, and kept: the ring
-/// shows it when it is back.
+/// A light requested while the ring is away fails for the caller but is kept: the ring shows it
+/// when it is back.
 class LightDriver {
  public:
   /// `exchange` is where events are announced, and the newest frame is known.
@@ -42,7 +42,7 @@ class LightDriver {
   LightDriver& operator=(const LightDriver&) = delete;
   ~LightDriver() { stop(); }
 
-  /// Shows the first light on the calling thread, tells the capture thread when, starts the thread.
+  /// Shows the first light on the calling thread, notifies the capture thread, starts the thread.
   void start();
   /// Ends and joins the thread, after the write it is in.
   void stop() noexcept;
@@ -52,8 +52,8 @@ class LightDriver {
   [[nodiscard]] bool submit(Command command);
   [[nodiscard]] bool next_event(Event& out) { return events_.pop(out); }
   [[nodiscard]] hal::RingInfo info() const { return ring_->info(); }
-  /// The last error, or why the ring shows less light than it was asked for, or what else is worth
-  /// knowing of it; empty when well.
+  /// The last error, or why the ring shows less light than requested, or another remark on it;
+  /// empty when well.
   [[nodiscard]] std::string message() const;
   [[nodiscard]] hal::Light light() const;
   /// As Status::light_requested.
@@ -72,7 +72,7 @@ class LightDriver {
   void come_back();
   hal::ShowResult write(const hal::Light& light);
   void note(const LightNote& note);
-  void set_left(Event event);
+  void emit(Event event);
   [[nodiscard]] LightChanged changed() const;
 
   std::unique_ptr<hal::LightRing> ring_;

@@ -8,9 +8,9 @@
 
 namespace dtact::pipeline {
 
-/// When a frame's exposure began, CLOCK_MONOTONIC nanoseconds, as well as its timestamp tells: any
-/// stamp but that of the beginning itself is taken to lie a frame period after it. What a camera
-/// holds a frame back for longer than that is part of its light_delay_frames.
+/// Estimated start of a frame's exposure, CLOCK_MONOTONIC nanoseconds. Unless the timestamp is
+/// that of the start itself, it is assumed to lie a frame period after it. Any longer delay in the
+/// camera is part of its light_delay_frames.
 [[nodiscard]] std::int64_t exposure_start_ns(const hal::FrameInfo& info,
                                              std::int64_t period_ns) noexcept;
 
@@ -18,8 +18,8 @@ namespace dtact::pipeline {
 [[nodiscard]] std::int64_t stamp_lag_ns(hal::TimestampMeaning meaning,
                                         std::int64_t period_ns) noexcept;
 
-/// Matches frames with light changes by time. A change has a beginning (the ring is about to be
-/// written) and an end (it has been); it is complete in the frames whose exposure began at least
+/// Matches frames with light changes by time. A change has a start (just before the write to the
+/// ring) and an end (just after it). It is complete in frames whose exposure began at least
 /// the camera's delay after the end.
 class LightTimeline {
  public:

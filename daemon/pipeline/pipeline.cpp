@@ -102,13 +102,13 @@ DepthFrame Pipeline::prototype(const calibration::Calibration* calibration) cons
     const recon::RectifyTable& table = calibration->model->rectify;
     map = std::max(map, pixels(table.width, table.height));
   }
-  // Sized, not only reserved: copies keep the size, and its pages are touched now.
+  // Sized, not only reserved: copies keep the size, and the pages are touched now.
   frame.depth_um.resize(map);
-  // Any map up to so many rows takes its marks in here.
+  // Maps of up to this number of rows record their tiles here.
   constexpr int kMaxRows = 4096;
   frame.drawn.tiles.resize(kMaxRows / recon::TileGrid::kRows);
   frame.luma.resize(pixels(info_.width, info_.height));
-  // As much as YUYV, which is what drivers make room for themselves (uvcvideo: the camera's
+  // The size of YUYV, for which drivers make room themselves (uvcvideo: the camera's
   // dwMaxVideoFrameSize).
   frame.jpeg.resize(2 * pixels(info_.width, info_.height));
   return frame;

@@ -19,16 +19,16 @@ namespace dtact::pipeline {
 /// storage). Between start() and stop() the network thread uses it through Port.
 class Pipeline final : public Port {
  public:
-  /// `calibration` may be null: luma only. Takes all the memory that run time needs. Throws
+  /// `calibration` may be null: luma only. Allocates all memory that run time needs. Throws
   /// std::invalid_argument naming the setting and its fix. A calibration for another frame size
-  /// is a health condition, not an error.
+  /// sets a health flag and is no error.
   Pipeline(std::unique_ptr<hal::Camera> camera, std::unique_ptr<hal::LightRing> ring,
            const std::shared_ptr<const calibration::Calibration>& calibration,
            PipelineConfig config, base::Clock& clock = base::system_clock());
   ~Pipeline() override { stop(); }
 
-  /// Ring on, camera on, threads running. Once only. Throws std::runtime_error with the fix when
-  /// the camera does not start; a ring that fails is a health condition.
+  /// Turns on ring and camera and starts the threads. Call once. Throws std::runtime_error with
+  /// the fix when the camera does not start; a ring that fails sets a health flag.
   void start();
   /// Ends and joins the threads: within a tenth of a second and what the camera's and the ring's
   /// calls in progress take. The last good reference is written out before it returns.

@@ -9,7 +9,7 @@
 
 namespace dtact::pipeline {
 
-/// When something counts as touching.
+/// When a depth map counts as contact.
 struct ContactRules {
   double threshold_mm = 0.10;  ///< Contact is made where indentation exceeds this, millimetres, …
   double release_mm =
@@ -24,10 +24,10 @@ struct ReconstructionRules {
   static constexpr double kMinErrorUm = 1;
   static constexpr double kMaxErrorUm = 10000;
 
-  /// 1, 2 or 4: a pixel of the map is the mean over so many of the calibration's in each direction.
-  /// 0: chosen for every frame, the coarsest whose expected error stays within max_error_um.
+  /// 1, 2 or 4: a pixel of the map is the mean over this number of the calibration's pixels each
+  /// way. 0: for every frame the coarsest whose expected error stays within max_error_um.
   int decimation = 1;
-  /// Steps of the filter that undoes the gel's scattering (recon/sharpener.hpp): 0 … 2, or
+  /// Steps of the filter that sharpens against scattering (recon/sharpener.hpp): 0 … 2, or
   /// kAutoSharpen: for every frame the fewest whose expected error stays within max_error_um, all
   /// at recon::kSharpenedAt and interpolated to `decimation` (0: left so); as 0 where the
   /// calibration has none (recon::sharpening_steps()).
@@ -54,7 +54,7 @@ struct ReferenceRules {
   int frames = 32;            ///< Averaged into one reference, 1 … 256.
   int settle_frames = 8;      ///< The mean grey has settled when over this many frames, 2 … 64, …
   double settle_grey = 0.25;  ///< … it moves by less than this many grey levels.
-  int timeout_frames = 300;   ///< A picture that is not still by then is taken for touched.
+  int timeout_frames = 300;   ///< A picture that is not still by then counts as in contact.
 };
 
 /// Settings of the capture thread and what it decides. Does not change while it runs.

@@ -23,7 +23,7 @@ struct CommandDone;
 
 /// When something happened.
 struct Stamp {
-  std::uint64_t sequence = 0;     ///< Of the last frame before; 0 also when there was none.
+  std::uint64_t sequence = 0;     ///< The previous frame's; 0 also when there was none.
   std::int64_t monotonic_ns = 0;  ///< CLOCK_MONOTONIC.
   std::int64_t wall_ns = 0;       ///< The same moment since 1970.
 };
@@ -33,7 +33,7 @@ struct ReferenceCopy {
   int width = 0;  ///< Pixels of the camera frame.
   int height = 0;
   std::vector<std::uint16_t> image_q8;  ///< Row-major, 256 units a grey level.
-  hal::Light light;                     ///< That it was taken under.
+  hal::Light light;                     ///< The light when it was taken.
   std::uint64_t sequence = 0;           ///< The last frame in it.
   std::uint64_t calibration = 0;        ///< UseCalibration::key.
 };
@@ -64,7 +64,7 @@ struct SetReconstruction {
 /// CommandDone, so that its memory is allocated and freed on the network's side only.
 struct Command {
   std::variant<SetLight, Rezero, UseCalibration, CopyReference, SetReconstruction> what;
-  /// The caller's own continuation; whoever takes the CommandDone calls it. The pipeline may keep
+  /// The caller's continuation, called when the CommandDone is fetched. The pipeline may keep
   /// the command longer than the caller lives: capture nothing that must not outlive the caller.
   std::function<void(const CommandDone&)> then = {};
 };
@@ -89,8 +89,8 @@ struct CommandDone {
   Stamp at = {};             ///< When a calibration or maps came into use.
   std::optional<std::int64_t> light_since_ns = {};  ///< Of SetLight, as DepthFrame's.
 };
-/// What is touched, or not any more, by two measured frames: while nothing can be measured nothing
-/// is told, and what was touched before counts as held.
+/// Contact begun or ended between two measured frames. Without measurement no event is sent, and
+/// the earlier contact counts as held.
 struct ContactChanged {
   bool in_contact = false;
   Stamp at = {};  ///< The frame that shows it.
@@ -154,7 +154,7 @@ struct Status {
   std::uint64_t frames = 0;                                     ///< Published since start.
   std::uint64_t skipped = 0;          ///< Published but replaced before the network fetched them.
   double fps = 0;                     ///< Over the last second.
-  double camera_fps = 0;              ///< Of the camera, by its timestamps; 0 = not known yet.
+  double camera_fps = 0;              ///< Measured by the camera's timestamps; 0 = unknown.
   std::optional<int> cpu;             ///< The capture thread is pinned to this CPU.
   std::vector<std::string> realtime;  ///< One sentence for each real-time setting refused.
   std::vector<StageStatistics> stages;
@@ -202,7 +202,7 @@ class Port {
   [[nodiscard]] virtual UseCalibration prepare(
       const std::shared_ptr<const calibration::Calibration>& calibration,
       const ReconstructionRules& rules) const = 0;
-  /// As prepare(), for the calibration in use, or null, by other rules: makes only the maps.
+  /// As prepare(), for the calibration in use, or null, with other rules: makes only the maps.
   [[nodiscard]] virtual SetReconstruction prepare_maps(
       const std::shared_ptr<const calibration::Calibration>& in_use,
       const ReconstructionRules& rules) const = 0;

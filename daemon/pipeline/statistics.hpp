@@ -14,8 +14,8 @@ namespace dtact::pipeline {
 /// The percentiles and counts of one stage.
 [[nodiscard]] StageStatistics summarise(const char* stage, const Histogram& times);
 
-/// How long each stage takes, how fast frames come, and what the thread that adds them costs the
-/// kernel. One thread adds, any thread reads.
+/// Durations of each stage, frame rate, and the kernel's resource usage of the thread that calls
+/// add(). One thread adds, any thread reads.
 class Statistics {
  public:
   /// A frame's stages, and from the payload's arrival to its publication. Once a second it also
@@ -26,7 +26,7 @@ class Statistics {
   [[nodiscard]] std::vector<StageStatistics> stages() const;
   /// Frames a second over the last whole second; 0 once none came for two seconds.
   [[nodiscard]] double fps(std::int64_t now_ns) const noexcept;
-  /// Of the thread that adds, as of the last whole second.
+  /// Usage of the thread that calls add(), as of the last whole second.
   [[nodiscard]] ThreadUsage usage() const noexcept;
 
  private:

@@ -49,7 +49,7 @@ HWY_NOINLINE void CountPixels(const uint8_t* luma, std::ptrdiff_t stride, size_t
   }
 }
 
-/// As many cells as `d8` has room for.
+/// The number of cells that fit into `d8`.
 template <class D8>
 HWY_INLINE void SumVector(D8 d8, const uint8_t* luma, std::ptrdiff_t stride, CellLimits limits,
                           int32_t* sum, int32_t* upper, int32_t* rough, CellCounts& counts) {

@@ -10,7 +10,7 @@ inline constexpr int kCell = 16;  ///< Side of a cell, pixels.
 /// Only every second row is read: the gel blurs over several, and the look is half as dear.
 inline constexpr int kRowStep = 2;
 inline constexpr int kCellPixels = kCell * kCell / kRowStep;  ///< Read of a cell.
-inline constexpr int kRoughPixels = 2 * kCell;                ///< Whose roughness is taken.
+inline constexpr int kRoughPixels = 2 * kCell;                ///< pixels for the roughness
 
 /// How the pixels of the cells are counted.
 struct CellLimits {
@@ -24,10 +24,10 @@ struct CellCounts {
   std::int64_t dark = 0;
 };
 
-/// One row of `cells` cells that lie side by side from `luma` on, rows `stride` bytes apart.
-/// sum[i]: grey levels of cell i added up; upper[i]: those of its upper half. rough[i]:
-/// |difference| of its rows 0 and 2 plus that of its rows 8 and 10, added up over kRoughPixels
-/// pairs of pixels; for white noise the mean is 1.128 standard deviations.
+/// Sums up one row of `cells` adjacent cells that begins at `luma`, rows `stride` bytes apart.
+/// sum[i]: sum of grey levels of cell i; upper[i]: that of its upper half. rough[i]:
+/// |difference| of its rows 0 and 2 plus that of its rows 8 and 10, summed over kRoughPixels
+/// pairs of pixels. For white noise the mean is 1.128 standard deviations.
 void sum_cells(const std::uint8_t* luma, std::ptrdiff_t stride, int cells, CellLimits limits,
                std::int32_t* sum, std::int32_t* upper, std::int32_t* rough,
                CellCounts& counts) noexcept;
@@ -47,7 +47,7 @@ struct CellPlanes {
   int window_columns = 0;
   int window_rows = 0;
   const std::int32_t* sum = nullptr;
-  const std::int32_t* sum_before = nullptr;  ///< Of the frame before.
+  const std::int32_t* sum_before = nullptr;  ///< the previous frame's
   const std::int32_t* rough = nullptr;
   const std::int32_t* expected = nullptr;  ///< Mean grey, Q16.
   std::int32_t* change = nullptr;          ///< Out: sum's mean − expected, Q16.
@@ -66,8 +66,8 @@ struct ChangeLimits {
 
 /// Sums over cells; "quiet" are those that were not active before.
 struct CellTotals {
-  std::int64_t grey = 0;          ///< Of `sum`.
-  std::int64_t quiet_change = 0;  ///< Of `change`, Q8.
+  std::int64_t grey = 0;          ///< of `sum`
+  std::int64_t quiet_change = 0;  ///< of `change`, Q8
   std::int64_t quiet_rough = 0;
   std::int64_t quiet_step = 0;  ///< Of |sum − sum_before|.
   int active = 0;               ///< Cells now.

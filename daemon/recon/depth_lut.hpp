@@ -8,11 +8,11 @@ namespace dtact::recon {
 /// Entries of a LUT for one grey level.
 inline constexpr int kEntriesPerLevel = 64;
 
-/// Darkening → indentation, 64 entries a grey level, so that a look-up needs no interpolation (what
-/// is looked up may be straight lines that follow the entries: kernel_lut.hpp).
-/// Entry i belongs to the Q6 darkening first_q6 + i. Below first_q6 the first entry stands (a bulge
-/// brighter than the LUT reaches is still a bulge); above covered_to_q6 the method `lut` marks
-/// pixels untrusted (pressed deeper than was calibrated) and `published` holds the end value.
+/// Darkening → indentation, 64 entries a grey level, so that a look-up needs no interpolation (the
+/// kernels may use straight lines that follow the entries: kernel_lut.hpp).
+/// Entry i belongs to the Q6 darkening first_q6 + i. Below first_q6 the first entry holds (a bulge
+/// brighter than the LUT covers is still a bulge). Above covered_to_q6 the method `lut` marks
+/// pixels untrusted (pressed deeper than calibrated); `published` keeps the end value.
 struct DepthLut {
   int first_q6 = 0;              ///< Darkening of entry 0, Q6 grey levels (64 = one level).
   std::vector<std::int16_t> um;  ///< Indentation in micrometres, positive = pressed.

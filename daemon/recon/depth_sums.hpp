@@ -12,11 +12,11 @@ namespace dtact::recon {
 struct SumRules {
   std::int16_t threshold_um = 0;  ///< Deeper pixels are summed.
   std::int16_t release_um = 0;    ///< Deeper pixels are counted, too.
-  /// Neighbours of the second difference lie so many pixels away; 0: nobody asks for the bend.
+  /// Distance in pixels of the second difference's neighbours; 0: the bend is not needed.
   int bend_reach = 0;
   std::int16_t bend_from_um = 0;  ///< Deeper pixels count for the bend.
 
-  /// Every so many rows are looked at for the bend: as far apart as its neighbours, at most four.
+  /// Step between the rows used for the bend: the distance of its neighbours, at most four.
   [[nodiscard]] constexpr int bend_step() const noexcept {
     return bend_reach < kMaxRows ? bend_reach : kMaxRows;
   }

@@ -9,23 +9,23 @@ namespace dtact::recon {
 /// How much the same indentation darkens at different places.
 enum class GainShape : std::uint8_t {
   none,     ///< Alike everywhere.
-  uniform,  ///< As the reference image is bright there: darkening is a share of the light.
+  uniform,  ///< Like the reference image's brightness: darkening is a share of the light.
   radial    ///< 1 + per_mm × distance from a centre (the paper's linear regression).
 };
 
 /// The part of a calibration that differs from pixel to pixel, in as few numbers as it takes.
 struct FlatFieldGain {
   GainShape shape = GainShape::none;
-  // Of `radial`. Millimetres from the map's centre, x right, y down.
+  // For `radial`. Millimetres from the map's centre, x right, y down.
   double centre_x_mm = 0;
   double centre_y_mm = 0;
   double per_mm = 0;  ///< −1 … 1
-  /// On top of any shape, 1 + Σ polynomial[i] · (x, y, x², xy, y²)[i] of the place in millimetres
-  /// from the map's centre, not below zero: a gel that is thicker on one side or in the middle.
+  /// Times any shape: 1 + Σ polynomial[i] · (x, y, x², xy, y²)[i] of the position in millimetres
+  /// from the map's centre, not below zero, for a gel that is thicker on one side or in the middle.
   /// None, two (a plane) or five (a quadratic).
   std::vector<double> polynomial = {};
 
-  /// That factor at a place.
+  /// The polynomial's factor at a position.
   [[nodiscard]] double polynomial_at(double x_mm, double y_mm) const noexcept;
 };
 

@@ -29,7 +29,7 @@ enum class ForceAbsence : std::uint8_t {
 ///     F = modulus_mpa ∫ q (u + zero_mm) dA.
 struct ForceModel {
   double modulus_mpa = 0;
-  double thickness_mm = 0;  ///< Of the gel.
+  double thickness_mm = 0;  ///< the gel thickness
   double zero_mm = 0;       ///< What depth maps lack where something presses.
   double error_share = 0;   ///< Error of readings left out of the fit over the force.
   int pairs = 0;            ///< Readings that made it, …
@@ -37,10 +37,10 @@ struct ForceModel {
   double to_n = 0;
 };
 
-/// The force of a contact in a map that is uncertain by `uncertainty_mm`.
+/// The force of a contact in a map with an uncertainty of `uncertainty_mm`.
 ///
-/// The uncertainty adds in squares a share of what the depth's is worth by the contact's stiffness,
-/// a share of the force for the law itself and what a contact too light to be seen presses with. It
+/// The force's uncertainty adds three parts in squares: a share of the depth's times the contact's
+/// stiffness, a share of the force for the law, and the force of a contact too light to see. It
 /// grows beyond the greatest reading.
 [[nodiscard]] Force force_of(const ForceModel& model, const GelResponse::Answer& answer,
                              double uncertainty_mm) noexcept;
@@ -55,7 +55,7 @@ class ForceMeter {
     std::optional<Force> force;
     ForceAbsence absence = ForceAbsence::none;
   };
-  /// Of a contact. `tiles`: where the map is not 0.
+  /// The reading for a contact. `tiles`: where the map is not 0.
   [[nodiscard]] Reading read(std::span<const std::int16_t> depth_um, const TileRows& tiles,
                              double uncertainty_mm) noexcept;
   /// Outside the contact.

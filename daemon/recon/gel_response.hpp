@@ -41,15 +41,15 @@ class CellMap {
   std::vector<std::int32_t> untrusted_;  // pixels of them
 };
 
-/// What a linear-elastic, incompressible gel bonded to a stiff block answers to an indentation. A
-/// pressure p gives the indentation û(k) = C(k) p̂(k), for Young's modulus E and thickness h
+/// The response of a linear-elastic, incompressible gel bonded to a stiff block to an indentation.
+/// A pressure p gives the indentation û(k) = C(k) p̂(k), for Young's modulus E and thickness h
 ///
 ///     C(k) = 3/(2 E k) · (sinh 2kh − 2kh) / (cosh 2kh + 1 + 2 (kh)²).
 ///
-/// By reciprocity the pressure p that makes u, which is none outside a region, has the force
+/// By reciprocity the pressure p that makes u, zero outside a region, has the force
 /// ∫ p dA = ∫ q u dA, where q is the pressure that indents the whole region by 1. The region may be
-/// wider than the contact: all that is pressed deeper than 0.04 mm. Depth maps blur the indentation
-/// by scattering; so does the C(k) that q is solved with, by a Gaussian of 0.2 h.
+/// wider than the contact: all points pressed deeper than 0.04 mm. Scattering blurs the indentation
+/// in depth maps; a Gaussian of 0.2 h blurs the C(k) that q is solved with likewise.
 class GelResponse {
  public:
   /// For maps of the same shape as `shape`. Takes a few milliseconds.

@@ -9,9 +9,9 @@
 
 namespace dtact::recon {
 
-/// A model's LUT as the kernels look it up. Method::lut: straight between knots a grey level
-/// apart wherever that says the same (kKnotsWithinUm), since a processor may hold the knots in
-/// registers and read no table; everything beyond the covered range looks up kUntrusted.
+/// A model's LUT in the kernels' form. Method::lut: straight lines between knots a grey level
+/// apart wherever the values agree (kKnotsWithinUm), since a processor may hold the knots in
+/// registers and read no table. Everything beyond the covered range gives kUntrusted.
 class KernelLut {
  public:
   /// Straight lines stand for a LUT that they follow within this, root mean square over the

@@ -23,7 +23,7 @@ std::int32_t round_shift(std::int32_t value) noexcept {
   return (value + (1 << (kBits - 1))) >> kBits;
 }
 
-/// The two pixels that share a tap. Within kSmoothable their sum is an int16, so that a product is
+/// The sum of the two pixels that share a tap. Within kSmoothable it is an int16, so a product is
 /// 16 × 16 → 32 bits, which every vector unit has; 32 × 32 is missing in SSE2.
 std::int16_t pair_sum(std::int16_t a, std::int16_t b) noexcept {
   return static_cast<std::int16_t>(a + b);

@@ -12,9 +12,9 @@
 /// other version of a kernel gives the same bits.
 namespace dtact::recon::kernels {
 
-/// Rows inside the reconstruction are written and read in whole blocks of this many pixels, so that
-/// no kernel but the first and the last has a tail loop. (gcc unrolls loops of 16 before it can
-/// make vector code of them, and not those of 32.)
+/// Rows inside the reconstruction are written and read in whole blocks of this many pixels, so
+/// only the first and the last kernel have a tail loop. (gcc unrolls loops of 16 before it can
+/// vectorise them, but not loops of 32.)
 inline constexpr int kBlock = 32;
 /// Greatest radius of a smoothing kernel: pixels that must be readable on either side of a row.
 inline constexpr int kMaxRadius = 32;
@@ -31,8 +31,8 @@ inline constexpr int kGainOne = 1 << 12;
   return (width + kBlock - 1) / kBlock * kBlock;
 }
 
-/// Bilinear: four 8-bit pixels with weights of 1/128 × 1/128 give Q14, rounded to Q6 (0 … 16320);
-/// then reference − frame, so that darkening is positive (±16320).
+/// Bilinear: four 8-bit pixels with weights of 1/128 × 1/128 give Q14, rounded to Q6 (0 … 16320).
+/// Then reference − frame, so that darkening is positive (±16320).
 void rectify_difference_row(const std::uint8_t* luma, std::ptrdiff_t stride,
                             const RectifyTable::Entry* entries, const std::int16_t* reference_q6,
                             int width, std::int16_t* difference_q6) noexcept;
@@ -67,7 +67,7 @@ void smooth_vertical_row(const std::int16_t* const* rows, std::span<const std::i
 
 /// A LUT that is straight between knots 2^step_bits entries apart: what between() says it is.
 struct alignas(64) Knots {
-  static constexpr std::size_t kCount = 128;  ///< As many as four registers of 512 bits hold.
+  static constexpr std::size_t kCount = 128;  ///< capacity of four 512-bit registers
   static constexpr int kFraction = 3;         ///< Heights are in eighths of a micrometre, …
   static constexpr int kDeepestUm = 4000;     ///< … so that this is the greatest one.
 
@@ -111,8 +111,8 @@ void bend_row(const std::int16_t* row_um, std::ptrdiff_t stride, int x0, int x1,
               DepthSums& sums) noexcept;
 
 /// gain = calibration / now in Q12, rounded. Where either is darker than kDarkest_q6 or the
-/// quotient exceeds the Q12 range the gain is one and the pixel is marked in `untrusted`, which is
-/// or-ed into.
+/// quotient exceeds the Q12 range, the gain is one and the pixel is marked in `untrusted`, which
+/// collects marks by OR.
 void gain_row(const std::int16_t* calibration_q6, const std::int16_t* now_q6, int width,
               std::int16_t* gain_q12, std::uint8_t* untrusted) noexcept;
 

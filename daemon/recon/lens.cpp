@@ -81,8 +81,8 @@ Point project(const Lens& lens, Point mm) {
     stretch += k * power;
     power *= r2;
   }
-  // What lies beyond a fold is not seen where the polynomial says; where there may be one, the
-  // slope of ρ(1 + k₁ρ² + …) is looked at on the whole way from the centre.
+  // The polynomial does not show points beyond a fold. Where a fold is possible, the
+  // slope of ρ(1 + k₁ρ² + …) is checked all the way from the centre.
   constexpr int kSteps = 32;
   const bool may_fold = !(lowest_slope(lens.radial, 0, r2) > 0) && !rises_in_parts(lens.radial, r2);
   for (int i = 1; i <= kSteps && may_fold; ++i) {

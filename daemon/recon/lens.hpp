@@ -8,7 +8,7 @@
 
 namespace dtact::recon {
 
-/// Where a point of the undeformed surface appears in the camera frame: a pinhole camera that looks
+/// Maps a point of the undeformed surface into the camera frame: a pinhole camera that looks
 /// at a plane, with radial distortion about its own centre (the even terms of Brown 1966; OpenCV's
 /// model with square pixels and without tangential terms). With h = homography · (x, y, 1),
 /// q = (h₀, h₁) / h₂ and ρ = |q − centre| / radius_px, the pixel is
@@ -42,8 +42,8 @@ struct Point {
 /// upright and not mirrored.
 void check(const Lens& lens, int frame_width, int frame_height);
 
-/// The depth map's place in the rectified image. That image has the scale mm_per_px everywhere, x
-/// to the right and y down, and shows the surface's origin at the pixel where the frame shows it.
+/// Position of the depth map in the rectified image. That has the scale mm_per_px everywhere, x
+/// to the right and y down. It shows the surface's origin at the same pixel as the frame.
 struct MapPlace {
   int col = 0;  ///< Upper left corner in the rectified image, pixels.
   int row = 0;

@@ -16,9 +16,9 @@ namespace dtact::recon {
 /// The taps that a model's method smooths with.
 [[nodiscard]] std::vector<std::int16_t> taps_of(const Model& model);
 
-/// The reference image on the map's pixels, as it was taken and in the present light, and what a
-/// difference from it is multiplied by so that it is one from the calibration's reference. Rows are
-/// whole blocks. Allocates when it is made, never later.
+/// The reference image on the map's pixels, as it was taken and in the present light, with the
+/// factor that scales a difference from it to one from the calibration's reference. Rows are
+/// whole blocks. Allocates at construction only.
 class LitReference {
  public:
   /// Takes the calibration's own reference.

@@ -37,7 +37,7 @@ inline constexpr int kSharpenedAt = 4;
 /// Throws std::invalid_argument, naming the key as in calibration.toml, outside those ranges.
 void check(const Scattering& scattering);
 
-/// Depth value of a pixel that must not be believed. 0 is a valid depth (untouched).
+/// Depth value of an untrusted pixel. 0 is a valid depth (no contact).
 inline constexpr std::int16_t kUntrusted = INT16_MIN;
 
 enum class Method : std::uint8_t {
@@ -67,7 +67,7 @@ struct Model {
   std::vector<Uncertainty> uncertainty;
   /// How the gel spreads light sideways, as fitted. None: not known, nothing can be sharpened.
   std::optional<Scattering> scattering;
-  /// A LUT holds for the levels of one filter only: these are for levels sharpened by so many
+  /// LUT for one filter only: for levels sharpened by this number of
   /// steps. Ascending, each of 1 and 2 at most once; with `scattering` and Method::lut only.
   struct Sharpened {
     int steps = 0;
@@ -82,16 +82,16 @@ struct Model {
   /// Depth-map sized; non-zero marks pixels that are never trusted. Empty: none.
   std::vector<std::uint8_t> untrusted;
   std::optional<ForceModel> force;  ///< None: not calibrated.
-  Surface surface;  ///< That the indentation is measured from; says where in space a pixel lies.
+  Surface surface;  ///< The indentation is measured from it; it gives a pixel's position in space.
 };
 
 /// Throws std::invalid_argument, naming the part, where the parts do not fit each other.
 void check(const Model& model);
 
-/// The model of a map of 1/`factor` the resolution (1, 2 or 4), for hosts that cannot afford the
-/// whole: its pixels are means over factor × factor of the model's, taken before smoothing, the
+/// The model of a map of 1/`factor` the resolution (1, 2 or 4), for slow hosts. Its pixels are
+/// means over factor × factor of the model's, taken before smoothing. The
 /// smoothing keeps its width in millimetres, and a pixel that covers an untrusted one is untrusted.
-/// Columns and rows that fill no pixel are left out on both sides alike, so that the centre stays
+/// Columns and rows that fill no pixel are left out on both sides alike, so the centre stays
 /// within half a pixel of `model`. Throws
 /// std::invalid_argument for another factor, a map smaller than one pixel or a decimated model.
 [[nodiscard]] Model decimate(const Model& model, int factor);

@@ -40,8 +40,8 @@ inline constexpr std::size_t kLumaPadding = 64;
 /// int16 micrometres). Holds its scratch rows, so run() never allocates. One thread at a time.
 class Reconstructor {
  public:
-  /// `sharpen_steps` 1 or 2: levels are sharpened by so many steps (sharpener.hpp) and looked up in
-  /// the model's LUT for that. Throws std::invalid_argument when the model's parts disagree in
+  /// `sharpen_steps` 1 or 2: levels are sharpened by this number of steps (sharpener.hpp), and the
+  /// model's LUT for it is used. Throws std::invalid_argument when the model's parts disagree in
   /// size, it has no such LUT or its scattering is too wide for its map.
   explicit Reconstructor(std::shared_ptr<const Model> model, int sharpen_steps = 0);
   ~Reconstructor();
@@ -64,8 +64,8 @@ class Reconstructor {
 
   /// `luma`: frame sized, rows `stride` bytes apart, kLumaPadding bytes readable after the last
   /// pixel. `depth_um`: width × height of the model's table, row-major. Borders are replicated when
-  /// smoothing. Beyond the LUT's covered range on the deep side Method::lut writes kUntrusted; so
-  /// do both methods where the mask says so and where either reference is darker than eight grey
+  /// smoothing. Beyond the LUT's covered range on the deep side Method::lut writes kUntrusted. Both
+  /// methods do so where the mask says so and where either reference is darker than eight grey
   /// levels or the light less than an eighth of the calibration's.
   void run(const std::uint8_t* luma, std::ptrdiff_t stride, std::span<std::int16_t> depth_um,
            StepTimes* times = nullptr) noexcept;

@@ -25,7 +25,7 @@ namespace dtact::recon {
 inline constexpr int kStrip = Smoother::kStrip;
 static_assert(2 * kStrip == TileGrid::kRows);
 
-/// Splits the time of a run into steps. Reads no clock when nobody asks.
+/// Splits the time of a run into steps. Reads no clock unless the times are requested.
 class Stopwatch {
  public:
   explicit Stopwatch(bool on) : on_(on), last_(on ? Clock::now() : Clock::time_point{}) {}
@@ -50,7 +50,7 @@ struct Reconstructor::Impl {
   [[nodiscard]] std::ptrdiff_t packed(int y) const noexcept {
     return std::ptrdiff_t{y} * grid.width;
   }
-  /// `sums` null: nobody asks.
+  /// `sums` may be null: not requested.
   void apply_lut(const std::uint8_t* luma, const TileRows& tiles, std::int16_t* depth,
                  StripSums* sums, StepTimes& times, Stopwatch& watch) noexcept;
   void clear_rest(const TileRows& tiles, DrawnTiles& drawn, std::int16_t* depth) const noexcept;
@@ -58,7 +58,7 @@ struct Reconstructor::Impl {
                      Stopwatch& watch) noexcept;
 
   std::shared_ptr<const Model> model;
-  int steps;  ///< Of sharpening.
+  int steps;  ///< of sharpening
   TileGrid grid;
   TileRows all_tiles;
   RectifyPlan plan;
@@ -68,7 +68,7 @@ struct Reconstructor::Impl {
   RowBuffer between;
   RowBuffer out;  ///< A strip after smoothing.
   std::optional<Sharpener> sharpener;
-  TileRows sharpener_tiles;  ///< Whose levels it reads.
+  TileRows sharpener_tiles;  ///< the tiles that it reads
   KernelLut lut;
   LitReference reference;
   int beyond = 0;

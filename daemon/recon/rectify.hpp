@@ -24,7 +24,7 @@ struct RectifyTable {
   };
   /// Row-major, (width · decimation) × (height · decimation).
   std::vector<Entry> entries;
-  /// 1, 2 or 4: a pixel of the map is the mean of decimation × decimation entries, so that a coarse
+  /// 1, 2 or 4: a pixel of the map is the mean of decimation × decimation entries. So a coarse
   /// map is a fine one averaged over areas and nothing aliases, whatever the lens does.
   int decimation = 1;
 

@@ -9,10 +9,10 @@
 
 namespace dtact::recon {
 
-/// A rectification table in the shape the vector kernel reads. Neighbouring pixels of the map are
-/// read close together in the frame, so eight of them (a group) find all their bytes in 16-byte
-/// pieces of a few frame rows: one load a row and a shuffle within the register stand for the
-/// gather. Identity, crop and lens differ only in how many rows a group needs.
+/// A rectification table in the layout that the vector kernel reads. Neighbouring pixels of the map
+/// are close together in the frame, so eight of them (a group) find all their bytes in 16-byte
+/// pieces of a few frame rows. One load per row and a shuffle within the register replace the
+/// gather. Identity, crop and lens differ only in the number of rows that a group needs.
 class RectifyPlan {
  public:
   static constexpr int kGroup = 8;               ///< Pixels whose bytes one load a row holds.
@@ -38,7 +38,7 @@ class RectifyPlan {
 
   [[nodiscard]] int blocks() const noexcept { return blocks_; }  ///< In a row of the map.
   [[nodiscard]] const Block* row(int y) const noexcept { return head_.data() + at(y); }
-  /// For each block of the row kBlockData bytes: 32 × place (column relative to the group's x in
+  /// For each block of the row kBlockData bytes: 32 × position (column relative to the group's x in
   /// the low four bits, row relative to the group's y above), 32 × fx, 32 × fy. Pixels beyond the
   /// map's width repeat its last one. Bytes, since the memory's speed limits the kernel.
   [[nodiscard]] const std::uint8_t* data(int y) const noexcept {
@@ -59,7 +59,7 @@ class RectifyPlan {
   int blocks_;
   std::ptrdiff_t stride_ = 0;
   std::vector<Block> head_;
-  std::vector<Corner> corners_;  ///< Of each group's bytes, kGroups a block.
+  std::vector<Corner> corners_;  ///< for each group's bytes, kGroups a block
   std::vector<std::uint8_t> data_;
 };
 

@@ -20,8 +20,8 @@ void lit_row(const std::int16_t* difference_q6, const std::int16_t* gain_q12, in
 /// coarse_width levels.
 void shrink_row(const std::int16_t* const* rows, int coarse_width, std::int16_t* coarse) noexcept;
 
-/// Where a row lies between two of the coarse grid, whose values are read from one before the first
-/// to one after the last that is needed.
+/// Position of a row between two of the coarse grid. Their values are read from one before the
+/// first to one after the last that is needed.
 struct WideRows {
   const std::int16_t* near = nullptr;   ///< The coarse row that the row lies in.
   const std::int16_t* other = nullptr;  ///< Its neighbour, above or below.
@@ -29,8 +29,8 @@ struct WideRows {
 };
 inline constexpr std::int16_t kEighth = 1 << 12;  ///< Q15
 
-/// One step for a row: after = before + level − H·before, clamped to ±kSmoothable, where H·before
-/// is narrow + share · (wide − narrow) and `wide` is read bilinearly, down the columns first.
+/// One step for a row: after = before + level − H·before, clamped to ±kSmoothable. H·before
+/// is narrow + share · (wide − narrow), and `wide` is read bilinearly, down the columns first.
 /// Products are 16 × 16 bits in Q15, rounded half up. `after` may be `before`.
 void sharpen_row(const std::int16_t* level, const std::int16_t* before, const std::int16_t* narrow,
                  const WideRows& wide, std::int16_t wide_share_q15, int width,

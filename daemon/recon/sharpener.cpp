@@ -22,7 +22,7 @@ double narrow_px(const Scattering& scattering, double mm_per_px) {
   return scattering.narrow_mm / mm_per_px;
 }
 
-/// Of the wide one on the coarse grid, coarse pixels.
+/// Width of the wide Gaussian on the coarse grid, coarse pixels.
 double wide_px(const Scattering& scattering, double mm_per_px) {
   constexpr double kSquare = kCoarse * kCoarse;
   // Variances add: of n equal steps (n² − 1) / 12, of bilinear reading n² / 6, averaged over

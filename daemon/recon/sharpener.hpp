@@ -19,7 +19,7 @@ struct MapArea {
   bool operator==(const MapArea&) const = default;
 };
 
-/// Undoes the gel's scattering H in levels L by Van Cittert's steps: x₀ = L, x ← x + L − Hx
+/// Sharpens levels L against the gel's scattering H by Van Cittert's steps: x₀ = L, x ← x + L − Hx
 /// (P. H. van Cittert, "Zum Einfluß der Spaltbreite auf die Intensitätsverteilung in
 /// Spektrallinien. II", Z. Phys. 69, 1931). What H keeps of a pattern, h, becomes 1 − (1 − h)ⁿ⁺¹
 /// after n steps, and noise that H blurs away is n + 1 times as strong. The narrow Gaussian runs on
@@ -49,8 +49,8 @@ class Sharpener {
   /// Whether neither Gaussian is too wide for a map of that scale.
   [[nodiscard]] static bool reaches(const Scattering& scattering, double mm_per_px) noexcept;
 
-  /// Taps of the two Gaussians, Q14 from the centre outwards; of the wide one on the coarse grid,
-  /// narrower by what means and bilinear reading blur by themselves.
+  /// Taps of the two Gaussians, Q14 from the centre outwards. The wide one is on the coarse grid,
+  /// narrower by the blur of the means and of bilinear reading.
   [[nodiscard]] static std::vector<std::int16_t> narrow_taps(const Scattering& scattering,
                                                              double mm_per_px);
   [[nodiscard]] static std::vector<std::int16_t> wide_taps(const Scattering& scattering,

@@ -52,8 +52,8 @@ class Smoother {
   /// Rows 2·pair and 2·pair + 1 for the blocks [first, last), in a RowBuffer: radius() columns on
   /// either side are read, too, and those beside the image overwritten. Pairs come in rising order.
   void push(int pair, std::int16_t* row_a, std::int16_t* row_b, int first, int last) noexcept;
-  /// The smoothed rows of a pair for blocks that were pushed for all pairs within reach(), of which
-  /// the last is at most kStrip + 2·reach() pushes ago.
+  /// The smoothed rows of a pair, for blocks that were pushed for all pairs within reach(); the
+  /// last push was at most kStrip + 2·reach() pushes ago.
   void take(int pair, std::int16_t* row_a, std::int16_t* row_b, int first, int last) noexcept;
 
  private:

@@ -16,11 +16,11 @@ struct Surface {
 
   // All that follows says nothing of a plane.
   double radius_mm = 0;
-  double axis_deg = 0;  ///< Of a cylinder: its axis' direction, from x towards y.
+  double axis_deg = 0;  ///< a cylinder's axis direction, from x towards y
   /// The camera looks along z through air and then through the flat back of the gel.
   double air_mm = 0;      ///< From the camera's pinhole to the gel.
   double gel_mm = 0;      ///< From there to the surface's origin.
-  double refraction = 1;  ///< Of the gel; the air's is 1.
+  double refraction = 1;  ///< the gel's; the air's is 1
 
   [[nodiscard]] bool operator==(const Surface&) const = default;
 };
@@ -29,7 +29,7 @@ struct Surface {
 struct SurfaceLimits {
   static constexpr double kMinRadiusMm = 1;
   static constexpr double kMaxRadiusMm = 10000;
-  static constexpr double kMinDistanceMm = 0.01;  ///< Of air and of gel on the camera's axis.
+  static constexpr double kMinDistanceMm = 0.01;  ///< through air and gel on the camera's axis
   static constexpr double kMaxDistanceMm = 1000;
   static constexpr double kMaxRefraction = 3;  ///< From 1.
 };

@@ -24,7 +24,7 @@ class CellLattice {
   [[nodiscard]] bool empty() const noexcept { return columns_ == 0; }
   /// Values a row of a plane of cells, vec::padded_cells(columns()).
   [[nodiscard]] int stride() const noexcept { return stride_; }
-  /// Where a cell's value stands in a plane.
+  /// Index of a cell's value in a plane.
   [[nodiscard]] std::size_t at(int column, int row) const noexcept {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(stride_) +
            static_cast<std::size_t>(column);

@@ -13,7 +13,7 @@ inline constexpr int kMaxPhases = 4;
 /// Where the fine pixels of a coarse one lie: beside its middle, towards one of its neighbours.
 struct Phases {
   int count = 0;  ///< 2 or 4.
-  /// Share of the neighbour in Q15, 0 … 1/2; of the one before for the first half of the phases, of
+  /// Weight of the neighbour in Q15, 0 … 1/2: the previous one for the first half of the phases,
   /// the next one for the others.
   std::array<std::int16_t, kMaxPhases> share_q15{};
 };

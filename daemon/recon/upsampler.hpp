@@ -15,7 +15,7 @@ namespace dtact::recon {
 /// only.
 class Upsampler {
  public:
-  /// Of a calibration's map of `width` × `height` pixels, from 1/`from` to 1/`to` of its
+  /// Upsamples a calibration's map of `width` × `height` pixels from 1/`from` to 1/`to` of its
   /// resolution: 1, 2 or 4, `to` below `from`.
   Upsampler(int width, int height, int from, int to);
 

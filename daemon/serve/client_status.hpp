@@ -13,7 +13,7 @@ struct EndpointInfo;
 // Of GetStatus' answer. Each fills a message that is empty.
 
 void fill(const EndpointInfo& endpoint, v1::Endpoint& out);
-/// Of a client that has been greeted.
+/// Fills in the status of an authenticated client.
 void fill(const Session& session, v1::ClientStatus& out);
 
 }  // namespace dtact::net

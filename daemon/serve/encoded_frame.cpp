@@ -12,7 +12,7 @@ namespace {
 
 using google::protobuf::io::CodedOutputStream;
 
-// Of the protobuf encoding.
+// Wire types of the protobuf encoding.
 constexpr std::uint32_t kVarint = 0;
 constexpr std::uint32_t kBytes = 2;  // length-delimited
 

@@ -13,7 +13,7 @@ namespace {
 using google::protobuf::internal::WireFormatLite;
 using google::protobuf::io::CodedInputStream;
 
-/// Of a message: those of today, some of tomorrow.
+/// Fields of a message: today's and room for some later ones.
 constexpr int kMaxFields = 16;
 
 /// Whether `bytes` are at most kMaxFields fields, numbers or bytes, of which `may_be_bytes` allows

@@ -45,9 +45,9 @@ using OnSocket = std::function<void(boost::asio::ip::tcp::socket, Peer)>;
 [[nodiscard]] std::shared_ptr<Listener> listen_tcp(boost::asio::io_context& io,
                                                    const NetConfig& config, OnSocket on_socket);
 
-/// Binds config.unix_socket, open to every user of this machine: Peer.trusted says who needs no
-/// token. Takes the place of a socket that nobody listens on any more, and removes its own at the
-/// end. Throws std::runtime_error naming path and fix, also when another program listens there.
+/// Binds config.unix_socket, open to every user of this machine: Peer.trusted marks users without
+/// need of a token. Replaces a stale socket, and removes its own at the
+/// end. Throws std::runtime_error with path and fix, also when another program listens there.
 [[nodiscard]] std::shared_ptr<Listener> listen_unix(boost::asio::io_context& io,
                                                     const NetConfig& config,
                                                     Listener::OnConnection on_connection);

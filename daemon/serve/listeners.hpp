@@ -27,7 +27,7 @@ class Listeners {
   Listeners& operator=(const Listeners&) = delete;
   ~Listeners() = default;
 
-  /// Connections are taken from now on and given to `admit`; their sessions tell `host`.
+  /// Accepts connections from now on and passes them to `admit`; their sessions notify `host`.
   void open(std::weak_ptr<SessionHost> host,
             std::function<void(const std::shared_ptr<Session>&)> admit);
   /// Takes no more of them.

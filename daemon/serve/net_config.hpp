@@ -19,7 +19,7 @@ enum class LogLevel : std::uint8_t { info, warning };
 struct LogLine {
   LogLevel level = LogLevel::info;
   std::string text;
-  std::string client = {};  ///< Whom it is about, as Peer.address; empty: nobody.
+  std::string client = {};  ///< The client concerned, as Peer.address; may be empty.
 };
 /// Called on the network thread only; must not throw.
 using Log = std::function<void(const LogLine&)>;
@@ -40,7 +40,7 @@ struct NetConfig {
   std::filesystem::path token_file;
   std::size_t max_clients = 32;              ///< More are refused with a sentence.
   std::size_t max_clients_per_address = 16;  ///< The same for each Peer.host.
-  /// Of one client, and as many at once after a rest. A request counts once for each 64 kB of it.
+  /// Rate limit of one client, and its burst. A request counts once for each 64 kB of it.
   int max_requests_per_s = 500;
   std::string frame_id = "dtact_surface";  ///< Name of the surface frame in every message.
   std::string name;                        ///< The daemon's own, in the handshake and status.
@@ -48,12 +48,12 @@ struct NetConfig {
   std::string version;                     ///< "0.1.0": in status.
   /// HelloReply.features: of what lives as long as the program.
   std::span<const char* const> features = wire::kFeatures;
-  std::chrono::milliseconds hello_timeout{5000};  ///< A client silent for so long is let go.
-  /// A peer whose machine has not answered for so long is dead: a pulled cable. One that answers
-  /// and only does not read is not.
+  std::chrono::milliseconds hello_timeout{5000};  ///< closes a client without Hello by then
+  /// A peer whose machine has not answered for this long is dead (a pulled cable). One that answers
+  /// but does not read is not.
   std::chrono::milliseconds peer_timeout{30000};
   /// SCHED_FIFO priority of the thread that runs the network part, below the capture thread's; 0 =
-  /// normal scheduling. Whoever owns the thread sets it, …
+  /// normal scheduling. Set by the owner of the thread, …
   int fifo_priority = 20;
   std::string realtime_refused;  ///< … and says here why it was refused; in status.
   Log log = [](const LogLine&) {};

@@ -28,7 +28,7 @@ class Outbox {
   /// Frames that came in vain while one message was being sent; 1 s of a whole stream.
   static constexpr int kStalledAfter = 60;
 
-  /// Whose outbox it is.
+  /// The owner of an outbox.
   class Owner {
    public:
     Owner() = default;
@@ -51,22 +51,22 @@ class Outbox {
   [[nodiscard]] bool frame_waits() const noexcept { return frame_ != nullptr; }
   /// The waiting frame is not wanted any more.
   void drop_frame() noexcept { frame_.reset(); }
-  /// The reader has stopped: a frame made for it would be made for nobody. Ends when what is being
-  /// sent has gone.
+  /// The reader has stopped, so a frame made for it would be wasted. Ends when the present
+  /// write has finished.
   [[nodiscard]] bool stalled() const noexcept { return replaced_during_write_ >= kStalledAfter; }
   /// Sends what is queued, then ends the sending side. Nothing may be pushed after it.
   void finish();
-  /// The transport is closed: nothing more is sent, and on_write_failed() is not called any more.
-  /// What is being written stays until the transport lets go of it.
+  /// The transport is closed: sends nothing more, and calls on_write_failed() no more.
+  /// The message being written stays until the transport releases it.
   void close() noexcept { closed_ = true; }
 
   /// Frames that this client was due and that were gone before they came here.
   void count_dropped(std::uint64_t frames) noexcept { dropped_ += frames; }
   [[nodiscard]] std::uint64_t sent() const noexcept { return sent_; }        ///< Frames.
-  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }  ///< Frames.
-  /// Of all messages with their lengths, whole ones only.
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }  ///< in frames
+  /// Whole messages sent, with their lengths.
   [[nodiscard]] std::uint64_t sent_bytes() const noexcept { return sent_bytes_; }
-  /// Of answers and events that are not sent.
+  /// Bytes of answers and events not yet sent.
   [[nodiscard]] std::size_t waiting_bytes() const noexcept { return control_bytes_; }
   /// "3 answers and events (1200 bytes)".
   [[nodiscard]] std::string backlog() const;
@@ -88,7 +88,7 @@ class Outbox {
   std::size_t control_bytes_ = 0;
   std::shared_ptr<const EncodedFrame> frame_;    ///< The frame that goes next.
   std::shared_ptr<const EncodedFrame> sending_;  ///< The frame that is being sent.
-  FrameEnvelope envelope_{0, 0};                 ///< Of `sending_`.
+  FrameEnvelope envelope_{0, 0};                 ///< for `sending_`
   bool writing_ = false;
   bool finishing_ = false;
   bool closed_ = false;

@@ -17,11 +17,11 @@ struct EndpointInfo {
 
 /// Whether the TCP address is one that other machines reach; not when it is no address.
 [[nodiscard]] bool reaches_beyond(const NetConfig& config);
-/// Such an address without TLS or without a token, see Endpoint.insecure.
+/// Whether the address is reachable without TLS or without a token, see Endpoint.insecure.
 [[nodiscard]] bool is_insecure(const NetConfig& config);
 
-/// Throws std::runtime_error, naming the keys and the fixes, when the settings would open the
-/// daemon to the network without TLS and token and do not say that this is meant, or name half a
+/// Throws std::runtime_error, naming the keys and the fixes, when the settings open the
+/// daemon to the network without TLS and token and without stating that intent, or name half a
 /// TLS pair.
 void check_security(const NetConfig& config);
 /// `config` after check_security(), with a log that unauthenticated clients cannot fill. Warns of

@@ -18,7 +18,7 @@ using boost::system::error_code;
 
 /// How long an ending connection may take to fetch its last answer.
 constexpr std::chrono::milliseconds kLinger{2000};
-/// How long whoever sends a wrong token waits for the answer.
+/// Delay of the answer to a wrong token.
 constexpr std::chrono::milliseconds kDenial{500};
 /// How long a large message may take to arrive: the longest at 1.1 Mbit/s.
 constexpr std::chrono::milliseconds kArrival{120'000};
@@ -34,7 +34,7 @@ std::string printable(std::string text) {
   return text;
 }
 
-/// Whether RIGHTS_VIEW is enough. A request that this daemon does not know harms nobody.
+/// Whether RIGHTS_VIEW is enough. A request unknown to this daemon does no harm.
 bool is_for_viewers(v1::ClientMessage::RequestCase request) {
   switch (request) {
     case v1::ClientMessage::kSetLight:

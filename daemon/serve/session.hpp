@@ -28,7 +28,7 @@ namespace dtact::net {
 
 class Session;
 
-/// Whom a session tells. Sessions hold it weakly: it may go first.
+/// The observer of sessions. Sessions hold it weakly: it may be destroyed first.
 class SessionHost {
  public:
   SessionHost() = default;
@@ -63,13 +63,13 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   void reply_error(std::uint64_t id, int error_code, const std::string& sentence);
   /// A frame of this client's kind.
   void send_frame(std::shared_ptr<const EncodedFrame> frame);
-  /// One more frame came out of the pipeline, after `missed` that nobody fetched. What this client
-  /// is to get of it, if anything: with what waited to be sent of the one before, which it
-  /// replaces.
+  /// One more frame came out of the pipeline, after `missed` unfetched ones. Returns the kind that
+  /// this client gets of it, if any, including what it replaces: parts of the previous frame that
+  /// still wait to be sent.
   [[nodiscard]] std::optional<FrameKind> due(std::int64_t timestamp_ns, std::uint64_t missed);
   /// Replaces the subscription, and the frame that waits by the old one.
   void subscribe(const Subscription& subscription);
-  /// Ends the connection now. The host is told.
+  /// Closes the connection now and notifies the host.
   void close(const std::string& reason, LogLevel level = LogLevel::info);
 
   [[nodiscard]] const Subscription& subscription() const noexcept { return subscription_; }
@@ -84,7 +84,7 @@ class Session : public std::enable_shared_from_this<Session>, private Outbox::Ow
   [[nodiscard]] Rights rights() const noexcept { return rights_.value_or(Rights::view); }
   [[nodiscard]] const Peer& peer() const noexcept { return transport_->peer(); }
   [[nodiscard]] const std::string& program() const noexcept { return program_; }
-  /// Of the version that the client speaks.
+  /// The outbox in the client's protocol version.
   [[nodiscard]] const Outbox& outbox() const noexcept { return outbox_; }
 
  private:

@@ -12,17 +12,17 @@ namespace dtact::net {
 /// The connections there are.
 class SessionList {
  public:
-  /// Connections that have not said Hello at one time. They are unauthenticated clients: whoever
-  /// comes after that takes the place of the oldest from where most of them are, so that a flood
-  /// from one address leaves room for those from others.
+  /// Limit of unauthenticated clients (connections without Hello). Beyond it a new one
+  /// replaces the oldest from the host with most of them. So a flood from one address
+  /// leaves room for clients from others.
   static constexpr std::size_t kMaxUnauthenticated = 64;
 
   /// A new connection: it is started.
   void admit(const std::shared_ptr<Session>& session);
   /// To every client that has been greeted and wants events.
   void broadcast(const v1::ServerMessage& event) const;
-  /// Lets go of one that has ended. Null when it is not there. Not while all() is walked through,
-  /// which a session may end in.
+  /// Removes a session that has ended. Null when it is not in the list. Not while iterating over
+  /// all(), in which a session may end.
   std::shared_ptr<Session> release(const Session* gone);
   /// Ends every connection.
   void dismiss(const std::string& reason);

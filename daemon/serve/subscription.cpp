@@ -158,7 +158,7 @@ Subscription::Due Subscription::next(std::int64_t timestamp_ns, std::uint64_t mi
   const std::uint64_t before = left();
   offered_ += missed;
   Due due;
-  // Of those that a rate limits, none is missed: a later one comes instead.
+  // Frames left out by the rate limit do not count as missed: a later one is sent instead.
   if (unlimited_) due.missed = left() - before;
   if (offered_++ % every_ != 0) return due;
   const std::int64_t spacing_ns =

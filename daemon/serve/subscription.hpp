@@ -12,9 +12,9 @@ class Subscribe;
 
 namespace dtact::net {
 
-/// At most so many a second, as even as the frames allow: of each period's frames the one nearest
-/// to its time is let through, so that neither the camera's jitter nor a rate that is no whole
-/// fraction of the camera's makes it more or fewer. A pause is not made up for.
+/// Limits the rate to this number per second, as evenly as the frames allow. Passes the frame
+/// nearest to each period's time, so that neither the camera's jitter nor a rate that is no whole
+/// fraction of the camera's changes the number. Does not make up for a pause.
 class RateLimit {
  public:
   /// 0: no limit.
@@ -65,7 +65,7 @@ class Subscription {
     Parts parts = 0;           ///< 0: no message.
     std::uint64_t missed = 0;  ///< Messages that were due before.
   };
-  /// One more frame came out of the pipeline, after `missed` that nobody fetched.
+  /// One more frame came out of the pipeline, after `missed` unfetched ones.
   [[nodiscard]] Due next(std::int64_t timestamp_ns, std::uint64_t missed) noexcept;
 
   /// All that is asked for.
@@ -87,7 +87,7 @@ class Subscription {
   bool events_ = true;
   bool unlimited_ = false;     ///< One part at least comes with every frame that `every_` leaves.
   std::uint64_t offered_ = 0;  ///< Frames of the pipeline, for `every_`.
-  std::int64_t last_ns_ = 0;   ///< Of the last frame that `every_` left.
+  std::int64_t last_ns_ = 0;   ///< The last frame that passed `every_`.
 };
 
 }  // namespace dtact::net

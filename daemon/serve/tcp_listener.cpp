@@ -66,8 +66,8 @@ tcp::acceptor listen(asio::io_context& io, const tcp::endpoint& endpoint, const 
   });
   step([&] { acceptor.bind(endpoint, error); });
   if (error.value() == EADDRNOTAVAIL) {
-    // DHCP may bring it any time after the start. The kernel lets clients in from that moment on;
-    // trying again here would only be later, and clients could not be told of it: they come by that
+    // DHCP may add the address any time after the start. The kernel accepts clients from then on;
+    // retrying here would only be later. Clients cannot be informed either: they connect to that
     // address.
     error.clear();
     bind_to_absent(acceptor, endpoint, error);

@@ -1,6 +1,6 @@
 #include "daemon/serve/tcp_progress.hpp"
 
-// The kernel's header, whose tcp_info tells more than the C library's. The two cannot be included
+// The kernel's header, whose tcp_info has more than the C library's. The two cannot be included
 // together, and Asio includes the other.
 #include <linux/tcp.h>
 #include <netinet/in.h>
@@ -14,7 +14,7 @@ std::optional<TcpProgress> tcp_progress(int socket) {
   tcp_info info{};
   socklen_t size = sizeof info;
   if (::getsockopt(socket, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return std::nullopt;
-  // Before Linux 4.6 it told less, and qemu-user tells four bytes.
+  // Before Linux 4.6 it had fewer fields, and qemu-user returns four bytes.
   constexpr std::size_t kNeeded =
       offsetof(tcp_info, tcpi_notsent_bytes) + sizeof info.tcpi_notsent_bytes;
   if (size < kNeeded) return std::nullopt;

@@ -24,10 +24,10 @@ bool PeerJudge::alive(const TcpProgress& progress, Clock::time_point now) {
   if (!progress.outstanding || progress.acked_bytes != acked_bytes_) moved_ = now;
   acked_bytes_ = progress.acked_bytes;
   standing_ = std::chrono::duration_cast<milliseconds>(now - moved_);
-  // The kernel counts from its first probe, which comes at most an interval before moved_ and at
-  // most the retransmission time-out after it. So user_timeout() leaves it five intervals, of which
-  // one passes until it is told again, and an answer to its probes is missing after six and that
-  // time-out. Before the stand-still there may have been nothing to answer.
+  // The kernel counts from its first probe, at most an interval before moved_ and at
+  // most the retransmission time-out after it. So user_timeout() leaves it five intervals. One of
+  // them passes before the next update, and an answer to its probes is missing after six and that
+  // time-out. Before the standstill there may have been nothing to answer.
   return std::min(standing_, progress.since_ack) < peer_timeout_ * 3 / 4;
 }
 
@@ -35,7 +35,7 @@ TcpWatch::TcpWatch(const boost::asio::any_io_executor& executor, int socket,
                    milliseconds peer_timeout)
     : timer_(executor), socket_(socket), judge_(peer_timeout, PeerJudge::Clock::now()) {
   set(socket, IPPROTO_TCP, TCP_USER_TIMEOUT, judge_.user_timeout().count());
-  // An idle client has nothing unacknowledged: probe it, so that a vanished one is let go.
+  // An idle client has nothing unacknowledged: probes it, to detect that it has vanished.
   const auto seconds = [](milliseconds time) {
     return std::max<std::int64_t>(1, time / milliseconds(1000));
   };

@@ -11,15 +11,15 @@
 
 namespace dtact::net {
 
-/// Tells a peer that stopped reading from one that is gone, by what the kernel knows of the
+/// Distinguishes a peer that stopped reading from one that is gone, by the kernel's state of the
 /// connection.
 ///
-/// A program that does not read (a debugger, a notebook) closes its window: nothing more can be
-/// sent, but its kernel goes on answering the probes of ours. TCP_USER_TIMEOUT alone ends such a
-/// connection, too, however often it is answered (tcp_probe_timer() in Linux' net/ipv4/tcp_timer.c,
-/// since 5.11), and without it the probes come ever more seldom, up to two minutes apart. So it is
-/// set, and moved on as long as the peer answers: the kernel then probes at least as often as it
-/// says (tcp_clamp_probe0_to_user_timeout()), and whoever answers no more is found.
+/// A program that does not read (a debugger, a notebook) closes its window. Nothing more can be
+/// sent, but its kernel keeps answering our kernel's probes. TCP_USER_TIMEOUT alone ends even this
+/// connection, however often it is answered (tcp_probe_timer() in Linux' net/ipv4/tcp_timer.c,
+/// since 5.11). Without it the probes become ever rarer, up to two minutes apart. So it is set,
+/// and extended as long as the peer answers: the kernel then probes at least as often as it
+/// says (tcp_clamp_probe0_to_user_timeout()), which detects a peer that no longer answers.
 class PeerJudge {
  public:
   using Clock = std::chrono::steady_clock;

@@ -53,7 +53,7 @@ void use_key(ssl::context& context, const std::filesystem::path& file,
              const std::filesystem::path& certificate) {
   const std::string text = read_private_file(file, "the TLS key");
   const auto asked = std::make_shared<bool>(false);
-  // Without it OpenSSL asks whoever sits at the terminal.
+  // Without it OpenSSL prompts on the terminal.
   context.set_password_callback([asked](std::size_t, ssl::context::password_purpose) {
     *asked = true;
     return std::string();

@@ -20,7 +20,7 @@ struct Tls {
   std::string fingerprint;  ///< As Endpoint.fingerprint.
 };
 
-/// Of the files that the settings name; null when they name none. Throws as Tls.
+/// Loads the files that the settings name; null when they name none. Throws as Tls.
 [[nodiscard]] std::unique_ptr<Tls> make_tls(const NetConfig& config);
 
 }  // namespace dtact::net

@@ -13,7 +13,7 @@ class TokenBucket {
   TokenBucket(double per_second, double burst, Clock::time_point now = Clock::now())
       : per_second_(per_second), burst_(burst), left_(burst), then_(now) {}
 
-  /// False, and nothing is taken, when there is not so much left.
+  /// False, and nothing is taken, when fewer are left.
   [[nodiscard]] bool take(double cost, Clock::time_point now = Clock::now()) {
     left_ =
         std::min(burst_, left_ + per_second_ * std::chrono::duration<double>(now - then_).count());

@@ -88,7 +88,7 @@ Tokens::Digest Tokens::digest_of(std::string_view token) {
 
 const Tokens::Entry* Tokens::entry_of(const Digest& digest) const {
   const Entry* found = nullptr;
-  // All of them, so that the time does not tell which one was meant.
+  // Compares all of them, so that the time does not reveal which one matched.
   for (const Entry& entry : entries_) {
     if (::CRYPTO_memcmp(entry.digest.data(), digest.data(), digest.size()) == 0) found = &entry;
   }

@@ -22,9 +22,9 @@ class Tokens {
     std::string name;  ///< What the file calls it, for the log; may be empty.
   };
 
-  /// A line for each token: "view TOKEN" or "control TOKEN", with a name behind it or not;
-  /// printable ASCII, separated by spaces; empty lines, and such as begin with '#', are passed
-  /// over. `file` names the text in errors. Throws std::runtime_error with file, line and fix,
+  /// A line for each token: "view TOKEN" or "control TOKEN", optionally followed by a name;
+  /// printable ASCII, separated by spaces. Empty lines and lines that begin with '#' are
+  /// skipped. `file` names the text in errors. Throws std::runtime_error with file, line and fix,
   /// never with a token; a text without any token is an error, too.
   Tokens(std::string_view text, const std::string& file);
 

@@ -124,7 +124,7 @@ class TlsTransport : public TcpTransport<ssl::stream<tcp::socket>> {
 
 void prepare(tcp::socket& socket) {
   const auto set = [&socket](int option, int value) {
-    // Each is an improvement and none a condition: without it the connection is only slower.
+    // Each is optional: without it the connection is only slower.
     (void)::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof value);
   };
   set(TCP_NODELAY, 1);

@@ -44,8 +44,8 @@ base::UniqueFd make_socket() {
   return base::UniqueFd(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
 }
 
-/// Removes a socket that a daemon left behind when it was killed. Whatever somebody listens on, and
-/// what is no socket, stays.
+/// Removes a socket left behind by a daemon that was killed. Keeps a socket with a listener and
+/// files that are no socket.
 void remove_stale(const fs::path& path, const sockaddr_un& address) {
   struct stat status{};
   if (::lstat(path.c_str(), &status) != 0) return;

@@ -111,7 +111,7 @@ void refuse_foreign(const fs::path& folder, const std::vector<std::string>& know
   }
 }
 
-/// Puts `fresh` in the place of `target`; what was there lies at `fresh` afterwards.
+/// Exchanges `fresh` and `target`: the old target is at `fresh` afterwards.
 void exchange(const fs::path& fresh, const fs::path& target) {
   if (::renameat2(AT_FDCWD, fresh.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0) return;
   if (errno != EINVAL && errno != ENOSYS) fail(errno, "cannot replace " + target.string());

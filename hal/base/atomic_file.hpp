@@ -10,8 +10,8 @@
 
 namespace dtact::base {
 
-/// Replaces `path` by write, fsync, rename, so that at any moment it is the old file or the new one
-/// as a whole, readable as `mode` says and never by more. Throws std::system_error naming the path.
+/// Replaces `path` by write, fsync, rename, so that at any moment it is wholly the old or the new
+/// file, with at most the permissions of `mode`. Throws std::system_error naming the path.
 void write_file_atomically(const std::filesystem::path& path, std::string_view content,
                            mode_t mode = 0644);
 
@@ -26,7 +26,7 @@ void sync_folder(const std::filesystem::path& folder);
 using FolderFiles = std::vector<std::pair<std::string, std::string>>;
 
 /// Writes a folder of files so that at any moment it is either absent, the old one or the new one.
-/// An old one is replaced only when it holds nothing but files named in `known`; `what` says in the
+/// An old one is replaced only when it holds nothing but files named in `known`. `what` says in the
 /// error what the folder should be ("a calibration"). Throws std::runtime_error.
 void write_folder_atomically(const std::filesystem::path& folder, const FolderFiles& files,
                              const std::vector<std::string>& known, const std::string& what);

@@ -26,7 +26,7 @@ void BackgroundThread::stop() noexcept {
 void BackgroundThread::run() {
   for (;;) {
     work_.wait();
-    const bool last = stop_;  // what was handed over before stop() is seen below
+    const bool last = stop_;  // jobs started before stop() are seen below
     for (Job* job : jobs_) {
       if (!job->busy()) continue;
       job->work_();

@@ -14,8 +14,8 @@ namespace dtact::base {
 /// One thread with normal scheduling for all that takes too long for the capture thread.
 class BackgroundThread {
  public:
-  /// A kind of work for the thread, one piece at a time: whoever hands over fills in the work's
-  /// data while the job is not busy, and leaves it alone until it is not again. The thread outlives
+  /// A kind of work for the thread, one piece at a time. The caller fills in the work's data
+  /// while the job is not busy, and leaves it alone while it is. The thread outlives
   /// its jobs: it gets them before it starts, and ends when the first of them is destroyed.
   class Job {
    public:
@@ -46,7 +46,7 @@ class BackgroundThread {
   ~BackgroundThread() { stop(); }
 
   void start();
-  /// Ends the thread after what was handed over.
+  /// Ends the thread after the work already started.
   void stop() noexcept;
 
  private:

@@ -9,7 +9,7 @@
 namespace dtact::base {
 namespace {
 
-/// Bound to `name` among abstract addresses; empty when somebody else is.
+/// A socket bound to the abstract address `name`; empty when the address is in use.
 UniqueFd bound(const std::string& name) {
   UniqueFd fd(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   sockaddr_un address{};

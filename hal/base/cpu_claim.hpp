@@ -10,7 +10,7 @@ namespace dtact::base {
 
 /// A CPU that this process claims for its real-time thread, so that several daemons on one machine
 /// take different ones. The claim is an abstract Unix socket: it ends with the process, however
-/// that ends. It keeps nobody from using the CPU.
+/// that ends. Other processes may still use the CPU.
 class CpuClaim {
  public:
   /// Claims the last of `cpus` that is free; where each is claimed, the last of those with the

@@ -100,7 +100,7 @@ void run_unpinned(const cpu_set_t& cpus, const std::function<void()>& body) {
   ::pthread_attr_init(&attributes);
   ::pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
   ::pthread_attr_setschedpolicy(&attributes, SCHED_OTHER);
-  // Said, although 0 is the default: glibc takes a priority nobody set from the thread that calls,
+  // Set although 0 is the default: glibc takes an unset priority from the calling thread,
   // and refuses SCHED_OTHER with that of a real-time thread.
   const sched_param parameters{.sched_priority = 0};
   ::pthread_attr_setschedparam(&attributes, &parameters);
@@ -138,7 +138,7 @@ std::optional<std::string> make_fifo(const std::string& name, int priority) {
 }
 
 std::optional<std::string> lock_memory() {
-  // ONFAULT: pages are locked when first touched, so untouched reserve costs nothing.
+  // ONFAULT: pages are locked at first access, so unused reserve costs nothing.
   if (::mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0) return std::nullopt;
   const int error = errno;
   return fmt::format(

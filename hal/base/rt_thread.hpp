@@ -58,8 +58,8 @@ void run_unpinned(const cpu_set_t& cpus, const std::function<void()>& body);
 /// nothing. `name` is how that sentence calls the thread.
 [[nodiscard]] std::optional<std::string> make_fifo(const std::string& name, int priority);
 
-/// Locks the process's memory as it is touched (MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT). Returns
-/// the sentence that says why it was refused and what to do, or nothing.
+/// Locks the process's memory page by page at first access (MCL_CURRENT | MCL_FUTURE |
+/// MCL_ONFAULT). Returns the reason for a failure with its fix, or nothing.
 [[nodiscard]] std::optional<std::string> lock_memory();
 
 }  // namespace dtact::base

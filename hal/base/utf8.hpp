@@ -6,7 +6,7 @@
 
 namespace dtact::base {
 
-/// The beginning of a UTF-8 text, at most so many bytes and no half of a character.
+/// The beginning of a UTF-8 text: at most `most` bytes, without a partial character.
 inline std::string first_bytes(const std::string& text, std::size_t most) {
   std::size_t end = std::min(text.size(), most);
   const auto continues = [&text](std::size_t at) {

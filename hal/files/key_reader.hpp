@@ -11,7 +11,7 @@
 
 namespace dtact::tomlfile {
 
-/// Takes typed values out of a TOML table and, at the end, refuses keys that nobody took. Every
+/// Reads typed values from a TOML table and, at the end, rejects keys that were not read. Every
 /// error is a std::runtime_error "FILE:LINE: KEY: what is wrong; what is allowed".
 class KeyReader {
  public:

@@ -59,7 +59,7 @@ class Cursor {
   struct Record {
     Op op;
     std::string_view fields;
-    std::uint64_t offset;  ///< Of the opcode.
+    std::uint64_t offset;  ///< position of the opcode
   };
   [[nodiscard]] Record record();
 

@@ -33,7 +33,7 @@ enum class Op : std::uint8_t {
 
 /// Before a record's fields: its opcode and their length.
 inline constexpr std::size_t kRecordHead = 9;
-/// Of a footer's fields.
+/// Length of a footer's fields.
 inline constexpr std::size_t kFooterLength = 20;
 /// A record, and a chunk once it is decompressed, has at most this many bytes: what a reader holds.
 inline constexpr std::uint64_t kMaxRecord = std::uint64_t{256} << 20U;

@@ -15,7 +15,7 @@ constexpr std::uint64_t kMessageHead = 22;
 
 /// Somewhere in the file messages lie: in a chunk, or one outside of any.
 struct Place {
-  std::uint64_t offset = 0;  ///< Of the record.
+  std::uint64_t offset = 0;  ///< position of the record
   bool chunk = true;
 };
 
@@ -180,7 +180,7 @@ void Reader::Impl::add_metadata(std::uint64_t offset) {
   metadata.push_back({std::move(key), fields.map()});
 }
 
-/// Goes through the data. What is damaged or cut off ends it, and is told in `damage`.
+/// Scans the data. Stops at the first damaged or truncated record and reports it in `damage`.
 void Reader::Impl::scan() {
   std::uint64_t offset = kMagic.size();
   try {

@@ -20,12 +20,12 @@ struct AttachmentPlace {
   std::uint64_t create_time = 0;
   std::string name;
   std::string media_type;
-  std::uint64_t offset = 0;  ///< Of the record.
+  std::uint64_t offset = 0;  ///< position of the record
 };
 
-/// Reads an MCAP file, of our writer or another's: by its summary or, where there is none or a
-/// damaged one, by going through all of it up to the first damage, which is how a file of a killed
-/// writer is read. Holds one chunk in memory. One thread.
+/// Reads an MCAP file of any writer by its summary. Without an intact summary it scans the file up
+/// to the first damage; so it can read the file of a killed
+/// writer. Holds one chunk in memory. One thread.
 class Reader {
  public:
   /// Throws Error when the file is no MCAP, std::system_error when it cannot be read.

@@ -29,7 +29,7 @@ class RecordFile {
   /// The records of the chunk at `offset`, decompressed and checked.
   [[nodiscard]] std::string load_chunk(std::uint64_t offset) const;
 
-  /// Over `bytes` that lie at `offset`, for reading their fields.
+  /// Returns a cursor over `bytes`, which begin at `offset`, for reading their fields.
   [[nodiscard]] Cursor cursor(std::string_view bytes, std::uint64_t offset) const {
     return {bytes, name_, offset};
   }

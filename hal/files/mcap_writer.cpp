@@ -12,7 +12,7 @@
 namespace dtact::mcap {
 namespace {
 
-/// Of the messages of one channel in a chunk: log time and place within the chunk.
+/// Messages of one channel in a chunk: log time and position within the chunk.
 using Places = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
 
 struct Times {

@@ -38,7 +38,7 @@ class Writer {
   [[nodiscard]] std::uint16_t add_channel(std::uint16_t schema, const std::string& topic,
                                           const std::string& message_encoding,
                                           const std::map<std::string, std::string>& metadata = {});
-  /// Of a channel that was added.
+  /// Adds a message of a channel added before.
   void add(const Message& message);
   void add(const Attachment& attachment);
   void add(const Metadata& metadata);
@@ -48,9 +48,9 @@ class Writer {
   /// The open chunk, the index and the end. Nothing may be added then.
   void finish();
 
-  /// Of the file so far, without the open chunk.
+  /// Size of the file so far, without the open chunk.
   [[nodiscard]] std::uint64_t bytes() const noexcept;
-  /// Of the open chunk, before compression.
+  /// Size of the open chunk, before compression.
   [[nodiscard]] std::size_t open_bytes() const noexcept;
 
  private:

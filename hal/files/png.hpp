@@ -30,13 +30,13 @@ struct Rgb8 {
 };
 
 /// A PNG as 8-bit grey. Colour becomes luma by ITU-R BT.601 (0.299 r + 0.587 g + 0.114 b, rounded),
-/// as a JPEG's luma is; 16-bit is reduced by rounding; transparency is ignored. Throws
+/// like a JPEG's luma; 16-bit is reduced by rounding; transparency is ignored. Throws
 /// std::runtime_error naming `path`.
 [[nodiscard]] Grey8 read_png_grey8(const std::filesystem::path& path);
 
 /// The same at 16 bits, full scale 65535 = white: an 8-bit value v becomes 257 v.
 [[nodiscard]] Grey16 read_png_grey16(const std::filesystem::path& path);
-/// A PNG in memory; `name` stands in error messages.
+/// A PNG in memory; error messages contain `name`.
 [[nodiscard]] Grey16 decode_png_grey16(std::string_view bytes, const std::string& name);
 
 [[nodiscard]] std::string encode_png(const Grey8& image);

@@ -28,7 +28,7 @@ struct Chip {
   std::string path;   ///< "/dev/gpiochip0"
   std::string label;  ///< "pinctrl-bcm2711", ...
   int lines = 0;
-  std::vector<std::string> names;  ///< Of the lines that have one, by offset; else empty.
+  std::vector<std::string> names;  ///< names of the lines by offset; empty for unnamed lines
   std::vector<std::string> links;  ///< Symbolic links to it: "/dev/gpiochip4" on a Raspberry Pi 5.
 };
 
@@ -71,7 +71,7 @@ struct Place {
                                                          int& error);
 /// A consumer as messages name it. Parts of the kernel hold lines without a name, or as "?".
 [[nodiscard]] std::string holder_name(const char* consumer);
-/// Who holds the line, its name in quotes; empty when nobody.
+/// The name of the line's consumer, in quotes; empty when the line is free.
 [[nodiscard]] std::string line_holder(const std::string& path, int line);
 [[nodiscard]] std::string library_version();
 

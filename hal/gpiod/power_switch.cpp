@@ -19,7 +19,7 @@ PowerSwitch::PowerSwitch(std::unique_ptr<OutputLine> line, int settle_ms, base::
 }
 
 PowerSwitch::~PowerSwitch() {
-  // At the end there is nobody left to tell, and giving the line back follows anyway.
+  // In a destructor an error cannot be reported, and releasing the line follows anyway.
   if (!leave_on_) (void)line_->set(false);
 }
 

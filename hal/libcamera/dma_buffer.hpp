@@ -49,9 +49,9 @@ class Mapping {
   std::span<const std::uint8_t> bytes_;
 };
 
-/// Tells the caches that the processor is to read (`begin`), or has read, a buffer that a device
-/// writes. False: what is read may be what the caches held before. Of memory that is no DMA buffer
-/// there is nothing to tell.
+/// Synchronises the caches before (`begin`) or after the processor reads a buffer that a device
+/// writes. False: a read may return old data from the caches. No effect on memory that is no DMA
+/// buffer.
 [[nodiscard]] bool sync_for_reading(int fd, bool begin) noexcept;
 
 /// Where a plane lies within one buffer.
@@ -66,7 +66,7 @@ struct PlaneExtent {
 [[nodiscard]] std::vector<PlaneExtent> planes_of(const libcamera::PixelFormat& format,
                                                  unsigned stride, unsigned height, unsigned bytes);
 
-/// As many buffers from `heap` as `stream` is configured for; empty when there are not so many.
+/// Allocates from `heap` the number of buffers that `stream` needs; empty when that fails.
 [[nodiscard]] std::vector<std::unique_ptr<libcamera::FrameBuffer>> make_frame_buffers(
     const DmaHeap& heap, const libcamera::StreamConfiguration& stream);
 

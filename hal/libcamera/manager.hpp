@@ -4,14 +4,14 @@
 
 namespace dtact::hal::libcamera_backend {
 
-/// This process's manager of cameras, of which libcamera allows one: it begins with the first of
-/// these objects and ends with the last. Cameras go back before that (libcamera's contract for
+/// This process's camera manager, of which libcamera allows one. It starts with the first of
+/// these objects and ends with the last. Cameras must be released before (libcamera's contract for
 /// CameraManager::stop()).
 ///
-/// It is kept no longer than a camera is used. When a camera that a manager has seen goes and comes
-/// again, the manager looks up what it freed (seen with 0.0.3:
+/// It is kept only while a camera is used. When a camera that a manager has seen disappears and
+/// returns, the manager accesses freed memory (seen with 0.0.3:
 /// DeviceEnumeratorUdev::addV4L2Device() finds the node in devMap_, whose MediaDeviceDeps are gone,
-/// where udev tells of the node before the media device), and one that starts while nodes appear
+/// where udev reports the node before the media device). A manager that starts while nodes appear
 /// can miss the last of them for good.
 class Manager {
  public:

@@ -29,10 +29,10 @@ constexpr const char* kGain = "analogue_gain";
 /// Asked for as FrameDurationLimits, read as FrameDuration.
 constexpr const char* kFrameDuration = "frame_duration";
 
-/// Microseconds. What a Pi's cameras start with when nobody says anything (ipa_base.cpp:
-/// defaultExposureTime); their list of controls names no default.
+/// Microseconds. The initial value of a Pi's cameras without a request (ipa_base.cpp:
+/// defaultExposureTime); their list of controls has no default.
 constexpr double kDefaultExposure = 20000;
-/// Of a frame's duration. The rest is what sensors need between two exposures: 4 to some 40 lines
+/// Share of a frame's duration. Sensors need the rest between two exposures: 4 to some 40 lines
 /// of about a thousand (cam_helper_*.cpp: frameIntegrationDiff).
 constexpr double kMaxFrameShare = 0.9;
 /// Microseconds: sensors count exposure in lines, of which the longest last about so long.

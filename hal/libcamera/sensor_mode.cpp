@@ -14,7 +14,7 @@ namespace {
 
 namespace lc = libcamera;
 
-/// As between what is asked for and what a V4L2 driver gives.
+/// The tolerance between a requested rate and that of a V4L2 driver.
 constexpr double kRateTolerance = 0.5;
 
 // A template, so that its members are looked up only where libcamera has them.

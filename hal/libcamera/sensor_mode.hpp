@@ -36,9 +36,9 @@ struct SensorMode {
 /// Makes `configuration` use `mode`.
 void set_sensor_mode(libcamera::CameraConfiguration& configuration, const SensorMode& mode);
 
-/// Of the modes that are no smaller than the picture asked for and keep its rate, the one with most
-/// pixels, and of two such the one with more bits. libcamera's own choice looks at sizes alone: an
-/// IMX477 asked for 800x600 runs at 2028x1520, hence at 40 frames a second.
+/// Returns the mode with the most pixels, then the most bits, among those that are no smaller
+/// than the requested picture and keep its rate. libcamera's own choice compares sizes only: an
+/// IMX477 set to 800x600 runs at 2028x1520, hence at 40 frames a second.
 [[nodiscard]] std::optional<SensorMode> choose_sensor_mode(const std::vector<SensorMode>& modes,
                                                            const CameraConfig& asked);
 

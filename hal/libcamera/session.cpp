@@ -68,7 +68,7 @@ class Last : public lc::Object {
   void done() {}
 };
 
-/// Returns when libcamera's thread has done all that it was told to before.
+/// Returns when libcamera's thread has finished all earlier calls.
 void wait_for(lc::Thread* thread) {
   auto last = std::make_unique<Last>();
   last->moveToThread(thread);
@@ -76,7 +76,7 @@ void wait_for(lc::Thread* thread) {
   last.release()->deleteLater();
 }
 
-/// Of what the pipeline answered when it was configured.
+/// The verdict on the pipeline's result of configure().
 ControlVerdict granted(bool as_asked) {
   return as_asked ? ControlVerdict::confirmed : ControlVerdict::refused;
 }

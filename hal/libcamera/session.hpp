@@ -50,8 +50,8 @@ class Session final : public live::Source {
     libcamera::FrameBuffer* buffer = nullptr;
     int fd = -1;  ///< The buffer's own.
     Mapping mapping;
-    std::size_t offset = 0;  ///< Of the first plane within the mapping.
-    std::size_t length = 0;  ///< Of the first plane.
+    std::size_t offset = 0;  ///< the first plane's, within the mapping
+    std::size_t length = 0;  ///< the first plane's
   };
 
   void configure(const CameraConfig& config);

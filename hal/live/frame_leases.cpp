@@ -55,8 +55,8 @@ void FrameLeases::give_back(int index) noexcept {
 
 void FrameLeases::end_lease(Lease& taken) noexcept {
   const Lease lease = std::exchange(taken, Lease{});
-  // Of a source that has been let go, nobody waits for the buffer. An error is met by the next
-  // call of dequeue().
+  // A source that has been closed does not need the buffer any more. The next call of dequeue()
+  // reports an error.
   if (lease.source && lease.source == current_) (void)lease.source->enqueue(lease.index);
 }
 

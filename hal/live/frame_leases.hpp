@@ -19,7 +19,7 @@ class FrameLeases final : private FrameOwner {
  public:
   FrameLeases(int width, int height);
 
-  /// Buffers of this source go back to its driver; none: nobody waits for them.
+  /// Buffers of this source are requeued to its driver; null: buffers are not requeued.
   void use(const std::shared_ptr<Source>& source) noexcept { current_ = source; }
   /// Makes `out` of the payload; `frame` without its time to decode, which is added. `kept`: the
   /// payload itself was lent and comes back with the frame.

@@ -19,17 +19,17 @@
 
 namespace dtact::hal::live {
 
-/// What is the same for every real camera, whatever library it is reached by. It may be absent,
-/// busy or forbidden, at the start and later: then grab() returns `unplugged`, the report says why,
-/// and the opener is called ten times a second until the camera streams again, with its controls
-/// locked.
+/// Common part of every real camera, whatever library accesses it. The camera may be absent,
+/// busy or forbidden, at the start and later. Then grab() returns `unplugged`, the report gives the
+/// reason, and the opener is called ten times a second until the camera streams again, with its
+/// controls locked.
 ///
 /// A second thread reads the locked controls once a second (a USB transfer each, too slow for the
-/// capture thread) and sets back what has moved.
+/// capture thread) and restores changed ones.
 class LiveCamera : public Camera {
  public:
-  /// `opener` is called by start() and then whenever the camera is away. `identity` stands in
-  /// messages until it has succeeded. Throws std::runtime_error for an impossible size or rate.
+  /// `opener` is called by start() and then whenever the camera is away. Messages use `identity`
+  /// until it has succeeded. Throws std::runtime_error for an impossible size or rate.
   LiveCamera(const CameraConfig& config, const std::string& backend, const std::string& identity,
              Opener opener);
   ~LiveCamera() override;

@@ -16,9 +16,9 @@ class PayloadDecoder {
  public:
   explicit PayloadDecoder(const Format& format);
 
-  /// Of the next payloads only this part need be decoded. It lies in the image.
+  /// Only this part of the next payloads needs decoding. It lies inside the image.
   void will_read(const Area& area) noexcept;
-  /// What can be told without decoding: the driver's mark, the length, a JPEG's first and last
+  /// Checks what needs no decoding: the driver's mark, the length, a JPEG's first and last
   /// marker.
   [[nodiscard]] PayloadStatus inspect(const FilledBuffer& filled) const noexcept;
   /// Unless ok, `out` is partly written and must not be used.

@@ -9,8 +9,8 @@
 
 namespace dtact::hal::live {
 
-/// When it is worth while to look for cameras: every two seconds, and in each try while the nodes
-/// of cameras are new. Looking opens every video or media device of the machine, and some of them
+/// Limits how often to search for cameras: every two seconds, and on each try while camera nodes
+/// are new. A search opens every video or media device of the machine, and some of them
 /// start firmware.
 class SearchThrottle {
  public:

@@ -14,7 +14,7 @@
 
 namespace dtact::hal::live {
 
-/// Why a camera cannot be used now: a condition that may pass by itself, with the fix.
+/// Why a camera cannot be used now, with the fix. The cause may pass by itself.
 class DeviceError : public std::runtime_error {
  public:
   DeviceError(CameraState state, const std::string& sentence)
@@ -40,8 +40,8 @@ struct Format {
   int width = 0;
   int height = 0;
   std::ptrdiff_t bytes_per_line = 0;  ///< 0 = lines without padding; of no meaning for JPEG.
-  bool full_range = true;             ///< Of raw luma.
-  /// Full-range grey payloads may be lent as they are: kLumaPadding bytes after them can be read,
+  bool full_range = true;             ///< range of raw luma
+  /// Full-range grey payloads may be used in place: kLumaPadding bytes after them can be read,
   /// and they stay readable until the source is destroyed.
   bool zero_copy = false;
 };
@@ -75,7 +75,7 @@ class Source {
   [[nodiscard]] virtual int queued() const noexcept = 0;
   /// Hands a buffer back to the driver. False: the stream is of no more use.
   [[nodiscard]] virtual bool enqueue(int index) noexcept = 0;
-  /// Lets go of the device, so that it can be opened anew while this object still exists.
+  /// Closes the device, so that it can be reopened while this object still exists.
   virtual void stop() noexcept = 0;
   /// Reads the locked ones of `controls` again and sets back what has moved. Returns the sentence
   /// that says what moved; empty when nothing did. Called on another thread than the rest.
@@ -85,8 +85,8 @@ class Source {
 /// A device that has been opened and streams.
 struct Opened {
   std::shared_ptr<Source> source;
-  std::string identity;      ///< As in CameraInfo.
-  std::string pixel_format;  ///< As in CameraInfo.
+  std::string identity;      ///< as in CameraInfo
+  std::string pixel_format;  ///< as in CameraInfo
   std::vector<CameraControl> controls;
 };
 

@@ -51,8 +51,8 @@ enum class Layout : std::uint8_t {
   nv12     ///< V4L2 NV12: a plane of Y, then a half-size plane of UV pairs, even width and height.
 };
 
-/// What the numbers of a payload mean; from the driver's colour metadata (V4L2_QUANTIZATION_*) or
-/// from the configuration. Nothing in the payload tells them apart.
+/// Value range of a payload, from the driver's colour metadata (V4L2_QUANTIZATION_*) or
+/// from the configuration. The payload itself does not show it.
 enum class Range : std::uint8_t {
   full,    ///< 0 = black, 255 = white: taken as it is.
   limited  ///< 16 = black, 235 = white (ITU-R BT.601): expanded.

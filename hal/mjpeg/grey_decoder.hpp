@@ -44,9 +44,9 @@ class GreyDecoder {
   GreyDecoder& operator=(const GreyDecoder&) = delete;
   ~GreyDecoder();
 
-  /// From now on decode() works out no more pixels than it must to give those of `crop` as it would
-  /// without one; what it writes elsewhere in the picture is unspecified. All of the payload is
-  /// still parsed, so that damage anywhere is told. A crop without pixels, or one that leaves the
+  /// From now on decode() computes only the pixels needed to give those of `crop` unchanged;
+  /// what it writes elsewhere in the picture is unspecified. All of the payload is
+  /// still parsed, so damage anywhere is reported. A crop without pixels, or one that leaves the
   /// picture, means the whole picture.
   void set_crop(const Area& crop) noexcept;
 

@@ -19,9 +19,9 @@ namespace dtact::hal::replay {
 struct Recording {
   int width = 0;                         ///< Pixels, of every frame.
   int height = 0;                        ///< Pixels.
-  std::vector<luma::LumaBuffer> images;  ///< Of a PNG recording.
-  std::vector<std::string> payloads;     ///< Of a JPEG recording.
-  /// When each frame comes, nanoseconds after the first; empty without timestamps.csv.
+  std::vector<luma::LumaBuffer> images;  ///< for a PNG recording
+  std::vector<std::string> payloads;     ///< for a JPEG recording
+  /// Time of each frame, nanoseconds after the first; empty without timestamps.csv.
   std::vector<std::int64_t> offsets_ns;
 
   [[nodiscard]] bool is_jpeg() const noexcept { return images.empty(); }

@@ -145,7 +145,7 @@ LedLevels Device::exposed_light() noexcept {
 
 void Device::wake() noexcept {
   const std::uint64_t one = 1;
-  // A full counter means that the reader has been told already.
+  // A full counter means that the reader has already been notified.
   (void)!::write(event_.get(), &one, sizeof one);
 }
 

@@ -18,7 +18,7 @@
 
 namespace dtact::hal::sim {
 
-/// What the device hands over: one frame as it comes off the bus.
+/// The device's output: one frame as it comes off the bus.
 struct Payload {
   std::vector<std::uint8_t> buffer;
   std::size_t bytes = 0;

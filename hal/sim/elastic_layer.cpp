@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kMaxIterations = 2000;
 // Greatest gap inside the contact and greatest overlap outside it that a solution may have, mm: a
-// hundredth of what a tenth of a grey level is worth.
+// hundredth of the depth that changes the grey by a tenth of a level.
 constexpr double kTolerance_mm = 3e-5;
 
 double compliance(double k, double h, double nu) {
@@ -102,7 +102,7 @@ Pressed ElasticLayer::solve(const cv::Mat1d& target_mm, const cv::Mat1d& guess) 
       along += (u[i] - g[i]) * t[i];
       curvature += q[i] * t[i];
     }
-    // Without contact yet there is no direction; any small step makes the overlapping points touch.
+    // Without contact there is no direction yet; any small step makes overlapping points meet.
     const double step = curvature > 0 ? along / curvature : 1e-3;
 
     bool clipped = false;

@@ -7,11 +7,11 @@ namespace dtact::hal::sim {
 /// What a press does to the gel. Matrices are the grid's size, double.
 struct Pressed {
   cv::Mat1d indentation_mm;  ///< Positive = pressed, negative = bulge.
-  cv::Mat1d pressure;        ///< In units of Young's modulus; > 0 exactly where they touch.
+  cv::Mat1d pressure;        ///< in units of Young's modulus; > 0 exactly in contact
   int iterations = 0;
 };
 
-/// A linear-elastic gel bonded to a stiff block, on a periodic grid. The surface answers a
+/// A linear-elastic gel bonded to a stiff block, on a periodic grid. The surface responds to a
 /// pressure p with û(k) = C(k)·p̂(k),
 ///
 ///     C(k) = 2(1 − ν²)/(E·k) · ((3 − 4ν)·sinh 2kh − 2kh)

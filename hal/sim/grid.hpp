@@ -9,8 +9,8 @@
 
 namespace dtact::hal::sim {
 
-/// The points on which contact is solved, of a curved gel unrolled (Place). Point (column, row)
-/// lies at x = x0_mm + column·spacing, y = y0_mm + row·spacing from the image's centre.
+/// The points on which contact is solved; those of a curved gel unrolled (Place). Point
+/// (column, row) is at x = x0_mm + column·spacing, y = y0_mm + row·spacing from the image's centre.
 struct Grid {
   int width = 0;
   int height = 0;
@@ -27,8 +27,8 @@ struct Grid {
 /// a free border; sides are lengths the FFT likes.
 [[nodiscard]] Grid make_grid(const Scene& scene);
 
-/// Where pixel (column, row) lies on the gel, lens included; of a curved gel on the plane that
-/// touches it in its apex.
+/// Position of pixel (column, row) on the gel, including the lens; for a curved gel on the tangent
+/// plane in its apex.
 [[nodiscard]] Place pixel_place(const CameraModel& camera, double column, double row) noexcept;
 
 /// For every pixel the four grid points around the place that it shows. Bilinear, in Q8.

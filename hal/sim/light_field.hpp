@@ -11,9 +11,9 @@
 
 namespace dtact::hal::sim {
 
-/// What a real gel shows untouched beside smooth light: bubbles, dust under the paint, old dents.
-/// Random numbers on a lattice, joined by cubic B-splines; always the same ones, for they belong to
-/// the sensor. Immutable.
+/// Irregularities of a real gel without contact: bubbles, dust under the paint, old dents.
+/// Random numbers on a lattice, joined by cubic B-splines; always the same ones, since they belong
+/// to the sensor. Immutable.
 class Texture {
  public:
   /// `rms`: share of the light; `size_mm`: the lattice's pitch, about the width of a mark.
@@ -35,8 +35,8 @@ using LedLevels = std::array<std::uint16_t, kLedCount>;
 [[nodiscard]] LedLevels mean(const LedLevels& a, const LedLevels& b) noexcept;
 
 /// The light on the undeformed gel as the camera sees it. Every LED shines through the diffuser
-/// as a point source on a plane, (1 + ρ²/d²)^−2 at the distance ρ from its foot (inverse square,
-/// and Lambert's cosine at both ends), plus an even share; the lens vignettes with the square of
+/// as a point source on a plane: (1 + ρ²/d²)^−2 at the distance ρ from its foot (inverse square,
+/// and Lambert's cosine at both ends), plus an even share. The lens vignettes with the square of
 /// the radius, and the gel has its faint texture.
 class LightField {
  public:

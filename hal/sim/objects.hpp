@@ -16,8 +16,8 @@ struct Object {
   double reach_mm = 0;  ///< Radius of a circle about the origin that holds all of it.
   /// Height of its surface at (x, y) above its lowest point, mm, ≥ 0; kNoSurface beside it.
   std::function<double(double x_mm, double y_mm)> height_mm;
-  /// The same of its upper surface, wherever it has a lower one. None: its outline goes on straight
-  /// up without end, which nothing but a tilt of most of a right angle could tell.
+  /// Its upper surface, wherever it has a lower one. None: its outline continues straight
+  /// up without end, which only a tilt of nearly a right angle could show.
   std::function<double(double x_mm, double y_mm)> top_mm = nullptr;
 };
 

@@ -15,15 +15,15 @@ namespace dtact::hal::sim {
 [[nodiscard]] double response(const OpticsModel& optics, double d_mm,
                               double thickness_mm = 0) noexcept;
 
-/// Indentation to loss of light, on the grid: the response, then a sum of Gaussian blurs. In
+/// Indentation to loss of light, on the grid: the response, then a sum of Gaussian blurs. Uses
 /// integers, with the blurs' weights fixed at construction. One thread at a time.
 ///
-/// Where the blurs' widths follow the local thickness, every point's loss is shared out between a
-/// few thicknesses, linearly between the two nearest, and each of them is blurred by its own
+/// Where the blurs' widths follow the local thickness, every point's loss is divided between a
+/// few thicknesses, linearly between the two nearest. Each of them is blurred by its own
 /// widths.
 class Optics {
  public:
-  /// Of `gel` the taper counts and, with knots or growth, the thickness; left out: it is even.
+  /// Uses the taper of `gel` and, with knots or growth, its thickness; default: an even gel.
   Optics(const OpticsModel& optics, const Grid& grid, const GelModel& gel = {});
 
   /// `indentation` in 1/Truth::kPerMm, `loss` as Q15 share of the local light; both grid sized.

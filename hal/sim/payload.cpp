@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kSpare = std::size_t{256} * 1024;
 
-// 800 × 600 asks libjpeg for 60 kB; four times that and a line's worth of everything.
+// For 800 × 600 libjpeg needs 60 kB; this is four times that plus one line of everything.
 std::size_t arena_bytes(int width) {
   return std::size_t{256} * 1024 + static_cast<std::size_t>(width) * 256;
 }

@@ -31,7 +31,7 @@ Quaternion operator*(const Quaternion& a, const Quaternion& b) {
 std::array<double, 3> vector_of(const Quaternion& q) {
   const double sine = cv::norm(q.v);
   if (sine == 0) return {};
-  // Of the two turns that end alike the one of at most 180 degrees.
+  // Two turns end alike; this is the one of at most 180 degrees.
   const double angle = 2 * std::atan2(sine, std::abs(q.w)) / kDegree;
   const cv::Vec3d v = q.v * ((q.w < 0 ? -angle : angle) / sine);
   return {v[0], v[1], v[2]};
@@ -96,7 +96,7 @@ class Line {
         origin_(pose.x_mm, pose.y_mm, pose.z_mm),
         back_(rotation_of(pose.turn_deg).t()) {}
 
-  /// How far beside the object's outline a point of the sensor's frame lies at most, mm.
+  /// Greatest distance of a point of the sensor's frame outside the object's outline, mm.
   [[nodiscard]] double beside(const cv::Vec3d& point) const {
     const cv::Vec3d p = back_ * (point - origin_);
     return std::hypot(p[0], p[1]) - object_.reach_mm;

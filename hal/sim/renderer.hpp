@@ -25,7 +25,7 @@ class Renderer {
   /// must be the truth's: contact is solved once for many lights.
   Renderer(std::shared_ptr<const Truth> truth, const Scene& scene, std::uint64_t seed);
 
-  /// From now on frames are exposed so many times as brightly as the scene says, 0.25 … 4.
+  /// Multiplies the exposure of the scene's frames from now on, 0.25 … 4.
   void set_gain(double gain) noexcept;
 
   /// Frame `sequence` in full-range luma: the first `rows` rows, `stride` bytes apart.

@@ -50,7 +50,7 @@ struct OpticsModel {
   double growth = 0;
   /// Not empty: instead of the four numbers above.
   std::vector<double> knots;
-  std::vector<double> slopes;  ///< As many.
+  std::vector<double> slopes;  ///< same size
 };
 
 enum class Arrangement : std::uint8_t { ring, sides };

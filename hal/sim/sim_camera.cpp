@@ -74,7 +74,7 @@ class SimCamera::Impl {
   std::uint64_t next_sequence = 0;
   std::uint64_t lost_seen = 0;
   std::uint64_t disconnects_seen = 0;
-  // What report() tells any thread.
+  // Values that report() returns to any thread.
   std::atomic<std::uint64_t> delivered{0};
   std::atomic<std::uint64_t> lost{0};
   std::atomic<std::uint64_t> skipped{0};
@@ -92,7 +92,7 @@ GrabStatus SimCamera::Impl::grab(Frame& out, std::int64_t timeout_ns) noexcept {
   while (device.hangs()) clock.sleep_until(clock.monotonic_ns() + kHangStep);
   const std::int64_t latest = clock.monotonic_ns() + timeout_ns;
   for (;;) {
-    // Told once as soon as it happens; later calls wait for the device to come back.
+    // Reported once as soon as it happens; later calls wait for the device to come back.
     const std::uint64_t disconnects = device.disconnects();
     if (std::exchange(disconnects_seen, disconnects) != disconnects) {
       (void)device.take();  // what was on the cable went with it

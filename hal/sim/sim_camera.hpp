@@ -10,9 +10,9 @@
 namespace dtact::hal::sim {
 
 /// The simulated sensor's camera. A thread of its own, "dtact-sim", is the device: it makes each
-/// frame one period ahead and lets go of it at its deadline; grab() unpacks the payload as it would
+/// frame one period ahead and delivers it at its deadline. grab() unpacks the payload as it would
 /// a real camera's. The device keeps three payloads: one it fills, the newest complete one, one
-/// that grab() reads; a newer frame replaces one that nobody fetched. When the device falls behind,
+/// that grab() reads. A newer frame replaces an unfetched one. When the device falls behind,
 /// its sequence jumps.
 ///
 /// With config.sim.paced == false there is no thread: every grab() makes the next frame of the

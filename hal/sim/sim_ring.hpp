@@ -8,8 +8,8 @@
 
 namespace dtact::hal::sim {
 
-/// What the simulated ring and the simulated camera share: the light on the gel. Any thread may
-/// call either function; both hold the lock for one copy only. Until somebody shows something, all
+/// The light on the gel, shared by the simulated ring and the simulated camera. Any thread may
+/// call either function; both hold the lock for one copy only. Before the first light all
 /// LEDs are white at full brightness.
 class LightLink {
  public:

@@ -8,9 +8,9 @@ namespace dtact::hal::sim {
 
 enum class SurfaceShape : std::uint8_t { plane, sphere, cylinder };
 
-/// The undeformed surface. Of a curved one the apex, where the camera's axis meets it, is the
-/// origin of the sensor's frame (Pose), and it falls away from there towards the camera; a
-/// cylinder's axis lies along x.
+/// The undeformed surface. On a curved one the apex, where the camera's axis meets it, is the
+/// origin of the sensor's frame (Pose), and the surface curves away from there towards the camera.
+/// A cylinder's axis lies along x.
 struct SurfaceModel {
   SurfaceShape shape = SurfaceShape::plane;
   double radius_mm = 0;
@@ -25,7 +25,7 @@ struct Place {
   double y_mm = 0;
 };
 
-/// A point of the undeformed surface in the sensor's frame. Pressed d deep it lies at at − d
+/// A point of the undeformed surface in the sensor's frame. Pressed d deep it moves to at − d
 /// normal.
 struct SurfacePoint {
   cv::Vec3d at;      ///< mm
@@ -34,9 +34,9 @@ struct SurfacePoint {
   std::array<double, 3> turn_deg{};
 };
 
-/// Where the straight line from the camera through `seen`, a place of the plane that touches the
-/// surface in its apex, meets the surface. Refraction is none of its own: camera_mm is where rays
-/// seem to start inside of the gel.
+/// Intersection of the surface with the straight line from the camera through `seen`, a position
+/// on the tangent plane in the apex. It needs no refraction: camera_mm is where rays
+/// seem to start inside the gel.
 [[nodiscard]] Place unrolled(const SurfaceModel& surface, const Place& seen) noexcept;
 
 [[nodiscard]] SurfacePoint point_at(const SurfaceModel& surface, const Place& place);

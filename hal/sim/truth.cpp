@@ -50,9 +50,9 @@ double sample(const cv::Mat1d& map, double column, double row) {
 }
 
 /// The indentation after an object that sticks to the gel has dragged it along by (x_mm, y_mm).
-/// Where they touch the map follows the object. Around it the gel is sheared and comes after: there
-/// the map is that of the object where it was, drawn towards where it is. The shear fades out over
-/// about the gel's thickness. `in_contact`: > 0 where they touch. All are grid sized.
+/// In contact the map follows the object. Around it the sheared gel lags behind: there
+/// the map is that of the object's old position, drawn towards the new one. The shear fades out
+/// over about the gel thickness. `in_contact`: > 0 in contact. All are grid sized.
 cv::Mat1d dragged(const cv::Mat1d& indentation_mm, const cv::Mat1d& in_contact, double x_mm,
                   double y_mm, double thickness_mm, const Grid& grid) {
   cv::Mat1d held(grid.height, grid.width);
@@ -82,7 +82,7 @@ std::optional<PressKey> state_at(const Press& press, double t) {
   return key;
 }
 
-// The farthest that anything of a touching object moves between two times, mm.
+// The greatest movement of any point of an object in contact between two times, mm.
 double movement(const Press& press, double t0, double t1) {
   const auto a = state_at(press, t0);
   const auto b = state_at(press, t1);

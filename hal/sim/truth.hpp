@@ -11,14 +11,14 @@
 
 namespace dtact::hal::sim {
 
-/// What is true of every frame, a pure function of scene and sequence: the gel's indentation, the
-/// objects' poses and the force. Contact is solved once at construction, at the presses' keys and
-/// as often between them as solve_step_mm asks; in between, maps are blended linearly in time,
-/// while poses are exact: where a map is judged against a pose, solve_step_mm has to be small.
+/// The true values of every frame, a pure function of scene and sequence: the gel's indentation,
+/// the objects' poses and the force. Contact is solved once at construction, at the presses' keys
+/// and between them at intervals of solve_step_mm. Maps between are blended linearly in time,
+/// while poses are exact: to compare a map with a pose, solve_step_mm has to be small.
 /// Immutable afterwards: any thread may ask.
 ///
-/// Of a curved surface the geometry is exact: rays, normals, and how deep an object reaches along
-/// them. The gel's answer is that of a flat one on the unrolled surface, which is longer along a
+/// On a curved surface the geometry is exact: rays, normals, and how deep an object reaches along
+/// them. The gel's response is that of a flat one on the unrolled surface, which is longer along a
 /// sphere's parallels by the arc over its sine (4 % at half a radius from the apex); so are light
 /// and scattering.
 class Truth {
@@ -33,11 +33,11 @@ class Truth {
   /// Indentation at every pixel of the camera's image (distortion included), row-major, mm,
   /// positive = pressed, negative = bulge.
   void indentation_mm(std::uint64_t sequence, std::vector<float>& out) const;
-  /// 255 where the object touches, 0 elsewhere; of the nearer one of the two maps between which
+  /// 255 in contact, 0 elsewhere; from the nearer one of the two maps between which
   /// the truth is blended.
   void contact(std::uint64_t sequence, std::vector<std::uint8_t>& out) const;
 
-  /// Where the object of a press (its number in the scene, from 0) is, touching or not; nothing
+  /// The pose of a press's object (numbered in the scene, from 0), in contact or not; nothing
   /// before its first key.
   [[nodiscard]] std::optional<Pose> pose(std::size_t press, std::uint64_t sequence) const;
   /// The point of the undeformed surface that a pixel shows.
@@ -60,13 +60,13 @@ class Truth {
   [[nodiscard]] const Scene& scene() const noexcept { return scene_; }
   [[nodiscard]] const Grid& grid() const noexcept { return grid_; }
   [[nodiscard]] const PixelMap& pixels() const noexcept { return pixels_; }
-  /// Maps that were solved, the untouched one included.
+  /// Number of solved maps, including that without contact.
   [[nodiscard]] std::size_t map_count() const noexcept { return maps_.size(); }
 
  private:
   struct Map {
     std::vector<std::int16_t> indentation;
-    std::vector<std::int16_t> contact;  // 256 where they touch
+    std::vector<std::int16_t> contact;  // 256 in contact
     double force_n = 0;
   };
   struct Instant {
@@ -78,7 +78,7 @@ class Truth {
   Scene scene_;
   Grid grid_;
   PixelMap pixels_;
-  std::vector<Map> maps_;          // [0] is untouched
+  std::vector<Map> maps_;          // [0] is without contact
   std::vector<Instant> instants_;  // times strictly ascending, the first is 0
 };
 

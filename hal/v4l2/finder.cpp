@@ -50,7 +50,7 @@ std::string link_to(const std::string& node, const char* folder) {
   return {};
 }
 
-/// Of the USB device, as the kernel read it from it.
+/// The USB device's serial number, as read by the kernel.
 std::string serial_of(const fs::path& usb_device) {
   std::ifstream file(usb_device / "serial");
   std::string serial;
@@ -275,7 +275,7 @@ DeviceName::Opened DeviceName::open(int width, int height) const {
                                           "camera.v4l2.device ({})",
                                           text_, names));
     }
-    // Of a camera with several nodes the one that can be opened, which has been seen to capture.
+    // Among several nodes of a camera prefers one that can be opened: it has been seen to capture.
     std::ranges::stable_partition(cameras, [](const Attached& c) { return c.problem.empty(); });
     if (cameras.size() > 1 && cameras[1].problem.empty()) {
       throw DeviceError(CameraState::unplugged,

@@ -12,7 +12,7 @@ struct Attached {
   std::string node;     ///< "/dev/video0": may change at every plug.
   std::string by_path;  ///< Link below /dev/v4l/by-path; empty where udev made none.
   std::string by_id;    ///< Link below /dev/v4l/by-id; empty where udev made none.
-  std::string serial;   ///< Of the USB device; empty when it has none.
+  std::string serial;   ///< the USB device's; empty when it has none
   std::string bus;      ///< The driver's bus_info: "usb-0000:00:14.0-2".
   std::string card;     ///< The camera's own name.
   std::string driver;
@@ -39,14 +39,14 @@ class DeviceName {
   explicit DeviceName(const std::string& text);
 
   /// The node, opened non-blocking, of the camera that the name means now. No name means the only
-  /// USB camera; where there is none, the only other node that delivers a format of
+  /// USB camera. Without one it means the only other node that delivers a format of
   /// supported_formats() at `width` × `height` pixels (0: at any). Throws DeviceError: unplugged
-  /// (naming what is attached instead), denied, or, when the name means none or several cameras,
+  /// (naming what is attached instead), denied, or, when the name matches none or several cameras,
   /// unplugged with the names to choose from. Never a metadata node.
   struct Opened {
     base::UniqueFd fd;
     std::string node;
-    std::string identity;  ///< As configured, or the stable name of the only camera.
+    std::string identity;  ///< as configured, or the stable name of the only camera
   };
   [[nodiscard]] Opened open(int width = 0, int height = 0) const;
   [[nodiscard]] bool is_path() const noexcept { return kind_ == Kind::path; }

@@ -13,8 +13,8 @@ namespace dtact::hal::v4l2 {
 /// The pixel formats that the HAL turns into luma.
 struct PixelFormat {
   std::uint32_t fourcc;
-  const char* name;  ///< As in CameraInfo: "MJPEG".
-  const char* key;   ///< As in the configuration: "mjpeg".
+  const char* name;  ///< as in CameraInfo: "MJPEG"
+  const char* key;   ///< as in the configuration: "mjpeg"
   live::Encoding encoding;
 };
 
@@ -35,7 +35,7 @@ struct Mode {
   std::vector<double> fps;    ///< Frames a second, highest first. Empty: the driver doesn't say.
   bool fps_is_range = false;  ///< `fps` is the highest and the lowest of a range.
 
-  /// As in CameraInfo, or the four letters of a format that the HAL cannot read.
+  /// The name in CameraInfo, or the four letters of a format that the HAL cannot read.
   [[nodiscard]] std::string format_name() const;
   [[nodiscard]] bool usable() const noexcept { return find_format(fourcc) != nullptr; }
   [[nodiscard]] bool has_size(int w, int h) const noexcept;

@@ -24,8 +24,8 @@ template <typename Argument>
 using live::DeviceError;
 using live::ModeError;
 
-/// The error of a failed system call on a camera. `what` says what was tried ("start the stream"),
-/// `node` on which file. Busy, permission and bandwidth get their own state and fix; any other
+/// The error of a failed system call on a camera. `what` names the action ("start the stream"),
+/// `node` the file. Busy, permission and bandwidth get their own state and fix; any other
 /// errno counts as unplugged, since drivers report a vanished device with nearly all of them.
 [[nodiscard]] DeviceError error_of(int error, const std::string& what, const std::string& node);
 

@@ -104,7 +104,7 @@ LockedControl lock(int fd, const Control& control, const v4l2_queryctrl& offered
   }
   int error = set(fd, control.id, value);
   if (error != 0 && control.id == V4L2_CID_EXPOSURE_AUTO) {
-    // Manual time with an automatic iris, which such a camera doesn't have.
+    // Manual time with an automatic iris, which this kind of camera doesn't have.
     value = V4L2_EXPOSURE_SHUTTER_PRIORITY;
     error = set(fd, control.id, value);
   }

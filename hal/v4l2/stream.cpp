@@ -59,10 +59,10 @@ Stream::Stream(base::UniqueFd fd, const std::string& node, std::uint32_t fourcc,
 
 Stream::~Stream() { stop(); }
 
-/// uvcvideo marks its times as start of exposure and takes them when the frame's first packet is
-/// decoded (uvc_video_decode_start() in drivers/media/usb/uvc/uvc_video.c). Only its parameter
-/// hwtimestamps, off by default, derives the start of exposure from the camera's clock, and not of
-/// every frame nor of every camera; which of them is not told, so the later of the two is claimed.
+/// uvcvideo marks its timestamps as start of exposure but takes them on decoding a frame's first
+/// packet (uvc_video_decode_start() in drivers/media/usb/uvc/uvc_video.c). Only its parameter
+/// hwtimestamps, off by default, derives the start of exposure from the camera's clock, though not
+/// for every frame or camera. It does not report which, so this returns the later of the two.
 TimestampMeaning Stream::meaning_of(std::uint32_t flags) const noexcept {
   if ((flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) != V4L2_BUF_FLAG_TSTAMP_SRC_SOE) {
     return TimestampMeaning::end_of_frame;
@@ -138,7 +138,7 @@ void Stream::set_rate(std::uint32_t fourcc, const CameraConfig& asked) {
   const double rate =
       got.numerator == 0 ? asked.fps : double{1.0} * got.denominator / got.numerator;
   if (std::abs(rate - asked.fps) <= 0.5) return;
-  // Of this mode it runs what it says now, whatever it has listed.
+  // This mode's present report counts, whatever the device has listed.
   std::vector<Mode> modes = list_modes(fd_.get());
   for (Mode& mode : modes) {
     if (mode.fourcc != fourcc || !mode.has_size(asked.width, asked.height)) continue;
@@ -194,7 +194,7 @@ void Stream::start() {
 
 void Stream::stop() noexcept {
   if (!fd_ || buffers_.empty()) return;
-  // Of a device that is gone every one of these fails, and nothing is left to be done about it.
+  // For a device that is gone each of these fails, and the failure needs no action.
   std::uint32_t type = kType;
   (void)call(fd_.get(), VIDIOC_STREAMOFF, type);
   for (const auto& buffer : buffers_) ::munmap(buffer.data(), buffer.size());

@@ -15,8 +15,8 @@ struct SurveyedCamera {
   std::vector<OfferedControl> controls;  ///< Those of the photometric lock.
 };
 
-/// Every video node, as list_nodes() orders them. Only asks: a camera that streams for somebody is
-/// not disturbed.
+/// Every video node, ordered as by list_nodes(). Read-only: a camera that streams for another
+/// program is not disturbed.
 [[nodiscard]] std::vector<SurveyedCamera> survey_cameras();
 
 }  // namespace dtact::hal::v4l2

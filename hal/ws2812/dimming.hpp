@@ -6,8 +6,8 @@
 
 namespace dtact::hal::ws2812 {
 
-// An LED's current, from the WS2812B's nominal figures: 1 mA asleep, 60 mA at full white, a third
-// of the difference for each channel, linear in the channel's value (the LEDs are pulse-width
+// An LED's current, from the WS2812B's nominal figures: 1 mA asleep, 60 mA at full white. Each
+// channel takes a third of the difference, linear in the channel's value (the LEDs are pulse-width
 // modulated at constant current).
 inline constexpr double kIdleMilliamps = 1;
 inline constexpr double kFullMilliamps = 60;
@@ -30,7 +30,7 @@ struct DimmedLight {
 /// Computed draw of a ring that shows `leds`, milliamperes.
 [[nodiscard]] double current_ma(const std::array<Rgb, kLedCount>& leds);
 
-/// Brightness and gamma first, then the budget: if the ring would draw more, all channels are
+/// Brightness and gamma first, then the budget. If the ring would draw more, all channels are
 /// scaled by one factor, so that colours keep their hue, and rounded down, so that the budget
 /// holds. A channel that is on stays on (at least 1) unless the budget forbids. Throws
 /// std::invalid_argument for a gamma outside 0.2 … 5 or a budget below the sleeping ring's draw.

@@ -9,7 +9,7 @@
 
 namespace dtact::hal::ws2812 {
 
-// The WS2812B's one-wire code: each bit is a high pulse, short for 0 and long for 1, then low; a
+// The WS2812B's one-wire code: each bit is a high pulse, short for 0 and long for 1, then low. A
 // long low latches what was shifted in. Nanoseconds.
 //
 //                    WS2812B-2020    WS2812B of 2014     accepted here
@@ -18,8 +18,8 @@ namespace dtact::hal::ws2812 {
 //   low  T0L, T1L    from 220        from 300            from 220
 //   latch  RES       over 280 000    over 50 000         300 000
 //
-// The accepted window is what both generations distinguish: between 400 and 600 one chip may read a
-// 0 where another reads a 1, and a low shorter than 220 no chip promises to see.
+// The accepted window is what both generations distinguish. Between 400 and 600 one chip may read a
+// 0 where another reads a 1, and no chip promises to see a low shorter than 220.
 inline constexpr double kZeroHighMinNs = 200;
 inline constexpr double kZeroHighMaxNs = 400;
 inline constexpr double kOneHighMinNs = 600;
@@ -27,7 +27,7 @@ inline constexpr double kOneHighMaxNs = 1000;
 inline constexpr double kLowMinNs = 220;
 inline constexpr double kLatchNs = 300'000;
 
-/// How a WS2812B bit is spelt in SPI bits at `hz` SPI bits a second.
+/// How SPI bits encode a WS2812B bit at `hz` SPI bits a second.
 ///
 ///   bits   0          1          high 0, high 1, least low       so hz may be
 ///   3      100        110        1, 2, 1 SPI bits                2.50 … 3.33 MHz
@@ -35,11 +35,11 @@ inline constexpr double kLatchNs = 300'000;
 ///   8      11000000   11111000   2, 5, 3                         5.00 … 8.33 MHz
 ///
 /// At 4 and 8 bits every byte ends low, so a controller that pauses between bytes only lengthens a
-/// low; at 3 bits a byte ends inside a pulse and such a pause would turn a 0 into a 1.
+/// low. At 3 bits a byte ends inside a pulse and a pause would turn a 0 into a 1.
 ///
-/// A clock that falls after it was asked for may fall by as much, from the fastest rate to the
-/// slowest: to 75 % at 3 bits, 66 % at 4, 60 % at 8. Below that a 0's pulse grows until LEDs read a
-/// 1 and all of them go white.
+/// A clock that drops after configuration may drop by the ratio of the fastest to the
+/// slowest rate: to 75 % at 3 bits, 66 % at 4, 60 % at 8. Below that a 0's pulse grows until LEDs
+/// read a 1 and all of them turn white.
 struct SpiFormat {
   int bits = 4;           ///< SPI bits for each WS2812B bit: 3, 4 or 8.
   double hz = 3'200'000;  ///< SPI clock.

@@ -18,8 +18,8 @@ namespace {
 
 constexpr std::size_t kPixelBytes = 4;
 constexpr std::int64_t kLedNs = 30'000;  // 24 bits at 800 kHz
-// A write that does not end at the last LED is sent HZ / 20 later, and the first brightness is such
-// a write; what is written meanwhile waits with it. A tick more, for the slowest kernel's.
+// A write that does not end at the last LED is sent HZ / 20 later; this applies to the first
+// brightness. What is written meanwhile waits with it. A tick more, for the slowest kernel's.
 constexpr std::int64_t kIncompleteNs = 60'000'000;
 
 /// The node went with the driver, or is there without it.

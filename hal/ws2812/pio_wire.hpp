@@ -14,13 +14,13 @@ namespace dtact::hal::ws2812 {
 /// WS2812B on a GPIO line that the kernel clocks through a Raspberry Pi 5's PIO: the character
 /// device of the driver ws2812-pio-rp1 (raspberrypi/linux#6551, dtoverlay=ws2812-pio). It takes
 /// four bytes a LED (red, green, blue, white) at offset 0 and sends them after write() has
-/// returned, so that nobody learns of a failure on the way to the LEDs. A single byte at offset 0
-/// is a brightness that brings a gamma table of the driver's own; 0 lets colours through as they
-/// are.
+/// returned, so a failure on the way to the LEDs is not reported. A single byte at offset 0
+/// is a brightness that selects the driver's own gamma table; 0 passes colours
+/// unchanged.
 ///
-/// The device is opened for each write: removing the driver frees what an open file still points
-/// to (ws2812_pio_rp1_remove()), and a file that is not just opened has left offset 0, to which
-/// the driver knows no seek.
+/// The device is opened for each write, since removing the driver frees what an open file still
+/// points to (ws2812_pio_rp1_remove()). A file that is not newly opened has left offset 0, to which
+/// the driver cannot seek.
 class PioWire final : public Wire {
  public:
   explicit PioWire(std::string device, base::Clock& clock = base::system_clock());

@@ -24,14 +24,14 @@ struct RingParts {
   std::function<std::unique_ptr<gpiod::PowerSwitch>()> switch_on;
 };
 
-/// A ring of WS2812B. attend() sends the light again every `resend_ms`, by which an LED that caught
-/// a glitch gets back to its colour: the last light that show() brought to the LEDs or, before the
+/// A ring of WS2812B. attend() re-sends the light every `resend_ms`, which restores an LED after
+/// a glitch: the last light that show() brought to the LEDs or, before the
 /// first, the one requested last.
 ///
-/// A ring that is absent, busy, forbidden or refused by its own wire is away: show() says so at
-/// once, and the ring is looked for, first after a quarter of a second, then ever more rarely down
-/// to every two seconds. On destruction it goes dark, then loses its power, unless it is to be left
-/// on.
+/// A ring that is absent, busy, forbidden or refused by its own wire is away. show() reports it at
+/// once, and the ring is searched for, first after a quarter of a second, then less and less often,
+/// at least every two seconds. On destruction it turns dark and then loses its power, unless it
+/// stays on by configuration.
 class Ring final : public LightRing {
  public:
   /// Looks for the ring once. Throws std::invalid_argument for settings that make no sense.

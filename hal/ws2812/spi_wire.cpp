@@ -80,7 +80,7 @@ namespace {
 // At 3.2 MHz 4096 bytes last 10 ms, of which an interruption of 50 µs is half a percent.
 constexpr std::size_t kLongestProbe = 16384;
 constexpr std::size_t kProbes = 8;
-// Above this a deviation is worth a note although the pulses still fit.
+// A larger deviation gets a note although the pulses still fit.
 constexpr double kReportedDeviation = 0.03;
 
 // Transfers that are off in a row before the clock is suspected.

@@ -66,13 +66,13 @@ struct MeasuredRate {
 
 /// WS2812B on an SPI controller's data line (MOSI).
 ///
-/// The controller's clock may change while we run, and LEDs then show anything without an error
-/// (jgarff/rpi_ws281x#381, #401: a Raspberry Pi 4 at idle). So each transfer is timed, on the
-/// thread that writes it: less what a transfer costs besides the wire, it tells the rate, which
-/// must lie in the window. One that is off is sent again, which heals the LEDs if the clock was off
-/// for a moment and costs a millisecond if it was not. An interruption only lengthens, so that a
+/// The controller's clock may change at run time, and LEDs then show anything without an error
+/// (jgarff/rpi_ws281x#381, #401: a Raspberry Pi 4 at idle). So the writing thread times each
+/// transfer and subtracts the cost besides the wire. The resulting rate
+/// must lie in the window. A transfer outside is repeated, which restores the LEDs if the clock was
+/// off for a moment, and else costs a millisecond. An interruption only lengthens, so a
 /// short transfer is always a fast clock; a long one may be a busy machine, and so may three in a
-/// row. Then the rate is measured as at the start, which interruptions hardly reach, and that alone
+/// row. Then the rate is measured as at the start, which interruptions hardly affect. That alone
 /// decides: a clock outside the window is an error, and the wire is lost() until it is right again.
 class SpiWire final : public Wire {
  public:
@@ -98,7 +98,7 @@ class SpiWire final : public Wire {
   SpiFormat format_;
   bool check_rate_;
   base::Clock& clock_;
-  std::string deviation_;    // of the rate measured last, worth a note
+  std::string deviation_;    // note on the rate measured last
   double overhead_ns_ = 0;   // of a transfer, measured with it
   std::uint64_t sent_ = 0;   // transfers of colours
   std::uint64_t again_ = 0;  // of these, sent again because they were off

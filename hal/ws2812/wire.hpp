@@ -19,7 +19,7 @@ class Wire {
   /// The first call: finds out, without a colour that LEDs would show, whether the wire can serve a
   /// chain of `leds`.
   [[nodiscard]] virtual std::string prepare(int leds) = 0;
-  /// What prepare() or send() found worth knowing; empty when nothing.
+  /// Information from prepare() or send() that is not an error; empty when none.
   [[nodiscard]] virtual std::string note() const = 0;
   /// Sends one colour to each LED, the chain's first LED first, and waits until it is through.
   [[nodiscard]] virtual std::string send(std::span<const Rgb> leds) = 0;

@@ -56,7 +56,7 @@ constexpr std::uint64_t find_escapes(std::uint64_t nibbles) noexcept {
   return (nibbles + 0x7171717171717171U) & 0x8080808080808080U;
 }
 
-/// So many bytes may be read behind what load() is for.
+/// load() may read this number of bytes beyond its data.
 constexpr std::size_t kPadding = 7;
 
 std::uint64_t load(const std::uint8_t* eight) noexcept {

@@ -44,9 +44,9 @@ struct BallPress {
   image::Grey16 reference_q8;        ///< Untouched, Q8 luma, the mean of many frames.
   std::vector<image::Grey8> frames;  ///< The ball pressed in and at rest.
   double ball_radius_mm = 0;
-  double mm_per_px = 0;             ///< Of the depth map.
+  double mm_per_px = 0;             ///< The depth map's scale.
   std::optional<recon::Lens> lens;  ///< None: the frame as it is.
-  /// Of the frame or, with a lens, of the rectified image; none: all that the frame shows.
+  /// Part of the frame or, with a lens, of the rectified image; none: the whole frame.
   std::optional<Crop> crop;
   /// Places in millimetres of the lens's surface; without a lens from the map's centre. The
   /// published method has none.
@@ -54,7 +54,7 @@ struct BallPress {
   recon::Method method = recon::Method::lut;
   /// Where `gain` says nothing, the press may: whether darkening is a share of the light.
   bool may_share_light = false;
-  /// Of the ball's lowest point, where it was measured. The published method has no use for it.
+  /// Measured depth of the ball's lowest point, if any. The published method does not use it.
   std::optional<double> depth_mm = {};
 };
 

@@ -17,7 +17,7 @@ struct SagProfile {
     double weight = 0;  ///< Pixels.
   };
   std::vector<Ring> rings;         ///< From the middle outwards.
-  std::optional<double> depth_mm;  ///< Of the lowest point, when somebody measured it.
+  std::optional<double> depth_mm;  ///< Measured depth of the lowest point, if any.
   /// What the gain is linear in, at this press's place (gain_terms()); empty: no gain is fitted.
   std::vector<double> place = {};
 };
@@ -25,8 +25,8 @@ struct SagProfile {
 /// One LUT for all presses, and how deep each of them was.
 struct ChainFit {
   std::vector<Knot> knots;       ///< Rising; the first at a darkening above zero.
-  std::vector<double> depth_mm;  ///< Of each press's lowest point.
-  std::vector<double> gain;      ///< As recon::FlatFieldGain::polynomial.
+  std::vector<double> depth_mm;  ///< Depth of each press's lowest point.
+  std::vector<double> gain;      ///< See recon::FlatFieldGain::polynomial.
   /// Indentations that no press shows between two that are shown (or zero), millimetres.
   struct Gap {
     double from_mm = 0;
@@ -56,7 +56,7 @@ inline constexpr double kBridgedMm = 0.15;
 /// From zero to the shallowest ring the LUT is a line to the origin: no darkening is no depth.
 inline constexpr double kBridgedFromZeroMm = 0.4;
 
-/// The gel's contact with a ball is narrower than the circle in which the ball cuts the untouched
+/// The gel's contact with a ball is narrower than the circle in which the ball cuts the undeformed
 /// surface: 3.04 mm against 3.12 for a 4 mm ball 1.5 mm deep (solved for 2 to 2.5 mm thickness).
 inline constexpr double kContactOfCut = 0.97;
 
@@ -85,11 +85,11 @@ struct PressChain {
 };
 [[nodiscard]] PressChain chain_presses(const std::vector<PressRings>& presses);
 
-/// A press under a LUT that it had no part in, as a user's press meets it. Free is one number: the
-/// depth of its lowest point, which nobody measured (where somebody did, nothing is). What is
-/// judged is the known shape: how the indentation that the LUT reads follows the sphere inside the
-/// sure contact. That sees slope and bends of the LUT and the gain at the press's place; an offset
-/// that the LUT has at all depths it cannot see.
+/// Evaluates a press with a LUT that was made without it, as for a user's press. The one free
+/// parameter is the depth of its lowest point; where that was measured, there is none. The result
+/// compares the LUT's indentation with the known sphere inside the sure contact. This tests the
+/// LUT's slope and bends and the gain at the press's place. It cannot detect a constant offset of
+/// the LUT.
 struct LeftOutResidual {
   struct Ring {
     double depth_mm = 0;

@@ -7,12 +7,12 @@
 
 namespace dtact::calibration {
 
-/// Where a ball touches.
+/// A ball's contact.
 struct Contact {
   double col = 0;             ///< Centre, pixels of the depth map.
   double row = 0;             ///< Centre, pixels of the depth map.
   double radius_mm = 0;       ///< Contact radius, at most 0.85 of the ball's.
-  double ball_radius_mm = 0;  ///< Of the ball.
+  double ball_radius_mm = 0;  ///< The ball's radius.
   double peak_levels = 0;     ///< Greatest darkening, grey levels.
 };
 
@@ -49,10 +49,10 @@ class NoContact : public std::runtime_error {
 /// darker than 0.3 of the peak, weighted with the darkening; the radius is where the mean darkening
 /// about it falls to 3 grey levels, at most 0.85 of the ball's radius (further out the sphere is so
 /// steep that a pixel spans 0.1 mm of depth). Throws saying what to do: NoContact when nothing
-/// touches (less than 8 grey levels), std::runtime_error when the contact leaves the map.
+/// is in contact (below 8 grey levels), std::runtime_error when the contact leaves the map.
 [[nodiscard]] Contact find_contact(const DarkeningMap& map, double ball_radius_mm);
 
-/// How much darker the untouched surroundings became between reference and frame, grey levels: the
+/// How much darker the surroundings without contact became since the reference, grey levels: the
 /// median over tiles of the far field. 0 unless it is sure, that is: at least 0.5 levels, twice the
 /// spread of the tiles, and the far field shows in at least eight tiles on both sides of the
 /// contact. (The faint outskirts of the bulge are uneven and fail this; a drifted lamp passes.)

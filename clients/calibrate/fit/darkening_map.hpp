@@ -13,7 +13,7 @@
 
 namespace dtact::calibration {
 
-/// The darkening of every pixel of the depth map, grey levels, positive = darker than untouched.
+/// The darkening (reference − frame) of every pixel of the depth map, grey levels.
 /// NaN where the light is too weak or the mask forbids. Row-major.
 struct DarkeningMap {
   int width = 0;

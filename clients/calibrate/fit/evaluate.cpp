@@ -48,7 +48,7 @@ void for_contact(const DarkeningMap& map, const Contact& contact, const Visit& v
   }
 }
 
-/// Of a LUT from the pixels `fitted` on the others.
+/// Error of a LUT made from the pixels `fitted` on the others.
 double left_out_error(const SymmetricPress& press, const PixelFilter& fitted) {
   const recon::DepthLut lut = fit_lut(press.map, press.contact, fitted);
   std::vector<double> errors;

@@ -15,8 +15,8 @@
 
 namespace dtact::calibration {
 
-/// How well a calibration reads a ball whose depth nobody knows: against a sphere about the
-/// contact's centre that meets zero at the contact's edge.
+/// How well a calibration reads a ball of unknown depth, compared with a sphere about the contact's
+/// centre that is zero at the contact's edge.
 struct Evaluation {
   Contact contact;
   double drift_levels = 0;  ///< Taken off the difference; see far_field_drift().
@@ -34,8 +34,8 @@ struct Evaluation {
   /// rest (its offset removed): mean of both ways, the sectors also turned by half of one.
   std::optional<double> sector_mae_mm;
   std::size_t pixels = 0;     ///< In the contact.
-  std::size_t untrusted = 0;  ///< Of them, marked.
-  std::size_t unseen = 0;     ///< Of them, too dark or masked, whatever the LUT says.
+  std::size_t untrusted = 0;  ///< Marked pixels.
+  std::size_t unseen = 0;     ///< Pixels too dark or masked, independent of the LUT.
   /// Share of the contact and of the ring about it (half a radius wide) that has less than half of
   /// their median light.
   double dim = 0;
@@ -98,10 +98,10 @@ struct Evaluation {
 [[nodiscard]] std::string dim_part_of(const Calibration& made, const BallPresses& set);
 
 inline constexpr double kMaxOffsetMm = 0.22;
-inline constexpr double kMaxShape = 0.09;    ///< Of the sphere's depth.
-inline constexpr double kMinShapeMm = 0.05;  ///< What a light press may be off in any case.
-inline constexpr double kMaxUnseen = 0.02;   ///< Of the contact.
-inline constexpr double kMaxDim = 0.1;       ///< Of the contact and its ring.
+inline constexpr double kMaxShape = 0.09;    ///< Share of the sphere's depth.
+inline constexpr double kMinShapeMm = 0.05;  ///< Error always allowed, for light presses.
+inline constexpr double kMaxUnseen = 0.02;   ///< Share of the contact.
+inline constexpr double kMaxDim = 0.1;       ///< Share of contact and ring.
 inline constexpr double kMinSlopeUm = 12;    ///< A grey level.
 inline constexpr double kMaxSlopeUm = 120;   ///< A grey level.
 

@@ -46,7 +46,7 @@ inline constexpr double kSureOfContact = 0.9;
 
 /// What the sure part of a press's contact says: sag = depth − slope · darkening.
 struct SagFit {
-  double depth_mm = 0;  ///< Of the lowest point, if no darkening is no depth.
+  double depth_mm = 0;  ///< Depth of the lowest point, with zero darkening = zero depth.
   double slope = 0;     ///< Millimetres a grey level.
 };
 

@@ -36,7 +36,7 @@ struct Fit {
   PressAsymmetry gain;
   Eigen::VectorXd knots;  ///< kKnotLevels apart, the first at no darkening.
 
-  /// Of the LUT; beyond the last knot along the last two.
+  /// Depth by the LUT; extrapolated from the last two knots.
   [[nodiscard]] double depth_at(double level) const { return value_at(knots, level / kKnotLevels); }
   [[nodiscard]] double slope_at(double level) const {
     return (depth_at(level + kKnotLevels) - depth_at(level - kKnotLevels)) / (2 * kKnotLevels);

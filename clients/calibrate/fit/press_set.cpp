@@ -76,9 +76,9 @@ struct Trial {
   const std::vector<SettledPress>* presses = nullptr;
   recon::GainShape shape = recon::GainShape::none;
   std::vector<PressRings> rings;
-  ChainFit fit;  ///< Of all presses.
+  ChainFit fit;  ///< Fit to all presses.
   LeaveOneOut left_out;
-  std::vector<double> errors_mm;  ///< Of each press left out; NaN: nothing to say.
+  std::vector<double> errors_mm;  ///< For each press left out; NaN: unknown.
 };
 
 std::string name_of(const Trial& trial) {
@@ -266,7 +266,7 @@ Calibration build(const BallPresses& presses, PressReport* report) {
   }
   std::vector<Trial> trials;
   for (const int terms : {0, 2, 5}) {
-    // As many presses as the gain has factors say nothing of how it predicts another.
+    // With only as many presses as the gain has factors, its prediction cannot be tested.
     if (terms > 0 && static_cast<int>(seen.size()) < terms + 3) break;
     trials.push_back(try_gain(seen, set, recon::GainShape::none, terms));
     if (!lit.empty()) trials.push_back(try_gain(lit, set, recon::GainShape::uniform, terms));

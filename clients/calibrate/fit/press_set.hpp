@@ -14,7 +14,7 @@ struct BallPresses {
   struct Press {
     std::string name;                  ///< In messages.
     std::vector<image::Grey8> frames;  ///< The ball pressed in and at rest.
-    std::optional<double> depth_mm;    ///< Of its lowest point, where it was measured.
+    std::optional<double> depth_mm;    ///< Measured depth of the lowest point, if any.
   };
   std::vector<Press> presses;
   double ball_radius_mm = 0;
@@ -29,8 +29,8 @@ struct BallPresses {
 /// What build() found out on the way.
 struct PressReport {
   struct Depth {
-    std::string name;     ///< Of the press.
-    double depth_mm = 0;  ///< Of its lowest point, as fitted.
+    std::string name;     ///< The press's name.
+    double depth_mm = 0;  ///< Fitted depth of the lowest point.
   };
   std::vector<Depth> presses;         ///< Those that were used.
   std::vector<std::string> left_out;  ///< The others: name and reason.
@@ -42,7 +42,7 @@ struct PressReport {
   struct Gain {
     std::string name;              ///< "none", "share of the light, plane", ...
     double error_mm = 0;           ///< Mean absolute error.
-    double standard_error_mm = 0;  ///< Of its difference from the best of all; 0: the best.
+    double standard_error_mm = 0;  ///< Of the difference from the best; 0: the best.
     bool chosen = false;
   };
   std::vector<Gain> gains;  ///< From the simplest on.

@@ -97,7 +97,7 @@ void fill_gaps(std::vector<double>& depth, const std::vector<int>& count) {
 
 Circle enclosing_circle(std::vector<Pixel> points) {
   if (points.empty()) return {};
-  // Only the ends of each row can touch the circle, and there are few of them.
+  // Only the ends of each row can lie on the circle, and there are few of them.
   std::ranges::sort(
       points, [](Pixel a, Pixel b) { return a.row != b.row ? a.row < b.row : a.col < b.col; });
   std::vector<Pixel> ends;

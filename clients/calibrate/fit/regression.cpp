@@ -50,7 +50,7 @@ class LineFit {
   double s_ = 0;
 };
 
-/// Of each pixel's line through zero, depth = slope · level.
+/// Slope of each pixel's line through zero, depth = slope · level.
 struct PixelSlopes {
   std::vector<double> depth_level;
   std::vector<double> level_level;
@@ -127,7 +127,7 @@ Calibration build_regression(const BallPresses& set, double centre_x_mm, double 
                  .centre_y_mm = centre_y_mm,
                  .per_mm = k / b};
   model->smoothing_px = kTwoFilters;
-  // Levels that became deeper by the gain look up further on; brighter than untouched is nothing.
+  // Levels increased by the gain are looked up further on; brighter than the reference is 0.
   model->lut.first_q6 = 0;
   for (int q6 = 0; q6 <= kLastLevel * recon::kEntriesPerLevel; ++q6) {
     model->lut.um.push_back(static_cast<std::int16_t>(

@@ -126,7 +126,7 @@ Fit fit_force(const std::vector<Pair>& pairs, std::optional<double> thickness_mm
   double share = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     fit.left_out.push_back(readings.error(i, readings.fit(i)));
-    // Of light readings the scale's resolution is most of the error.
+    // The scale's resolution dominates the error of light readings.
     share += std::abs(fit.left_out.back()) / std::max(pairs[i].newtons, heaviest.newtons / 10) /
              static_cast<double>(pairs.size());
   }

@@ -20,7 +20,7 @@ inline constexpr int kMinPairs = 6;
 
 struct Fit {
   recon::ForceModel model;
-  std::vector<double> left_out;  ///< Of each pair: what the others say of it minus the reading, N.
+  std::vector<double> left_out;  ///< For each pair: prediction by the others − reading, N.
 };
 
 /// Fits Young's modulus, the depth's zero and, unless it is known, the gel's thickness to the

@@ -15,15 +15,15 @@ namespace dtact::force {
 /// What the user gave: frames, and what the scale said while they were taken.
 struct Reading {
   std::string frames;  ///< A PNG file, a folder of them, or a recording: press.mcap[:frame[:end]].
-  double value = 0;    ///< As the scale shows it.
+  double value = 0;    ///< The scale's reading.
 };
 
 /// "FRAMES@VALUE". Throws std::runtime_error.
 [[nodiscard]] Reading parse_reading(const std::string& text);
 
-/// A CSV file of two columns with the heading `frames,force`; frames are relative to its folder,
-/// empty lines and those with a # first are passed over. Throws std::runtime_error with file and
-/// line.
+/// Reads a CSV file of two columns with the heading `frames,force`. Frames are relative to its
+/// folder; empty lines and those that begin with # are skipped. Throws std::runtime_error with file
+/// and line.
 [[nodiscard]] std::vector<Reading> read_readings(const std::filesystem::path& csv);
 
 /// The contacts of frames, averaged over each reading's frames.

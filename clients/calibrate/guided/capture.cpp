@@ -15,8 +15,8 @@ namespace dtact::ctl::guided {
 namespace {
 
 constexpr std::chrono::milliseconds kFrameWait{100};
-/// Frames that have to agree before the first is taken: a press on its way down slower than 0.2 mm
-/// a second passes for still, and the drift of those taken tells it.
+/// Frames that must agree before the first is taken. A press moving down slower than 0.2 mm a
+/// second passes as still; the drift of the captured frames reveals it.
 constexpr int kSettleFrames = 10;
 /// Grey levels a cell may move while it counts as still (about 0.05 mm). The most noise that the
 /// daemon calls tolerable, 2.5 a pixel, moves the worst of all cells by 1.
@@ -26,7 +26,7 @@ constexpr double kDrift = 0.5;
 /// A press that differs less from the one before, somewhere, is the same.
 constexpr double kSamePress = 2.0;
 constexpr int kBrighterFrames = 5;
-/// Waits for a frame in vain until the user is told, two seconds.
+/// Waits without a frame until the user gets a message, two seconds.
 constexpr int kMisses = 20;
 
 /// Ends a wait by the frames' times; where none come, by how often that was.

@@ -47,7 +47,7 @@ struct ObservedFrame {
 class Capture {
  public:
   struct Rules {
-    double timeout_s = 60;  ///< Of the frames' times, until CaptureTimeout.
+    double timeout_s = 60;  ///< By the frames' times; then CaptureTimeout.
   };
   /// `shown` is called with each usable frame and a few words about it.
   Capture(Sensor& sensor, Console& console, const CellGrid& grid, const Rules& rules,
@@ -62,8 +62,8 @@ class Capture {
 
   /// Waits for `count` frames in a row that hold still. Throws CaptureTimeout, Ended and as next().
   [[nodiscard]] SteadyFrames reference(int count);
-  /// The same where something presses the surface that was untouched, and elsewhere or otherwise
-  /// than in `last` (empty: none). A line typed meanwhile takes the press as it is. Throws
+  /// Waits for an object in contact, at another place or depth than in `last` (empty: none), and
+  /// captures it. A line typed meanwhile captures the press as it is. Throws
   /// ReferenceInContact too.
   [[nodiscard]] SteadyFrames press(int count, const CellMeans& reference, const CellMeans& last);
 

@@ -19,7 +19,7 @@ class CellGrid {
   /// where that is less than 8 cells.
   explicit CellGrid(const recon::FrameRegion& region);
 
-  /// Of a frame of 8-bit luma, `width` pixels a row, without padding.
+  /// Means of a frame of 8-bit luma, `width` pixels a row, without padding.
   [[nodiscard]] CellMeans of(const std::vector<std::uint8_t>& luma, int width) const;
   /// The same of Q8 luma.
   [[nodiscard]] CellMeans of(const std::vector<std::uint16_t>& luma_q8, int width) const;
@@ -36,7 +36,7 @@ class CellGrid {
 
 /// What a frame shows against the undeformed surface, grey levels.
 struct ContactEvidence {
-  double darkest = 0;     ///< Of a cell, less the light's change.
+  double darkest = 0;     ///< Darkest cell, less the light's change.
   double brightest = 0;   ///< The same the other way.
   double light = 0;       ///< By how much most cells became darker: the light changed.
   double dark_cells = 0;  ///< Those darker by kEdgeLevels.

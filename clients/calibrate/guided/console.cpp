@@ -26,7 +26,7 @@ std::string trimmed(const std::string& text) {
   return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
 }
 
-/// Of a picture in the terminal.
+/// Width of an image in the terminal.
 constexpr int kColumns = 44;
 
 }  // namespace
@@ -78,7 +78,7 @@ StreamConsole::~StreamConsole() {
 
 void StreamConsole::fetch() {
   const std::size_t lines = in_.fetch();
-  // The terminal has echoed them: the cursor stands so much below the live lines.
+  // The terminal has echoed them: the cursor is that far below the live lines.
   if (live_lines_ > 0) live_lines_ += lines;
 }
 

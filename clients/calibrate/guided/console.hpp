@@ -13,10 +13,10 @@ namespace dtact::ctl::guided {
 /// A press that was taken, on the depth map.
 struct CapturedPress {
   std::string name;
-  double col = 0;  ///< Of the contact's middle, pixels.
+  double col = 0;  ///< The contact's middle, pixels.
   double row = 0;
   double radius_px = 0;
-  double depth_mm = 0;  ///< Of its lowest point: as fitted, else by the contact's width.
+  double depth_mm = 0;  ///< Depth of its lowest point: fitted, else by the contact's width.
 };
 
 /// What the user typed since it was last asked.
@@ -62,12 +62,12 @@ struct Prompt {
 /// What stands before the user until the next takes its place.
 struct Scene {
   const image::Grey8* picture = nullptr;  ///< The sensor now, the map's part; null: as before.
-  double mm_per_px = 0;                   ///< Of the picture.
+  double mm_per_px = 0;                   ///< The picture's scale.
   std::string words;                      ///< About the picture.
   Prompt prompt;
   std::vector<CapturedPress> presses;
   double covered_mm = 0;     ///< How deep the LUT of these presses reaches; 0: there is none.
-  int presses_required = 0;  ///< After so many the calibration is made.
+  int presses_required = 0;  ///< Number of presses for the calibration.
 };
 
 /// Where the session speaks with its user; the tests play one.

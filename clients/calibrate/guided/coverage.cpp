@@ -55,7 +55,7 @@ Coverage cover(const PressImages& images, const calibration::Calibration& empty,
   }
   coverage.presses = contacts_of(images, empty);
   if (!coverage.made) return coverage;
-  // As fitted; what was left out does not count.
+  // Depths as fitted; presses that were left out do not count.
   std::erase_if(coverage.presses, [&](CapturedPress& press) {
     const auto used = std::ranges::find(coverage.report.presses, press.name,
                                         &calibration::PressReport::Depth::name);

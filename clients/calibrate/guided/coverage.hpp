@@ -9,8 +9,8 @@
 
 namespace dtact::ctl::guided {
 
-/// What the presses so far come to by themselves, which is quick to say: what they lack for that is
-/// worth pressing however the LUT is made in the end.
+/// Coverage of the presses so far without a gel model, which is quick to compute. The presses that
+/// it lacks improve the LUT with every calibration method.
 struct Coverage {
   /// Null where they determine no LUT, or one that is doubted.
   std::shared_ptr<const calibration::Calibration> made;

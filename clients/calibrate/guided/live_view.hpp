@@ -16,7 +16,7 @@ namespace dtact::ctl::guided {
 /// folder.
 class LiveView {
  public:
-  /// `presses_required`: after so many the calibration is made.
+  /// `presses_required`: number of presses for the calibration.
   LiveView(Console& console, WorkFolder& folder, int presses_required)
       : console_(console), folder_(folder) {
     scene_.presses_required = presses_required;

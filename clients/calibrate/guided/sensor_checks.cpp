@@ -15,7 +15,7 @@
 namespace dtact::ctl::guided {
 namespace {
 
-// As the daemon judges its own picture (daemon/pipeline/image_watch.cpp).
+// The daemon's own limits (daemon/pipeline/image_watch.cpp).
 constexpr double kDarkGrey = 20;
 constexpr double kWhiteShare = 0.01;
 constexpr std::uint8_t kWhite = 254;

@@ -19,7 +19,7 @@ namespace dtact::ctl::guided {
 /// The frame cannot be used, though the next may: a light change under way, a repeated picture.
 [[nodiscard]] bool passing_trouble(const google::protobuf::RepeatedField<int>& health);
 
-/// Camera and light as the daemon tells them, in the calibration's terms.
+/// Camera and light of the daemon, in the calibration's terms.
 [[nodiscard]] calibration::Origin origin_of(const v1::Status& status);
 /// r, g, b that each LED emits: its colour after brightness and the ring's gamma.
 [[nodiscard]] std::vector<std::uint8_t> leds_of(const v1::LightState& light);

@@ -18,7 +18,7 @@ struct Plan {
   std::filesystem::path folder;  ///< The work folder.
   double ball_radius_mm = 0;
   MapOptions map;
-  int presses = 6;  ///< After so many the calibration is made, where they suffice.
+  int presses = 6;  ///< Presses after which the calibration is made, if they suffice.
   int reference_frames = 32;
   int press_frames = 16;
   double timeout_s = 60;  ///< For each take.
@@ -33,15 +33,15 @@ enum class Outcome {
   unfinished,  ///< The user or the input ended the session before there was one.
 };
 
-/// The guided calibration: reference, presses, LUT, upload; each saved in the work folder as soon
-/// as it is taken, so that the session can end anywhere and another one goes on.
+/// The guided calibration: reference, presses, LUT, upload. Each is saved in the work folder as
+/// soon as it is taken, so another session can continue at any point.
 class Session {
  public:
   /// Throws std::runtime_error when the work folder cannot be made.
   Session(Sensor& sensor, Console& console, Plan plan);
 
-  /// Throws std::runtime_error with a fix when the daemon is not fit, a take fails where nobody
-  /// is there to fix it, or camera or light changed since the work folder was begun;
+  /// Throws std::runtime_error with a fix when the daemon is not ready, a capture fails without a
+  /// user to fix it, or camera or light changed since the work folder was begun;
   /// client::Error as the sensor does.
   [[nodiscard]] Outcome run();
 

@@ -43,7 +43,7 @@ class WorkFolder {
   /// The folder's name as the daemon takes it for a calibration: letters, digits, '-' and '_', at
   /// most 64.
   [[nodiscard]] std::string calibration_name() const;
-  /// Of something in the folder, as the command line takes it.
+  /// Path of a file in the folder, for the command line.
   [[nodiscard]] std::string at(const std::string& name) const { return (path_ / name).string(); }
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 

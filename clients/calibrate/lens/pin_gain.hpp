@@ -10,8 +10,8 @@
 
 namespace dtact::ctl {
 
-/// What the pins of a board, all of one length, tell of how much the same dent darkens from place
-/// to place.
+/// Flat-field gain from the pins of a board, all of one length: how the darkening of the same dent
+/// varies over the map.
 struct PinGain {
   recon::FlatFieldGain gain;  ///< Places in millimetres of the marks.
   /// RMS of the relative error with which the others predict each pin's darkening, with no gain,

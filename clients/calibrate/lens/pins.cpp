@@ -65,7 +65,7 @@ struct Settled {
   const Lattice* lattice = nullptr;
   std::vector<Mark> marks;
   std::vector<std::string> missing;
-  double rms_mm = 0;  ///< Of the marks about a lens of twelve parameters.
+  double rms_mm = 0;  ///< Residual of the marks for a lens of 12 parameters.
 };
 
 /// The median of the heights around a place of the lattice.
@@ -176,8 +176,8 @@ bool same_places(const Lattice& a, const Lattice& b, double apart) {
 
 /// All lattices at several scales, of the board as it is and on edge.
 std::vector<Lattice> lattices_of(const cv::Mat1f& image, const Board& board) {
-  // Of the image's shorter side: from pins a few pixels wide to a board twice as large as the
-  // frame.
+  // Shares of the image's shorter side: from pins a few pixels wide to a board twice as large as
+  // the frame.
   constexpr double kScales[] = {1 / 160., 1 / 120., 1 / 80., 1 / 60., 1 / 48., 1 / 36., 1 / 24.};
   std::vector<Lattice> all;
   for (const double scale : kScales) {

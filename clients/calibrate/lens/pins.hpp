@@ -17,7 +17,7 @@ struct Board {
 
 /// The board's pins in an image.
 struct PinPress {
-  /// As the image shows them: a board seen on edge has its rows and columns swapped.
+  /// Counted in the image: a board seen on edge has its rows and columns swapped.
   int rows = 0;
   int cols = 0;
   /// Those found, row-major from the upper left; millimetres from the board's middle, with level

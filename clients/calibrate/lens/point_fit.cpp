@@ -138,8 +138,8 @@ Parameters affine_start(std::span<const Mark> marks, const Units& u, std::size_t
   return p;
 }
 
-/// Of the model's parameters, the first of `p`. Throws FitFailed where the solver does, so that a
-/// smaller model's parameters do not pass as this one's.
+/// Fits the model's parameters, the first ones of `p`. Throws FitFailed where the solver fails, so
+/// that a smaller model's parameters do not pass as this one's.
 void minimise(Parameters& p, const Units& u, std::span<const Mark> marks, LensModel model) {
   const int n = parameters(model);
   auto cost = std::make_unique<ceres::DynamicNumericDiffCostFunction<MarkCost, ceres::CENTRAL>>(

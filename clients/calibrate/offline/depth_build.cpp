@@ -162,7 +162,7 @@ calibration::Calibration build_lut(const PressImages& images, FitMethod method,
   const auto add_note = [&found](const std::string& line) {
     if (!line.empty()) found.note += (found.note.empty() ? "" : "\n") + line;
   };
-  // Several presses tell their own gain, but the gel is fitted under the lens file's.
+  // Several presses determine their own gain, but the gel is fitted with the lens file's.
   if (method != FitMethod::alone || images.set.presses.size() == 1) {
     add_note(calibration::gain_left_out(images.gain, made));
   }

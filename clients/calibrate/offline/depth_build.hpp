@@ -25,7 +25,7 @@ void add_map_options(CLI::App& command, MapOptions& options);
 /// The same, for a frame of known size.
 struct MapChoice {
   std::optional<recon::Lens> lens;
-  recon::FlatFieldGain gain;    ///< Of the lens file: what its board's pins ask for.
+  recon::FlatFieldGain gain;    ///< From the lens file: the gain of its board's pins.
   bool gain_specified = false;  ///< LensFile::gain_specified.
   double mm_per_px = 0;
   std::optional<calibration::Crop> crop;
@@ -38,7 +38,7 @@ struct MapChoice {
 /// Several presses of one ball, and what is recorded of where they come from.
 struct PressImages {
   calibration::BallPresses set;
-  recon::FlatFieldGain gain;  ///< Of the lens file.
+  recon::FlatFieldGain gain;  ///< From the lens file.
   calibration::Origin origin;
 };
 

@@ -17,7 +17,7 @@ struct ImageSet {
 
   [[nodiscard]] int width() const { return images.front().width; }
   [[nodiscard]] int height() const { return images.front().height; }
-  /// As the camera gives them to the daemon: 8-bit luma.
+  /// The frames as 8-bit luma, as the daemon gets them.
   [[nodiscard]] std::vector<image::Grey8> frames() const;
   /// The mean as Q8 luma (grey level times 256).
   [[nodiscard]] image::Grey16 mean_q8() const;

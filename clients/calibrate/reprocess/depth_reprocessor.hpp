@@ -18,12 +18,12 @@
 
 namespace dtact::reprocess {
 
-/// Whether the frame was recorded under that condition.
+/// Whether the frame was recorded with that health flag.
 [[nodiscard]] bool has(const v1::Frame& frame, v1::Health flag);
 
-/// Makes the depth of recorded frames anew, by the parts that make it in the daemon with its
-/// default settings: where the image differs from the untouched one, the light followed, the
-/// reconstruction, the contact. Frames come in their order.
+/// Recomputes the depth of recorded frames with the daemon's own parts and default settings:
+/// difference from the reference, light compensation, reconstruction and contact. Frames must come
+/// in their order.
 class DepthReprocessor {
  public:
   /// Throws std::invalid_argument when the calibration covers too little of the frame.
@@ -44,7 +44,7 @@ class DepthReprocessor {
   [[nodiscard]] bool in_contact() const noexcept { return contact_.in_contact(); }
 
  private:
-  /// Of a map: 1/decimation of the calibration's resolution, sharpened by so many steps.
+  /// A map's 1/decimation of the calibration's resolution, and its sharpening steps.
   struct MapVariant {
     int decimation = 1;
     int steps = 0;
@@ -60,7 +60,7 @@ class DepthReprocessor {
 
   std::shared_ptr<const calibration::Calibration> calibration_;
   pipeline::CalibratedImage image_;
-  std::vector<int> steps_;  ///< That the calibration has LUTs for.
+  std::vector<int> steps_;  ///< Steps with a LUT in the calibration.
   std::map<MapVariant, pipeline::Resolutions> maps_;
   std::vector<std::uint16_t> reference_q8_;
   pipeline::LightFollower follower_;

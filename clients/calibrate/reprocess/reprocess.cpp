@@ -112,7 +112,7 @@ class Reprocessor {
     return status == hal::mjpeg::Status::ok;
   }
 
-  /// The mean of the first frames, which the user says are untouched.
+  /// The mean of the first frames, without contact according to the user.
   void take_first_frames() {
     if (options_.reference_frames == 0) {
       throw std::runtime_error(

@@ -16,11 +16,11 @@ using Eigen::Vector3d;
 constexpr int kMaxSteps = 20;
 /// A step shorter than this is the last, metres.
 constexpr double kConverged = 2e-7;
-/// Eigenvalues of the normal equations are mean squares of what the distances change for a unit of
-/// motion. Below kMinCore where the object touches, a direction is not told from what the normals
-/// err by: 3°, whose square is 0.003, and kNoises times their variance, which scatters by √(2/n) of
-/// itself where n of them are independent. Twice as much would leave out the turn of two balls
-/// about the line between them, which blur makes less round, and loses sensor_b's lopsided ball.
+/// Eigenvalues of the normal equations are mean squares of the distances' change per unit of
+/// motion. Below kMinCore in the contact, a direction cannot be told from the error of the normals:
+/// 3°, whose square is 0.003, and kNoises times their variance. That scatters by √(2/n) of itself
+/// for n independent normals. Twice as much would leave out the rotation of two balls about the
+/// line between them, which blur makes less round, and loses sensor_b's lopsided ball.
 constexpr double kMinCore = 0.003;
 constexpr double kNoises = 3;
 /// Times the number of independent places an eigenvalue below this is of an unobservable direction:
@@ -46,10 +46,10 @@ constexpr double kMaxDifference = 0.2;
 /// A surfel and the gel that it is compared with.
 struct Pair {
   Vector3d moved;
-  Vector3d edge;  ///< Of the surfel, moved.
+  Vector3d edge;  ///< The surfel's edge, moved.
   double share = 1;
   Vector3d normal;        ///< Mean of the surfel's and the gel's.
-  Vector3d upright;       ///< Of the undeformed surface.
+  Vector3d upright;       ///< The undeformed surface's normal.
   double difference = 0;  ///< Squared, of both normals.
   double distance = 0;    ///< From the gel to where the surfel should be, along `normal`, metres.
 };
@@ -153,7 +153,7 @@ AllEquations equations_of(const std::vector<Pair>& pairs, std::size_t surfels, A
 /// Orthonormal twists, one a column.
 using Twists = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
 
-/// Of `twists`, which are orthonormal, the part that turns the object about axes along the surface.
+/// The subspace of the orthonormal `twists` that rotates the object about axes along the surface.
 Twists rolls_of(const Twists& twists, const Vector3d& upright) {
   if (twists.cols() == 0) return twists;
   const Eigen::MatrixXd turns =
@@ -164,10 +164,10 @@ Twists rolls_of(const Twists& twists, const Vector3d& upright) {
   return twists * parts.matrixV().leftCols(rolling);
 }
 
-/// The mean equations of both, without what they must not determine. Along directions that the
-/// touched shape does not show, the core's normals are noise. There only shoulders count: they
-/// follow the object's edges. But they also follow the rim of a round contact, which stays where it
-/// is while the object rolls; so they do not determine a roll that the touched shape does not show.
+/// The mean of core and shoulder equations, without the parts that each must not determine. In
+/// directions that the shape in contact does not determine, the core's normals are noise and only
+/// shoulders count: they follow the object's edges. They also follow the rim of a round contact,
+/// which stays in place while the object rolls. So shoulders alone do not determine a roll.
 Equations mean_of(const AllEquations& all, double min_core, const Vector3d& upright) {
   Equations mean;
   mean.weight = all.core.weight + all.shoulders.weight;
@@ -188,7 +188,7 @@ Equations mean_of(const AllEquations& all, double min_core, const Vector3d& upri
   return mean;
 }
 
-/// Of the steps that change nothing of what is observed, the one that turns least.
+/// The step with the least rotation among those that differ only in unobservable directions.
 Twist min_turn(const Twist& step, const std::vector<Twist>& free) {
   if (free.empty()) return step;
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 6> turns(3, free.size());

@@ -12,7 +12,7 @@ namespace dtact::perceive {
 /// How surfels lie on the gel of a view.
 struct Alignment {
   Motion motion = Motion::Identity();
-  double rms = 0;      ///< Of the distances along the normals, of the points that count, metres.
+  double rms = 0;      ///< RMS of the distances along the normals, for points that count, metres.
   double overlap = 0;  ///< Share of the surfels that count.
   double fit = 0;      ///< Share of the surfels compared that count: the others lie elsewhere.
   std::size_t points = 0;  ///< Number of those.
@@ -26,14 +26,14 @@ struct Alignment {
 /// Point-to-plane ICP with projective association: brings `surfels` onto the gel that `view` shows,
 /// starting at `start`. Each surfel is compared with the gel above or below it along the undeformed
 /// surface's normal; Gauss-Newton with Tukey's weights. Where neither the gel nor the surfel is
-/// pressed, nothing is compared. Directions that the shape does not determine (a ball's rotations,
-/// a plate's sliding) are not moved along, except for what makes the rotation least, so that a
-/// sliding ball slides and does not roll.
+/// pressed, nothing is compared. There is no motion along unobservable directions (a ball's
+/// rotations, a plate's sliding), except to minimise the rotation. So a sliding ball slides and
+/// does not roll.
 [[nodiscard]] Alignment align(std::span<const Surfel> surfels, const ContactView& view,
                               const Motion& start);
 
-/// The covariance, as Alignment has it, of an error that is unknown along unit twists about
-/// `centre`, their rotation times `arm`, and 0 along all others.
+/// The covariance (as in Alignment) of an error that is unknown along the unit `twists` and 0 along
+/// all others. Twists are about `centre`, with rotations times `arm`.
 [[nodiscard]] Matrix6 unknown_along(std::span<const Twist> twists, const Eigen::Vector3d& centre,
                                     double arm);
 

@@ -50,7 +50,7 @@ ContactPatch make_patch(const ContactView& view) {
   }
   if (core == 0) return patch;
   patch.area = static_cast<double>(core) * view.px() * view.px();
-  // Every so many-th pixel of both sides, and so of the places beside.
+  // Takes every `stride`-th pixel along both sides, for core and beside.
   const int stride = std::max(1, static_cast<int>(std::ceil(std::sqrt(
                                      static_cast<double>(core) / static_cast<double>(kCore)))));
   const Motion back = patch.frame.inverse();

@@ -9,17 +9,17 @@
 
 namespace dtact::perceive {
 
-/// What one frame says of where an object may be, in a few hundred samples of the gel's surface:
-/// where it lies against the object, and where the object can only be further away. All in the
-/// contact's frame: its origin in the middle of the contact, z along the undeformed surface's
-/// normal there, towards the object. Metres. It holds on to nothing: another thread may have it.
+/// A few hundred samples of the gel's surface in one frame: where the gel lies against the object,
+/// and where the object can only be further away. All samples are in the contact's frame: its
+/// origin is the middle of the contact, z the undeformed surface's normal there, towards the
+/// object. Metres. It references no other data, so another thread may own it.
 struct ContactPatch {
   struct Sample {
     Eigen::Vector3d point;
     Eigen::Vector3d normal;
   };
-  /// The gel lies against the object: it touches, and does not bend away as where it hangs between
-  /// an edge and the undeformed surface (there it is a shoulder, under an object a bowl or flat).
+  /// Samples where the gel lies against the object. Between an object's edge and the undeformed
+  /// surface the gel forms a shoulder; under an object it is flat or a bowl.
   std::vector<Sample> core;
   /// Some of all other places: no part of the object is below them.
   std::vector<Sample> beside;
@@ -27,11 +27,11 @@ struct ContactPatch {
   double beside_weight = 1;
   /// The contact's frame to the surface frame.
   Motion frame = Motion::Identity();
-  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< Of the core.
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  ///< The core's middle.
   double lowest = 0;   ///< z of the core, but for its lowest twentieth.
   double highest = 0;  ///< And but for its highest.
   double arm = 0;      ///< How far the core reaches from its middle: root mean square.
-  double area = 0;     ///< Of the core, square metres.
+  double area = 0;     ///< The core's area, square metres.
 };
 
 /// At most about 1500 samples of the core and twice as many beside, each in no order. No core where

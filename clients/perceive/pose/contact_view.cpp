@@ -9,8 +9,8 @@
 namespace dtact::perceive {
 namespace {
 
-/// Three standard deviations of the noise of a reference map, metres; and what a reference that
-/// has aged may be off by, as a share of the deepest point.
+/// Three standard deviations of a reference map's noise, metres. kPressedShare: the error of an
+/// aged reference, as a share of the deepest point.
 constexpr double kNoise = 3e-5;
 constexpr double kPressedShare = 0.05;
 /// The depth's curvature is taken over so far to both sides, metres.

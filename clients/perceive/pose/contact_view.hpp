@@ -19,8 +19,8 @@ struct Surfel {
   double share = 1;
 };
 
-/// The gel's surface in one frame, round a contact: the object's own shape where it touches, and
-/// beside it the gel's shoulders, which move with the object.
+/// The gel's surface around a contact in one frame: the object's own shape inside the contact, and
+/// the gel's shoulders beside it, which move with the object.
 class ContactView {
  public:
   /// `cloud` is what a CloudMaker makes of `depth` at stride 1, `table` its table (null: a plane);
@@ -29,14 +29,14 @@ class ContactView {
               double uncertainty_um);
 
   struct Sample {
-    Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< Of the gel, metres.
-    Eigen::Vector3d normal = Eigen::Vector3d::Zero();    ///< Of the gel there, of length 1.
+    Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< Point of the gel, metres.
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();    ///< The gel's normal, length 1.
     Eigen::Vector3d upright = Eigen::Vector3d::UnitZ();  ///< The undeformed surface's normal.
-    double depth = 0;  ///< Of the gel there, metres, positive = pressed.
+    double depth = 0;  ///< The gel's depth, metres, positive = pressed.
     double below = 0;  ///< How deep the point asked for lies below the undeformed surface, metres.
   };
-  /// The gel where the undeformed surface's normal through `point` (metres) crosses it,
-  /// interpolated between four pixels; nothing beside the map and where a pixel is untrusted.
+  /// The gel where the undeformed surface's normal through `point` (metres) crosses it.
+  /// Interpolated between four pixels; nothing outside the map and where a pixel is untrusted.
   [[nodiscard]] std::optional<Sample> at(const Eigen::Vector3d& point) const;
 
   /// The object lies on the gel here: no shoulder, where the depth falls off hollowly.
@@ -53,13 +53,13 @@ class ContactView {
   [[nodiscard]] const Eigen::Vector3d& centre() const noexcept { return centre_; }
   /// Mean of the undeformed surface's normals there, of length 1.
   [[nodiscard]] const Eigen::Vector3d& upright() const noexcept { return upright_; }
-  /// Of the pressed pixels, square metres.
+  /// Area of the pressed pixels, square metres.
   [[nodiscard]] double area() const noexcept { return static_cast<double>(pixels_) * px_ * px_; }
   /// Metres.
   [[nodiscard]] double deepest() const noexcept { return deepest_; }
-  /// As the frame states it, metres.
+  /// The frame's uncertainty, metres.
   [[nodiscard]] double uncertainty() const noexcept { return uncertainty_; }
-  /// Of the depth at a pixel, metres; NaN where it is untrusted.
+  /// Depth at a pixel, metres; NaN where it is untrusted.
   [[nodiscard]] double depth(std::size_t i) const noexcept;
 
   [[nodiscard]] const PointCloud& cloud() const noexcept { return cloud_; }

@@ -5,7 +5,7 @@
 
 namespace dtact::perceive {
 
-/// A rigid motion or a pose: p lies at linear() · p + translation() after it. Metres, surface
+/// A rigid motion or a pose: maps p to linear() · p + translation(). Metres, surface
 /// frame.
 using Motion = Eigen::Isometry3d;
 

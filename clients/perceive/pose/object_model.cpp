@@ -36,8 +36,8 @@ void check_size(const Eigen::AlignedBox3d& box) {
       kMinObjectMm, kMaxObjectMm));
 }
 
-/// One surfel of a direction (the largest component of its normal, and that one's sign) in each
-/// cell, so that thin walls keep both of their sides.
+/// Keeps one surfel per cell and direction (axis and sign of the normal's largest component), so
+/// that thin walls keep both sides.
 class Thinner {
  public:
   Thinner(double cell, const Vector3d& corner) : cell_(cell), corner_(corner) {}
@@ -61,8 +61,8 @@ class Thinner {
   std::vector<Surfel> kept_;
 };
 
-/// The same for the same mesh: points spread evenly over each triangle (the sequence of Martin
-/// Roberts' plastic number), as many as its area is worth, the fractions carried on.
+/// Spreads points evenly over each triangle (Martin Roberts' plastic number sequence), as many as
+/// its area needs, carrying fractions on. Deterministic: the same mesh gives the same points.
 std::vector<Surfel> sample(const Mesh& mesh, double scale, double spacing, const Vector3d& corner) {
   Thinner thinner(spacing, corner);
   constexpr double kFirst = 0.7548776662466927;
@@ -165,7 +165,7 @@ class Tumble {
  private:
   static constexpr int kDirections = 1600;
 
-  /// Of the middle over the plane.
+  /// Height of the middle above the plane.
   [[nodiscard]] double height_of(const Vector3d& direction) const {
     double most = 0;
     for (const Vector3d& point : points_) most = std::max(most, direction.dot(point));
@@ -187,7 +187,7 @@ std::vector<Vector3d> rests_of(const std::vector<Surfel>& surfels) {
   return rests;
 }
 
-/// Of a closed surface the mean of what points outwards is positive wherever it is measured from.
+/// For a closed surface the mean outward component is positive for any origin.
 void check_outward(const std::vector<Surfel>& surfels, const Vector3d& middle) {
   double outward = 0;
   double all = 0;
@@ -232,7 +232,7 @@ ObjectModel make_object(const Mesh& mesh, double metres_per_unit, std::string na
   for (;; model.spacing *= 1.2) {
     model.surfels = cloud ? thin(mesh, metres_per_unit, model.spacing, box.min())
                           : sample(mesh, metres_per_unit, model.spacing, box.min());
-    // Nor may a cloud's own gaps be holes: two of its points for each that is left.
+    // A cloud's own gaps must not become holes either: two of its points for each one kept.
     const bool sparse = cloud && mesh.points.size() < 2 * model.surfels.size();
     if (model.surfels.size() <= kMaxSurfels && !sparse) break;
     if (sparse && model.spacing > kCoarse) {

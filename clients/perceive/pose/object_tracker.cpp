@@ -10,10 +10,10 @@
 namespace dtact::perceive {
 namespace {
 
-/// A contact that has grown so many times shows more of the object: it is searched again.
+/// A contact that has grown by this factor shows more of the object: the search is repeated.
 constexpr double kSearchGrown = 1.5;
-/// After a search that found nothing the next one waits for so many frames, twice as many each
-/// time.
+/// Frames until the next search after one without result; doubles each time, up to
+/// kMaxPause.
 constexpr int kPause = 30;
 constexpr int kMaxPause = 600;
 

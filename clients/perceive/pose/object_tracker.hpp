@@ -40,7 +40,7 @@ class ObjectTracker {
     std::stop_source stop;
     std::future<std::optional<Placement>> result;
     Motion contact = Motion::Identity();  ///< The contact's motion at its frame.
-    double area = 0;                      ///< Of the contact then, square metres.
+    double area = 0;                      ///< The contact's area then, square metres.
   };
 
   void begin_search(const ContactView& view);
@@ -53,7 +53,7 @@ class ObjectTracker {
   std::shared_ptr<const ObjectModel> object_;
   Tracker contact_;
   std::optional<Search> search_;
-  std::optional<Placement> placement_;  ///< As the contact lay in its first frame.
+  std::optional<Placement> placement_;  ///< Relative to the contact's first frame.
   double searched_area_ = 0;
   int pause_ = 0;                       ///< Frames until the next search may begin.
   int next_pause_ = 0;                  ///< After a search that found nothing; 0: the shortest.

@@ -20,7 +20,7 @@ constexpr double kSameWay = 0.7;
 constexpr double kInside = 1.5;
 /// Inside by this is allowed to noise and to edges between samples, metres.
 constexpr double kAllowed = 3e-5;
-/// Of score_of() at the last steps, metres.
+/// The `limit` of score_of() at the last steps, metres.
 constexpr double kFineLimit = 1e-4;
 
 double inside(double gap, double limit) { return std::clamp((-gap - kAllowed) / limit, 0.0, 1.0); }
@@ -163,7 +163,7 @@ std::vector<Twist> unobservable_twists(const BottomView& bottom, const ContactPa
   constexpr double kShift = 2.5e-4;
   constexpr double kLimit = 1e-4;
   constexpr double kChange = 0.03;
-  // What the touched shape does not show, by the distances along the normals alone.
+  // Directions that the shape in contact does not show, by distances along the normals alone.
   Matrix6 shape = Matrix6::Zero();
   double count = 0;
   for (const auto& sample : patch.core) {

@@ -42,7 +42,7 @@ class BottomView {
 
   Motion from_object_ = Motion::Identity();
   std::vector<Surfel> surfels_;
-  std::vector<std::int32_t> cells_;  ///< Of surfels_; −1: none.
+  std::vector<std::int32_t> cells_;  ///< Indices into surfels_; −1: none.
   double x0_ = 0;
   double y0_ = 0;
   double per_cell_ = 0;
@@ -50,8 +50,8 @@ class BottomView {
   int height_ = 0;
 };
 
-/// How well an object whose underside this is explains a contact: the part of the core that lies on
-/// it, each place weighted by its distance (1 on it, 0 from `limit` on), less the places where the
+/// How well an object with this underside explains a contact. The score is the part of the core
+/// that lies on it, weighted by distance (1 on it, 0 from `limit` on), minus the places where the
 /// object would be inside the gel. At most 1. `move`: the contact's frame to the underside's.
 [[nodiscard]] double score_of(const BottomView& bottom, const ContactPatch& patch,
                               const Motion& move, double limit);
@@ -69,7 +69,7 @@ struct ScoredPose {
                                     const Motion& move, double step, double last);
 
 /// Unit twists about the patch's middle, in the contact's frame, along which the score hardly
-/// changes over a quarter of a millimetre: neither the touched shape shows them nor its outline.
+/// changes over a quarter of a millimetre: neither the contact's shape nor its outline shows them.
 [[nodiscard]] std::vector<Twist> unobservable_twists(const BottomView& bottom,
                                                      const ContactPatch& patch, const Motion& move);
 

@@ -26,7 +26,7 @@ constexpr double kFirstLimit = 2e-4;
 constexpr std::size_t kSamples = 200;
 /// The object's lowest part is what is within the core's height and this, metres.
 constexpr double kLift = 8e-5;
-/// As far up as anything of it may be in the gel's way.
+/// Height up to which the object may collide with the gel, metres.
 constexpr double kInTheWay = 1e-3;
 /// Its area is the core's within this factor: the core ends short of edges.
 constexpr double kAreaFactor = 4;
@@ -46,7 +46,7 @@ constexpr double kExplained = 0.5;
 constexpr double kAsWell = 0.06;
 
 struct Candidate {
-  Matrix3d turn;                      ///< Of the object's frame to the underside's.
+  Matrix3d turn;                      ///< The object's frame to the underside's.
   Motion move = Motion::Identity();   ///< The contact's frame to the underside's.
   Motion place = Motion::Identity();  ///< The object's frame to the contact's.
   double score = 0;
@@ -119,7 +119,7 @@ class Search {
     move.translation() = -(move.linear() * patch_.middle);
     move.translation().head<2>() += low;
     move.translation().z() = -patch_.lowest;
-    // Where the lowest of it does not touch, it is not as deep.
+    // If its lowest part is not in contact, the object is less deep.
     std::array<double, kFirstSamples> gaps{};
     std::size_t count = 0;
     for (const auto& sample : few_.core) {

@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr std::size_t kSurfels = 1500;
-/// A contact that has grown so many times shows what its keyframe lacks.
+/// A contact that has grown by this factor shows what its keyframe lacks.
 constexpr double kGrown = 1.5;
 /// What a good alignment has at least; through the daemon those of fifteen objects that turn, slide
 /// and roll have a fit above 0.95. A frame becomes a keyframe where it shares less than kShared
@@ -123,8 +123,8 @@ std::size_t Tracker::oldest_shared(const ContactView& view, const Motion& from) 
 }
 
 bool Tracker::relocalise(const ContactView& view) {
-  // From where it was, and from a keyframe that is moved to where the contact is now and turned
-  // about the normal; another turn with every frame.
+  // Starts from the last pose, and from a keyframe moved to the present contact and rotated about
+  // the normal. Each frame tries another angle.
   constexpr std::array kTurns{0.0, 0.25, -0.25, 0.5, -0.5, 0.9, -0.9, 1.4, -1.4, 2.1, -2.1, 3.1};
   const auto attempt = static_cast<std::size_t>(lost_ - 1);
   for (const std::size_t key : {current_, (current_ + attempt) % keyframes_.size()}) {
@@ -180,9 +180,9 @@ const Tracker::Pose& Tracker::follow(const ContactView& view, std::uint64_t sequ
   take(std::move(found), State::tracked);
   if (view.area() >= kGrown * keyframes_[current_].area ||
       view.deepest() >= kGrown * keyframes_[current_].deepest) {
-    // In its place: the tip that is touched first lies on all that is touched later, and turns on
-    // it as it likes. A contact that is being pressed in is not taken to slide meanwhile, so what
-    // its tip does not show adds no uncertainty.
+    // Replaces the keyframe: the tip in contact first fits all later contacts at any angle. A
+    // contact that is being pressed in is assumed not to slide meanwhile, so directions that its
+    // tip does not determine add no uncertainty.
     const Matrix6 covariance = keyframes_[current_].covariance;
     keyframes_[current_] = keyframe_of(view);
     keyframes_[current_].covariance = covariance;

@@ -11,10 +11,10 @@ namespace dtact::perceive {
 /// A smaller contact has no shape, square metres: 300 pixels of 0.0414 mm.
 constexpr double kMinArea = 5.13e-7;
 
-/// Tracks an object from the frame in which it is first touched. The gel seen in that frame, and in
-/// keyframes later, is kept as surfels where they lay in the first frame. Each frame is aligned
-/// with the oldest keyframe that it shares enough with, so that errors add up over keyframes and
-/// not over frames, and are gone where the object comes back.
+/// Tracks an object from its first frame of contact. Keyframes, the first frame among them, hold
+/// the gel as surfels in the coordinates of the first frame. Each frame is aligned with the oldest
+/// keyframe that it overlaps enough with. So errors add up over keyframes and not over frames, and
+/// vanish when the object returns.
 class Tracker {
  public:
   enum class State : std::uint8_t {
@@ -23,14 +23,14 @@ class Tracker {
     tracked,    ///< The motion is known.
     lost,       ///< No motion explains the frame; `motion` is the last one known.
     recovered,  ///< Tracked again after a loss.
-    searching   ///< Of an ObjectTracker: the object has not been found yet.
+    searching   ///< ObjectTracker only: the object has not been found yet.
   };
   struct Pose {
     State state = State::idle;
     std::uint64_t since = 0;  ///< Sequence of the frame that the motion is measured from.
     Alignment alignment;
-    std::vector<Twist> unobservable;  ///< As unobservable_of() says.
-    std::uint32_t alternatives = 0;   ///< Of an ObjectTracker: as Placement has them.
+    std::vector<Twist> unobservable;  ///< From unobservable_of().
+    std::uint32_t alternatives = 0;   ///< ObjectTracker only: Placement::alternatives.
     /// The motion can be used.
     [[nodiscard]] bool valid() const noexcept {
       return state == State::started || state == State::tracked || state == State::recovered;
@@ -48,10 +48,10 @@ class Tracker {
 
  private:
   struct Keyframe {
-    std::vector<Surfel> surfels;  ///< As they lay in the first frame.
+    std::vector<Surfel> surfels;  ///< In the coordinates of the first frame.
     Motion motion = Motion::Identity();
-    Matrix6 covariance;  ///< Of the error of `motion`.
-    double deepest = 0;  ///< Of the contact, metres.
+    Matrix6 covariance;  ///< Of `motion`'s error.
+    double deepest = 0;  ///< The contact's depth, metres.
     double area = 0;     ///< Square metres.
     Eigen::Vector3d centre;
   };

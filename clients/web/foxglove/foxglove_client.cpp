@@ -123,7 +123,7 @@ void FoxgloveClient::subscribe(const SubscriptionRequest& request) {
         status(kError, fmt::format("{} subscriptions are all there may be", kMaxSubscriptions)));
   }
   Subscription made{number / kTopics, static_cast<Topic>(number % kTopics), nullptr};
-  // It comes when it changes: whoever is new has missed it.
+  // It is sent at changes only, so a new subscriber gets the last one.
   if (made.topic == Topic::light) made.waiting = mounts_[made.place].sensor->light();
   subscriptions_.emplace(request.subscription, std::move(made));
   if (!writing_) write_next();
@@ -187,7 +187,7 @@ void FoxgloveClient::send(std::string bytes, bool text) {
   if (closed_) return;
   control_.push_back({std::move(bytes), text});
   if (control_.size() > kMaxControl) {
-    // Later, since whoever sends may be walking through the listeners.
+    // Posted, because the sender may be iterating over the listeners.
     asio::post(socket_->executor(), [self = shared_from_this()] {
       self->close("too many answers and notices lay unread");
     });

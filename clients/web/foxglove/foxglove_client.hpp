@@ -28,7 +28,7 @@ struct Mount {
 /// One client of the Foxglove protocol. On the thread that runs the gateway's `io`.
 ///
 /// Overflow. Of each channel the newest message waits, in place of one before it. Answers and
-/// notices are never dropped: a client that leaves more than kMaxControl of them unread is let go.
+/// notices are never dropped: a client with more than kMaxControl of them unread is disconnected.
 class FoxgloveClient : public SensorTopics::Listener,
                        public std::enable_shared_from_this<FoxgloveClient> {
  public:

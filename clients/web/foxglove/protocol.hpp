@@ -38,7 +38,7 @@ struct Channels {
   Topics topics;
 };
 
-// Of the server's. `prefixes`: what stands before the services of each sensor.
+// Messages of the server. `prefixes`: prefix of each sensor's services.
 
 [[nodiscard]] std::string server_info(std::string_view program);
 [[nodiscard]] std::string advertise(const std::vector<Channels>& all);
@@ -54,7 +54,7 @@ struct Channels {
 /// What stands before the payload of a message.
 [[nodiscard]] std::string message_head(std::uint32_t subscription, std::uint64_t time_ns);
 
-// Of a client's.
+// Messages of a client.
 
 struct SubscriptionRequest {
   std::uint32_t subscription = 0;
@@ -62,7 +62,7 @@ struct SubscriptionRequest {
 };
 struct Operation {
   std::string name;                                  ///< "subscribe"
-  std::vector<SubscriptionRequest> subscribed = {};  ///< Of subscribe.
+  std::vector<SubscriptionRequest> subscribed = {};  ///< By subscribe.
   std::vector<std::uint32_t> ended = {};             ///< Subscriptions, of unsubscribe.
 };
 /// Empty when it is no JSON object with an "op"; entries that make no sense are left out.

@@ -10,8 +10,8 @@
 
 namespace dtact::web::foxglove {
 
-/// One daemon's channels: makes each message once for all who want it, and asks the daemon for what
-/// somebody wants. On the thread that runs the gateway's `io`.
+/// One daemon's channels. Makes each message once for all subscribers, and requests only subscribed
+/// parts from the daemon. Runs on the thread of the gateway's `io`.
 class SensorTopics {
  public:
   class Listener {
@@ -31,12 +31,12 @@ class SensorTopics {
 
   void start();
   void stop();
-  /// What a listener wants from now on. It is told how the daemon is from its first call, also when
-  /// it wants nothing.
+  /// Sets what a listener wants from now on. From its first call it receives the daemon's state,
+  /// also when it wants nothing.
   void want(Listener& listener, Topics wanted);
   void forget(Listener& listener);
   [[nodiscard]] Source& source() const noexcept { return *source_; }
-  /// The light as it is, for who has just asked; null while it is not known.
+  /// The present light, for new subscribers; null while unknown.
   [[nodiscard]] const std::shared_ptr<const Message>& light() const noexcept { return light_; }
 
  private:

@@ -15,7 +15,7 @@ std::shared_ptr<const Message> made(const v1::Frame& frame,
               message.SerializeAsString()});
 }
 
-/// As a recording has it: pictures stand on channels of their own.
+/// Like in a recording: images have channels of their own.
 std::shared_ptr<const Message> without_pictures(const v1::Frame& frame, bool depth) {
   v1::Frame plain = frame;
   plain.clear_luma();
@@ -56,7 +56,7 @@ Topics served_by(const std::optional<v1::HelloReply>& daemon) {
 v1::Subscribe subscription_for(Topics wanted) {
   const auto wants = [wanted](Topic topic) { return wanted.test(index(topic)); };
   v1::Subscribe request;
-  // Whoever takes whole frames stores them, or looks at them from afar; a picture is made here.
+  // Clients of whole frames store them or are remote; images are made here.
   if (wants(Topic::frame)) {
     request.set_depth(v1::DEPTH_PREDICT_ZSTD);
   } else if (wants(Topic::depth)) {

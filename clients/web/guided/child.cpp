@@ -32,7 +32,7 @@ namespace {
 constexpr std::chrono::seconds kTimeout{5};
 /// As Child::kSecretFile names it.
 constexpr int kSecret = 3;
-/// Of what is written as errors, so much is kept: the end, which says why.
+/// Bytes kept of the error output: its end, which has the reason.
 constexpr std::size_t kMaxErrors = 2000;
 
 [[noreturn]] void fail(int error, const std::string& what) {
@@ -64,7 +64,7 @@ struct Pair {
   base::UniqueFd there;
 };
 
-/// A file without a name that nobody else can read.
+/// A file without a name that no other process can read.
 base::UniqueFd secret_file(const std::string& secret) {
   base::UniqueFd file(::memfd_create("secret", MFD_CLOEXEC));
   if (!file || ::fchmod(file.get(), S_IRUSR | S_IWUSR) != 0 ||
@@ -74,7 +74,7 @@ base::UniqueFd secret_file(const std::string& secret) {
   return file;
 }
 
-/// What posix_spawn is told.
+/// Arguments of posix_spawn.
 class Spawning {
  public:
   Spawning() {

@@ -21,7 +21,7 @@ class Child : public std::enable_shared_from_this<Child> {
   /// The longest line that is taken; one that is longer ends the program.
   static constexpr std::size_t kMaxLine = std::size_t{8} << 20U;
   static constexpr std::size_t kMaxTyped = std::size_t{64} << 10U;
-  /// The file, in the program, that holds what it is told in secret.
+  /// The path of the secret's file, as the program sees it.
   static constexpr const char* kSecretFile = "/proc/self/fd/3";
 
   struct Handlers {
@@ -64,10 +64,10 @@ class Child : public std::enable_shared_from_this<Child> {
   Handlers handlers_;
   pid_t pid_ = -1;  ///< −1: not there, or waited for.
   int status_ = 0;
-  int open_ = 0;  ///< Of exit, output and errors.
+  int open_ = 0;  ///< Open ones of exit, output and errors.
   std::string output_;
   std::array<char, 1024> piece_{};
-  std::string said_;  ///< As errors, the end of it.
+  std::string said_;  ///< End of the error output.
   std::string typed_;
   std::string writing_;
 };

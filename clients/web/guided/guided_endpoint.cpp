@@ -156,7 +156,7 @@ std::shared_ptr<Child> GuidedEndpoint::begin(const Calibrated& sensor, const std
   const fs::path folder = folder_for(work_, name, wish.resume());
   cli::GuidedLine line;
   line.mutable_started()->set_folder(folder.string());
-  relay.tell(cli::json_line(line));
+  relay.send_text(cli::json_line(line));
   auto child = std::make_shared<Child>(relay.executor());
   try {
     child->start(words_for(sensor.options, wish, folder), sensor.options.token,

@@ -33,7 +33,7 @@ class GuidedEndpoint {
 
   void stop();
   [[nodiscard]] bool knows(std::string_view path) const { return find(path) != nullptr; }
-  /// Of a path that knows() knows; `token`: the page's.
+  /// Opens a path for which knows() is true; `token`: the page's.
   [[nodiscard]] Upgrade upgrade(std::string_view path, std::string token);
 
  private:

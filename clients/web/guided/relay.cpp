@@ -18,7 +18,7 @@ namespace {
 
 /// How dtact-calibrate begins a line that holds a scene.
 constexpr std::string_view kScene = R"({"scene":)";
-/// How long one that was told why may take to read it.
+/// How long a page may take to read the reason before it is closed.
 constexpr std::chrono::seconds kLinger{10};
 /// Sentences that wait for a page that does not read: a session says a few a minute.
 constexpr std::size_t kMaxTexts = 256;
@@ -56,7 +56,7 @@ void Relay::take(const std::string& message) {
   try {
     Child::Handlers handlers;
     handlers.line = [weak](std::string line) {
-      if (const auto self = weak.lock()) self->tell(std::move(line));
+      if (const auto self = weak.lock()) self->send_text(std::move(line));
     };
     handlers.ended = [weak](int status, const std::string& errors) {
       if (const auto self = weak.lock()) self->on_child_ended(status, errors);
@@ -67,7 +67,7 @@ void Relay::take(const std::string& message) {
   }
 }
 
-void Relay::tell(std::string text) {
+void Relay::send_text(std::string text) {
   if (finished_) return;
   if (texts_.size() >= kMaxTexts) return finish("this page has not read for too long");
   queue(std::move(text));

@@ -36,7 +36,7 @@ class Relay : public std::enable_shared_from_this<Relay> {
   /// Ends it at once.
   void close() { over(); }
   /// A message to the page (a GuidedLine as JSON). Of scenes that wait the newest is sent.
-  void tell(std::string text);
+  void send_text(std::string text);
   [[nodiscard]] boost::asio::any_io_executor executor() { return socket_->executor(); }
 
  private:
@@ -59,7 +59,7 @@ class Relay : public std::enable_shared_from_this<Relay> {
   bool writing_ = false;
   bool finished_ = false;  ///< Nothing comes after what waits.
   bool over_ = false;
-  boost::asio::steady_timer linger_;  ///< Until one that was told all is let go of.
+  boost::asio::steady_timer linger_;  ///< Closes the page after its last message.
 };
 
 }  // namespace dtact::web::guided

@@ -49,7 +49,7 @@ const browser = {
   target: ["chrome109", "firefox115", "safari16.4"],
 };
 
-/** Of the project's chart of speed against accuracy what a daemon can be asked for. */
+/** The settings from the project's chart of speed against accuracy that a daemon accepts. */
 function measured() {
   const [names, ...rows] = readFileSync(
     path.join(values.tree, "tests/accuracy/chart/chart.csv"),
@@ -84,7 +84,7 @@ function withNeeded(name, known = new Set()) {
   return known;
 }
 
-/** What the packages that become part of the page ask to be told with it. */
+/** Licence notices of the packages that become part of the page. */
 function licences() {
   const { dependencies } = JSON.parse(readFileSync("package.json", "utf8"));
   const names = new Set(Object.keys(dependencies).flatMap((name) => [...withNeeded(name)]));

@@ -26,11 +26,11 @@ bool has_line(const std::string& text, std::string_view wanted) {
 }
 
 struct Trouble {
-  unsigned bit;  ///< Of what is now; what was since the start is 16 bits above.
+  unsigned bit;  ///< the present state; the state since the start is 16 bits above
   const char* name;
   const char* fix;
 };
-// As the Raspberry Pi's documentation of vcgencmd says, under get_throttled.
+// According to the Raspberry Pi's documentation of vcgencmd, under get_throttled.
 constexpr std::array<Trouble, 4> kTroubles{{
     {0, "under-voltage", "a supply and a cable made for this board; then vcgencmd get_throttled"},
     {1, "processor clock capped", "see under-voltage; vcgencmd measure_clock arm"},

@@ -109,12 +109,12 @@ Findings check_camera(const Machine& machine, const hal::CameraConfig& camera) {
                           fmt::format("{} \"{}\" captures{}", node, video.card,
                                       video.usb ? "" : ", on no USB port"),
                           ""});
-    }  // Metadata nodes are nobody's concern.
+    }  // Metadata nodes are not relevant.
   }
   if (!captures && findings.empty()) {
     findings.push_back({bad, "no video node captures", "v4l2-ctl --list-devices"});
   }
-  // A Raspberry Pi 4 has such nodes of its image processor without any camera (bcm2835-isp).
+  // A Raspberry Pi 4 has these nodes for its image processor without any camera (bcm2835-isp).
   if (captures && !usb && camera.backend == "v4l2" && camera.v4l2.device.empty()) {
     findings.push_back({Verdict::note, "none of them is a USB camera",
                         "lsusb, then dtactctl cameras and camera.v4l2.device"});

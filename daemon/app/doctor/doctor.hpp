@@ -7,17 +7,17 @@
 
 namespace dtact::app {
 
-/// `dtactd --doctor`: looks at what the configuration needs of this machine (camera nodes and their
+/// `dtactd --doctor`: checks what the configuration needs of this machine (camera nodes and their
 /// ports, SPI and GPIO with their permissions, SPI rate, clocks, power, real-time limits, memory)
-/// and prints one line for each thing looked at; under what is wrong, the command that fixes it.
-/// Changes nothing: the SPI's true rate is measured with zeros, which LEDs ignore. Returns the exit
+/// and prints one line for each check; under a failed one, the command that fixes it.
+/// Changes nothing: it measures the SPI's true rate with zeros, which LEDs ignore. Returns the exit
 /// status: 0 when nothing is wrong, else 1.
 [[nodiscard]] int doctor(const hal::Config& config, std::ostream& out,
                          const Machine& machine = Machine());
 
-/// `dtactd --doctor --report`: what this machine is (board, system, libraries, cameras with their
-/// modes) and the doctor's findings, for somebody else to read: neither names of users and hosts
-/// nor serial numbers stand in it.
+/// `dtactd --doctor --report`: describes this machine (board, system, libraries, cameras with their
+/// modes) with the doctor's findings, for other readers: without user names, host names
+/// and serial numbers.
 void report(const hal::Config& config, std::ostream& out, const Machine& machine = Machine());
 
 }  // namespace dtact::app

@@ -39,7 +39,7 @@ class Machine {
   /// The board's name of itself, as "Raspberry Pi 5 Model B Rev 1.0"; empty without a device tree.
   [[nodiscard]] std::string model() const { return line("/proc/device-tree/model").value_or(""); }
 
-  /// Whether there is such a file.
+  /// Whether the file exists.
   [[nodiscard]] bool has(const std::string& path) const;
   /// Whether dtactd.service is installed.
   [[nodiscard]] bool has_service() const;

@@ -6,14 +6,14 @@
 
 namespace dtact::pipeline {
 
-/// Sees contact in a depth map, with hysteresis: made when the area deeper than `threshold_mm`
-/// reaches `area_mm2`, lost when the area deeper than `release_mm` falls below it, each for
-/// `debounce_frames` frames in a row. Untrusted pixels count for nothing.
+/// Detects contact in a depth map, with hysteresis. Contact begins when the area deeper
+/// than `threshold_mm` reaches `area_mm2` and ends when that deeper than `release_mm` is smaller,
+/// each after `debounce_frames` frames in a row. Untrusted pixels are ignored.
 class ContactDetector {
  public:
   explicit ContactDetector(const ContactRules& rules) : rules_(rules) {}
 
-  /// What the reconstruction is to add up; no bend.
+  /// What the reconstruction has to sum up; no bend.
   [[nodiscard]] recon::SumRules sum_rules() const noexcept;
 
   /// What one depth map of `width` × `height` pixels, `mm_per_px` millimetres each, added up to by
@@ -29,7 +29,7 @@ class ContactDetector {
 
   ContactRules rules_;
   bool in_contact_ = false;
-  int agreeing_ = 0;  // frames in a row that speak for the other state
+  int agreeing_ = 0;  // consecutive frames that contradict the present state
 };
 
 }  // namespace dtact::pipeline

@@ -43,7 +43,7 @@ void DepthMaker::make(const hal::LumaView& luma, const ReferenceTracker& tracker
   out.surface = model.surface;
   // Within the capacity reserved at start, so this allocates nothing.
   out.depth_um.resize(static_cast<std::size_t>(out.width) * static_cast<std::size_t>(out.height));
-  // What another calibration or rung drew in this buffer says nothing about this one's map.
+  // Marks left in this buffer by another calibration or resolution do not apply to this map.
   const bool another =
       out.drawn_generation != generation_ || out.drawn_resolution != maps_->resolution_index();
   if (another || resolution.coarse) out.drawn.rest = 0;
@@ -80,7 +80,7 @@ void DepthMaker::make(const hal::LumaView& luma, const ReferenceTracker& tracker
   out.times.inspect_ns = steps.sums_ns + clock_.monotonic_ns() - began_ns;
 }
 
-/// What the map is worth, and how the next is made.
+/// Estimates the map's uncertainty and chooses the resolution of the next map.
 void DepthMaker::judge(const Trust& trust, double bend, DepthFrame& out) noexcept {
   const double plain_um = plain_bend_um(bend, out.sharpen_steps);
   const auto expected_um = [&](int decimation, int steps) {

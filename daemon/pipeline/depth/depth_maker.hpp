@@ -14,31 +14,31 @@
 
 namespace dtact::pipeline {
 
-/// Makes a frame's depth where it differs from the reference image, says what touches and what the
-/// map is worth, and chooses how the next map is made. Capture thread only; does not allocate
+/// Makes depth where a frame differs from the reference image, detects contact, estimates the
+/// uncertainty and chooses the resolution of the next map. Capture thread only; does not allocate
 /// after construction.
 class DepthMaker {
  public:
   DepthMaker(const PipelineConfig& config, base::Clock& clock);
 
-  /// From now on this calibration's; null: none. `generation` tells calibrations apart.
+  /// Switches to this calibration; null: none. `generation` identifies the calibration.
   void use(Resolutions* maps, std::uint64_t generation) noexcept;
-  /// The reference image is another: follows it. Takes about six frames' time.
+  /// A new reference image is in use. Takes about six frames' time.
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
-  /// The light on it is. Takes about a frame's time.
+  /// The light has changed by `factor`. Takes about a frame's time.
   void set_light(double factor) noexcept;
 
-  /// Depth, contact and uncertainty of a frame that `tracker` has just looked at, into buffers
-  /// that hold a map of this calibration. `judged`: somebody asks what the map is worth; else its
-  /// bend is left out of the uncertainty, unless the resolution is chosen by it or there is a
-  /// force.
+  /// Writes depth, contact and uncertainty of the frame that `tracker` last looked at to buffers
+  /// that hold a map of this calibration. `judged`: a client wants the uncertainty. Without it the
+  /// uncertainty leaves out the bend, unless the bend chooses the resolution or the force needs
+  /// it.
   void make(const hal::LumaView& luma, const ReferenceTracker& tracker, bool judged,
             DepthFrame& out) noexcept;
-  /// No depth is made of this frame: what was known of contact stands, and `out` says nothing.
+  /// Makes no depth of this frame: the contact state stays, and `out` reports no contact.
   void skip(DepthFrame& out, ContactAbsence why) noexcept;
 
   [[nodiscard]] bool in_contact() const noexcept { return contact_.in_contact(); }
-  /// Somewhere in the last frame the image was darker than the LUT reaches.
+  /// The last frame was somewhere darker than the LUT covers.
   [[nodiscard]] bool beyond() const noexcept { return beyond_; }
 
  private:
@@ -50,7 +50,7 @@ class DepthMaker {
   Resolutions* maps_ = nullptr;
   std::uint64_t generation_ = 0;
   ContactDetector contact_;
-  ResolutionChooser chooser_{0};  ///< Of maps_.
+  ResolutionChooser chooser_{0};  ///< chooses among maps_
   bool beyond_ = false;
 };
 

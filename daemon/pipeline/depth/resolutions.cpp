@@ -23,8 +23,8 @@ void require_sharpening(const recon::Model& model, int steps) {
       "model, or set reconstruction.sharpen to \"auto\" or \"off\"");
 }
 
-/// Of the reference over the map's pixels that are lit and to be trusted: housing that the frame
-/// shows beside the map, or a dark corner in it, has no depth that light could move.
+/// Mean grey of the reference over the map's lit, trusted pixels. Housing beside the map and a
+/// dark corner in it have no depth, so light cannot change it there.
 double mean_grey_of(const recon::Model& model) {
   constexpr int kDarkest_q8 = 4 * recon::kernels::kDarkest_q6;
   const recon::RectifyTable& map = model.rectify;
@@ -64,7 +64,7 @@ void add_force(Resolution& resolution, std::span<const std::int16_t> depth_um, b
 Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
                          const recon::CellLattice& lattice, const ReconstructionRules& rules)
     : model_(model), max_error_um_(rules.max_error_um), mean_grey_(mean_grey_of(*model)) {
-  // Where nothing else is asked for a sharpened map stays as coarse as it is made.
+  // Without another request a sharpened map keeps the resolution at which it is made.
   const int map = rules.decimation == 0 ? recon::kSharpenedAt : rules.decimation;
   if (rules.sharpen > 0) {
     require_sharpening(*model, rules.sharpen);
@@ -74,7 +74,7 @@ Resolutions::Resolutions(const std::shared_ptr<const recon::Model>& model,
   std::vector<int> steps;
   if (rules.sharpen == ReconstructionRules::kAutoSharpen) steps = recon::sharpening_steps(*model);
   if (!steps.empty()) {
-    // The rung without steps is as coarse as the others: plain at full resolution costs more.
+    // The resolution without steps is as coarse as the others: plain at full resolution costs more.
     add(lattice, recon::kSharpenedAt, 0, map);
     for (const int each : steps) add(lattice, recon::kSharpenedAt, each, map);
   } else if (rules.decimation != 0) {
@@ -137,7 +137,7 @@ double Resolutions::lut_um(double depth_mm, int steps) const noexcept {
   const auto& rows =
       of_steps == model_->sharpened.end() ? model_->uncertainty : of_steps->uncertainty;
   if (rows.empty()) {
-    // The radial gain is the published regression's alone.
+    // Only the published regression uses the radial gain.
     const bool published = model_->method == recon::Method::published ||
                            model_->gain.shape == recon::GainShape::radial;
     return published ? kDefaultPublishedUncertaintyUm : kDefaultLutUncertaintyUm;

@@ -17,23 +17,23 @@
 
 namespace dtact::pipeline {
 
-/// One way to turn frames into depth: at a resolution, plain or sharpened. Sharpened levels are
-/// made at recon::kSharpenedAt and interpolated to the map that was asked for.
+/// One way to turn frames into depth: a resolution, plain or sharpened. Sharpened maps are
+/// made at recon::kSharpenedAt and interpolated to the requested resolution.
 struct Resolution {
   recon::Reconstructor reconstructor;
   recon::TileReaders readers;
-  recon::TileRows tiles;  ///< Of the last frame.
+  recon::TileRows tiles;  ///< written by the last frame
 
-  /// Of a map that is finer than the reconstruction: what is interpolated.
+  /// Reconstruction that is interpolated to a finer map.
   struct Coarse {
     recon::Upsampler upsampler;
     std::vector<std::int16_t> depth_um;
     recon::DrawnTiles drawn;
   };
   std::optional<Coarse> coarse;
-  std::optional<recon::ForceMeter> force;  ///< Where the calibration has a force.
+  std::optional<recon::ForceMeter> force;  ///< set if the calibration has a force
 
-  /// The reconstruction's; the map's may be finer.
+  /// The reconstruction's decimation; the map may be finer.
   [[nodiscard]] int decimation() const noexcept { return reconstructor.model().rectify.decimation; }
   [[nodiscard]] int steps() const noexcept { return reconstructor.sharpen_steps(); }
 };
@@ -43,7 +43,7 @@ struct Resolution {
 void add_force(Resolution& resolution, std::span<const std::int16_t> depth_um, bool beyond,
                double uncertainty_um, ContactSummary& contact) noexcept;
 
-/// What a map is and where it goes.
+/// Size and pixel scale of a map.
 struct MapShape {
   int width = 0;
   int height = 0;
@@ -51,8 +51,8 @@ struct MapShape {
   double mm_per_px = 0;
 };
 
-/// A calibration's model in each way that may be asked for: the rungs of a ladder, from the
-/// cheapest to the most accurate. Made on the network's side, used on the capture thread.
+/// A calibration's model at each resolution that may be requested, ordered from the cheapest to
+/// the most accurate. Made on the network thread, used on the capture thread.
 class Resolutions {
  public:
   static constexpr std::size_t kMaxResolutions = 3;
@@ -64,23 +64,23 @@ class Resolutions {
 
   /// ReconstructionRules::max_error_um.
   [[nodiscard]] double max_error_um() const noexcept { return max_error_um_; }
-  /// The one that works on the next frame.
+  /// The resolution for the next frame.
   [[nodiscard]] Resolution& in_use() noexcept { return all_[in_use_]; }
   [[nodiscard]] std::size_t resolution_index() const noexcept { return in_use_; }
   [[nodiscard]] std::span<const Resolution> resolutions() const noexcept { return all_; }
   void use(std::size_t resolution_index) noexcept { in_use_ = resolution_index; }
-  /// The rung of that resolution and so many steps, if there is one.
+  /// The index for this decimation and number of steps, if there is one.
   [[nodiscard]] std::optional<std::size_t> find(int decimation, int steps) const noexcept;
 
-  /// The map that the rung in use gives.
+  /// The map at the resolution in use.
   [[nodiscard]] MapShape shape() const noexcept;
 
   void set_reference(std::span<const std::uint16_t> reference_q8) noexcept;
   /// The light is the reference's times `factor`.
   void set_light(double factor) noexcept;
 
-  /// What the LUT for so many steps is uncertain by at an indentation, micrometres: as the
-  /// calibration says, else kDefaultLutUncertaintyUm or, of a published method,
+  /// Uncertainty of the LUT for this number of steps at an indentation, micrometres: the
+  /// calibration's value, else kDefaultLutUncertaintyUm or, for a published method,
   /// kDefaultPublishedUncertaintyUm.
   [[nodiscard]] double lut_um(double depth_mm, int steps) const noexcept;
   /// The same with what the reference image is trusted to, in squares: of a contact that is
@@ -88,15 +88,15 @@ class Resolutions {
   [[nodiscard]] double contact_um(double deepest_mm, int steps, const Trust& trust) const noexcept;
 
  private:
-  /// What a light that differs from the reference's by `share` adds to or takes off every
-  /// indentation, micrometres.
+  /// Error of every indentation, micrometres, under a light that differs from the reference's by
+  /// `share`.
   [[nodiscard]] double light_um(double share) const noexcept;
   void add(const recon::CellLattice& lattice, int decimation, int steps, int map_decimation);
 
   std::shared_ptr<const recon::Model> model_;
   double max_error_um_;
-  double mean_grey_;             // of the calibration's reference where depth is made of it
-  std::vector<Resolution> all_;  // the cheaper before the more accurate
+  double mean_grey_;             // of the calibration's reference, over the mapped pixels
+  std::vector<Resolution> all_;  // from the cheapest to the most accurate
   std::size_t in_use_ = 0;
 };
 

@@ -19,11 +19,11 @@ double added(int decimation) noexcept {
   }
 }
 
-/// What sharpening by 0, 1 and 2 steps leaves of the blur that hides edges, and by how much a
-/// sharpened map bends more than a plain one of the same thing, at the median over the frames of
+/// The part of the edge-hiding blur that remains after 0, 1 and 2 steps of sharpening, and how much
+/// more a sharpened map bends than a plain one of the same object. Medians over the frames of
 /// config/scenes/all_objects.toml (tests/accuracy/chart/auto_test.cpp): 0.54 and 0.33 of the plain
-/// map's blur, 1.3 and 1.7 times its bend, where the scattering is known exactly. A fitted one is
-/// known less well: 0.6 and 0.4.
+/// map's blur, 1.3 and 1.7 times its bend, with the scattering known exactly. A fitted one is
+/// less exact: 0.6 and 0.4.
 struct Sharpened {
   double left;
   double bend;

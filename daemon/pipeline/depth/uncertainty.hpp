@@ -18,22 +18,22 @@ namespace dtact::pipeline {
 
 inline constexpr double kBendMm = 0.166;
 
-/// By how much more the pixels left of a contact bend and err than bend_um() says, where `beyond`
-/// of them are untrusted because they are deeper than the calibration and `made` are left: those
-/// are the rim, and next to an untrusted pixel no bend is seen. The root of all over those left: on
-/// objects 1.3 to 2.1 mm deep in gels calibrated to 1.1 to 1.5 mm, 10 to 83 % of them untrusted,
-/// the true error was 0.5 to 1.0 of what is stated with it, and up to 2.4 without
+/// Factor on bend and error of a contact's remaining pixels when `beyond` of its pixels are deeper
+/// than the calibration and therefore untrusted, and `made` remain. Those are the rim, and next to
+/// an untrusted pixel no bend is seen. Returns the square root of all over the remaining pixels.
+/// With objects 1.3 to 2.1 mm deep in gels calibrated to 1.1 to 1.5 mm, 10 to 83 % untrusted, the
+/// true error was 0.5 to 1.0 of the stated uncertainty, and up to 2.4 without the factor
 /// (tests/accuracy/whole).
 [[nodiscard]] double rim_factor(std::int64_t made, std::int64_t beyond) noexcept;
 
-/// What a LUT is taken to be uncertain by where its calibration, an old one, does not say: what
-/// such LUTs were off by under a ball of 5 mm after a press or thirty of one of 4 mm, micrometres
+/// Uncertainty of a LUT whose calibration, an old one, does not state it, micrometres. Such LUTs
+/// had this error under a ball of 5 mm after one press or thirty of a ball of 4 mm
 /// (tests/accuracy/table/table.md, against the true indentation, the mean over six lights: ours
-/// from one press 50, the published ones 98 and 118, which are held for one here).
+/// from one press 50, the published ones 98 and 118, treated as one method here).
 inline constexpr double kDefaultLutUncertaintyUm = 50;
 inline constexpr double kDefaultPublishedUncertaintyUm = 118;
-/// Added, in squares, while a reference that was scaled to another light stands in: under a ball
-/// pressed 1 mm that was 0.02 to 0.03 mm off (simulated sensor).
+/// Added, in squares, while a reference scaled to another light is in use: its error was 0.02 to
+/// 0.03 mm under a ball pressed 1 mm (simulated sensor).
 inline constexpr double kStaleReferenceUm = 30;
 
 /// Mean absolute error to expect inside the contact, micrometres: what the LUT is uncertain by

@@ -13,15 +13,15 @@ namespace dtact::pipeline {
 /// What a calibration says of the reference image, with the memory to compare frames with it: made
 /// on the network's side, used on the capture thread.
 struct CalibratedImage {
-  /// Throws std::invalid_argument, saying what to do, when the calibration covers too little of the
-  /// frame to tell light from touch.
+  /// Throws std::invalid_argument with the fix when the calibration covers too little of the
+  /// frame to distinguish light changes from contact.
   explicit CalibratedImage(std::shared_ptr<const calibration::Calibration> of);
 
   std::shared_ptr<const calibration::Calibration> calibration;
-  LumaGrid grid;      ///< Of the calibration's reference.
+  LumaGrid grid;      ///< The calibration's reference at low resolution.
   CellRegion region;  ///< Cells that lie wholly in the calibrated part of the frame.
   Cells cells;
-  std::shared_ptr<const GelMarks> marks;  ///< Of the gel, within the region.
+  std::shared_ptr<const GelMarks> marks;  ///< The gel's marks within the region.
 };
 
 /// The ring emits another light than at calibration: any channel, after brightness and gamma, off

@@ -14,13 +14,13 @@
 
 namespace dtact::pipeline {
 
-/// Tells when the camera has moved against the gel since calibration, by the gel's marks
-/// (gel_marks.hpp): then depth is right and lies in the wrong place. Averages frames without
+/// Detects by the gel's marks (gel_marks.hpp) that the camera has moved against the gel since
+/// calibration: then depth is right but at the wrong position. Averages frames without
 /// contact on the capture thread, once after a new reference and then every kPauseNs, and compares
 /// on the side thread, which takes a tenth of a second.
 class CameraShiftDetector {
  public:
-  /// `frames`: so many are averaged, as for a reference.
+  /// `frames`: number of frames averaged, as for a reference.
   CameraShiftDetector(int width, int height, int frames, base::BackgroundThread& thread);
 
   // On the capture thread; neither waits nor allocates.

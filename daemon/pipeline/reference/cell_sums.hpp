@@ -12,19 +12,19 @@ namespace dtact::pipeline {
 /// Standard deviation over mean magnitude of a Gaussian's difference of two draws: √(π/2)/√2.
 inline constexpr double kFromDifference = 0.8862;
 
-/// What a frame tells by itself and beside the frame before, over the part that the map reads.
-/// Levels of grey.
+/// Statistics of a frame, alone and against the previous one, over the part that the map reads.
+/// Grey levels.
 struct FrameStatistics {
   std::int64_t pixels = 0;
   std::int64_t saturated = 0;  ///< Pixels at least as bright as CellLimits::saturated.
   std::int64_t dark = 0;       ///< Pixels at most as bright as CellLimits::dark.
   /// Standard deviation of a pixel's noise, from all cells: steep depth adds a little.
   double rough_noise = 0;
-  /// Rows of cells, at the frame's edge or inside, none of which changed by a bit since the frame
-  /// before. Noise changes every row: such a row was not exposed anew. Clipped cells do not count.
+  /// Rows of cells, at the frame's edge or inside, that equal the previous frame's bit for bit.
+  /// Noise changes every row: an equal row was not exposed anew. Clipped cells do not count.
   int unchanged_rows = 0;
-  /// How unevenly the rows of cells changed since the frame before: root mean square of the second
-  /// difference, along the columns, of each row's mean change. Bands that wander, not a press.
+  /// How unevenly rows of cells changed since the previous frame: root mean square of the second
+  /// difference, along the columns, of each row's mean change. High for moving bands, not a press.
   double ripple = 0;
   /// The same of half rows of cells: bands too fine for whole ones, down to about twelve pixels.
   double fine_ripple = 0;

@@ -13,7 +13,7 @@ constexpr double kQ16 = 65536;
 constexpr int kCell = vec::kCell;
 /// Weight of a new frame in the noise's slow mean.
 constexpr double kNoiseWeight = 1.0 / 64;
-/// At least one cell of so many has to be untouched for the light to be seen beside a press.
+/// At least one cell in kQuietShare must be out of contact for the light to be seen beside a press.
 constexpr int kQuietShare = 4;
 
 std::int32_t q16(double levels) noexcept {
@@ -125,8 +125,8 @@ void Cells::follow_drift() noexcept {
       ++quiet;
     }
   }
-  // Light moves as a whole: touched cells go along with what the quiet ones did, whatever they
-  // show themselves. Otherwise drift would light up ring after ring around a press.
+  // Light changes as a whole, so cells in contact follow the mean of the quiet ones, whatever they
+  // show themselves. Otherwise drift would activate ring after ring around a press.
   const double common = 2 * quiet > lattice_.cells() ? moved / quiet : 0;
   for (int row = 0; row < lattice_.rows() && active_cells_ > 0; ++row) {
     for (int column = 0; column < lattice_.columns(); ++column) {
@@ -136,8 +136,8 @@ void Cells::follow_drift() noexcept {
   mean_drift_ = total / lattice_.cells() / kQ16;
 }
 
-/// Most cells are active, and yet the frame is the reference in its light: what was followed is
-/// over. Touched cells would keep it for ever.
+/// Most cells are active, yet the frame equals the reference in its light: the followed drift is
+/// gone. Cells in contact would keep it for ever.
 void Cells::forget_drift() noexcept {
   for (std::size_t i = 0; i < drift_.size(); ++i) set_drift(i, 0);
   mean_drift_ = 0;

@@ -15,20 +15,20 @@ namespace dtact::pipeline {
 /// When a change counts. Grey levels; one is about 32 µm pressed or 9 µm bulged.
 ///
 /// The frame is compared as means over cells of 16×16 pixels and over every window of 2×2 cells. A
-/// change becomes active above `factor` standard deviations of what these means do by themselves
-/// from frame to frame, measured while running, but never below the floor nor above the ceiling;
-/// it stays active until it is below half of that. What is hidden is therefore a press that is
-/// nowhere above the ceilings. With the defaults and sensor_a's noise the floors hold: a wide press
+/// change becomes active above `factor` standard deviations of the frame-to-frame noise of these
+/// means, measured while running, but never below the floor nor above the ceiling.
+/// It stays active until it is below half of that. So only a press that is nowhere above the
+/// ceilings stays hidden. With the defaults and sensor_a's noise the floors hold: a wide press
 /// hides up to 0.25 levels (8 µm). A spot blurred by the gel (0.3 mm, 8 pixels) hides up to a
-/// peak of 0.8 levels (26 µm), wherever it lies between the cells. cells_test.cpp has the proof.
+/// peak of 0.8 levels (26 µm), wherever it lies between the cells. Shown by cells_test.cpp.
 struct CellSettings {
   double factor = 5.5;  ///< A false alarm in minutes: some 3000 comparisons a frame.
   double cell_floor = 0.4;
   double cell_ceiling = 0.8;
   double window_floor = 0.25;
   double window_ceiling = 0.5;
-  /// The reference image is followed where nothing is active in or beside a cell; the other cells
-  /// go along with the mean of those while they are the majority. At most so many levels a frame
+  /// Drift of the reference image is followed where no cell nearby is active. The other cells
+  /// follow the mean of those while they are the majority. Limit in levels per frame
   /// (0.01 levels a second at 60 fps) …
   double drift_per_frame = 0.01 / 60;
   /// … and at most so far from the reference: what a press slower than that can lose.
@@ -36,7 +36,7 @@ struct CellSettings {
   recon::vec::CellLimits limits;
 };
 
-/// What a frame tells of the light, as one factor on the reference image.
+/// The light seen in a frame, as one factor on the reference image.
 struct LightSeen {
   enum class From : std::uint8_t {
     nothing,  ///< Not seen in this frame.
@@ -49,11 +49,11 @@ struct LightSeen {
   double change = 0;
 };
 
-/// What one look at a frame tells. Levels of grey.
+/// Result of comparing one frame. Grey levels.
 struct CellReport {
   double mean_grey = 0;
   double pixel_noise = 0;   ///< Standard deviation of a pixel's noise, from quiet cells.
-  double cell_noise = 0;    ///< Of a quiet cell's mean, from frame to frame, slowly averaged.
+  double cell_noise = 0;    ///< Frame-to-frame noise of a quiet cell's mean, slowly averaged.
   double quiet_change = 0;  ///< Frame − reference image (drift followed), mean of quiet cells.
   double drift = 0;         ///< Mean of what was followed since the reference was set.
   LightSeen light;
@@ -62,9 +62,9 @@ struct CellReport {
   int active_cells = 0;
 };
 
-/// The reference image in the present light, as means over cells: reference × light + drift. Tells
-/// where a frame differs from it, by a look that is much cheaper than a reconstruction. Never
-/// allocates after construction.
+/// The reference image in the present light, as means over cells: reference × light + drift. Finds
+/// where a frame differs from it, much more cheaply than a reconstruction. Does not allocate
+/// after construction.
 class Cells {
  public:
   explicit Cells(const recon::CellLattice& lattice, const CellSettings& settings = {});
@@ -85,7 +85,7 @@ class Cells {
   }
   [[nodiscard]] const recon::CellLattice& lattice() const noexcept { return lattice_; }
 
-  /// The light is looked for among touched cells, and drift followed, on every so many frames.
+  /// Every kFollowEvery-th frame follows drift and looks for the light among cells in contact.
   static constexpr int kFollowEvery = 16;
 
  private:

@@ -14,25 +14,25 @@ using LightField = std::array<float, kGridCells>;
 
 /// What two images of one sensor differ in, once smooth light is taken out.
 struct ContactVerdict {
-  /// The deepest local darkening: what the second darkest cell lacks, as a share of the light that
-  /// the fit expects there. A press of 1 mm lacks about 0.19 (31 grey levels of 161, sensor_a); two
+  /// The deepest local darkening: that of the second darkest cell, as a share of the light that
+  /// the fit expects there. A press of 1 mm gives about 0.19 (31 grey levels of 161, sensor_a); two
   /// references of one sensor, taken apart, at most 0.006 (sensors a and b). The second darkest, so
-  /// that one odd cell is no touch.
+  /// that a single odd cell is not taken for contact.
   float darkening = 0;
   /// Share of the cells that the fit explains to within 1 %. Low where most of the field changed.
   float explained = 0;
 };
 
-/// Tells a press from a change of light, without depth: light and drift multiply the image by a
-/// field that is smooth and wide, a press darkens a compact spot and brightens the ring around it.
+/// Distinguishes a press from a light change, without depth. Light and drift multiply the image by
+/// a smooth, wide field; a press darkens a compact spot and brightens the ring around it.
 /// The field is a polynomial, fitted with weights that fall off for cells that disagree
 /// (Geman–McClure), so that a press does not pull it far.
 class ContactCheck {
  public:
   ContactCheck();
 
-  /// Degrees of the field. A dimmed ring and drift need one number; another set of LEDs needs a
-  /// shape, which also bends a little after what touches: on the simulated sensor, under a ball
+  /// Degrees of the field. A dimmed ring and drift need one number. Another set of LEDs needs a
+  /// shape, which also bends a little towards the contact: on the simulated sensor, under a ball
   /// pressed 1 mm, by up to 3 % or 0.15 mm.
   static constexpr int kSameShape = 0;
   static constexpr int kAnyShape = 4;

@@ -143,7 +143,7 @@ double excess(const std::vector<Patch>& patches, const Movement& movement, doubl
     return 0;
   }
   apart /= within;
-  // As uncertain as the sum over all of them is.
+  // The sum's uncertainty is that of all patches.
   return sum * std::sqrt(static_cast<double>(patches.size()) / within);
 }
 

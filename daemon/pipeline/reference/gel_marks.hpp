@@ -28,16 +28,16 @@ class GelMarks {
     double strength = 0;
   };
 
-  /// The correlation of two images of one still sensor is the same at a displacement and at its
-  /// opposite, whatever belongs to whom. Where it is not, some of the marks have moved, even if
-  /// others, the camera's own, have not. Looked for in patches, so that turns out to five degrees
-  /// are found as well, and out to kReach pixels each way. Empty: nothing is sure to have moved by
-  /// kMin pixels, or there are no marks to tell by. Two references of one real sensor stand out
-  /// by at most 5.6; with all but the stripes of one moved by 2 to 12 pixels, by 21 to 36
+  /// The correlation of two images of one still sensor is symmetric: equal at a displacement and at
+  /// its opposite. Where it is not, some of the marks have moved, even if
+  /// others, the camera's own, have not. The search goes by patches, so that turns of up to five
+  /// degrees are found, and extends kReach pixels each way. Empty: no move of at least
+  /// kMin pixels is certain, or there are no marks to compare. Two references of one real sensor
+  /// give at most 5.6; with all but the stripes of one moved by 2 to 12 pixels, 21 to 36
   /// (sensors a and b; real_marks_test).
   [[nodiscard]] std::optional<Move> moved_to(const GelMarks& now) const;
 
-  /// Of the frame, as given.
+  /// The region of the frame, as given.
   [[nodiscard]] const recon::FrameRegion& part() const noexcept { return part_; }
 
   static constexpr int kReach = 16;

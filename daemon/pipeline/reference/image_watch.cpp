@@ -37,10 +37,10 @@ namespace {
 /// plane is fitted, with weights that leave out what a press changes: a ball, a nut, a bar and a
 /// disc of 8 mm move it by up to 0.55 % (simulated sensor).
 constexpr double kDriftShare = 0.01;
-/// A press whose bulge covers most of the field moves it further, but only up, by 2 % in two
-/// hundred random scenes (tests/accuracy/whole) and by more than 3 % in others, and the plane then
-/// explains 34 to 70 % of the cells. Nothing is said of the light then: where it brightens by so
-/// little under a press that wide, only its release tells.
+/// A press whose bulge covers most of the field moves it further, but only up: by 2 % in two
+/// hundred random scenes (tests/accuracy/whole), by more than 3 % in others. The plane then
+/// explains 34 to 70 % of the cells. Nothing is reported about the light then: a brightening this
+/// small under a press that wide shows only after its release.
 constexpr double kMaxBulge = 0.05;
 constexpr float kLightExplains = 0.75F;
 constexpr int kDriftDegree = 1;

@@ -14,15 +14,15 @@ namespace dtact::pipeline {
 
 /// A frame beside its reference, once one smooth light is taken out of what differs.
 struct LightCompared {
-  double brighter = 0;  ///< That light is brighter than the followed one, by this share of it.
+  double brighter = 0;  ///< How much brighter the light is than the followed one, as a share.
   double lost = 0;      ///< What covers takes this share of the whole picture's light.
 };
 
-/// Tells exposure or gain that runs automatically, whatever the camera says of its controls, by
-/// what nothing else does: something covers a part of the picture, and at once the rest brightens
-/// by about as much as keeps the mean. A press is no such thing: the gel does not compress, so
-/// that the bulge round it gives back the light that it takes. Nor does light that changes by
-/// itself, or by command, change as something begins to cover. One thread; does not allocate.
+/// Detects automatic exposure or gain, whatever the camera reports of its controls, by its unique
+/// effect: something covers part of the picture, and at once the rest brightens
+/// by about as much as keeps the mean. A press differs: the gel does not compress, so
+/// the bulge around it returns the light that it takes. Light that changes by
+/// itself or by command differs too: not when a cover begins. One thread; does not allocate.
 class ExposureWatch {
  public:
   /// There is a new reference: whatever exposure it was taken with, it begins with that.
@@ -57,9 +57,9 @@ class ExposureWatch {
   bool follows_ = false;
 };
 
-/// What the picture itself tells about how far depth can be believed, from the statistics that the
-/// look for activity gathers. What each limit is worth in millimetres, and what no limit can tell,
-/// is in tests/accuracy/atlas. One thread; does not allocate after construction.
+/// Rates how far depth can be trusted from the picture alone, using the statistics gathered by
+/// the search for activity. tests/accuracy/atlas has each limit in millimetres, and what no limit
+/// can detect. One thread; does not allocate after construction.
 class ImageWatch {
  public:
   /// Depth is measured against this from now on: Q8 luma, frame sized. `region`: as for

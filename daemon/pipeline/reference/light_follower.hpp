@@ -8,25 +8,25 @@
 
 namespace dtact::pipeline {
 
-/// Follows the light as one factor on the reference: LEDs that warm up or age and an exposure that
+/// Follows the light as one factor on the reference. LEDs that warm up or age and an exposure that
 /// drifts darken the whole field alike, which no local press does, however faint. It follows what
-/// one factor explains completely, and during contact what it explains of the cells that
-/// there is no contact; either for at least kQuietNs. It limits how fast and how far:
+/// one factor explains completely and, during contact, what one explains of the cells without
+/// contact; either after at least kQuietNs. It limits how fast and how far:
 ///
-/// - A slow change goes through: up to the rate, and as much more as the rate allows for the time
-///   that the light could not be seen because too much was touched, if it was followed before that.
+/// - A slow change is followed up to the rate. After a time when contact hid the light it is
+///   followed further, as far as the rate allows for that time, if it was followed before.
 /// - A step beyond kStep is not followed, however long it lasts: it may be a flat press of all of
-///   the field, which looks the same. Nor is anything beyond the limit. Both are told.
+///   the field, which looks the same. Nor is anything beyond the limit. Both set a health flag.
 ///
-/// What it can lose is therefore a press that covers the field evenly: kStep (8 µm) at once, and up
+/// So it can lose a press that covers the field evenly: kStep (8 µm) at once, and up
 /// to the limit (0.1 mm with the default) if it comes more slowly than the rate.
 /// tests/accuracy/atlas has the rows. One thread; does not allocate.
 class LightFollower {
  public:
   explicit LightFollower(const DriftRules& rules) noexcept;
 
-  /// A new reference is in use: the factor is one again. `follows`: false where nobody can apply
-  /// it; then it only tells.
+  /// A new reference is in use: resets the factor to 1. `follows`: false where the factor cannot
+  /// be applied; then it only reports.
   void restart(bool follows = true) noexcept;
   /// The next frame that depth is measured in, and when it was taken. Returns the light's factor on
   /// the reference where it has moved by enough to be applied; until the next frame it must be.
@@ -38,9 +38,9 @@ class LightFollower {
   [[nodiscard]] double factor() const noexcept { return applied_; }
   /// What of the light is not followed, as last seen: a share of it, positive where it is brighter.
   [[nodiscard]] double left() const noexcept { return left_; }
-  /// How far the light may have moved since it was last seen: a share, 0 while it is in sight. As
-  /// it moves at most at the rate and up to the limit, any amount up to that is as likely as
-  /// another, and half of it is what to expect.
+  /// Expected light change since it was last seen: a share, 0 while it is in sight. The
+  /// light moves at most at the rate and up to the limit, and any amount up to that is equally
+  /// likely, so this is half of it.
   [[nodiscard]] double unseen() const noexcept;
   /// left() is beyond kReportedDrift and has been for kReportedDriftFrames: depth is off by half a
   /// grey level.
@@ -61,7 +61,7 @@ class LightFollower {
   double limit_;  // share
   bool follows_ = true;
   double applied_ = 1;
-  double followed_ = 1;   // what applied_ goes to in steps worth the work
+  double followed_ = 1;   // target of applied_, in steps that justify the update
   double allowance_ = 0;  // share that the light may have moved while it was not seen
   bool lost_ = false;     // the light last seen is too far from the followed one
   double left_ = 0;

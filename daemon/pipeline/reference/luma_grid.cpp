@@ -6,7 +6,7 @@
 namespace dtact::pipeline {
 namespace {
 
-/// Pixel rows `row(y)` of `width` × `height` values, each worth 1/unit grey levels.
+/// Pixel rows `row(y)` of `width` × `height` values in units of 1/unit grey levels.
 template <typename RowOf>
 void measure_rows(RowOf row, int width, int height, float unit, LumaGrid& grid) noexcept {
   double total = 0;

@@ -12,16 +12,16 @@ namespace dtact::pipeline {
 inline constexpr int kGridWidth = 40;
 inline constexpr int kGridHeight = 30;
 inline constexpr std::size_t kGridCells = std::size_t{kGridWidth} * kGridHeight;
-/// Frames smaller than this have no grid worth the name.
+/// Smaller frames have no meaningful grid.
 inline constexpr int kMinFrameWidth = 2 * kGridWidth;
 inline constexpr int kMinFrameHeight = 2 * kGridHeight;
 
 /// A frame at low resolution: the mean grey of each of 40×30 cells, about 1 mm a side on the
-/// sensors known. Averaging 400 pixels leaves 0.05 grey levels of noise, and what touches covers a
+/// known sensors. Averaging 400 pixels leaves 0.05 grey levels of noise, and a contact covers a
 /// cell or more.
 struct LumaGrid {
   std::array<float, kGridCells> cells{};  ///< Grey levels, row-major.
-  float mean = 0;                         ///< Of all cells.
+  float mean = 0;                         ///< over all cells
 };
 
 /// Cell boundaries: cell i of `cells` covers the pixels [edge(i), edge(i + 1)) of `pixels`.

@@ -28,7 +28,7 @@ namespace {
 constexpr float kUnlitGrey = 8;
 /// While a reference is averaged no cell may move more than this, grey levels (0.03 mm).
 constexpr float kStillGrey = 1;
-/// Local darkening that is a touch. Between two references of one sensor: at most 0.006; the
+/// Local darkening that counts as contact. Between two references of one sensor: at most 0.006; the
 /// lightest press of the real images: 0.05 (ContactVerdict). 0.0125 is about 0.07 mm.
 constexpr float kContactDarkening = 0.0125F;
 /// The same between images under different light, of which the fit leaves a little: on the
@@ -99,7 +99,7 @@ void ReferenceKeeper::begin() noexcept {
 
 void ReferenceKeeper::light_changed(bool in_contact, bool same_shape) noexcept {
   same_shape_ = same_shape_ && same_shape;
-  // During an earlier change nothing new is known about touch; what was known then still holds.
+  // During an earlier change nothing new is known about contact; the earlier knowledge still holds.
   if (ready()) no_contact_before_ = quality_ == ReferenceQuality::fresh && !in_contact;
   if (ready()) starting_ = false;
   phase_ = Phase::settling;
@@ -234,8 +234,8 @@ ReferenceStep ReferenceKeeper::decide(Outcome obstacle) noexcept {
 
 ReferenceStep ReferenceKeeper::use_fallback() noexcept {
   const Known known = best_known();
-  // One number is measured best where most of the image is far from the touch: on all of it (0.02
-  // mm of depth instead of 0.03 under a ball pressed 1 mm, simulated sensor).
+  // A single factor is measured best where most of the image is far from the contact: on all of it
+  // (error 0.02 mm instead of 0.03 under a ball pressed 1 mm, simulated sensor).
   const ContactVerdict verdict =
       same_shape_ ? check_.compare(*known.grid, now_, {}, ContactCheck::kSameShape, field_)
                   : check_.compare(*known.grid, now_, region_, ContactCheck::kAnyShape, field_);
@@ -247,7 +247,7 @@ ReferenceStep ReferenceKeeper::use_fallback() noexcept {
   relight(known.reference_q8, width_, height_, field_, fallback_);
   quality_ = same_light ? ReferenceQuality::restored : ReferenceQuality::stale;
   phase_ = Phase::holding;
-  no_contact_before_ = false;  // something has touched, or moved, since
+  no_contact_before_ = false;  // contact, or motion, since
   watched_ = 0;
   clear_ = 0;
   return {.reference_changed = true, .answer = std::nullopt};

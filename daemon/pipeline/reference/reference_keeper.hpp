@@ -44,43 +44,43 @@ enum class ReferenceQuality : std::uint8_t {
 };
 
 struct ReferenceStep {
-  bool reference_changed = false;  ///< reference() is another from now on.
-  std::optional<Outcome> answer;   ///< To the re-zero that was asked for.
+  bool reference_changed = false;  ///< reference() has changed.
+  std::optional<Outcome> answer;   ///< Result of the requested re-zero.
 };
 
-/// Decides when the reference image may be taken and what stands in until then. The sequence: wait
-/// until the mean grey settles, average, compare with what is known to be untouched, and only then
-/// take it. While a fallback reference is in use it looks every few frames whether there is no
-/// contact any more. All memory is taken at construction; one thread.
+/// Decides when to take the reference image and which fallback to use until then. The sequence:
+/// waits until the mean grey settles, averages, compares with an image known to be without contact,
+/// and only then takes it. While a fallback reference is in use it checks every few frames whether
+/// the contact has ended. Allocates at construction only; one thread.
 class ReferenceKeeper {
  public:
   ReferenceKeeper(int width, int height, const ReferenceRules& rules);
 
   /// The last good reference of an earlier run (Q8, frame sized). `same_light`: made under the
-  /// light of now; `same_shape`: under the same colours, whatever the brightness.
+  /// present light; `same_shape`: under the same colours, at any brightness.
   void restore(std::span<const std::uint16_t> reference_q8, bool same_light, bool same_shape);
   /// What the calibration knows; the span and the grid must outlive their use here. `same_light`:
   /// as restore()'s. A fresh reference stays, whatever else is known is forgotten and the sequence
   /// begins again.
   void use_calibration(std::span<const std::uint16_t> reference_q8, const LumaGrid& grid,
                        const CellRegion& region, bool same_light) noexcept;
-  /// The camera has (re)started: begins the sequence.
+  /// The camera has (re)started: starts the sequence.
   void begin() noexcept;
   /// The light is about to change or has just changed: no depth until the next reference.
-  /// `in_contact`: what the depth said last; `same_shape`: only the brightness changes.
+  /// `in_contact`: according to the last depth; `same_shape`: only the brightness changes.
   void light_changed(bool in_contact, bool same_shape) noexcept;
-  /// Asks for the present image as reference. An answer means that it is refused at once, else it
-  /// comes out of step().
+  /// Requests the present image as reference. A returned outcome is an immediate refusal; otherwise
+  /// step() returns the outcome.
   [[nodiscard]] std::optional<Outcome> rezero(bool force, bool in_contact) noexcept;
   void cancel_rezero() noexcept {
     request_.reset();
     if (phase_ == Phase::holding) averaging_ = false;
   }
 
-  /// The next frame under settled light. Mostly cheap; a decision takes about two frames' time.
+  /// Takes the next frame under settled light. Mostly cheap; a decision takes two frames' time.
   [[nodiscard]] ReferenceStep step(const hal::LumaView& luma) noexcept;
 
-  /// The next image counts for a reference, all of it. Else step() does not look.
+  /// The next image is needed for a reference, whole. Otherwise step() ignores it.
   [[nodiscard]] bool looks() const noexcept;
   [[nodiscard]] State state() const noexcept;
   [[nodiscard]] ReferenceQuality quality() const noexcept { return quality_; }
@@ -92,7 +92,7 @@ class ReferenceKeeper {
   [[nodiscard]] bool dark() const noexcept { return dark_frames_ >= rules_.settle_frames; }
   /// Q8 luma, frame sized. Only when ready().
   [[nodiscard]] std::span<const std::uint16_t> reference() const noexcept;
-  /// The reference in use is worth keeping for the next start: taken without contact.
+  /// The reference in use may be stored for the next start: taken without contact.
   [[nodiscard]] bool storable() const noexcept {
     return quality_ == ReferenceQuality::fresh && !forced_;
   }
@@ -132,14 +132,14 @@ class ReferenceKeeper {
   bool starting_ = true;
   bool averaging_ = false;          // while holding: a new reference is being gathered
   bool no_contact_before_ = false;  // there was no contact right before the light changed
-  bool other_light_ = false;        // than what is known was made under
+  bool other_light_ = false;        // the light differs from that of the known images
   bool same_shape_ = true;          // the light differs from it by a factor only
   bool forced_ = false;
   std::optional<Request> request_;
   int waited_ = 0;       // frames since the sequence or the average began
   int dark_frames_ = 0;  // in a row, while no reference is in use
   int watched_ = 0;      // frames since the last look
-  int clear_ = 0;        // looks in a row that saw nothing touch
+  int clear_ = 0;        // consecutive checks without contact
 
   std::vector<std::uint16_t> good_;  // the last good reference
   LumaGrid good_grid_;

@@ -20,8 +20,8 @@ struct StoredReference {
   hal::Light light;  ///< What the ring showed.
 };
 
-/// Replaces what is stored, each file by write, fsync, rename; the TOML names the image's length
-/// and checksum, so that two halves of different ages are noticed. Throws std::exception naming the
+/// Replaces the stored reference, each file by write, fsync, rename. The TOML has the image's
+/// length and checksum, to detect two files of different ages. Throws std::exception naming the
 /// file.
 void save_reference(const StoredReference& reference, const calibration::Calibration& calibration,
                     const std::filesystem::path& folder);

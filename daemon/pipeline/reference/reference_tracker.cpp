@@ -55,7 +55,7 @@ void ReferenceTracker::use(CalibratedImage* image) noexcept {
 void ReferenceTracker::camera_began() noexcept { keeper_.begin(); }
 
 void ReferenceTracker::light_changes(const hal::Light& light) noexcept {
-  // Rewriting what is shown anyway leaves the reference as good as it was.
+  // Rewriting the light that is already shown leaves the reference valid.
   if (light == shown_) return;
   keeper_.light_changed(in_contact_, light.leds == shown_.leds);
   shown_ = light;
@@ -94,12 +94,12 @@ Observation ReferenceTracker::look(const hal::LumaView& luma, const FrameState& 
   return look;
 }
 
-/// From now on depth is measured against the keeper's reference.
+/// Measures depth against the keeper's reference from now on.
 void ReferenceTracker::use_reference() noexcept {
   const recon::Model& model = *image_->calibration->model;
   const auto reference = keeper_.reference();
   image_->cells.set_reference(reference);
-  // Nobody can apply a factor where depth is measured by the published method.
+  // The published method cannot apply a factor to its depth.
   follower_.restart(model.method == recon::Method::lut);
   watch_.set_reference(reference, width_, height_, image_->region);
   exposure_.restart();
@@ -109,7 +109,7 @@ void ReferenceTracker::use_reference() noexcept {
   keep_due_ = keeper_.storable();
 }
 
-/// The writer may be busy with the one before: then it is offered again with the next frame.
+/// The writer may still be busy: then the next frame offers the reference again.
 void ReferenceTracker::keep_reference() noexcept {
   if (!keep_due_) return;
   keep_due_ = !writer_.offer(keeper_.reference(), shown_, image_->calibration);

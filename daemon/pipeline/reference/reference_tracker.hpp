@@ -23,29 +23,29 @@ namespace dtact::pipeline {
 struct FrameState {
   std::int64_t timestamp_ns = 0;  ///< The frame's own, CLOCK_MONOTONIC.
   std::int64_t now_ns = 0;        ///< CLOCK_MONOTONIC.
-  bool settled = false;           ///< It shows the present light and nothing of an earlier one.
-  bool whole = false;             ///< All of it was read, not only what the map reads.
+  bool settled = false;           ///< It shows only the present light, no earlier one.
+  bool whole = false;             ///< All of it was decoded, not only what the map reads.
 };
 
-/// What a look at a frame answers.
+/// The result of a look at a frame.
 struct Observation {
   bool measurable = false;     ///< Depth can be measured in this frame, against reference().
   bool new_reference = false;  ///< reference() is another from this frame on, and light() is 1.
   bool new_light = false;      ///< light() is another from this frame on.
-  std::optional<Outcome> rezeroed;  ///< The answer to the re-zero that was asked for.
+  std::optional<Outcome> rezeroed;  ///< Result of the requested re-zero.
 };
 
 /// How far the reference can be trusted.
 struct Trust {
   bool stale = false;     ///< It was scaled from another light.
-  double light_left = 0;  ///< What of the light is not followed: a share, positive = brighter.
-  /// What the light is to be expected to have moved out of sight: a share, 0 or more.
+  double light_left = 0;  ///< Light change that is not followed: a share, positive = brighter.
+  /// Expected change of the light while out of sight: a share, 0 or more.
   double light_unseen = 0;
 };
 
-/// The reference image in the present light, reference × light + drift, and all that is known of
-/// it: where a frame differs from it, what the light does, which conditions hold, how far it can be
-/// trusted. Nobody else knows any of this. Capture thread, where it says nothing else; there it
+/// The reference image in the present light, reference × light + drift, with its state:
+/// where a frame differs from it, how the light changes, which health flags hold, how far to trust
+/// it. The only owner of this knowledge. Capture thread unless noted otherwise; there it
 /// does not allocate.
 class ReferenceTracker {
  public:
@@ -55,39 +55,39 @@ class ReferenceTracker {
 
   // Not on the capture thread.
 
-  /// Its thread runs: it writes good references to the state folder and compares places.
+  /// Starts its thread, which writes references to the state folder and detects camera shift.
   void start() { side_.start(); }
-  /// Ends it after what it has been given is done.
+  /// Stops the thread after the work it has been given.
   void stop() noexcept { side_.stop(); }
-  /// Waits until all that was given to the comparison of places has been judged. Any thread.
+  /// Waits until all pending camera shift checks are done. Any thread.
   void settle() const noexcept { camera_shift_.settle(); }
   /// How far the camera has moved since calibration; empty: not. Any thread.
   [[nodiscard]] std::string camera_shift_message() const { return camera_shift_.message(); }
   /// Why the last reference could not be written and what to do; empty when it was. Any thread.
   [[nodiscard]] std::string storage_message() const { return writer_.message(); }
-  /// A reference was written: the one of an earlier run is no longer there. Any thread.
+  /// A reference was written, so that of an earlier run is gone. Any thread.
   [[nodiscard]] bool has_written() const noexcept { return writer_.has_written(); }
   /// The last good reference of an earlier run by this calibration, if the state folder has one.
   /// Before the first look. Throws std::runtime_error naming the file that cannot be read.
   void restore(const calibration::Calibration& calibration);
 
-  // What happens to the image, or is asked of it.
+  // Changes of the image and requests for it.
 
   /// The last good reference of an earlier run, taken under `light`.
   void restore(std::span<const std::uint16_t> reference_q8, const hal::Light& light);
   /// From now on this calibration; null: none. A fresh reference stays.
   void use(CalibratedImage* image) noexcept;
-  /// The camera has begun anew: what was known of its image is in doubt.
+  /// The camera has restarted: what was known of its image is in doubt.
   void camera_began() noexcept;
-  /// The ring is about to show this, or shows it since just now.
+  /// The ring is about to show this light, or has just begun to.
   void light_changes(const hal::Light& light) noexcept;
-  /// Asks for the present image as reference. An answer means that it is refused at once, else it
-  /// comes with a look. Only while there is a calibration.
+  /// Requests the present image as reference. A returned outcome is an immediate refusal; otherwise
+  /// look() returns it. Only while there is a calibration.
   [[nodiscard]] std::optional<Outcome> rezero(bool force) noexcept {
     return keeper_.rezero(force, in_contact_);
   }
   void cancel_rezero() noexcept { keeper_.cancel_rezero(); }
-  /// What depth says of the frame just looked at. Where no depth is made, whatever is active
+  /// Whether depth found contact in the frame just looked at. Where no depth is made, activity
   /// counts.
   void set_in_contact(bool in_contact) noexcept { in_contact_ = in_contact; }
 
@@ -98,10 +98,10 @@ class ReferenceTracker {
   /// Looks at a frame. Mostly cheap; a decision on the reference takes about two frames' time.
   Observation look(const hal::LumaView& luma, const FrameState& moment) noexcept;
 
-  // Answers.
+  // Results.
 
   [[nodiscard]] State state() const noexcept;
-  /// Of the frame looked at.
+  /// The health flags after the last look.
   [[nodiscard]] HealthSet health_flags() const noexcept;
   [[nodiscard]] Trust trust() const noexcept;
   /// A plane of cells (CalibratedImage::cells): not 0 where the frame differs from it.
@@ -112,7 +112,7 @@ class ReferenceTracker {
   /// There is a reference to measure against.
   [[nodiscard]] bool ready() const noexcept { return keeper_.ready(); }
   [[nodiscard]] ReferenceQuality quality() const noexcept { return keeper_.quality(); }
-  /// As it was taken: Q8 luma, frame sized. Only when ready().
+  /// The reference as it was taken: Q8 luma, frame sized. Only when ready().
   [[nodiscard]] std::span<const std::uint16_t> reference() const noexcept {
     return keeper_.reference();
   }

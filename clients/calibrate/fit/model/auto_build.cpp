@@ -38,7 +38,7 @@ double mean_of_sure(const SymmetricPress& press, const Value& value) {
   return sum / pixels;
 }
 
-/// Of the ball's radius: the profile goes to 2.25 (kFarField).
+/// Multiples of the ball's radius; the profile reaches 2.25 (kFarField).
 constexpr std::array<double, 2> kReaches = {1.5, 1.75};
 /// Right, down, left, up.
 constexpr std::array<std::pair<int, int>, 4> kSides = {{{1, 0}, {0, 1}, {-1, 0}, {0, -1}}};
@@ -84,7 +84,7 @@ SymmetricPress seen(const Calibration& calibration, const BallPresses& set,
   return without_asymmetry(settled.map, settled.contact, gain);
 }
 
-/// Of the deepest of the presses that a gel was fitted to.
+/// Spread of the deepest press that a gel was fitted to.
 double spread_of(const FittedCalibration& fitted, const BallPresses& set) {
   const auto deepest = std::ranges::max_element(fitted.presses, {}, &PressReport::Depth::depth_mm);
   const auto press = std::ranges::find(set.presses, deepest->name, &BallPresses::Press::name);

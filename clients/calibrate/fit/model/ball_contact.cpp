@@ -96,7 +96,7 @@ double half_space(Eigen::Index j, double rho) {
 /// All that does not depend on the press: lengths in contact radii.
 struct Matrices {
   Eigen::VectorXd kappa;      ///< Wave numbers, ascending.
-  Eigen::VectorXd weight;     ///< Of the quadrature over them.
+  Eigen::VectorXd weight;     ///< Quadrature weights over them.
   Eigen::MatrixXd transform;  ///< Hankel transform of each hat, a column each.
   Eigen::MatrixXd inside;     ///< J₀(κρ) at the knots, a column each.
   Eigen::MatrixXd outside;    ///< And beyond.

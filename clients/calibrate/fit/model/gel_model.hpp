@@ -34,7 +34,7 @@ struct GelModel {
 /// A ball press on RadialTransform's grid.
 struct PredictedPress {
   Eigen::VectorXd indentation_mm;
-  Eigen::VectorXd spectrum;  ///< Of the loss, not yet scattered.
+  Eigen::VectorXd spectrum;  ///< The loss before scattering.
 };
 
 [[nodiscard]] PredictedPress predict_press(const GelModel& gel, const BallContact& contact);

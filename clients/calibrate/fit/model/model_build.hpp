@@ -21,7 +21,7 @@ struct FittedCalibration {
   ModelFit fit;
   double light_levels = 0;                         ///< Grey levels that are all of the light.
   std::vector<PressReport::Depth> presses;         ///< Those that were used.
-  std::vector<ChosenAsymmetry> press_asymmetries;  ///< Of each of them.
+  std::vector<ChosenAsymmetry> press_asymmetries;  ///< One for each press.
   std::vector<std::string> left_out;  ///< Presses without a usable contact: name and reason.
 
   /// What one press's gain was chosen by, and how much darker the light was, in a sentence or two;

@@ -254,7 +254,7 @@ PressProfile profile_of(const SymmetricPress& press, double light_levels, double
   const double step = 2 * press.map.mm_per_px;
   struct Ring {
     double loss = 0;
-    double square = 0;  ///< Of the distance.
+    double square = 0;  ///< Squared distance.
     double count = 0;
   };
   std::vector<Ring> rings(static_cast<std::size_t>(std::ceil(reach / step)));

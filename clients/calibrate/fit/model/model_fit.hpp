@@ -24,8 +24,8 @@ struct PressProfile {
   std::vector<double> loss;
   std::vector<double> noise;  ///< Standard error of each mean by the pixels' noise.
   double ball_radius_mm = 0;
-  double contact_radius_mm = 0;  ///< As find_contact() has it: to start from.
-  double smoothing_mm = 0;       ///< Of the map.
+  double contact_radius_mm = 0;  ///< Start value, from find_contact().
+  double smoothing_mm = 0;       ///< The map's.
 };
 
 /// `light_levels`: the grey level that the press's map counts as all of the light: the mean of the
@@ -56,8 +56,8 @@ struct ModelFit {
   };
   std::vector<Press> presses;
   double residual = 0;  ///< Over all.
-  /// As fitted (Parameter), and their covariance: (JᵀJ)⁻¹ with the priors, and the residual for the
-  /// noise.
+  /// The fitted values (Parameter) and their covariance: (JᵀJ)⁻¹ with the priors, and the residual
+  /// as the noise.
   Eigen::VectorXd parameters;
   Eigen::MatrixXd covariance;
 

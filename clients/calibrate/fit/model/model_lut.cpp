@@ -89,7 +89,7 @@ void for_places(const Shown& ball, std::size_t lut, const Add& add) {
 }
 
 struct Knots {
-  int first = 0;  ///< Of the knot at `first`·kKnotLevels.
+  int first = 0;  ///< Index: the knot is at `first`·kKnotLevels.
   Eigen::VectorXd depth_mm;
 
   [[nodiscard]] double at(double level) const {

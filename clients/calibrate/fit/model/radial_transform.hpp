@@ -55,7 +55,7 @@ class RadialTransform {
   RadialTransform();
 
   Eigen::VectorXd k_;
-  Eigen::VectorXd weights_;  ///< Of the quadrature over wave numbers.
+  Eigen::VectorXd weights_;  ///< Quadrature over wave numbers.
   Eigen::MatrixXd forward_;
   Eigen::MatrixXd back_;
 };

@@ -62,10 +62,10 @@ connect = Client
 __all__ = [
     "Busy", "CalibrationEvent", "CalibrationFiles", "CalibrationSummary", "Camera", "Client",
     "ConnectionError", "Contact", "ContactEvent", "Denied", "DeviceFailed", "EndedByDaemon",
-    "Error", "Event", "Frame", "IdentityError", "Invalid", "Light", "LightEvent", "NoFrame",
+    "Error", "Event", "Frame", "IdentityError", "InContact", "Invalid", "Light", "LightEvent", "NoFrame",
     "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Reconnected",
     "Reconstruction", "ReconstructionEvent", "Recording", "ReferenceEvent", "ReferenceImage",
     "Refused", "Server", "StateEvent", "Status", "StorageFailed", "StoredCalibration",
-    "Subscription", "Surface", "TimeoutError", "Touched", "Uncalibrated", "Unsupported", "aio", "connect",
+    "Subscription", "Surface", "TimeoutError", "Uncalibrated", "Unsupported", "aio", "connect",
     "read",
 ]

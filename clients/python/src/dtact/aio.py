@@ -1,11 +1,11 @@
-"""The same for asyncio:
+"""The asyncio client:
 
     async with dtact.aio.connect("gripper") as s:
         async for frame in s.frames():
             ...
 
-What came is kept while nobody takes it, as with the client that waits. Several tasks may use one
-client; of those that take frames each gets some.
+Frames and events are kept until they are taken, as in the blocking client. Several tasks may share
+one client; each frame goes to one of them.
 """
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _Item = TypeVar("_Item")
 
 
 class _Link(asyncio.BufferedProtocol):
-    """Puts what comes into the conversation and wakes whoever waits for it."""
+    """Feeds received bytes to the conversation and wakes its waiters."""
 
     def __init__(self, conversation: Conversation) -> None:
         self._conversation = conversation
@@ -129,10 +129,9 @@ class Client(Session):
         self._subscription = subscription
 
     async def frames(self, timeout: float | None = None) -> AsyncIterator[Frame]:
-        """One frame after another, without an end. Subscribes to depth if nothing is subscribed.
-        Who comes back late gets the newest `kept_frames`. NoFrame when none comes within `timeout`
-        seconds, which are the client's unless given; with `reconnect` there is no limit unless one
-        is given."""
+        """Yields frames without end. Subscribes to depth if nothing is subscribed. A slow reader gets
+        the newest `kept_frames`. Raises NoFrame when none arrives within `timeout` seconds (default:
+        the client's timeout, or no limit with `reconnect`)."""
         if self._subscription is None:
             await self.subscribe()
         limit = timeout if timeout is not None or self._reconnect else self._timeout
@@ -258,7 +257,7 @@ class Client(Session):
             self._opening = asyncio.create_task(self._open())
             self._opening.add_done_callback(self._opened)
         opening = self._opening
-        # As asyncio.shield(), but close(), which cancels the opening, does not cancel who waits.
+        # Like asyncio.shield(), except that close(), which cancels the opening, spares the waiters.
         await asyncio.wait([opening])
         if opening.cancelled():
             raise self._broken
@@ -267,7 +266,7 @@ class Client(Session):
     def _opened(self, opening: asyncio.Task[None]) -> None:
         self._opening = None
         if not opening.cancelled():
-            opening.exception()  # Else asyncio complains where nobody waited any more.
+            opening.exception()  # Retrieved, else asyncio complains when no task waits any more.
 
     async def _open(self) -> None:
         """Connects and subscribes as before."""
@@ -284,7 +283,7 @@ class Client(Session):
             self._server = server
             if self._subscription is not None:
                 await self._exchange(self._subscribe_request(self._subscription))
-        except BaseException as e:  # A cancellation too: nobody would close the link.
+        except BaseException as e:  # Cancellation too: the link would stay open.
             self._lost(e if isinstance(e, Error) else ConnectionError(
                 f"connecting to {self._address} was given up"))
             self._note_failure()

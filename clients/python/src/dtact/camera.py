@@ -65,14 +65,14 @@ def _of_this_machine() -> list[dict[str, Any]]:
 
 
 class Camera:
-    """One sensor, read by a thread of its own between connect() and disconnect(), so that the newest
-    frame is always at hand.
+    """One sensor. Between connect() and disconnect() a thread reads it, so that the newest frame is
+    always available.
 
     :param address: see dtact.Client, as for `token`, `token_file`, `fingerprint` and `ca_file`.
-    :param fps: at most so many frames a second; None: all of the daemon's.
-    :param width: and `height`, of depth and picture in pixels: the daemon's, or a half or a quarter
-        of them; None: the daemon's.
-    :param use_rgb: and `use_depth`, as LeRobot's depth cameras have them.
+    :param fps: limit, frames a second; None: all of the daemon's.
+    :param width: and `height`: size of depth and image in pixels, the daemon's or a half or a
+        quarter of it; None: the daemon's.
+    :param use_rgb: and `use_depth`, as in LeRobot's depth cameras.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Camera:
         self._thread: threading.Thread | None = None
         self._stop = threading.Event()
         self._changed = threading.Condition()
-        # Of the reading thread, under `_changed`:
+        # Written by the reading thread, guarded by `_changed`:
         self._newest: Frame | None = None
         self._came_at = 0.0  # time.perf_counter()
         self._count = 0
@@ -124,10 +124,9 @@ class Camera:
 
     @staticmethod
     def find_cameras() -> list[dict[str, Any]]:
-        """The daemon of this machine at the usual address, and those that announce themselves in
-        the network (`dtactctl find`, where it is installed). Of each "name", "type", "id" (the
-        address to give) and "serial"; of this machine's also "default_stream_profile" with width,
-        height and fps."""
+        """Finds the daemon of this machine at the default address, and those announced in the
+        network (by `dtactctl find`, if installed). Each entry has "name", "type", "id" (the address)
+        and "serial"; this machine's also "default_stream_profile" with width, height and fps."""
         found = _of_this_machine()
         program = shutil.which("dtactctl")
         if program is not None:
@@ -198,17 +197,17 @@ class Camera:
     # ------------------------------------------------------------ depth
 
     def read_depth(self) -> NDArray[np.float32]:
-        """The next frame's indentation: float32 (H, W, 1) in metres, positive = pressed; 0 where
-        it is not to be believed, since LeRobot's encoder has no room for NaN."""
+        """The next frame's indentation: float32 (H, W, 1) in metres, positive = pressed. Untrusted
+        pixels are 0, because LeRobot's encoder cannot store NaN."""
         return self._metres(self._after(self._checked("depth"), 10_000))
 
     def async_read_depth(self, timeout_ms: float = 200) -> NDArray[np.float32]:
-        """As async_read(), with read_depth()'s values."""
+        """Like async_read(), with the values of read_depth()."""
         self._checked("depth")
         return self._metres(self._after(self._seen["depth"], timeout_ms, "depth"))
 
     def read_latest_depth(self, max_age_ms: int = 500) -> NDArray[np.float32]:
-        """As read_latest(), with read_depth()'s values."""
+        """Like read_latest(), with the values of read_depth()."""
         self._checked("depth")
         return self._metres(self._latest(max_age_ms))
 

@@ -64,10 +64,9 @@ class Client(Session):
         self._subscription = subscription
 
     def frames(self, timeout: float | None = None) -> Iterator[Frame]:
-        """One frame after another, without an end. Subscribes to depth if nothing is subscribed.
-        Who comes back late gets the newest `kept_frames`. NoFrame when none comes within `timeout`
-        seconds, which are the client's unless given; with `reconnect` there is no limit unless one
-        is given."""
+        """Yields frames without end. Subscribes to depth if nothing is subscribed. A slow reader gets
+        the newest `kept_frames`. Raises NoFrame when none arrives within `timeout` seconds (default:
+        the client's timeout, or no limit with `reconnect`)."""
         if self._subscription is None:
             self.subscribe()
         limit = timeout if timeout is not None or self._reconnect else self._timeout
@@ -108,7 +107,7 @@ class Client(Session):
         return self._ask(requests.set_reconstruction(resolution, sharpen, max_error_um))
 
     def rezero(self, force: bool = False) -> None:
-        """Takes the present picture as untouched; `force`: although in contact."""
+        """Takes a new reference image; `force`: even in contact."""
         self._ask(requests.rezero(force))
 
     def calibration(self, number: int | None = None) -> CalibrationFiles:

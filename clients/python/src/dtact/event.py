@@ -1,4 +1,4 @@
-"""What the daemon tells every client that wants events, and what the client adds."""
+"""Events of the daemon, and those that the client adds."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from .values import Contact, Light, Reconstruction, health_names, wall_time
 
 @dataclass(frozen=True)
 class Event:
-    """What all events have."""
+    """Fields of all events."""
 
     #: The last frame captured before it; 0: none yet.
     sequence: int
@@ -27,7 +27,7 @@ class ContactEvent(Event):
 
 @dataclass(frozen=True)
 class LightEvent(Event):
-    """The light changed, by whomever."""
+    """The light changed."""
 
     light: Light
 
@@ -41,7 +41,7 @@ class ReferenceEvent(Event):
 
 @dataclass(frozen=True)
 class StateEvent(Event):
-    """The daemon's state or its conditions changed."""
+    """The daemon's state or its health flags changed."""
 
     state: str
     health: tuple[str, ...]

@@ -60,13 +60,13 @@ class Frame:
 
     @property
     def untrusted_value(self) -> int:
-        """What in `depth_values` marks a pixel not to believe."""
+        """The value in `depth_values` that marks an untrusted pixel."""
         return int(self._depth.untrusted_value)
 
     @property
     def uncertainty_mm(self) -> float:
-        """Mean absolute error to expect inside the contact, millimetres. What the conditions in
-        `health` say is not in it."""
+        """Mean absolute error to expect inside the contact, millimetres. It does not include the
+        effects that the flags in `health` warn of."""
         return float(self._depth.uncertainty_um) * 1e-3
 
     @property
@@ -81,7 +81,7 @@ class Frame:
 
     @property
     def sharpen_steps(self) -> int:
-        """Steps of the filter that undid the gel's scattering before the LUT; 0: none."""
+        """Sharpening steps against the gel's scattering, applied before the LUT; 0: none."""
         return int(self._depth.sharpen_steps)
 
     @property
@@ -162,16 +162,16 @@ class Frame:
 
     @cached_property
     def pose(self) -> ObjectPose | None:
-        """How the touched object has moved; None when it was not subscribed or there is no contact,
-        and until what touches is as large as about half a square millimetre."""
+        """Motion of the object in contact. None when not subscribed, without contact, and until the
+        contact is about half a square millimetre large."""
         return ObjectPose.of(self.message.pose) if self.message.HasField("pose") else None
 
     # ------------------------------------------------------------ what was measured
 
     @cached_property
     def contact(self) -> Contact | None:
-        """What touches; None when it was not measured, which is not the same as no
-        contact: `contact_absence` says why."""
+        """The contact. None when it was not measured, which differs from no contact:
+        `contact_absence` says why."""
         return Contact.of(self.message.contact) if self.message.HasField("contact") else None
 
     @property
@@ -181,7 +181,7 @@ class Frame:
 
     @cached_property
     def health(self) -> tuple[str, ...]:
-        """The conditions that speak against the depth, by name; empty when all is well."""
+        """Names of the health flags that are set; empty when all is well."""
         return health_names(self.message.health)
 
     @cached_property

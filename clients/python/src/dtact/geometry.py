@@ -1,4 +1,4 @@
-"""What dtact-perceive adds to a frame: points, and how the touched object has moved."""
+"""What dtact-perceive adds to a frame: points, and the motion of the object in contact."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -42,8 +42,8 @@ class PointCloud:
 
     points: NDArray[np.float32]  #: (H, W, 3) metres in the surface frame; NaN where there is none
     normals: NDArray[np.float32]  #: (H, W, 3) of length 1; NaN where there is no point
-    decimation: int  #: one point of so many pixels of the calibration's resolution
-    made_in_s: float = 0.0  #: what making it took
+    decimation: int  #: pixels of the calibration's resolution per point, along each side
+    made_in_s: float = 0.0  #: computation time
 
     @classmethod
     def of(cls, m: Message) -> PointCloud:
@@ -81,9 +81,9 @@ class PointCloud:
 
 @dataclass(frozen=True)
 class ObjectPose:
-    """How the touched object has moved since the contact was made, in the surface frame: a point p
-    of it now lies at `matrix() @ (p, 1)`, in millimetres. Of a known object (`object`) p is in the
-    frame of its file."""
+    """Motion of the object since contact began, in the surface frame: its point p is now at
+    `matrix() @ (p, 1)`, in millimetres. For a known object (`object`), p is in the frame of its
+    file."""
 
     #: "started", "tracked", "lost" (the last one is repeated), "recovered", or "searching" (for a known
     #: object: there is no motion)

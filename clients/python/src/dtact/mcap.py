@@ -18,7 +18,7 @@ from .messages import COMPRESSED_IMAGE, message_class
 
 _MAGIC = b"\x89MCAP0\r\n"
 _CHANNEL, _MESSAGE, _CHUNK = 0x04, 0x05, 0x06
-# A record, and a chunk once it is decompressed, has at most so many bytes in files of dtactctl.
+# Maximum bytes of a record, and of a decompressed chunk, in files of dtactctl.
 _MAX_RECORD = 256 << 20
 _FRAMES, _EVENTS, _JPEGS = "/dtact/frame", "/dtact/event", "/camera/jpeg"
 

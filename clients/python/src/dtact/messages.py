@@ -23,7 +23,7 @@ for _file in descriptor_pb2.FileDescriptorSet.FromString(
 ).file:
     _pool.AddSerializedFile(_file.SerializeToString())
 
-# Of foxglove.CompressedImage what recordings are read for; its other fields are passed over.
+# The fields of foxglove.CompressedImage that the reader needs; protobuf skips the others.
 _pool.AddSerializedFile(
     descriptor_pb2.FileDescriptorProto(
         name="compressed_image.proto",

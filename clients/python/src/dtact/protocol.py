@@ -1,7 +1,7 @@
-"""The conversation with a daemon, without any input or output: bytes in, bytes out.
+"""The protocol with a daemon, without I/O: bytes in, bytes out.
 
-Whoever reads gives what get_buffer() asks for and says with buffer_updated() how much came, as
-asyncio's BufferedProtocol does; answers, frames and events are then to be taken."""
+The caller reads into get_buffer() and reports the count to buffer_updated(), as with asyncio's
+BufferedProtocol. Answers, frames and events can then be taken."""
 from __future__ import annotations
 
 from collections import deque
@@ -16,7 +16,7 @@ from .messages import Message, ServerMessage
 
 #: Longest message either way, bytes.
 MAX_BYTES = 16 << 20
-#: Events kept for whoever reads them; the oldest yield.
+#: Events kept until they are taken; beyond it the oldest are dropped.
 MAX_EVENTS = 100_000
 
 _T = TypeVar("_T")
@@ -60,11 +60,11 @@ class Conversation:
         self.answers: dict[int, Message] = {}
         #: Why the daemon ends the connection, once it has said so.
         self.farewell: Error | None = None
-        #: Of the last frame that came; 0: none.
+        #: Sequence of the last frame received; 0: none.
         self.last_sequence = 0
 
     def successor(self) -> Conversation:
-        """That of the next connection: what came of events stays to be taken."""
+        """The conversation for the next connection; it keeps the events not taken yet."""
         other = Conversation(self._kept_frames)
         other._arrivals = self._arrivals
         other._events = self._events
@@ -72,7 +72,7 @@ class Conversation:
         return other
 
     def tell(self, event: Event) -> None:
-        """An event that is not the daemon's."""
+        """Adds an event of the client itself."""
         self._arrivals += 1
         self._events.put(self._arrivals, event)
 
@@ -92,7 +92,7 @@ class Conversation:
         return number, len(body).to_bytes(4, "big") + body
 
     def forget(self, number: int) -> None:
-        """Nobody waits for the answer any more."""
+        """Discards the answer to this request."""
         self._waiting.discard(number)
         self.answers.pop(number, None)
 
@@ -103,7 +103,7 @@ class Conversation:
         return memoryview(self._part)[self._filled :]
 
     def buffer_updated(self, count: int) -> None:
-        """So many bytes came. ProtocolError when they are no message of a daemon."""
+        """Takes `count` bytes from the buffer. ProtocolError when they are no daemon's message."""
         self._filled += count
         if self._filled < len(self._part):
             return

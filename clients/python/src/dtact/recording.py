@@ -11,7 +11,7 @@ from types import TracebackType
 from .address import Address
 from .errors import Error
 
-#: It finishes the file when it is told to end.
+#: Time for dtactctl to finish the file after it was asked to end.
 _FINISH_S = 30.0
 
 

@@ -52,20 +52,20 @@ class Session:
     """A connection to dtactd.
 
     :param address: "host", "host:port", "unix:/path"; port 7377 unless given.
-    :param token: what the daemon asks for on an address beyond its machine. It is sent only to
-        this machine, to a daemon known by `fingerprint` or `ca_file`, or where `insecure` says so.
+    :param token: the token that the daemon requires from other machines. It is sent only to this
+        machine, to a daemon known by `fingerprint` or `ca_file`, or if `insecure` is set.
     :param token_file: the same from the first line of a file that only its owner may read.
     :param fingerprint: SHA-256 of the daemon's certificate in hexadecimal, as `dtactctl cert`
-        prints it: TLS 1.3, and nobody else is spoken to.
-    :param ca_file: TLS 1.3 with a certificate that one of those in this PEM file has signed for the
-        host's name.
-    :param insecure: sends the token over plain TCP to other machines too: whoever hears it there may
-        use it.
+        prints it. Selects TLS 1.3; any other certificate is refused.
+    :param ca_file: PEM file of CAs. Selects TLS 1.3; one of them must have signed the daemon's
+        certificate for the host's name.
+    :param insecure: sends the token over plain TCP to other machines too, where eavesdroppers can
+        read and use it.
     :param program: shown by `dtactctl status`.
     :param timeout: seconds for the connection, each request, and each frame.
     :param reconnect: connect and subscribe again when the connection breaks while frames or events
-        are awaited. A request that is under way then fails with ConnectionError.
-    :param kept_frames: frames kept while nobody takes them, the newest; 1: always the newest.
+        are awaited. A pending request then fails with ConnectionError.
+    :param kept_frames: number of newest frames kept until they are taken; 1: only the newest.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class Session:
         self._broken: Error = ConnectionError(f"not connected to {self._address}")
         self._lost_at: float | None = None
         self._lost_because = ""
-        # Of all calls and tasks together: who polls with short time-outs waits as long as others.
+        # Shared by all calls and tasks: polling with short time-outs does not shorten the back-off.
         self._back_off = BackOff()
         self._next_attempt = 0.0  # time.monotonic()
         self._begin()
@@ -172,11 +172,11 @@ class Session:
             self._lost_at, self._lost_because = time.monotonic(), str(error)
 
     def _note_failure(self) -> None:
-        """An attempt to connect came to nothing."""
+        """Records a failed attempt to connect."""
         self._next_attempt = time.monotonic() + self._back_off.next()
 
     def _note_return(self) -> None:
-        """Tells of it where there was a connection before."""
+        """Adds a Reconnected event if there was a connection before."""
         self._back_off = BackOff()
         self._next_attempt = 0.0
         if self._lost_at is not None:

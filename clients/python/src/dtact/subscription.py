@@ -1,4 +1,4 @@
-"""What a client wants of every frame."""
+"""The parts of each frame that a client subscribes to."""
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -11,16 +11,16 @@ Encoding = Literal["auto", "int16", "predict_zstd"]
 
 @dataclass(frozen=True)
 class Subscription:
-    """What is to be sent from now on. What is left out is not sent; a limit of 0 Hz is none."""
+    """The parts to be sent from now on; others are not sent. A limit of 0 Hz means no limit."""
 
-    #: How depth travels; both encodings give the same depth. "auto": int16 on the daemon's own
-    #: machine, where bytes cost least; predict_zstd elsewhere. None: no depth.
+    #: Encoding of depth; both give the same values. "auto": int16 on the daemon's own machine,
+    #: where bandwidth is cheap; predict_zstd elsewhere. None: no depth.
     depth: Encoding | None = "auto"
     luma: bool = False  #: the camera's picture in grey
     jpeg: bool = False  #: the camera's own JPEG, if that is what it delivers
     summary: bool = False  #: frames also without maps: contact, health and times
     every: int = 1  #: every n-th frame
-    depth_hz: float = 0.0  #: at most so many depth maps a second, 0.01 … 1000
+    depth_hz: float = 0.0  #: limit, depth maps a second, 0.01 … 1000
     luma_hz: float = 0.0
     jpeg_hz: float = 0.0
     summary_hz: float = 0.0
@@ -30,11 +30,11 @@ class Subscription:
     #: "contact": the box around what is pressed, and no map while nothing is.
     region: tuple[int, int, int, int] | Literal["contact"] | None = None
     events: bool = True
-    #: Points of the surface during contact, of dtact-perceive, which has no depth: "float32",
-    #: or half as large "int16". `decimation` and `region` say which.
+    #: Point cloud of the surface during contact, from dtact-perceive, which has no depth:
+    #: "float32", or "int16" of half the size. `decimation` and `region` select the points.
     cloud: Literal["float32", "int16"] | None = None
     cloud_hz: float = 0.0
-    pose: bool = False  #: how the touched object moves, of dtact-perceive
+    pose: bool = False  #: motion of the object in contact, from dtact-perceive
     pose_hz: float = 0.0
 
     def message(self, same_machine: bool) -> Message:

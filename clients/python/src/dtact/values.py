@@ -24,7 +24,7 @@ def health_names(health: Iterable[int]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Contact:
-    """What touches, in a summary."""
+    """Summary of the contact."""
 
     in_contact: bool
     area_mm2: float  #: pressed deeper than the contact threshold
@@ -58,8 +58,8 @@ class Light:
 
     brightness: int  #: 0 … 255
     leds: tuple[tuple[int, int, int], ...]  #: eight colours (r, g, b) of 0 … 255
-    #: The daemon's CLOCK_MONOTONIC in seconds from which on frames are exposed under it; None while
-    #: it is not known.
+    #: Since when frames are exposed under this light: the daemon's CLOCK_MONOTONIC, seconds. None
+    #: while unknown.
     since_s: float | None
 
     @classmethod
@@ -175,7 +175,7 @@ class Status:
     calibration: CalibrationSummary | None
     version: str
     message: Message
-    reconstruction: Reconstruction | None  #: None from daemons that do not tell
+    reconstruction: Reconstruction | None  #: None if the daemon does not report it
 
     @classmethod
     def of(cls, m: Message) -> Status:
@@ -187,7 +187,7 @@ class Status:
 
 @dataclass(frozen=True)
 class Server:
-    """Who answered."""
+    """The program that answered."""
 
     program: str
     major: int
@@ -195,9 +195,9 @@ class Server:
     features: frozenset[str]  #: what it can do that others cannot; proto/README.md lists the names
     rights: str  #: "view" or "control"
     name: str
-    serial: str  #: the camera's, as far as it tells one
-    frame_id: str  #: of the surface frame
-    rezero_timeout_s: float = 0  #: a re-zero is answered within this time
+    serial: str  #: the camera's serial number; empty if it has none
+    frame_id: str  #: id of the surface frame
+    rezero_timeout_s: float = 0  #: longest time until the answer to a re-zero
 
     @classmethod
     def of(cls, m: Message) -> Server:

@@ -20,7 +20,7 @@ class Page {
   private readonly help = this.makeHelp();
   private readonly shown = new Map<string, Pane>();
   private readonly buttons = new Map<string, HTMLButtonElement>();
-  /** The pane that keys go to: the one that was touched last. */
+  /** The pane that receives keys: the one used last. */
   private active = "";
 
   constructor() {

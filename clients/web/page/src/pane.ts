@@ -19,7 +19,7 @@ import { Stage } from "./view/stage";
 import type { Tool, View } from "./view/stage";
 import { fixed } from "./labels";
 
-/** Numbers that change with every frame are told so often: more cannot be read. */
+/** Update interval of numbers that change with every frame: faster is unreadable. */
 const TELL_MS = 100;
 
 const KEYS_OF_POINTS = [" ", "ArrowLeft", "ArrowRight"];
@@ -364,7 +364,7 @@ export class Pane {
     this.sensor.pause(paused);
     say(this.pauseButton, paused ? "Resume" : "Pause");
     this.pauseButton.setAttribute("aria-pressed", String(paused));
-    // Not the number that it told when it was paused before.
+    // Not the number shown at an earlier pause.
     say(this.behind, "");
     this.steps.hidden = !paused;
     this.element.classList.toggle("paused", paused);

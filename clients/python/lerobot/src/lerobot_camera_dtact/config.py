@@ -1,4 +1,4 @@
-"""What stands in a robot's configuration under `cameras`."""
+"""A robot's configuration under `cameras`."""
 from __future__ import annotations
 
 from dataclasses import dataclass

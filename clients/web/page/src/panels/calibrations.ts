@@ -35,7 +35,7 @@ export class CalibrationsPanel {
   );
   readonly element = panel("Calibrations", this.list, this.upload, this.answer);
 
-  /** What is told is that the list did not come. */
+  /** The message shown is that the list did not arrive. */
   private lacking = false;
   private inUse: MapShape | undefined;
 
@@ -105,7 +105,7 @@ export class CalibrationsPanel {
     const [toml, png] = FILES.map((name) => files.find((file) => file.name === name));
     this.picker.value = "";
     if (!toml || !png) return this.tell(`Choose both ${FILES.join(" and ")} of the folder.`);
-    // The browser does not tell the folder's name; the moment names it as well.
+    // The browser does not reveal the folder's name, so the time becomes the name.
     const name = `web-${new Date().toISOString().slice(0, 19).replaceAll(":", "")}`;
     const [calibrationToml, referencePng] = await Promise.all(
       [toml, png].map(async (file) => new Uint8Array(await file.arrayBuffer())),

@@ -1,4 +1,4 @@
-// What touches, in numbers.
+// The contact in numbers.
 import { ObjectPose_Tracking } from "../../gen/dtact_pb";
 import type { ObjectPose, Vector3 } from "../../gen/dtact_pb";
 import { Facts, panel } from "../dom";
@@ -12,7 +12,7 @@ const TRACKING: Record<number, string> = {
   [ObjectPose_Tracking.SEARCHING]: "searching",
 };
 
-/** What moved since the contact was made, or where a known object is, as dtact-perceive tells it. */
+/** Motion since contact began, or the pose of a known object, from dtact-perceive. */
 function motion(pose: ObjectPose | undefined): { moved: string; turned: string } {
   if (!pose) return { moved: "–", turned: "–" };
   const reported = (vector: Vector3 | undefined, digits: number): string =>
@@ -56,7 +56,7 @@ export class ContactPanel {
     this.hideMotion();
   }
 
-  /** Of a sensor that does not tell how what is touched moves. */
+  /** For a sensor without the motion of the object in contact. */
   hideMotion(): void {
     this.motion.element.hidden = true;
   }

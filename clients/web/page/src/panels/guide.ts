@@ -7,7 +7,7 @@ import { button, el, say, svg } from "../dom";
 import type { Sensor } from "../session/sensor";
 import { fixed } from "../labels";
 
-/** Of the picture's scale bar, mm. */
+/** Length of the picture's scale bar, mm. */
 const BAR_MM = 5;
 /** Lines that stay; a session says some fifty. */
 const MAX_SAID = 200;

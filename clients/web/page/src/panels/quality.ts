@@ -62,7 +62,7 @@ export class QualityPanel {
     this.reference = { sequence: Number(sequence), restored };
   }
 
-  /** After a connection was made: events tell only what comes later. */
+  /** After connecting: events report only later changes. */
   async ask(sensor: Sensor): Promise<void> {
     this.reference = undefined;
     this.facts.set("reference", "–");
@@ -76,7 +76,7 @@ export class QualityPanel {
         this.reference ??= { sequence: Number(result.value.sequence), restored: false };
       }
     } catch {
-      // There is none yet; the event tells when one is taken.
+      // There is none yet; an event reports when one is taken.
     }
   }
 

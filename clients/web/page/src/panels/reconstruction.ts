@@ -10,13 +10,13 @@ import { fixed, um } from "../labels";
 
 const RESOLUTIONS = { full: "Full", half: "Half", quarter: "Quarter", auto: "Auto" };
 const SHARPEN = { off: "Off", once: "1", twice: "2", auto: "Auto" };
-/** As the wire has it; as keys of an object numbers would come first. */
+/** The protocol's values. They are not the keys, because numeric keys of an object come first. */
 const STEPS = { off: "off", once: "1", twice: "2", auto: "auto" };
 type Resolution = keyof typeof RESOLUTIONS;
 type Sharpen = keyof typeof SHARPEN;
 
 const [WIDTH, HEIGHT, LEFT, BOTTOM] = [280, 150, 34, 26];
-/** Of a way's frames the newest count most: each new one by so much. */
+/** Weight of a new frame in the moving average of a setting's times. */
 const WEIGHT = 0.05;
 const REDRAW_MS = 250;
 /** What was seen of ways of making depth, at most. */
@@ -74,7 +74,7 @@ export class ReconstructionPanel {
       el("label", { class: "row" }, "within", this.bound, "µm"),
     ),
   );
-  /** Closed at first: one line says what depth takes and is worth. */
+  /** Closed at first: one line shows the time and the uncertainty of depth. */
   readonly element = el(
     "details",
     { class: "panel", "aria-label": "Speed and accuracy" },
@@ -118,7 +118,7 @@ export class ReconstructionPanel {
     this.draw();
   }
 
-  /** Of frames in which there is contact: elsewhere there is little to make. */
+  /** Only for frames in contact: others need little computation. */
   frame(frame: Frame): void {
     const way = wayOf(frame);
     if (!way || !frame.depth || frame.contact?.inContact !== true) return;

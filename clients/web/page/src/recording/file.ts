@@ -1,7 +1,7 @@
 // What a recording is written to: memory at first, then the browser's own files.
 import type { IWritable } from "@mcap/core";
 
-/** Pieces of so many bytes become a Blob, which browsers keep on disk. */
+/** Pieces of this many bytes become a Blob, which browsers keep on disk. */
 const PIECE_BYTES = 16 * 1024 * 1024;
 
 export class GrowingFile implements IWritable {

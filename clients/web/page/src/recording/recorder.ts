@@ -1,5 +1,5 @@
 // Records what a session receives: subscribes to what a recording needs, fetches what depth is made
-// by, and tells how far it is.
+// by, and reports its progress.
 import { create } from "@bufbuild/protobuf";
 import { GetCalibrationSchema, GetReferenceSchema, GetStatusSchema } from "../../gen/dtact_pb";
 import type { Event, Frame, Reply } from "../../gen/dtact_pb";
@@ -17,7 +17,7 @@ export interface Recorded {
   bytes: number;
   seconds: number;
   file?: Blob;
-  /** Why it ended, where nobody said so. */
+  /** The reason when it ended by itself. */
   why?: string;
 }
 

@@ -98,7 +98,7 @@ export class Recording {
     this.add("/dtact/event", EventSchema, event);
   }
 
-  /** As of the first frame. */
+  /** Value at the first frame. */
   addStatus(status: Status): void {
     if (this.frames === 0) this.status = status;
     else this.add("/dtact/status", StatusSchema, status);
@@ -126,7 +126,7 @@ export class Recording {
 
   private queue<T>(step: () => Promise<T>): Promise<T> {
     const done = this.last.then(step);
-    // What fails fails all that waits behind it, and is told by finish().
+    // A failure fails all queued writes; finish() reports it.
     done.catch(() => {});
     this.last = done;
     return done;

@@ -10,11 +10,11 @@ export function nowMs(): number {
   return performance.timeOrigin + performance.now();
 }
 
-/** Of the last ten pings the fastest says best what the daemon's clock was. */
+/** The fastest of the last ten pings gives the best estimate of the daemon's clock. */
 export class ClockOffset {
   private readonly samples: Sample[] = [];
 
-  /** A Ping went out and its Pong came in at these times of the page; the Pong told the daemon's. */
+  /** Adds a Ping: the page's times when it was sent and answered, and the daemon's from the Pong. */
   add(sentMs: number, receivedMs: number, monotonicNs: bigint): void {
     const middle = (sentMs + receivedMs) / 2;
     this.samples.push({ wayMs: receivedMs - sentMs, offsetMs: middle - Number(monotonicNs) / 1e6 });

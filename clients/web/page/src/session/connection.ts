@@ -36,12 +36,12 @@ export class Connection {
   private why = "";
   /** Said last by the other end before it ended the connection. */
   private lastWord: string | undefined;
-  /** The newest frame that has come and is not decoded; an older one gives way. */
+  /** The newest frame not decoded yet; it replaces an older one. */
   private pending: Uint8Array | undefined;
   private readonly later = new MessageChannel();
   /** Frames that gave way here. */
   gaveWay = 0;
-  /** No frame gives way. */
+  /** No frame is skipped. */
   every = false;
 
   constructor(
@@ -135,7 +135,7 @@ export class Connection {
     const back = connected && !this.reached;
     this.reached = connected;
     this.why = error ?? "";
-    // What it can and lets one do may differ from what the greeting on this connection told.
+    // Its features and rights may differ from those in this connection's HelloReply.
     if (back) return this.connect();
     this.tell();
   }

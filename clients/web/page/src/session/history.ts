@@ -17,7 +17,7 @@ export class History {
     }
   }
 
-  /** The frame so many before the newest; the oldest where there are not as many. */
+  /** The frame this many before the newest; the oldest if there are fewer. */
   behind(count: number): { frame: Frame; behind: number } | undefined {
     const behind = Math.max(0, Math.min(count, this.kept.length - 1));
     const kept = this.kept[this.kept.length - 1 - behind];

@@ -72,7 +72,7 @@ function unpackCloud(cloud: WireCloud): Cloud {
   return { values, width, height, mmPerUnit: 1000 * cloud.metresPerUnit, points: cloud.points };
 }
 
-/** Of every 16th trusted pixel, micrometres; undefined where there is none. */
+/** RMS of every 17th pixel that is trusted, micrometres; undefined if there is none. */
 function rootMeanSquareUm(map: DepthMap): number | undefined {
   let sum = 0;
   let count = 0;

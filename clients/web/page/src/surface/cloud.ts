@@ -1,5 +1,5 @@
-// What dtact-perceive serves in space: the points of the contact, lit by their normals, and the axes of
-// what is touched as it moved since the contact was made. Loaded when there is such a sensor.
+// Draws dtact-perceive's data in 3D: the contact's points, lit by their normals, and the axes of the
+// object, which show its motion since contact began. Loaded when a sensor has such data.
 import {
   AxesHelper,
   BufferAttribute,

@@ -4,7 +4,7 @@ import type { Range } from "./map_canvas";
 
 const STEPS_MM = [0.01, 0.02, 0.05, 0.1, 0.2, 0.25, 0.5, 1, 2, 5, 10];
 
-/** Draws it upright into so many CSS pixels; `ink` is the text's colour. */
+/** Draws it upright, in CSS pixels; `ink` is the text's colour. */
 export function drawColourBar(
   context: CanvasRenderingContext2D,
   left: number,
@@ -32,7 +32,7 @@ export function drawColourBar(
   context.fillStyle = ink;
   context.strokeStyle = ink;
   context.lineWidth = 1;
-  // As the map marks what is not to be believed.
+  // Striped like untrusted pixels in the map.
   for (let x = 0; x < width; ++x) {
     for (let y = 0; y < cap - 2; ++y) {
       context.fillStyle =

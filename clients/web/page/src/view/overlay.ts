@@ -51,7 +51,7 @@ export function scaleLength(grid: Grid): number {
   return LENGTHS_MM.reduce((best, length) => (length <= fifth * 1.05 ? length : best));
 }
 
-/** Draws the marks into a picture of so many CSS pixels. */
+/** Draws the marks into a picture; its size is in CSS pixels. */
 export function drawMarks(
   context: CanvasRenderingContext2D,
   width: number,
