@@ -25,7 +25,7 @@
 namespace dtact::e2e {
 namespace {
 
-// Of the ranges for documentation (RFC 5737, RFC 3849): nobody's.
+// From the ranges for documentation (RFC 5737, RFC 3849): unused.
 constexpr const char* kIpv4 = "192.0.2.7";
 constexpr const char* kIpv6 = "2001:db8::7";
 

@@ -15,7 +15,7 @@ namespace dtact::e2e {
 struct DepthError {
   double inside_mm = 0;   ///< Mean absolute error inside the true contact; NaN without contact.
   double outside_mm = 0;  ///< The same everywhere else.
-  int inside_pixels = 0;  ///< Of the true contact.
+  int inside_pixels = 0;  ///< Pixels of the true contact.
   int untrusted = 0;      ///< Of them, those not to be believed.
 };
 

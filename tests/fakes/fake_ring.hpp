@@ -22,7 +22,7 @@ class FakeRing final : public hal::LightRing {
     std::vector<hal::Light> shown;
     hal::RingReport report;  // guarded by mutex
 
-    void tell(hal::RingReport what) {
+    void set_report(hal::RingReport what) {
       const std::scoped_lock lock(mutex);
       report = std::move(what);
     }

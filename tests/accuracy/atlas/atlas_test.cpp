@@ -21,8 +21,8 @@ namespace dtact::atlas {
 namespace {
 
 // The LUT from one press alone, whose nominal error (0.036 mm) is about a grey level: the limits
-// of the conditions are set to that. The LUT from many presses is better, and so leaves twice its
-// nominal error before a light that drifted by less than a grey level can be told; the page has its
+// of the health flags assume that. The LUT from many presses is better, and so leaves twice its
+// nominal error before a light that drifted by less than a grey level is detected; the page has its
 // rows.
 const Method& ours() {
   const auto found = std::ranges::find(methods(), "sphere alone, one press", &Method::name);

@@ -63,7 +63,7 @@ hal::LumaView Spoiler::make(const Shot& shot, std::uint64_t sequence) {
 void Spoiler::light_up(const Shot& shot, std::uint64_t sequence) {
   const auto clean = renderer_.render_clean(shot.moment, hal::sim::led_levels(shot.light));
   for (int y = 0; y < height_; ++y) {
-    // Frames come at no multiple of the PWM's period, so the bands wander.
+    // Frames come at no multiple of the PWM's period, so the bands move.
     const double phase =
         2 * std::numbers::pi * (y / shot.band_rows + 0.37 * static_cast<double>(sequence));
     const double factor = shot.exposure * (1 + shot.band * std::sin(phase)) / 64;

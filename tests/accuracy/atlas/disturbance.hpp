@@ -14,7 +14,7 @@
 
 namespace dtact::atlas {
 
-/// How one frame is made, and what is wrong with it. As it stands: a clean frame.
+/// How one frame is made, and what is wrong with it. Default: a clean frame.
 struct Shot {
   std::uint64_t moment = 0;  ///< Frame of the solved choreography.
   hal::Light light;          ///< What the ring really shows.

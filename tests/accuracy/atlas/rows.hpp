@@ -11,12 +11,12 @@ namespace dtact::atlas {
 /// One condition, swept from harmless to broken.
 struct Row {
   std::string_view group;  ///< light, image, scene or reference: its picture.
-  std::string_view id;     ///< Of its lines in the CSV.
+  std::string_view id;     ///< Names its lines in the CSV.
   std::string_view title;
-  std::string_view unit;       ///< Of the swept value.
+  std::string_view unit;       ///< Unit of the swept value.
   std::vector<double> values;  ///< The first is harmless; its error is nominal.
   std::function<Script(double)> script;
-  /// Why one luma image cannot tell this condition; empty where it can. See the page.
+  /// Why one luma image cannot show this condition; empty where it can. See the page.
   std::string_view undecidable;
 };
 

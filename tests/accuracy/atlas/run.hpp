@@ -23,10 +23,10 @@ struct Script {
   int frames = 0;             ///< Asked of the camera, damaged ones included.
   double fps = 60;            ///< Fewer let minutes pass in few frames.
   bool follow = true;         ///< The reference follows the light, as configured by default.
-  int judged = 12;            ///< The last so many are judged.
+  int judged = 12;            ///< Number of last frames judged.
   std::optional<int> rezero;  ///< The frame before which a new reference is asked for.
   bool force = true;          ///< It is taken although in contact, as the darkened field seems to.
-  std::function<Shot(int)> shot;  ///< Of frame n.
+  std::function<Shot(int)> shot;  ///< The shot of frame n.
   /// The moment whose indentation is true at frame n, where it is not the one shown.
   std::function<std::uint64_t(int)> moment;
 };
@@ -34,22 +34,22 @@ struct Script {
 /// The frames from start-up until the reference is taken: settling (8) and averaging (16).
 inline constexpr int kReady = 30;
 
-/// What came of a run's judged frames.
+/// Result of a run's judged frames.
 struct Outcome {
-  double inside_mm = 0;   ///< Mean absolute error where the object touches; NaN: no depth there.
-  double outside_mm = 0;  ///< And elsewhere.
+  double inside_mm = 0;   ///< Mean absolute error in contact; NaN: no depth there.
+  double outside_mm = 0;  ///< The same elsewhere.
   /// As error_mm(), with the truth moved along with a picture that the camera's place moves: what
   /// is left is wrong in depth, not in place. NaN where the camera did not move.
   double along_mm = std::numeric_limits<double>::quiet_NaN();
   double withheld = 0;   ///< Share of the frames without depth, or of the contact marked untrusted.
-  double flagged = 0;    ///< Share of the frames that carried a condition.
+  double flagged = 0;    ///< Share of the frames that carried a health flag.
   double stated_mm = 0;  ///< The uncertainty that the frames with depth carried, mean.
   std::array<int, pipeline::kHealthCount> health_flags{};  ///< Frames that carried each.
   int frames = 0;
 
   /// The larger of the two errors; NaN when there was no depth at all.
   [[nodiscard]] double error_mm() const noexcept;
-  /// The user was told, or was given nothing: in at least half of the frames.
+  /// At least half of the frames carried a health flag or had no depth.
   [[nodiscard]] bool reported() const noexcept { return flagged >= 0.5 || withheld >= 0.5; }
 };
 
@@ -57,7 +57,7 @@ struct Outcome {
 /// the same script gives the same outcome. Without real-time settings, state folder or ring.
 [[nodiscard]] Outcome run(const Method& method, const Script& script);
 
-/// Names of the conditions that at least a tenth of the frames carried, comma separated.
+/// Names of the health flags that at least a tenth of the frames carried, comma separated.
 [[nodiscard]] std::string health_flags_of(const Outcome& outcome);
 
 }  // namespace dtact::atlas

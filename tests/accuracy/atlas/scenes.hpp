@@ -18,7 +18,7 @@ struct Pose {
   double depth_mm = 0;
 };
 
-/// Solves each pose by itself; moment_of(i) is a frame at which only poses[i] touches, and frame 0
+/// Solves each pose by itself; moment_of(i) is a frame at which only poses[i] presses, and frame 0
 /// shows the undeformed gel.
 [[nodiscard]] std::shared_ptr<const hal::sim::Truth> solve(const std::vector<Pose>& poses);
 [[nodiscard]] std::uint64_t moment_of(std::size_t pose);

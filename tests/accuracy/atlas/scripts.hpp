@@ -14,7 +14,7 @@ using Spoil = std::function<void(Shot&, int n, double value)>;
 inline constexpr int kFrames = kReady + 60;  ///< A second after the reference.
 inline constexpr int kPress = kReady + 6;    ///< The first frame that shows the object.
 
-/// Untouched until kPress, then pressed. From kReady on `spoil` changes each shot.
+/// No contact until kPress, then pressed. From kReady on `spoil` changes each shot.
 [[nodiscard]] Script press(std::shared_ptr<const hal::sim::Truth> truth, double value,
                            const Spoil& spoil);
 

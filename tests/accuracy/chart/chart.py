@@ -7,7 +7,7 @@ CPU time of the one thread, the median over all rounds; instructions are counted
 where the system allows it; the error is the mean absolute difference from the simulator's
 indentation inside the true contact (everywhere, outside the contact), no offset removed.
 
-Writes chart.csv and chart.svg to --out. Exit code: 0, or 1 when something could not be measured.
+Writes chart.csv and chart.png to --out. Exit code: 0, or 1 when something could not be measured.
 """
 import argparse
 import csv
@@ -29,7 +29,7 @@ sys.path.insert(0, os.path.join(HERE, "..", "..", "bench"))
 from paper_pipeline import HEIGHT, LEFT, SIDE, TOP, WIDTH, PaperPipeline  # noqa: E402
 from run import machine  # noqa: E402
 
-matplotlib.use("svg")
+matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
 TITLES = {"ball": "5 mm ball, 1.2 mm deep", "screws": "three set screws, 0.8 mm deep",
@@ -186,8 +186,7 @@ def draw_points(axes, rows, value, front):
 
 
 def plot(rows, shots, file, label):
-    plt.rcParams.update({"font.family": "DejaVu Sans", "font.size": 8, "svg.fonttype": "none",
-                         "svg.hashsalt": "dtact"})
+    plt.rcParams.update({"font.family": "DejaVu Sans", "font.size": 8})
     # A processor that is shared may not let its instructions be counted: no empty row then.
     views = [("time per frame, µs", "median_us", False, True),
              ("instructions per pixel of the full map", "instructions_per_pixel", False, False),
@@ -228,13 +227,13 @@ def plot(rows, shots, file, label):
     figure.suptitle("Speed against accuracy, simulated sensor, 800×600 → 580×580 "
                     f"(no error is drawn as 0.1 µm)\n{label}", fontsize=9)
     figure.tight_layout(rect=(0, 0.255 / len(views), 1, 0.985))
-    figure.savefig(file, metadata={"Date": None})
+    figure.savefig(file, dpi=90)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
     parser.add_argument("--server", required=True, help="the chart_server program")
-    parser.add_argument("--out", required=True, help="folder for chart.csv and chart.svg")
+    parser.add_argument("--out", required=True, help="folder for chart.csv and chart.png")
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--core", type=int, default=max(os.sched_getaffinity(0)))
     options = parser.parse_args()
@@ -261,7 +260,7 @@ def main():
         writer.writeheader()
         for row in rows:
             writer.writerow({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()})
-    plot(rows, shots, os.path.join(options.out, "chart.svg"), machine())
+    plot(rows, shots, os.path.join(options.out, "chart.png"), machine())
     for shot in shots:
         print(f"\n{TITLES.get(shot, shot)}: the Pareto front, and the paper's pipeline")
         for row in sorted((r for r in rows if r["shot"] == shot), key=lambda r: r["median_us"]):

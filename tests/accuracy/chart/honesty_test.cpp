@@ -1,4 +1,4 @@
-// Whether depth maps are worth what they state: true error over stated uncertainty. What is stated
+// Whether depth maps match their uncertainty: true error over stated uncertainty. What is stated
 // rests on constants that were taken from simulated scenes: the blur's from all_objects.toml on the
 // built-in sensor (daemon/pipeline/depth/uncertainty.hpp), the zero's from presses on sensors drawn
 // between those fitted to sensor_a and sensor_b (lut_uncertainty.hpp), those of the list of several
@@ -51,7 +51,7 @@ struct Specimen {
   Scene scene;
   std::size_t light = 0;  ///< Into table::configurations().
   double ball_mm = 0;     ///< Radius.
-  double depth_mm = 0;    ///< Of the one press.
+  double depth_mm = 0;    ///< Depth of the one press.
   /// The sphere alone cannot chain its presses: the lightest are not seen.
   bool leaves_gap = false;
 };

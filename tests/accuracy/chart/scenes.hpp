@@ -21,7 +21,7 @@ inline constexpr double kMmPerPx = 0.0413793;
 /// Something at rest on the sensor.
 struct Shot {
   std::string name;                  ///< "ball", "screws", "flat", "nothing".
-  std::vector<image::Grey8> frames;  ///< Of the same moment; only the noise differs.
+  std::vector<image::Grey8> frames;  ///< The same moment; only the noise differs.
   std::vector<float> truth_mm;       ///< Indentation at every pixel of the crop, row-major.
   /// Where the error counts: true contact, everywhere without contact. Row-major, crop sized.
   std::vector<std::uint8_t> judged;

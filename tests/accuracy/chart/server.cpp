@@ -1,4 +1,4 @@
-// Works one setting on one shot when told to, so that a driver can alternate between all of them
+// Works one setting on one shot on command, so that a driver can alternate between all of them
 // and the Python pipeline.
 //   list                  the settings, tab separated: NAME|METHOD|DECIMATION|TILES|SMOOTHING_MM
 //   shots                 the shots' names, tab separated

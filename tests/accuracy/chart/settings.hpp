@@ -21,18 +21,18 @@ struct Setting {
   bool tiles = false;  ///< Only what changed.
   double smoothing_mm = 0.1;  ///< Standard deviation; 0: the method's own.
   std::shared_ptr<const recon::Model> model;
-  int steps = 0;  ///< Of sharpening.
+  int steps = 0;  ///< Sharpening steps.
 };
 
 /// All of them, calibrated with make_calibration_press() or, "regression" and "several", with
 /// make_calibration_presses(), "virtual balls" as with_luts_of_virtual_balls() says, and nothing
 /// else. "list" and "several" are of the known sphere alone, "ours" is what dtact-calibrate makes
-/// of the one press unless it is told otherwise.
+/// of the one press by default.
 [[nodiscard]] std::vector<Setting> make_settings(const image::Grey16& reference);
 
 struct Error {
   double mean_absolute_mm = 0;  ///< Over judged, trusted pixels.
-  double untrusted_share = 0;   ///< Of the judged pixels.
+  double untrusted_share = 0;   ///< Share of the judged pixels.
 };
 
 /// What a list of several presses is made from: the calibration presses of a 4 mm ball.

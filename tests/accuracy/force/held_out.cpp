@@ -46,7 +46,7 @@ class Draw {
 
 struct Drawn {
   sim::Object object;
-  double reach_mm;  ///< Of its place, so that it stays within the field.
+  double reach_mm;  ///< Range of its position, within the field.
 };
 
 Drawn draw_object(Draw& draw) {
@@ -125,7 +125,7 @@ std::string calibrate(const std::vector<std::string>& arguments) {
   return last_line(said.str());
 }
 
-/// As a user does, with a ball of 4 mm, a disc and a kitchen scale.
+/// Calibrates as a user does, with a ball of 4 mm, a disc and a kitchen scale.
 std::string make_calibration(double thickness_mm, Calibrating calibrating, std::uint64_t seed,
                              const fs::path& folder) {
   constexpr double kNewtonsPerGram = 0.00980665;

@@ -18,7 +18,7 @@ enum class Calibrating : std::uint8_t {
 /// One press of an object that had no part in the calibration, and the force that a client got.
 struct HeldOut {
   std::string object;
-  double thickness_mm = 0;  ///< Of the gel.
+  double thickness_mm = 0;  ///< Gel thickness.
   double depth_mm = 0;
   double true_n = 0;
   bool valid = false;

@@ -11,7 +11,7 @@ namespace dtact::model_study {
 
 /// Errors of one method of the paper's table on objects, a value each seed, mm.
 struct ObjectErrors {
-  /// By object: mean absolute one against the simulator's indentation where the object touches.
+  /// By object: mean absolute error against the simulator's indentation in contact.
   std::vector<std::vector<double>> in_contact_mm;
   std::vector<double> no_contact_mm;  ///< Root mean square of one frame's map.
   int refused = 0;                    ///< Seeds whose press was not taken.

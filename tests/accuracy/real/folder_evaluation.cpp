@@ -112,7 +112,7 @@ std::vector<std::string> lines_of(const FolderEvaluation& e) {
         e.ball->half_mae_mm.value_or(0), e.ball->half_worst_mm.value_or(0),
         e.ball->sector_mae_mm.value_or(0)));
     lines.push_back(
-        "LUT: of the ball's known sphere alone (--method LUT), also where a calibration would be "
+        "LUT: of the ball's known sphere alone (--method list), also where a calibration would be "
         "refused");
     lines.push_back(e.ball->press_asymmetry.describe());
     if (std::string left_out = calibration::gain_left_out(e.gain.gain, *e.calibration);

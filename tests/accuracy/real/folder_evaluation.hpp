@@ -12,11 +12,11 @@
 
 namespace dtact::ctl {
 
-/// What a folder of a sensor's images tells: `board_reference.png` and `board.png`,
+/// Results from a folder of a sensor's images: `board_reference.png` and `board.png`,
 /// `ball_reference.png` and `ball.png`. What could not be done is empty and has its reason.
 struct FolderEvaluation {
   std::optional<PinPress> pins;
-  PinGain gain;                                         ///< That the pins ask for.
+  PinGain gain;                                         ///< The gain that the pins select.
   std::string no_pins;                                  ///< Why there is no lens.
   std::optional<calibration::Calibration> calibration;  ///< On the rectified image, of the ball.
   std::optional<calibration::Evaluation> ball;

@@ -17,7 +17,7 @@ struct PinDepths {
   /// the others chose.
   std::vector<double> mm;
   double mean_mm = 0;
-  double tilt_x_um_per_mm = 0;  ///< Of the plane through them that is taken off below.
+  double tilt_x_um_per_mm = 0;  ///< Slope of the plane through them, removed below.
   double tilt_y_um_per_mm = 0;
   double spread = 0;  ///< Standard deviation without the tilt over the mean.
 };

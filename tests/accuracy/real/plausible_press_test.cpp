@@ -47,7 +47,7 @@ TEST_P(PlausiblePress, NothingIsSaidOfHealthyOnes) {
   BallPress published = ball_press(images_, scale());
   published.method = recon::Method::published;
   EXPECT_THAT(doubts_of(published), IsEmpty());
-  // A tenth of the scale less: told by nothing in one press.
+  // A tenth of the scale less: one press does not show it.
   EXPECT_THAT(doubts_of(ball_press(images_, 0.9 * scale())), IsEmpty());
 }
 

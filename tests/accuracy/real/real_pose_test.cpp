@@ -30,7 +30,7 @@ constexpr std::int16_t kUntrusted = -32768;
 constexpr int kSteps = 30;
 constexpr double kSlideMm = 2;
 constexpr double kTwistDeg = 15;
-/// Of one frame of sensor_a, grey levels (high-pass standard deviation).
+/// Noise of one frame of sensor_a, grey levels (high-pass standard deviation).
 constexpr double kNoise = 0.98;
 
 struct Sensor {

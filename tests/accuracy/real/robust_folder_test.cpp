@@ -51,7 +51,7 @@ TEST_P(RobustFolder, ReadsTheBallAsBefore) {
   struct Row {
     const char* what;
     Change change;
-    double times;  ///< Of the half-disc error of the images as they are, at most.
+    double times;  ///< Limit, relative to the unaltered images' half-disc error.
   };
   for (const auto& [what, change, times] :
        {Row{"portrait", turned, 1.05}, Row{"dark corners", dark_corners, 1.5},

@@ -30,7 +30,7 @@ struct MeanPin {
   double half_mm = 0;
   /// Greatest fall, millimetres a millimetre.
   double slope = 0;
-  /// Of the tip above the least depth about it, millimetres.
+  /// Height of the tip above the least depth around it, millimetres.
   double height_mm = 0;
   /// How much deeper than halfway to the next pin (along the rows and columns) the least depth
   /// nearer to the pin lies, a share of the height. What is pressed aside rises evenly towards
@@ -107,7 +107,7 @@ MeanPin look(const std::vector<double>& profile) {
 /// The board of one sensor as the daemon reads it, not sharpened, once and twice.
 struct Pins {
   std::vector<MeanPin> mean;
-  std::vector<double> spread;  ///< Of their depths.
+  std::vector<double> spread;  ///< Spread of their depths.
 };
 
 Pins read_board(const std::string& name, const FolderEvaluation& e,

@@ -72,7 +72,7 @@ class Sensor {
     }
     return mean;
   }
-  /// Mean distance from the true indentation where a ball touches, mm.
+  /// Mean distance from the true indentation in contact with a ball, mm.
   double error(const recon::Model& model, double t) {
     const std::vector<float> um = mean_depth_um(model, reference().pixels, frames(t));
     std::vector<float> truth;

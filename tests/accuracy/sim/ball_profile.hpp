@@ -23,7 +23,7 @@ struct Image {
   }
 };
 
-/// Untouched and pressed, both of the same size.
+/// Reference and pressed image, both of the same size.
 struct BallPress {
   Image reference;
   Image ball;

@@ -18,11 +18,11 @@ struct PinProfile {
   double diagonal = 0;  ///< In the middle of four.
 };
 
-/// Of the folder's board_reference.png and board.png. The scale is the images' own: the mean
-/// distance of the nine pins. `middle`: near the middle pin, pixels.
+/// Profile of the folder's board_reference.png and board.png. The scale is the images': the
+/// mean distance of the nine pins. `middle`: near the middle pin, pixels.
 [[nodiscard]] PinProfile real_pins(const std::filesystem::path& folder, const Centre& middle);
 
-/// Of the calibration board pressed so deep into the sensor of `scene`; without noise.
+/// Profile of the calibration board pressed this deep into the sensor of `scene`; without noise.
 [[nodiscard]] PinProfile simulated_pins(const hal::sim::Scene& scene, double depth_mm);
 
 /// Root mean square of the difference of rings and both places between, when `a` is first moved by

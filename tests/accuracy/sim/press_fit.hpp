@@ -13,7 +13,7 @@ struct Fit {
   double x_mm = 0;  ///< Measured: the centroid of the darkening.
   double y_mm = 0;
   double depth_mm = 0;
-  double rms = 0;  ///< Of the profiles' difference, grey levels.
+  double rms = 0;  ///< RMS of the profiles' difference, grey levels.
 };
 
 /// Twelve parameters: depth, thickness, four of the response and three of the scattering by the

@@ -25,10 +25,10 @@ struct Darkening {
   std::vector<std::uint8_t> levels;  ///< Row-major.
 };
 
-/// The same object turned about the y axis by so many degrees, its right side deeper.
+/// The same object rotated about the y axis by `degrees`, its right side deeper.
 [[nodiscard]] hal::sim::Object askew(const hal::sim::Object& object, double degrees);
-/// How much deeper than its middle the lowest point of such an object is. The middle's depth is
-/// what a zero from a line through forces finds, as long as all of it touches.
+/// How much deeper than its middle the lowest point of that object is. The middle's depth is
+/// what a zero from a line through forces finds, as long as all of it is in contact.
 [[nodiscard]] double lowest_of_askew(const hal::sim::Object& object, double degrees);
 
 /// One object pressed into a gel at the image's centre, to one depth after another. `sensor`:
@@ -37,15 +37,15 @@ struct Ladder {
   hal::sim::Object object;
   std::vector<double> depths_mm;  ///< Ascending.
   double deeper_mm = 0;           ///< It is pressed deeper than depths_mm says by as much.
-  /// All of it touches at any depth, so that the gel answers in proportion and one depth is
+  /// All of it is in contact at any depth, so that the gel answers in proportion and one depth is
   /// solved: an upright flat face.
   bool proportional = false;
 };
 [[nodiscard]] std::shared_ptr<const hal::sim::Truth> press(const hal::sim::Scene& sensor,
                                                            const Ladder& ladder);
 
-/// What the camera shows at each depth: one frame against the mean of four untouched ones. Optics
-/// and light are `sensor`'s. `shrink`: so many pixels in a row and in a column are averaged into
+/// What the camera shows at each depth: one frame against the mean of four without contact. Optics
+/// and light are `sensor`'s. `shrink`: this many pixels in a row and in a column are averaged into
 /// one first, as the study did to see what resolution it takes.
 [[nodiscard]] std::vector<Darkening> photograph(const std::shared_ptr<const hal::sim::Truth>& truth,
                                                 const hal::sim::Scene& sensor,

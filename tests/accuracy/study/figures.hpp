@@ -38,10 +38,10 @@ inline constexpr std::array<Spread, 6> kBias_mm = {{{-0.072, 0.027},
                                                     {-0.090, 0.067}}};
 /// Over all six depths, the zero not corrected.
 inline constexpr Range kBiasUncorrected_mm = {-0.107, -0.170, -0.045};
-/// How deep below the surface F ∝ d^1.5 puts a ball's first touch.
+/// How deep below the surface F ∝ d^1.5 puts a ball's first contact.
 inline constexpr Spread kBallZero_mm = {0.155, 0.029};
 
-/// Of the spacings 1.25, 1.5, 1.75 and 2 mm, how many a unit resolves, by gel: mean over units.
+/// How many of the spacings 1.25, 1.5, 1.75 and 2 mm a unit resolves, by gel: mean over units.
 inline constexpr std::array<Range, 3> kResolvedOfFour = {{{1.83, 0, 3}, {3.0, 2, 4}, {0.67, 0, 2}}};
 /// The weaker peak over the stronger, by gel: median over a unit's presses; how far the study's
 /// pillars lean.

@@ -13,7 +13,7 @@ namespace dtact::study {
                                                      const hal::sim::Object& object,
                                                      std::span<const double> depths_mm);
 
-/// Where F = a (d − d₀)^1.5, Hertz's law for a half-space, puts a ball's first touch when it is
+/// Where F = a (d − d₀)^1.5, Hertz's law for a half-space, puts a ball's first contact when it is
 /// fitted to forces at known depths (a line through F^⅔): d₀, mm below the true surface.
 [[nodiscard]] double hertz_zero_mm(std::span<const double> depths_mm,
                                    std::span<const double> forces);

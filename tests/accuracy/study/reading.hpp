@@ -27,7 +27,7 @@ struct StudyLut {
 /// A depth map read by the LUT and what a flat object's is judged by.
 struct FlatReading {
   double depth_mm = 0;     ///< Median within 1 mm of the centre.
-  double diameter_mm = 0;  ///< Of a circle as large as what is at least half as deep.
+  double diameter_mm = 0;  ///< Radius of a circle as large as what is at least half as deep.
   double side_mm = 0;      ///< Mean of that patch's width and height.
 };
 /// The published reading: levels smoothed (Gaussian, 7 × 7), the LUT less its entry at 2 grey

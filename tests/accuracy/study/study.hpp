@@ -20,7 +20,7 @@ inline constexpr int kThreshold = 5;
 
 /// A simulated sensor that goes through the study.
 struct Specimen {
-  std::string law;  ///< Of gel and light.
+  std::string law;  ///< Law of gel and light.
   hal::sim::Scene sensor;
 };
 
@@ -66,7 +66,7 @@ struct Result {
   std::vector<Rung> resolutions;
   std::vector<PillarPress> pillars;
 
-  /// Of the spacings 1.25, 1.5, 1.75 and 2 mm those that are resolved at 0.1, 0.2 or 0.3 mm.
+  /// The spacings of 1.25, 1.5, 1.75 and 2 mm that are resolved at 0.1, 0.2 or 0.3 mm.
   [[nodiscard]] int resolved_of_four(double tilt_deg) const;
 };
 

@@ -35,7 +35,7 @@ struct RegressionCentre {
 /// A column of the table: which LEDs are lit, and where they are.
 struct Configuration {
   std::string_view name;
-  std::string_view scheme;  ///< Of net::scheme_leds().
+  std::string_view scheme;  ///< A name of net::scheme_leds().
   hal::sim::Arrangement arrangement = hal::sim::Arrangement::ring;
   /// Relative to all LEDs of the ring: half of the LEDs are exposed twice as long, so that the
   /// reference image is as bright.

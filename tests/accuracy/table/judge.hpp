@@ -13,7 +13,7 @@ namespace dtact::table {
 /// Absolute errors added up over pixels.
 struct Error {
   double sum_mm = 0;
-  std::size_t pixels = 0;     ///< That were judged.
+  std::size_t pixels = 0;     ///< Number of judged pixels.
   std::size_t untrusted = 0;  ///< That were marked instead, and are not among them.
 
   void add(double error_mm) noexcept;
@@ -26,14 +26,14 @@ struct Error {
 [[nodiscard]] Error against_circle(std::span<const std::int16_t> depth_um,
                                    const calibration::Circle& circle, double ball_radius_mm);
 
-/// True indentation over the crop at one moment, and where the object touches.
+/// True indentation over the crop at one moment, and where the object is in contact.
 struct TruePress {
   std::vector<float> indentation_mm;
   std::vector<std::uint8_t> contact;
 };
 [[nodiscard]] TruePress true_press(const hal::sim::Truth& truth, std::uint64_t sequence);
 
-/// Depth against the simulator's indentation where the ball touches.
+/// Depth against the simulator's indentation in contact with the ball.
 [[nodiscard]] Error against_indentation(std::span<const std::int16_t> depth_um,
                                         const TruePress& press);
 

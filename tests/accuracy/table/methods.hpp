@@ -18,12 +18,12 @@ struct Material {
   const Trial* trial = nullptr;  ///< For the balls' radii.
   RegressionCentre regression_centre;
   image::Grey16 reference_q8;
-  std::vector<image::Grey8> centre;             ///< Of the press near the centre.
-  std::vector<std::vector<image::Grey8>> many;  ///< Of the presses anywhere.
+  std::vector<image::Grey8> centre;             ///< The press near the centre.
+  std::vector<std::vector<image::Grey8>> many;  ///< The presses anywhere.
 };
 
-/// "We average images within a small time window": so many of each press, and of the untouched
-/// gel.
+/// "We average images within a small time window": the number for each press, and for the
+/// reference.
 inline constexpr std::size_t kPressFrames = 8;
 inline constexpr std::size_t kReferenceFrames = 32;
 
@@ -33,7 +33,7 @@ inline constexpr std::size_t kReferenceFrames = 32;
 [[nodiscard]] std::shared_ptr<const recon::Model> alone_single(const Material& material);
 [[nodiscard]] std::shared_ptr<const recon::Model> alone_many(
     const Material& material, calibration::PressReport* report = nullptr);
-/// As dtact-calibrate makes it unless it is told otherwise.
+/// Made by the default method of dtact-calibrate.
 [[nodiscard]] std::shared_ptr<const recon::Model> ours_single(const Material& material);
 [[nodiscard]] std::shared_ptr<const recon::Model> ours_many(const Material& material);
 

@@ -10,7 +10,7 @@
 
 namespace dtact::table {
 
-/// Of gel and light: the built-in sensor's, or another_law()'s.
+/// Law of gel and light: the built-in sensor's, or another_law()'s.
 enum class Law : std::uint8_t { built_in, another };
 
 /// One method under one configuration over the test presses of one trial.
@@ -20,7 +20,7 @@ struct Cell {
   std::size_t method = 0;         ///< Into methods().
   Law law = Law::built_in;
   Error circle;       ///< Against the published circle's sphere.
-  Error indentation;  ///< Against the simulator's truth, where the ball touches.
+  Error indentation;  ///< Against the simulator's truth, in contact.
 };
 
 /// Solves a trial's presses once and judges every method under the configurations

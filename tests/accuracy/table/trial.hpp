@@ -48,7 +48,7 @@ struct Trial {
 
 /// Frames of a solved choreography that show the gel at rest.
 inline constexpr std::uint64_t kStillFrames = 40;
-/// The first frame of so many that show press `index`; those without contact begin at 0.
+/// The first of the frames that show press `index`; those without contact begin at 0.
 [[nodiscard]] std::uint64_t first_still_frame(const hal::sim::Truth& truth, std::size_t index);
 
 }  // namespace dtact::table

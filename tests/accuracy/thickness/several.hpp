@@ -11,8 +11,8 @@ namespace dtact::thickness {
 /// What a sensor differs in from the built-in one.
 struct Specimen {
   double thickness_mm = 2.0;
-  double taper_x = 0;             ///< Of the thickness, per mm.
-  std::size_t configuration = 0;  ///< Of the light: into table::configurations().
+  double taper_x = 0;             ///< Taper of the thickness, per mm.
+  std::size_t configuration = 0;  ///< Light: index into table::configurations().
 };
 
 /// The LUT from thirty presses of a 4 mm ball and that from one, judged on twenty presses of a
@@ -28,7 +28,7 @@ struct SeveralPresses {
   double one_mm = 0;
   double flat_several_mm = 0;
   double flat_one_mm = 0;
-  /// Of each press of the 5 mm ball: true error over what the LUT states for half of its depth.
+  /// True error over the LUT's uncertainty at half depth, for each press of the 5 mm ball.
   std::vector<double> ratios;
 };
 

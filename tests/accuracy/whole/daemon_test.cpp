@@ -30,7 +30,7 @@ keys = [
 ]
 )";
 
-/// Of the pixels that both maps have, micrometres: the mean and the greatest difference.
+/// Difference of the common pixels, micrometres: the mean and the greatest difference.
 struct Difference {
   double mean_um = 0;
   int worst_um = 0;

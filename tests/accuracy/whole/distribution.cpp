@@ -29,16 +29,15 @@ double ratio(double error, double stated) { return std::abs(error) / stated; }
 
 const std::vector<Quantity>& quantities() {
   static const std::vector<Quantity> all = {
-      {"depth where it touches", "mm", [](const FrameErrors& f) { return f.inside; }},
-      {"depth where it touches / stated", "",
-       [](const FrameErrors& f) { return f.inside_ratio(); }},
+      {"depth in contact", "mm", [](const FrameErrors& f) { return f.inside; }},
+      {"depth in contact / stated", "", [](const FrameErrors& f) { return f.inside_ratio(); }},
       {"depth within 1 mm beside", "mm", [](const FrameErrors& f) { return f.beside; }},
       {"depth within 1 mm beside / stated", "",
        [](const FrameErrors& f) { return f.in_contact ? ratio(f.beside, f.stated) : NAN; }},
       {"depth elsewhere", "mm", [](const FrameErrors& f) { return f.away; }},
       {"depth elsewhere / stated", "",
        [](const FrameErrors& f) { return ratio(f.away, f.stated); }},
-      {"untrusted where it touches", "share", [](const FrameErrors& f) { return f.untrusted; }},
+      {"untrusted in contact", "share", [](const FrameErrors& f) { return f.untrusted; }},
       {"contact area", "share", [](const FrameErrors& f) { return std::abs(f.area); }},
       {"contact centroid", "mm", [](const FrameErrors& f) { return f.centroid; }},
       {"deepest", "mm", [](const FrameErrors& f) { return std::abs(f.deepest); }},

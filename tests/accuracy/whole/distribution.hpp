@@ -32,7 +32,7 @@ struct Quantity {
 [[nodiscard]] Distribution distribution_of(const std::vector<SceneReport>& scenes,
                                            std::string_view name);
 
-/// Frames that say "touching" where no object touches, and resting contacts that are not told.
+/// Frames that report contact where there is none, and resting contacts that are not reported.
 struct ContactMistakes {
   int false_contacts = 0;
   int no_contact_frames = 0;

@@ -12,8 +12,8 @@ namespace dtact::whole {
 
 /// A rigid object, and how it is first pressed in.
 struct MovingObject {
-  const char* name;   ///< As in a file's name.
-  const char* lines;  ///< Of a scene's press: what it is.
+  const char* name;   ///< Name in a file's name.
+  const char* lines;  ///< Lines of a scene's press: its shape.
   double depth_mm;    ///< Where the motions begin.
   double start_deg;   ///< Its rotation there.
 };

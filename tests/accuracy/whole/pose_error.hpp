@@ -16,7 +16,7 @@ struct Direction {
 /// The direction on an object that has moved by `motion`.
 [[nodiscard]] Direction carried(const Direction& direction, const Eigen::Isometry3d& motion);
 
-/// Of a motion that was found against the true one, split at the contact's centre.
+/// Error of an estimated motion against the true one, split at the contact's centre.
 struct PoseError {
   double mm = 0;
   double deg = 0;

@@ -119,7 +119,7 @@ void print_row(const Sequence& sequence, const std::string& tracker,
     lost += row.usable ? 0 : 1;
     restarts += before != nullptr && row.usable && before->usable && row.since != before->since;
     before = &row;
-    end.fill({INFINITY, INFINITY});  // as long as nothing was told
+    end.fill({INFINITY, INFINITY});  // as long as no pose was reported
     if (!row.told) continue;
     end = listed(errors_of(row));
     for (std::size_t way = 0; row.usable && way < kWays.size(); ++way) {

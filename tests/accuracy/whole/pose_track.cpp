@@ -59,7 +59,7 @@ Contact contact_of(const std::string& bytes) {
           std::max(kMinArm, std::sqrt(contact.area_mm2() / std::numbers::pi))};
 }
 
-/// Of what was found in a row, against what is true there.
+/// Errors of the pose found in a row, against the truth there.
 PoseErrors errors_of(const Sequence& sequence, const TrackRow& row, const Eigen::Isometry3d& found,
                      const Eigen::Isometry3d& truth) {
   const std::size_t at = sequence.index(row.sequence);

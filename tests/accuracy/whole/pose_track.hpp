@@ -31,7 +31,7 @@ struct TrackRow {
 /// come at that rate, for what searches on a thread of its own; 0: as fast as they are taken.
 [[nodiscard]] std::vector<TrackRow> perceive_track(const std::vector<std::string>& frames,
                                                    perceive::FrameMaker& maker, double fps = 0);
-/// Another tracker's file: sequence,usable,since,r11…r33,x_mm,y_mm,z_mm,frame_us; nothing is told
+/// Another tracker's file: sequence,usable,since,r11…r33,x_mm,y_mm,z_mm,frame_us; no pose
 /// where `since` is 0. Throws std::runtime_error naming file and line.
 [[nodiscard]] std::vector<TrackRow> read_track(const std::filesystem::path& csv);
 
@@ -41,11 +41,11 @@ struct PoseErrors {
   PoseError reported;  ///< Without the directions that the tracker reports as unobservable.
   PoseError shape;     ///< Without those of Sequence::unobservable().
 };
-/// Of the motion since the object began to move; where the tracker has begun anew meanwhile, of
-/// what it says itself. `row`: one of `track` that is told.
+/// Errors of the motion since the object began to move; after a restart of the tracker, of the
+/// motion it reports itself. `row`: one of `track` with a pose.
 [[nodiscard]] PoseErrors motion_errors(const Sequence& sequence, const std::vector<TrackRow>& track,
                                        const TrackRow& row);
-/// Of a known object's place, up to its symmetries.
+/// Errors of a known object's pose, up to its symmetries.
 [[nodiscard]] PoseErrors place_errors(const Sequence& sequence, const TrackRow& row,
                                       const std::vector<Eigen::Isometry3d>& symmetries);
 

@@ -30,8 +30,7 @@ namespace dtact::whole {
 namespace {
 
 net::Subscription accepted(const v1::Subscribe& request, net::Serves serves) {
-  constexpr std::uint32_t kMinor = 1;
-  return std::get<net::Subscription>(net::Subscription::from(request, kMinor, {}, serves));
+  return std::get<net::Subscription>(net::Subscription::from(request, {}, serves));
 }
 
 /// hal::sim::SimCamera without its thread and with a truth that others share.

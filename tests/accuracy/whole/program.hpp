@@ -40,22 +40,22 @@ struct MapFrame {
 /// What light a frame is exposed in.
 struct Lighting {
   hal::sim::LedLevels leds = hal::sim::led_levels({});
-  double gain = 1;  ///< So many times as bright, 0.25 … 4.
+  double gain = 1;  ///< Factor on the brightness, 0.25 … 4.
 };
 
-/// What the program runs with. As it stands: a daemon without a configuration.
+/// What the program runs with. Default: a daemon without a configuration.
 struct Settings {
   pipeline::PipelineConfig daemon;
   net::FrameKind kind = perceive_kind();
-  std::uint64_t seed = 1;        ///< Of the camera's noise.
+  std::uint64_t seed = 1;        ///< Seed of the camera's noise.
   std::string output = "mjpeg";  ///< What the camera delivers: "luma", "yuyv" or "mjpeg".
-  /// Of each frame; none: all LEDs as the ring shows them.
+  /// Light of each frame; none: all LEDs as the ring shows them.
   std::function<Lighting(std::uint64_t sequence)> lighting;
 };
 
 /// The simulated camera, the daemon's capture loop and its frame encoder in one thread and in the
 /// camera's own time: the same truth and settings give the same depth. The ring shows what it shows
-/// at start. The reference is taken in the first 45 frames, which must be untouched.
+/// at start. The reference is taken in the first 45 frames, which must be contact-free.
 class Program {
  public:
   /// Throws std::runtime_error when `calibration`, a folder, cannot be read, and

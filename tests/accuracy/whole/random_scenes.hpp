@@ -15,7 +15,7 @@ struct RandomRun {
   int scenes_each = 20;
   int threads = 2;
   std::string only;              ///< The name of the one scene to judge; empty: all.
-  std::filesystem::path folder;  ///< Of calibrations; one that is there is used.
+  std::filesystem::path folder;  ///< Folder of calibrations; an existing one is used.
 };
 
 /// Draws sensors, calibrates each, and judges scenes on it. What a sensor's calibration printed

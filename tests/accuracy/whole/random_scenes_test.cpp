@@ -35,7 +35,7 @@ const std::vector<SceneReport>& scenes() {
 }
 
 TEST(RandomScenes, DepthIsWithinWhatItStates) {
-  const Distribution ratio = distribution_of(scenes(), "depth where it touches / stated");
+  const Distribution ratio = distribution_of(scenes(), "depth in contact / stated");
   EXPECT_GT(ratio.count, 20U);
   EXPECT_LT(ratio.median, 1);
   EXPECT_LT(ratio.p95, 2);

@@ -17,12 +17,12 @@ namespace dtact::whole {
 struct FrameErrors {
   JudgedFrame frame;
   double stated = NAN;     ///< DepthMap.uncertainty_um.
-  double inside = NAN;     ///< Mean absolute error where the object touches, …
+  double inside = NAN;     ///< Mean absolute error in contact, …
   double beside = NAN;     ///< … within kBesideMm round it, …
   double away = NAN;       ///< … and everywhere else.
-  double untrusted = NAN;  ///< Share of the pixels where it touches.
+  double untrusted = NAN;  ///< Share of the pixels in contact.
   bool in_contact = false;
-  bool pressed = false;   ///< An object touches the gel, truly and within the map.
+  bool pressed = false;   ///< An object is in contact, truly and within the map.
   double true_area = 0;   ///< mm² truly deeper than the contact threshold.
   double area = NAN;      ///< Said, as a share of the true one, minus 1.
   double centroid = NAN;  ///< Distance from the true one.
@@ -38,7 +38,7 @@ struct FrameErrors {
   /// A flag says that the picture is not what depth is measured by, which no uncertainty covers.
   /// Pixels deeper than calibrated are untrusted and take nothing from the others.
   [[nodiscard]] bool is_flagged() const noexcept;
-  /// What is stated is "inside the contact": NaN where none is told.
+  /// The stated uncertainty is "inside the contact": NaN where none is reported.
   [[nodiscard]] double inside_ratio() const noexcept { return in_contact ? inside / stated : NAN; }
 };
 
@@ -47,7 +47,7 @@ struct SceneReport {
   std::string what;
   LightCase light = LightCase::same;
   double thickness_mm = 0;
-  double calibrated_mm = 0;  ///< As deep as the lookup table reaches.
+  double calibrated_mm = 0;  ///< Greatest depth of the lookup table.
   std::vector<FrameErrors> frames;
   /// Frames from the first judged one on, and of those: with the flag, and with it without cause.
   int watched = 0;
@@ -55,7 +55,7 @@ struct SceneReport {
   std::array<int, pipeline::kHealthCount> false_alarms{};
   int beyond_missed = 0;  ///< Judged frames truly deeper than calibrated that do not say so.
 
-  /// Of the frame without a flag that errs most against what it states: every kMapStep-th pixel,
+  /// The unflagged frame that errs most against its uncertainty: every kMapStep-th pixel,
   /// micrometres.
   int map_width = 0;
   std::vector<std::int16_t> true_map;

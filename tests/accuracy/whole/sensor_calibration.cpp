@@ -31,7 +31,7 @@ constexpr double kNewtonsPerGram = 0.00980665;
 
 struct Load {
   sim::Object object;
-  double share;  ///< Of the gel's thickness.
+  double share;  ///< Depth as a share of the gel.
   double x_mm = 0;
   double y_mm = 0;
 };

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of a minute's maps.
+/// Limit for a minute's maps.
 constexpr std::size_t kMaxBytes = std::size_t{4} << 30U;
 
 const char* phase_of(const MotionFrames& frames, std::uint64_t n) {

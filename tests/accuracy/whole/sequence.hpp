@@ -56,7 +56,7 @@ struct Sequence {
 [[nodiscard]] std::vector<ShapeRow> shape_of(const hal::sim::Scene& scene,
                                              const MotionFrames& frames);
 
-/// Runs the program on a choreography and hands over a sequence for each motion, named
+/// Runs the program on a choreography and passes a sequence for each motion, named
 /// OBJECT.MOTION. `shapes`: shape_of() of each.
 void record(const std::shared_ptr<const hal::sim::Truth>& truth,
             const std::filesystem::path& calibration, const MovingObject& object,

@@ -67,11 +67,11 @@ TEST(Cells, ADimmedLightIsNoContact) {
   const CellMeans reference(100, 150);
   CellMeans now(100, 147);
   now[5] = 137;
-  const Seen seen = compare(reference, now);
-  EXPECT_EQ(seen.light, 3);
-  EXPECT_EQ(seen.darkest, 10);
-  EXPECT_EQ(seen.brightest, 0);
-  EXPECT_EQ(seen.dark_cells, 1);
+  const ContactEvidence evidence = compare(reference, now);
+  EXPECT_EQ(evidence.light, 3);
+  EXPECT_EQ(evidence.darkest, 10);
+  EXPECT_EQ(evidence.brightest, 0);
+  EXPECT_EQ(evidence.dark_cells, 1);
 }
 
 TEST(Cells, ARealBallsBrightRingIsNoReferenceInContact) {
@@ -84,9 +84,9 @@ TEST(Cells, ARealBallsBrightRingIsNoReferenceInContact) {
     const CellGrid grid({0, 0, reference.width, reference.height});
     const CellMeans before = grid.of(reference.pixels, reference.width);
     const CellMeans now = grid.of(pressed.pixels, pressed.width);
-    const Seen seen = compare(before, now);
-    EXPECT_GT(seen.darkest, 30) << sensor;
-    EXPECT_FALSE(reference_in_contact(seen)) << sensor;
+    const ContactEvidence evidence = compare(before, now);
+    EXPECT_GT(evidence.darkest, 30) << sensor;
+    EXPECT_FALSE(reference_in_contact(evidence)) << sensor;
     EXPECT_TRUE(reference_in_contact(compare(now, before))) << sensor << " the other way round";
   }
 }

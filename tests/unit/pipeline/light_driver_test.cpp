@@ -117,17 +117,17 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
 
 TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
   driver.start();
-  ring.set_left(
+  ring.set_report(
       {.ok = false, .message = "the wire is cut", .note = {}, .writes = 2, .failures = 1});
   EXPECT_TRUE(eventually([&] { return driver.trouble(); }));
   EXPECT_TRUE(eventually([&] { return driver.message() == "the wire is cut"; }));
-  ring.set_left({.ok = true, .message = {}, .note = {}, .writes = 3, .failures = 1});
+  ring.set_report({.ok = true, .message = {}, .note = {}, .writes = 3, .failures = 1});
   EXPECT_TRUE(eventually([&] { return !driver.trouble() && driver.message().empty(); }));
 }
 
 TEST_F(LightDriverTest, WhatIsWorthKnowingOfTheRingIsReportedWhileNothingIsWrong) {
   driver.start();
-  ring.set_left(
+  ring.set_report(
       {.ok = true, .message = {}, .note = "one write was late", .writes = 2, .failures = 0});
   EXPECT_TRUE(eventually([&] { return driver.message() == "one write was late"; }));
   EXPECT_FALSE(driver.trouble());
@@ -143,7 +143,7 @@ TEST_F(LightDriverTest, ARingThatNeverReSendsHealsByTheNextWriteAlone) {
   ring.broken = true;
   ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
   ASSERT_TRUE(next());
-  ring.set_left({.ok = true, .message = {}, .note = {}, .writes = 0, .failures = 0});
+  ring.set_report({.ok = true, .message = {}, .note = {}, .writes = 0, .failures = 0});
   std::this_thread::sleep_for(std::chrono::milliseconds(600));  // in which it is looked at twice
   EXPECT_TRUE(driver.trouble());
   EXPECT_EQ(driver.message(), "the fake ring is broken: fix it");

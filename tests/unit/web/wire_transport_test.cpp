@@ -52,7 +52,7 @@ using testing::ElementsAre;
 
 TEST(WireTransport, ATextGoesAtOnceWhenNothingIsWritten) {
   Rig rig;
-  rig.transport.publish("a");
+  rig.transport.send_text("a");
   EXPECT_THAT(rig.socket->written, ElementsAre("text:a"));
   const std::string bytes = "1";
   rig.write(bytes);
@@ -67,12 +67,12 @@ TEST(WireTransport, OfTextsThatWaitTheNewestGoes) {
   Rig rig;
   const std::string bytes = "1";
   rig.write(bytes);
-  rig.transport.publish("a");
-  rig.transport.publish("b");
+  rig.transport.send_text("a");
+  rig.transport.send_text("b");
   rig.socket->finish();
   EXPECT_EQ(rig.done, 1);
   EXPECT_THAT(rig.socket->written, ElementsAre("1", "text:b"));
-  rig.transport.publish("c");
+  rig.transport.send_text("c");
   rig.transport.shutdown_send(nullptr);
   rig.socket->finish();
   EXPECT_THAT(rig.socket->written, ElementsAre("1", "text:b", "end"));
@@ -90,7 +90,7 @@ TEST(WireTransport, ATextMayOutliveIt) {
   const auto socket = std::make_shared<FakeSocket>();
   {
     WireTransport transport(socket, {});
-    transport.publish("a");
+    transport.send_text("a");
   }
   socket->finish();
   EXPECT_THAT(socket->written, ElementsAre("text:a"));

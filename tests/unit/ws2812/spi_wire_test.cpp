@@ -139,7 +139,7 @@ TEST(Ws2812SpiWire, ErrorsNameDeviceAndFix) {
   EXPECT_THAT(wire.send({}), HasSubstr("spidev.bufsiz"));
 }
 
-// As a Raspberry Pi 4's clock does whose core falls from 500 to 200 MHz at idle, for one transfer.
+// Like a Raspberry Pi 4's clock whose core falls from 500 to 200 MHz at idle, for one transfer.
 TEST(Ws2812SpiWire, ATransferThatWasOffIsSentAgain) {
   Bench bench;
   SpiWire wire = bench.wire();
