@@ -107,7 +107,7 @@ class Measurement {
       if (same(frame.light(), light)) ++lit;
       if (lit <= 2 * LightStep::kRest) continue;
       if (frame.contact().in_contact()) {
-        throw failure("there is contact the sensor: lift it and measure again");
+        throw failure("there is contact: lift the object and measure again");
       }
       greys.push_back(mean_grey(frame.luma()));
       before_ = greys.back();

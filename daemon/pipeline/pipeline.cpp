@@ -35,7 +35,7 @@ HealthSet health_of(std::uint32_t bits) noexcept {
 const char* sentence(Outcome outcome) noexcept {
   switch (outcome) {
     case Outcome::refused_contact:
-      return "there is contact: lift it and ask again, or force it";
+      return "there is contact: lift the object and ask again, or force it";
     case Outcome::refused_unsteady:
       return "the image does not hold still: lift what touches and ask again, or force it";
     case Outcome::refused_dark:

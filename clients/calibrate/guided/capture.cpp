@@ -181,7 +181,7 @@ SteadyFrames Capture::press(int count, const CellMeans& reference, const CellMea
     brighter = reference_in_contact(seen) ? brighter + 1 : 0;
     if (brighter == kBrighterFrames) throw ReferenceInContact{};
     if (brighter > 0) return "brighter than the reference somewhere";
-    if (seen.darkest < kContactLevels) return "there is no contact the surface";
+    if (seen.darkest < kContactLevels) return "there is no contact";
     if (!last.empty() && largest_change(last, look.cells) < kSamePress) {
       return "this press is taken already, press elsewhere";
     }

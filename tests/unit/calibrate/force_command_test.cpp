@@ -184,7 +184,7 @@ TEST_F(ForceOfARecording, TakesWhatTheDaemonMeasured) {
   EXPECT_FLOAT_EQ(deepest(":8:11"), 0.6F);  // 0.5, 0.6 and 0.7
   EXPECT_FLOAT_EQ(deepest(":2:6"), 0.15F);  // of those that touch
   EXPECT_THAT([&] { (void)reader.measure(file + ":0:4"); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("nothing touches")));
+              ThrowsMessage<std::runtime_error>(HasSubstr("no contact")));
   EXPECT_THAT([&] { (void)reader.measure(file); },
               ThrowsMessage<std::runtime_error>(
                   AllOf(HasSubstr("press.mcap:15"), HasSubstr("deeper than"))));

@@ -93,7 +93,7 @@ TEST(FitForce, RefusesWhatCannotBeRight) {
 
   std::vector<Pair> air = pairs();
   air[4] = {"press/4.png", cap(0), 0.5};
-  expect_refused(air, "press/4.png", "nothing touches");
+  expect_refused(air, "press/4.png", "no contact");
 
   std::vector<Pair> other = pairs();
   other[4] = {"quarter.mcap", recon::CellMap(kWidth / 4, kHeight / 4, 4.1 * kMmPerPx), 0.5};

@@ -64,7 +64,7 @@ TEST(ParseCalibration, AGelIsOptionalAndWhole) {
 
 TEST(ParseCalibration, RefusesImpossibleValues) {
   expect_refused(with("version = 1", "version = 2"), "version", "2 is not allowed");
-  expect_refused(with("\"LUT\"", "\"magic\""), "method", "\"published\"");
+  expect_refused(with("\"lut\"", "\"magic\""), "method", "\"published\"");
   expect_refused(with("mm_per_px = 0.051", "mm_per_px = 0"), "mm_per_px", "0 is not allowed");
   expect_refused(with("mm_per_px = 0.051", "mm_per_px = nan"), "mm_per_px", "not allowed");
   expect_refused(with("smoothing_px = 1.5", "smoothing_px = -1"), "smoothing_px", "not allowed");

@@ -37,7 +37,7 @@ TEST(Features, PingAndReference) {
     reference.mutable_reference()->set_png("png");
     EXPECT_TRUE(peer.answer(reference).has_get_reference());
     peer.refuse(v1::ERROR_DENIED, "this token may only view");
-    peer.refuse(v1::ERROR_CONTACT, "something touches");
+    peer.refuse(v1::ERROR_CONTACT, "there is contact");
   }});
   Client client(daemon.options);
   EXPECT_TRUE(client.has_feature("reference"));

@@ -93,15 +93,15 @@ TEST(Calibration, IsListed) {
       ctl(rig, {"calibration", "list"}).out,
       "          id  uploaded              name         image        map    mm/px  method     "
       "range\n"
-      "  configured  -                     factory    800x600    580x580   0.0414  list       "
+      "  configured  -                     factory    800x600    580x580   0.0414  lut        "
       "-0.02 "
       "to 1.40 mm\n"
-      "*          1  2026-01-31T12:00:00Z  first      800x600    580x580   0.0414  list       "
+      "*          1  2026-01-31T12:00:00Z  first      800x600    580x580   0.0414  lut        "
       "-0.02 "
       "to 1.40 mm\n"
       "           2  2026-01-31T12:00:00Z  broken   cannot be read: calibration.toml:3: scale "
       "missing\n"
-      "           3  2026-01-31T12:00:00Z  stuck      800x600    580x580   0.0414  list       "
+      "           3  2026-01-31T12:00:00Z  stuck      800x600    580x580   0.0414  lut        "
       "-0.02 "
       "to 1.40 mm\n");
   const std::string json = ctl(rig, {"calibration", "list", "--json"}).out;

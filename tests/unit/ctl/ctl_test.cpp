@@ -163,7 +163,7 @@ TEST(Rezero, IsRefusedUnlessForced) {
       const bool force = std::get<pipeline::Rezero>(command.what).force;
       return pipeline::CommandDone{
           command, force ? pipeline::Outcome::done : pipeline::Outcome::refused_contact,
-          force ? "" : "something touches"};
+          force ? "" : "there is contact"};
     });
   });
   const auto refused = ctl(rig, {"rezero"});

@@ -216,7 +216,7 @@ TEST_F(PipelineTest, RezeroUnderContactIsRefusedUnlessForced) {
   ASSERT_TRUE(until_frame([](const DepthFrame& f) { return f.contact.in_contact; }));
   const CommandDone refused = ask(Rezero{});
   EXPECT_EQ(refused.outcome, Outcome::refused_contact);
-  EXPECT_EQ(refused.message, "there is contact: lift it and ask again, or force it");
+  EXPECT_EQ(refused.message, "there is contact: lift the object and ask again, or force it");
   EXPECT_EQ(ask(Rezero{.force = true}).outcome, Outcome::done);
   ASSERT_TRUE(until_frame([](const DepthFrame& f) {
     return f.has_depth && !f.contact.in_contact && f.contact.deepest_mm < 0.1;
@@ -356,7 +356,7 @@ TEST_F(PipelineTest, DepthIsMadeInAnotherWayAgainstTheSameReference) {
   EXPECT_TRUE(until_frame([](const DepthFrame& f) { return f.has_depth; }));
   EXPECT_EQ(frame->decimation, 4);
   const std::string refused = refusal([&] { (void)reconstruct({.decimation = 1, .sharpen = 2}); });
-  EXPECT_NE(refused.find("no list"), std::string::npos) << refused;
+  EXPECT_NE(refused.find("no LUT"), std::string::npos) << refused;
   EXPECT_EQ(pipeline->status().reconstruction.decimation, 4);
   EXPECT_EQ(all<ReferenceTaken>().size(), 1U);
 }

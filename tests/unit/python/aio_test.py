@@ -53,11 +53,11 @@ class Aio(unittest.IsolatedAsyncioTestCase):
 
     async def test_refusal_and_no_frame(self):
         def refuse(request, reply):
-            reply.error.code, reply.error.message = 5, "something touches"
+            reply.error.code, reply.error.message = 5, "there is contact"
         with FakeDaemon() as daemon:
             daemon.answers["rezero"] = refuse
             async with dtact.aio.connect(daemon.address) as s:
-                with self.assertRaisesRegex(dtact.InContact, "something touches"):
+                with self.assertRaisesRegex(dtact.InContact, "there is contact"):
                     await s.rezero()
                 with self.assertRaisesRegex(dtact.NoFrame, "serving"):
                     await self.first(s.frames(timeout=0.05))

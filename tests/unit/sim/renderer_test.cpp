@@ -51,7 +51,7 @@ vignetting = 0.02
 
 TEST(Renderer, SameSeedSameBytesWithEveryCompiler) {
   std::string toml = kSmallSensor;
-  toml.replace(toml.find("[gel]"), 7, kFixedSensor + "[gel]");
+  toml.replace(toml.find("[gel]"), 5, kFixedSensor + "[gel]");
   Scene scene = parse_scene(toml + kBallPress, "fixed.toml");
   scene.gel.texture = 0.002;
   scene.gel.texture_mm = 0.3;
