@@ -76,7 +76,7 @@ test("presses become a calibration that the daemon uses", async () => {
   assert.match(words, done);
   assert.match(refused, /somebody calibrates this sensor already/);
   assert.ok((await guide.locator(".depths circle").count()) >= 6);
-  assert.match(await guide.locator(".depths").textContent(), /the list reaches [\d.]+ mm/);
+  assert.match(await guide.locator(".depths").textContent(), /the LUT reaches [\d.]+ mm/);
   // As large as the map, with the presses' circles on it.
   const canvas = guide.locator("canvas");
   assert.equal(await canvas.evaluate(({ width, height }) => `${width} ${height}`), "560 520");

@@ -21,7 +21,7 @@ test("picture, numbers, profile and plots on one screen", async () => {
       );
       await until(
         () => pane.locator('[data-fact="inContact"]').textContent(),
-        (text) => text === "nothing touches",
+        (text) => text === "no contact",
       );
     }
     await pane.getByRole("radio", { name: "Line" }).click();

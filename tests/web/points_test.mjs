@@ -80,7 +80,7 @@ test("points are drawn during contact, and none else", async () => {
   await view.page.screenshot({ path: path.join(work, "points.png") });
   await until(
     () => fact(pane, "points").textContent(),
-    (text) => text.startsWith("Nothing touches"),
+    (text) => text.startsWith("No contact"),
   );
   await until(drawn, ({ pixels }) => pixels === 0);
 });

@@ -125,7 +125,7 @@ class Commands(unittest.TestCase):
                 try:
                     s.rezero()
                 except dtact.InContact as e:
-                    self.assertIn("touches", str(e))
+                    self.assertIn("there is contact", str(e))
                     return
             self.fail("it was never refused")
 

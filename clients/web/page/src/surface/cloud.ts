@@ -66,7 +66,7 @@ export class CloudView {
   private readonly reported = el("output", { class: "row corner", "data-fact": "points" });
 
   constructor(host: HTMLElement) {
-    this.space = new Space(host, "The touched points in space; drag to turn, wheel to come closer");
+    this.space = new Space(host, "Points of the contact; drag to turn, wheel to zoom");
     host.append(this.reported);
     // Their true extent is the shader's to know.
     this.points.frustumCulled = false;
@@ -87,7 +87,7 @@ export class CloudView {
 
   private clear(): void {
     this.points.visible = this.axes.visible = false;
-    say(this.reported, "There is no contact: there are no points.");
+    say(this.reported, "No contact, so no points.");
     this.space.render();
   }
 
