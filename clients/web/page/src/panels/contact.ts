@@ -21,10 +21,10 @@ function motion(pose: ObjectPose | undefined): { moved: string; turned: string }
   if (pose.tracking === ObjectPose_Tracking.SEARCHING) {
     return { moved: `${pose.object}: ${how}`, turned: "–" };
   }
-  const unseen = pose.unobservable.length;
+  const unobservable = pose.unobservable.length;
   return {
     moved: `${reported(pose.translationMm, 2)} mm${how ? `, ${how}` : ""}`,
-    turned: `${reported(pose.rotationDeg, 1)}°${unseen > 0 ? `, ${unseen} unseen` : ""}`,
+    turned: `${reported(pose.rotationDeg, 1)}°${unobservable > 0 ? `, ${unobservable} unobservable` : ""}`,
   };
 }
 
@@ -33,7 +33,7 @@ export class ContactPanel {
     moved: { label: "Moved", hint: "Since the contact was made: x, y, z of the surface frame" },
     turned: {
       label: "Turned",
-      hint: "Axis times angle; directions that the shape does not show are unseen",
+      hint: "Axis times angle; directions that the shape does not show are unobservable",
     },
   });
   private readonly facts = new Facts({

@@ -11,11 +11,11 @@ export class QualityPanel {
   private readonly facts = new Facts({
     state: { label: "State" },
     uncertainty: {
-      label: "Depth is worth",
+      label: "Uncertainty",
       hint: "Mean absolute error to expect inside the contact",
     },
     noContact: {
-      label: "Untouched RMS",
+      label: "RMS without contact",
       hint: "In the last frame in which there was no contact; 0 where nothing differs from the reference",
     },
     reference: {
