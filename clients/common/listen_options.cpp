@@ -24,9 +24,10 @@ void add_listen_options(CLI::App& command, net::NetConfig& settings) {
       ->type_name("FILE");
   command.add_option("--tls-key", settings.tls_key, "The certificate's key (PEM)")
       ->type_name("FILE");
-  command.add_flag("--listen-insecure", settings.insecure,
-                   "Listen beyond this machine without TLS or tokens: whoever reaches it may watch "
-                   "and command");
+  command.add_flag(
+      "--listen-insecure", settings.insecure,
+      "Listen beyond this machine without TLS or tokens: every host that reaches it may "
+      "watch and command");
 }
 
 }  // namespace dtact::cli

@@ -43,8 +43,8 @@ bool is_final(const ConnectionError& error) {
 v1::Hello hello_for(const Options& options, const Connection& connection) {
   if (!options.token.empty() && !connection.confidential() && !options.insecure) {
     throw IdentityError(fmt::format(
-        "the token was not sent: {} is another machine, and over plain TCP whoever "
-        "listens on the way could use it. Give the daemon's fingerprint (dtactctl cert --show "
+        "the token was not sent: {} is another machine, and over plain TCP any "
+        "host on the way could read it. Give the daemon's fingerprint (dtactctl cert --show "
         "prints it there), or allow this explicitly with insecure",
         connection.name()));
   }

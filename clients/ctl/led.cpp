@@ -99,7 +99,7 @@ void add_led(CLI::App& app, Context& context) {
 
 void add_rezero(CLI::App& app, Context& context) {
   auto* command =
-      app.add_subcommand("rezero", "Take the present image as untouched: the new reference");
+      app.add_subcommand("rezero", "Take a new reference image; refused during contact");
   const auto force = std::make_shared<bool>(false);
   command->add_flag("--force", *force, "Also during contact: it will read as zero depth");
   command->callback([&context, force] { client::Client(context.target).rezero(*force); });

@@ -58,9 +58,10 @@ void print_calibration(const v1::Status& status, std::ostream& out) {
 }
 
 void print_endpoint(const v1::Endpoint& endpoint, std::ostream& out) {
-  fmt::print(out, "listens      {}{}{}{}\n", endpoint.address(), endpoint.tls() ? ", TLS" : "",
-             endpoint.token() ? ", token" : "",
-             endpoint.insecure() ? ", INSECURE: whoever can reach it is let in or listens" : "");
+  fmt::print(
+      out, "listens      {}{}{}{}\n", endpoint.address(), endpoint.tls() ? ", TLS" : "",
+      endpoint.token() ? ", token" : "",
+      endpoint.insecure() ? ", INSECURE: every host that reaches it may connect or listen" : "");
   if (!endpoint.fingerprint().empty()) {
     fmt::print(out, "             fingerprint {}\n", endpoint.fingerprint());
   }

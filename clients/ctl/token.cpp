@@ -34,7 +34,7 @@ void add_token(CLI::App& app, Context& context) {
     std::string name;
   };
   const auto arguments = std::make_shared<Arguments>();
-  command->add_option("--new", arguments->rights, "What whoever has it may do")
+  command->add_option("--new", arguments->rights, "What its holder may do")
       ->required()
       ->check(CLI::IsMember({"view", "control"}));
   command->add_option("--name", arguments->name, "What the daemon's log calls it, without blanks")

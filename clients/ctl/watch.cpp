@@ -185,7 +185,7 @@ class Watch {
       for (const v1::Health condition : all_.health()) {
         conditions += (conditions.empty() ? "" : ", ") + client::name_of(condition);
       }
-      context_.out << fmt::format("deepest {:.3f} mm; {} dropped; conditions: {}\n",
+      context_.out << fmt::format("deepest {:.3f} mm; {} dropped; health flags: {}\n",
                                   all_.deepest_mm(), last_.dropped(),
                                   conditions.empty() ? "none" : conditions);
     }

@@ -39,7 +39,7 @@ std::string_view type_of(const std::string& name) {
     if (extension == known) return type;
   }
   throw std::runtime_error(
-      fmt::format("{}: browsers could not be told what a file of this name is: leave it out of the "
+      fmt::format("{}: there is no content type for a file of this name: leave it out of the "
                   "page, or add its kind to clients/web/page.cpp",
                   name));
 }

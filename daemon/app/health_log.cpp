@@ -58,10 +58,10 @@ std::vector<HealthLog::Line> HealthLog::step(const pipeline::Status& status, Tim
     const unsigned times = std::exchange(flag.times, 0);
     flag.last = now;
     flag.reported = on;
-    const std::string often =
-        times > 1 || !on
-            ? fmt::format(" (came {} time{} since it was last told)", times, times == 1 ? "" : "s")
-            : "";
+    const std::string often = times > 1 || !on
+                                  ? fmt::format(" (came {} time{} since it was last reported)",
+                                                times, times == 1 ? "" : "s")
+                                  : "";
     lines.push_back(
         {!is_usual(health), name, fmt::format("{}: {}{}", name, fix(status, health), often)});
   }

@@ -37,7 +37,7 @@ const char* sentence(Outcome outcome) noexcept {
     case Outcome::refused_contact:
       return "there is contact: lift the object and ask again, or force it";
     case Outcome::refused_unsteady:
-      return "the image does not hold still: lift what touches and ask again, or force it";
+      return "the image does not hold still: lift the object and ask again, or force it";
     case Outcome::refused_dark:
       return "the image is too dark to be a reference: make the light brighter";
     case Outcome::uncalibrated:
@@ -46,7 +46,7 @@ const char* sentence(Outcome outcome) noexcept {
     case Outcome::no_reference:
       return "the reference is being taken: ask again when the state is serving";
     case Outcome::camera_away:
-      return "the camera delivers no frames: see its condition in the status";
+      return "the camera delivers no frames: see the camera in the status";
     case Outcome::done:
     case Outcome::device_error:  // The ring says what is wrong with it.
     case Outcome::ring_away:

@@ -38,8 +38,8 @@ void check_security(const NetConfig& config) {
   }
   throw std::runtime_error(fmt::format(
       "net.address = \"{}\" opens the sensor to other machines, which needs TLS and a "
-      "token: set {}; or net.listen_insecure = true, if whoever can reach it may watch and "
-      "command; or net.address = \"127.0.0.1\"",
+      "token: set {}; or net.listen_insecure = true, if every host that reaches it may watch "
+      "and command; or net.address = \"127.0.0.1\"",
       config.address, missing));
 }
 
@@ -49,7 +49,7 @@ NetConfig checked(NetConfig config) {
     config.log(
         {LogLevel::warning,
          fmt::format(
-             "net.listen_insecure: whoever can reach {} may {} the sensor, since there is no "
+             "net.listen_insecure: every host that reaches {} may {} the sensor, since there is no "
              "{}",
              config.address, config.token_file.empty() ? "watch and command" : "watch",
              config.token_file.empty() ? "token" : "TLS to keep a token secret")});

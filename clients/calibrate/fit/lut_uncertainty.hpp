@@ -35,7 +35,7 @@ inline constexpr double kDepthBinMm = 0.2;
     std::optional<double> depth_mm = {});
 
 /// The ring's part of the second alone, millimetres: what its scattered light may make of the
-/// press's zero on a LUT of so many millimetres a grey level.
+/// press's zero on a LUT of `slope` millimetres a grey level.
 [[nodiscard]] double ring_uncertainty_mm(const SettledPress& press, double slope);
 
 }  // namespace dtact::calibration

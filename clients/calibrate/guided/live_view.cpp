@@ -48,7 +48,7 @@ image::Grey8 LiveView::picture(const image::Grey8& frame) const {
 std::string LiveView::words_on(const ObservedFrame& look, const std::string& words) const {
   if (reference_cells_.empty()) return words;
   const ContactEvidence seen = compare(reference_cells_, look.cells);
-  if (seen.darkest < kContactLevels) return "untouched; " + words;
+  if (seen.darkest < kContactLevels) return "no contact; " + words;
   const double width_mm = 2 * cell_mm_ * std::sqrt(seen.dark_cells / std::numbers::pi);
   return fmt::format("contact {:.1f} mm wide, darkest {:.0f} grey levels; {}", width_mm,
                      seen.darkest, words);

@@ -35,7 +35,7 @@ class DepthReprocessor {
 
   /// Replaces `frame`'s depth, contact and what follows from them. The map has the resolution that
   /// the frame's own had and is sharpened by as many steps; full resolution and none where it had
-  /// no map, and no steps where the calibration has no LUT for so many.
+  /// no map, and no steps where the calibration has no LUT for them.
   void remake(const hal::LumaView& luma, v1::Frame& frame);
 
   /// Frames so far whose own map was sharpened by steps that the calibration has no LUT for.

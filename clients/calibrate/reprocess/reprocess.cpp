@@ -272,8 +272,8 @@ void add_reprocess(CLI::App& app, cli::Context& context) {
   command
       ->add_option(
           "--reference-frames", options->reference_frames,
-          "There was no contact in so many frames at the beginning: where the recording holds "
-          "no reference image")
+          "Number of frames without contact at the beginning, where the recording holds no "
+          "reference image")
       ->check(CLI::Range(1, 1000));
   command->add_flag("--force", options->force, "Replace the file if it exists");
   cli::add_json_option(*command, context);

@@ -62,7 +62,7 @@ TEST_F(Conditions, OneThatComesAndGoesIsReportedOnceAMinuteWithItsCount) {
   EXPECT_THAT(after(38s, with({})), IsEmpty());
   EXPECT_THAT(after(1s, with({})),
               ElementsAre("frames_lost: The camera loses frames on their way to this machine: look "
-                          "at the USB cable and hub. (came 10 times since it was last told)"));
+                          "at the USB cable and hub. (came 10 times since it was last reported)"));
   EXPECT_THAT(after(100s, with({})), IsEmpty());
   EXPECT_THAT(after(1s, with({Health::frames_lost})),
               ElementsAre("frames_lost: The camera loses frames on their way to this machine: look "

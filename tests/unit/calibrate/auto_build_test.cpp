@@ -64,7 +64,7 @@ TEST(AutoBuild, ConstrainsTheLutToAGelThatIsTheSameInAllParts) {
   const Calibration made = build_auto(set, {}, report);
   EXPECT_THAT(report.note,
               testing::AllOf(HasSubstr("LUT: what the press shows, at the depth of a gel"),
-                             HasSubstr("averages of 10 images and more")));
+                             HasSubstr("averages of at least 10 images")));
   EXPECT_TRUE(made.gel);
   PressReport ignored;
   EXPECT_NE(made.model->lut.um, build_from_sphere(set, {}, ignored).model->lut.um);

@@ -67,7 +67,7 @@ TEST(Status, ReportsWhereTheDaemonListens) {
   const auto result = ctl(rig, {"status"});
   EXPECT_EQ(result.code, 0) << result.error;
   EXPECT_THAT(result.out, HasSubstr("listens      0.0.0.0:" + std::to_string(rig.tcp_port()) +
-                                    ", INSECURE: whoever can reach it"));
+                                    ", INSECURE: every host that reaches it"));
 }
 
 TEST(Status, IsPrinted) {

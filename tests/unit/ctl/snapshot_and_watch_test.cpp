@@ -96,7 +96,7 @@ TEST(Watch, PrintsLinesAndASummary) {
   EXPECT_EQ(result.code, 0) << result.error;
   EXPECT_THAT(result.out, AllOf(HasSubstr(" fps  contact "), HasSubstr("latency p50"),
                                 HasSubstr("\nwatched 1.5 s: "), HasSubstr(" ms since arrival; "),
-                                HasSubstr("conditions: none\n")));
+                                HasSubstr("health flags: none\n")));
 }
 
 TEST(Watch, PrintsJson) {

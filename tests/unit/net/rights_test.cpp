@@ -141,8 +141,9 @@ TEST(Security, ReportsWhereAnybodyMayCome) {
   config.address = "0.0.0.0";
   config.insecure = true;
   Rig rig(config);
-  EXPECT_THAT(rig.log(),
-              HasSubstr("net.listen_insecure: whoever can reach 0.0.0.0 may watch and command"));
+  EXPECT_THAT(
+      rig.log(),
+      HasSubstr("net.listen_insecure: every host that reaches 0.0.0.0 may watch and command"));
   RawClient client(rig.tcp_port());
   client.hello();
   const auto status =

@@ -64,7 +64,7 @@ TEST_F(PageFolder, NamesWhatIsWrong) {
   EXPECT_THAT(complaint(), HasSubstr("there is no index.html"));
   write("index.html", "<p>");
   write("secret.pem", "x");
-  EXPECT_THAT(complaint(), HasSubstr("secret.pem: browsers could not be told"));
+  EXPECT_THAT(complaint(), HasSubstr("secret.pem: there is no content type"));
 }
 
 }  // namespace

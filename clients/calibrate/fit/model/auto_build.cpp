@@ -122,12 +122,12 @@ std::string left_by(const FittedCalibration& fitted, const BallPresses& set) {
   constexpr std::size_t kEnough = 10;  // images whose mean has too little noise to matter
   const bool few = std::ranges::any_of(
       set.presses, [](const BallPresses::Press& press) { return press.frames.size() < kEnough; });
-  return fmt::format(
-      "; the gel itself leaves {:.3f} grey levels{}", fitted.fit.residual * fitted.light_levels,
-      few ? fmt::format("; averages of {} images and more of the press, and of the untouched "
-                        "surface, show whether that is more than their noise",
-                        kEnough)
-          : "");
+  return fmt::format("; the gel itself leaves {:.3f} grey levels{}",
+                     fitted.fit.residual * fitted.light_levels,
+                     few ? fmt::format("; averages of at least {} images of the press and of the "
+                                       "reference show whether that is more than their noise",
+                                       kEnough)
+                         : "");
 }
 
 Calibration constrained_to(const FittedCalibration& fitted, const BallPresses& set,

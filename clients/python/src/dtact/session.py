@@ -147,7 +147,7 @@ class Session:
         """The first request on a new connection, whose `_local` is known."""
         if self._token is not None and not (self._local or self._tls or self._insecure):
             raise IdentityError(f"the token was not sent: {self._address} is another machine, and "
-                                "over plain TCP whoever listens there gets it. Give the fingerprint "
+                                "over plain TCP any host on the way could read it. Give the fingerprint "
                                 "of the daemon's certificate (dtactctl cert prints it)")
         return requests.hello(self._program, self._token)
 

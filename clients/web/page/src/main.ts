@@ -81,7 +81,7 @@ class Page {
       made.title = error ?? "connected";
       made.setAttribute("aria-pressed", String(this.shown.has(name)));
     }
-    if (sensors.length === 0) this.tell("dtact-web is not told of any sensor: see its --help.");
+    if (sensors.length === 0) this.tell("dtact-web has no sensor: see its --help.");
     this.chooser.hidden = sensors.length < 2;
   }
 

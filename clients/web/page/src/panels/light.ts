@@ -36,7 +36,7 @@ export class LightPanel {
   private readonly chosen = el("span", { class: "quiet" });
   private readonly answer = el("p", { class: "answer", role: "alert" });
   private readonly zero = button("Re-zero", () => void this.rezero(false), {
-    title: "Take the present image as untouched (Z)",
+    title: "Take a new reference image (Z)",
   });
   private readonly anyway = button("Re-zero anyway", () => void this.rezero(true), {
     class: "warn",
