@@ -84,8 +84,9 @@ class LightRing {
 
   [[nodiscard]] virtual RingInfo info() const = 0;
   [[nodiscard]] virtual ShowResult show(const Light& light) = 0;
-  /// Does what is due by time, a re-send or a look for a ring that is away, and reports.
-  [[nodiscard]] virtual RingReport attend() { return {}; }
+  /// Does what is due by time, re-sending `light`, the one last shown, or looking for a ring that
+  /// is away, and reports.
+  [[nodiscard]] virtual RingReport attend(const Light& /*light*/) { return {}; }
 };
 
 }  // namespace dtact::hal

@@ -179,7 +179,7 @@ void run_daemon(const Config& config, const std::function<Config()>& load) {
 
   check_camera_files(config.hal.camera);
   hal::Devices devices = hal::open_devices(config.hal);
-  const hal::RingReport ring = devices.ring->attend();
+  const hal::RingReport ring = devices.ring->attend(config.pipeline.light);
   if (ring.away) spdlog::warn("no LED ring yet, it is looked for: {}", ring.message);
   if (!ring.note.empty()) spdlog::warn("ring: {}", ring.note);
   pipeline::PipelineConfig settings = config.pipeline;

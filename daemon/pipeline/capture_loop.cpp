@@ -24,11 +24,11 @@ CaptureLoop::CaptureLoop(const CaptureParts& parts, const PipelineConfig& config
       period_ns_(std::llround(1e9 / camera_.info().fps)),
       timeout_(std::min<std::chrono::nanoseconds>(
           std::chrono::nanoseconds(hal::stall_ns(period_ns_)), kLongestGrab)),
-      tracker_(camera_.info().width, camera_.info().height, config.light, config),
-      depth_(config, clock_),
-      watch_(period_ns_),
       timeline_(config.light, config.light_delay_frames.value_or(camera_.info().light_delay_frames),
                 period_ns_),
+      tracker_(camera_.info().width, camera_.info().height, timeline_, config),
+      depth_(config, clock_),
+      watch_(period_ns_),
       reporter_(exchange_),
       executor_(exchange_, reporter_, tracker_, depth_),
       whole_{0, 0, camera_.info().width, camera_.info().height},
@@ -67,14 +67,15 @@ void CaptureLoop::step() noexcept {
 void CaptureLoop::take_notes() noexcept {
   LightNote note;
   while (light_.next_note(note)) {
-    tracker_.light_changes(note.light);
-    // What was seen under no light or an unknown one counts no more than before a start.
-    if (note.returned) tracker_.camera_began();
+    const hal::Light before = timeline_.light();
     if (note.begins) {
       timeline_.change_begins(note.light, note.at_ns);
     } else {
       timeline_.change_ends(note.light, note.at_ns, note.failed);
     }
+    tracker_.light_changed(before);
+    // What was seen under no light or an unknown one counts no more than before a start.
+    if (note.returned) tracker_.camera_began();
   }
 }
 

@@ -65,10 +65,10 @@ class CaptureLoop {
   const std::int64_t period_ns_;
   const std::chrono::nanoseconds timeout_;
 
+  LightTimeline timeline_;  // before the tracker, which reads it
   ReferenceTracker tracker_;
   DepthMaker depth_;
   CameraWatch watch_;
-  LightTimeline timeline_;
   EventReporter reporter_;
   CommandExecutor executor_;
   hal::Frame frame_;

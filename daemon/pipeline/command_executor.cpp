@@ -57,7 +57,7 @@ std::optional<Outcome> CommandExecutor::execute(const CopyReference& command) no
   if (!active_) return Outcome::uncalibrated;
   if (!tracker_.ready()) return Outcome::no_reference;
   std::ranges::copy(tracker_.reference(), command.copy->image_q8.begin());
-  command.copy->light = tracker_.shown();
+  command.copy->light = tracker_.ring_light();
   command.copy->sequence = reference_sequence_;
   command.copy->calibration = key_;
   return Outcome::done;

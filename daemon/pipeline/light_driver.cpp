@@ -105,7 +105,7 @@ LightChanged LightDriver::changed() const {
 }
 
 std::chrono::nanoseconds LightDriver::attend() {
-  const hal::RingReport report = ring_->attend();
+  const hal::RingReport report = ring_->attend(light());
   {
     const std::scoped_lock lock(mutex_);
     note_ = report.note;

@@ -85,9 +85,9 @@ class LightDriver {
   std::atomic<bool> stop_{false};
   std::atomic<bool> trouble_{false};
   mutable std::mutex mutex_;  // between this thread and the network thread, held for a copy
-  hal::Light light_;
-  hal::Light requested_;                  // shown when the ring is back
-  int waiting_ = 0;                       // commands
+  hal::Light light_;          // the last that was shown; the ring re-sends it
+  hal::Light requested_;      // shown when the ring is back
+  int waiting_ = 0;           // commands
   std::optional<std::int64_t> shown_ns_;  // CLOCK_MONOTONIC of its write; none: not known
   std::string message_;
   std::string note_;

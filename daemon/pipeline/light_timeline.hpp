@@ -31,6 +31,8 @@ class LightTimeline {
   /// unknown since when.
   void change_ends(const hal::Light& light, std::int64_t at_ns, bool failed) noexcept;
 
+  /// What the ring shows, or is about to while a write is under way.
+  [[nodiscard]] const hal::Light& light() const noexcept { return now_; }
   /// What the ring showed when an exposure began.
   [[nodiscard]] const hal::Light& light_at(std::int64_t exposure_ns) const noexcept {
     return exposure_ns < began_ns_ ? before_ : now_;

@@ -33,16 +33,9 @@ Ring::~Ring() {
 
 ShowResult Ring::show(const Light& light) {
   const DimmedLight dimmed = dim(light, dimming_);
-  wanted_ = in_chain_order(dimmed.leds);
   if (!wire_ && std::chrono::steady_clock::now() >= next_look_) look_for_ring();
-  const std::string error = wire_ ? write(wanted_) : report_.message;
-  if (error.empty()) {
-    shown_ = wanted_;
-  } else {
-    // The command has failed, so that the light before it is still the one to show.
-    if (wire_ && shown_) wanted_ = *shown_;
-    return {false, error, dimmed.scale, report_.away};
-  }
+  const std::string error = wire_ ? write(in_chain_order(dimmed.leds)) : report_.message;
+  if (!error.empty()) return {false, error, dimmed.scale, report_.away};
   if (dimmed.scale >= 1) return {};
   return {true,
           fmt::format("dimmed to {:.0f} % of the light asked for, {:.0f} mA: "
@@ -51,12 +44,12 @@ ShowResult Ring::show(const Light& light) {
           dimmed.scale};
 }
 
-RingReport Ring::attend() {
+RingReport Ring::attend(const Light& light) {
   const Time now = std::chrono::steady_clock::now();
   if (!wire_ && now >= next_look_) {
     look_for_ring();
   } else if (wire_ && now >= next_send_) {
-    (void)write(wanted_);
+    (void)write(in_chain_order(dim(light, dimming_).leds));
   }
   report_.due = RingReport{}.due;
   if (wire_ && next_send_ != Time::max()) {

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "hal/config.hpp"
@@ -25,8 +24,7 @@ struct RingParts {
 };
 
 /// A ring of WS2812B. attend() re-sends the light every `resend_ms`, which restores an LED after
-/// a glitch: the last light that show() brought to the LEDs or, before the
-/// first, the one requested last.
+/// a glitch.
 ///
 /// A ring that is absent, busy, forbidden or refused by its own wire is away. show() reports it at
 /// once, and the ring is searched for, first after a quarter of a second, then less and less often,
@@ -40,14 +38,14 @@ class Ring final : public LightRing {
 
   [[nodiscard]] RingInfo info() const override { return parts_.info; }
   [[nodiscard]] ShowResult show(const Light& light) override;
-  [[nodiscard]] RingReport attend() override;
+  [[nodiscard]] RingReport attend(const Light& light) override;
 
  private:
   using Leds = std::array<Rgb, kLedCount>;
   using Time = std::chrono::steady_clock::time_point;
 
   void look_for_ring();
-  /// Empty, or what failed.
+  /// Writes in chain order. Returns what failed; empty when nothing did.
   std::string write(const Leds& leds);
   void be_away(const std::string& why);
   [[nodiscard]] Leds in_chain_order(const Leds& leds) const;
@@ -60,8 +58,6 @@ class Ring final : public LightRing {
   std::chrono::milliseconds pause_{};
   Time next_look_;
   Time next_send_ = Time::max();  // before the first show() there is nothing to repeat
-  Leds wanted_{};                 // in chain order
-  std::optional<Leds> shown_;     // the last that got there
   RingReport report_;
 };
 

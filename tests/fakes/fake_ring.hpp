@@ -3,6 +3,7 @@
 #include <atomic>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -20,7 +21,8 @@ class FakeRing final : public hal::LightRing {
     std::function<void(const hal::Light&)> on_show;
     mutable std::mutex mutex;
     std::vector<hal::Light> shown;
-    hal::RingReport report;  // guarded by mutex
+    std::optional<hal::Light> attended;  // guarded by mutex: the light to re-send
+    hal::RingReport report;              // guarded by mutex
 
     void set_report(hal::RingReport what) {
       const std::scoped_lock lock(mutex);
@@ -44,8 +46,9 @@ class FakeRing final : public hal::LightRing {
     if (handle_.on_show) handle_.on_show(light);
     return {};
   }
-  [[nodiscard]] hal::RingReport attend() override {
+  [[nodiscard]] hal::RingReport attend(const hal::Light& light) override {
     const std::scoped_lock lock(handle_.mutex);
+    handle_.attended = light;
     if (handle_.away) return {.ok = false, .away = true, .message = kAway, .note = {}};
     return handle_.report;
   }

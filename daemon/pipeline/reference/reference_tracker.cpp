@@ -13,16 +13,16 @@ constexpr double kOtherLevel = 0.1;
 
 }  // namespace
 
-ReferenceTracker::ReferenceTracker(int width, int height, const hal::Light& light,
+ReferenceTracker::ReferenceTracker(int width, int height, const LightTimeline& light,
                                    const PipelineConfig& config)
     : width_(width),
       height_(height),
+      timeline_(light),
       folder_(config.state_folder),
       writer_(width, height, folder_, side_),
       camera_shift_(width, height, config.reference.frames, side_),
       keeper_(width, height, config.reference),
-      follower_(config.drift),
-      shown_(light) {}
+      follower_(config.drift) {}
 
 void ReferenceTracker::restore(const calibration::Calibration& calibration) {
   if (folder_.empty()) return;
@@ -32,13 +32,13 @@ void ReferenceTracker::restore(const calibration::Calibration& calibration) {
 
 void ReferenceTracker::restore(std::span<const std::uint16_t> reference_q8,
                                const hal::Light& light) {
-  keeper_.restore(reference_q8, light == shown_, light.leds == shown_.leds);
+  keeper_.restore(reference_q8, light == ring_light(), light.leds == ring_light().leds);
 }
 
 void ReferenceTracker::use(CalibratedImage* image) noexcept {
   image_ = image;
   if (image == nullptr) return;
-  other_light_ = light_differs(*image->calibration, shown_);
+  other_light_ = light_differs(*image->calibration, ring_light());
   keeper_.use_calibration(image->calibration->model->reference_q8, image->grid, image->region,
                           !other_light_);
   camera_shift_.use_marks(image->marks);
@@ -54,12 +54,11 @@ void ReferenceTracker::use(CalibratedImage* image) noexcept {
 
 void ReferenceTracker::camera_began() noexcept { keeper_.begin(); }
 
-void ReferenceTracker::light_changes(const hal::Light& light) noexcept {
+void ReferenceTracker::light_changed(const hal::Light& before) noexcept {
   // Rewriting the light that is already shown leaves the reference valid.
-  if (light == shown_) return;
-  keeper_.light_changed(in_contact_, light.leds == shown_.leds);
-  shown_ = light;
-  other_light_ = image_ != nullptr && light_differs(*image_->calibration, shown_);
+  if (before == ring_light()) return;
+  keeper_.light_changed(in_contact_, before.leds == ring_light().leds);
+  other_light_ = image_ != nullptr && light_differs(*image_->calibration, ring_light());
 }
 
 Observation ReferenceTracker::look(const hal::LumaView& luma, const FrameState& moment) noexcept {
@@ -112,7 +111,7 @@ void ReferenceTracker::use_reference() noexcept {
 /// The writer may still be busy: then the next frame offers the reference again.
 void ReferenceTracker::keep_reference() noexcept {
   if (!keep_due_) return;
-  keep_due_ = !writer_.offer(keeper_.reference(), shown_, image_->calibration);
+  keep_due_ = !writer_.offer(keeper_.reference(), ring_light(), image_->calibration);
 }
 
 State ReferenceTracker::state() const noexcept {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "daemon/pipeline/health.hpp"
+#include "daemon/pipeline/light_timeline.hpp"
 #include "daemon/pipeline/pipeline_config.hpp"
 #include "daemon/pipeline/reference/calibrated_image.hpp"
 #include "daemon/pipeline/reference/camera_shift_detector.hpp"
@@ -49,9 +50,9 @@ struct Trust {
 /// does not allocate.
 class ReferenceTracker {
  public:
-  /// Frames of width × height pixels; `light`: what the ring shows at first. Throws
+  /// Frames of width × height pixels, lit by what `light` says, which outlives the tracker. Throws
   /// std::invalid_argument when the frames are too small or the rules impossible.
-  ReferenceTracker(int width, int height, const hal::Light& light, const PipelineConfig& config);
+  ReferenceTracker(int width, int height, const LightTimeline& light, const PipelineConfig& config);
 
   // Not on the capture thread.
 
@@ -79,8 +80,8 @@ class ReferenceTracker {
   void use(CalibratedImage* image) noexcept;
   /// The camera has restarted: what was known of its image is in doubt.
   void camera_began() noexcept;
-  /// The ring is about to show this light, or has just begun to.
-  void light_changes(const hal::Light& light) noexcept;
+  /// The timeline's light has changed from `before`.
+  void light_changed(const hal::Light& before) noexcept;
   /// Requests the present image as reference. A returned outcome is an immediate refusal; otherwise
   /// look() returns it. Only while there is a calibration.
   [[nodiscard]] std::optional<Outcome> rezero(bool force) noexcept {
@@ -116,8 +117,8 @@ class ReferenceTracker {
   [[nodiscard]] std::span<const std::uint16_t> reference() const noexcept {
     return keeper_.reference();
   }
-  /// The light it was taken under, or brought to: what the ring shows.
-  [[nodiscard]] const hal::Light& shown() const noexcept { return shown_; }
+  /// The light it was taken under, or scaled to: what the ring shows.
+  [[nodiscard]] const hal::Light& ring_light() const noexcept { return timeline_.light(); }
   /// The present light as a factor on it.
   [[nodiscard]] double light() const noexcept { return follower_.factor(); }
 
@@ -127,6 +128,7 @@ class ReferenceTracker {
 
   int width_;
   int height_;
+  const LightTimeline& timeline_;
   const std::filesystem::path folder_;
   base::BackgroundThread side_{"dtact-side"};  // before its jobs
   ReferenceWriter writer_;
@@ -137,7 +139,6 @@ class ReferenceTracker {
   ImageWatch watch_;
   ExposureWatch exposure_;
   CellReport report_;
-  hal::Light shown_;
   bool settled_ = true;       // the frame looked at
   bool in_contact_ = false;   // in the frame before
   bool other_light_ = false;  // the ring shows another than at calibration

@@ -157,10 +157,10 @@ TEST_F(PioRing, ARemovedDriverIsReportedAndOneThatIsBackIsPreparedAnew) {
   const ShowResult gone = ring->show(rainbow());
   EXPECT_FALSE(gone.ok);
   EXPECT_THAT(gone.message, HasSubstr("/dev/leds0: write failed: No such file or directory"));
-  EXPECT_TRUE(ring->attend().away);
+  EXPECT_TRUE(ring->attend(rainbow()).away);
   write_text(kMock + "sent", "0");
   probe_driver();  // its brightness is 255 again
-  ASSERT_TRUE(eventually([&] { return !ring->attend().away; }));
+  ASSERT_TRUE(eventually([&] { return !ring->attend(rainbow()).away; }));
   ASSERT_TRUE(ring->show(rainbow()).ok);
   EXPECT_EQ(recorded("writes"), kFromTheStart);
   EXPECT_TRUE(last_sent(kRainbow));
@@ -181,7 +181,7 @@ TEST_F(PioRing, ADriverThatCameBackWithAnotherCountIsReported) {
   const ShowResult result = ring->show(rainbow());
   EXPECT_FALSE(result.ok);
   EXPECT_THAT(result.message, HasSubstr("more than the ring's 8 LEDs"));
-  EXPECT_TRUE(ring->attend().away);
+  EXPECT_TRUE(ring->attend(rainbow()).away);
 }
 
 // The driver sends once write() has returned, so that the wire waits: for what the brightness put

@@ -153,22 +153,23 @@ TEST_F(SpiRing, AnErrorOfTheBusIsTheCommandsErrorAndHeals) {
   EXPECT_FALSE(result.ok);
   EXPECT_THAT(result.message, HasSubstr("/dev/spidev0.0: write failed: Input/output error"));
   EXPECT_THAT(result.message, HasSubstr("dmesg"));
-  EXPECT_FALSE(ring->attend().ok);
+  EXPECT_FALSE(ring->attend(rainbow()).ok);
   EXPECT_TRUE(recorded().empty());
 
   set("fail", 0);
-  ASSERT_TRUE(eventually([&] { return ring->attend().ok; }));
+  ASSERT_TRUE(eventually([&] { return ring->attend(rainbow()).ok; }));
   EXPECT_THAT(shown_by(recorded().back()), ElementsAreArray(rainbow().leds));
 }
 
 TEST_F(SpiRing, AfterAnErrorDuringTheMeasurementTheRingIsLookedForAgain) {
   set("fail", ETIMEDOUT);
   const auto ring = open_spi_ring(fast());
-  EXPECT_TRUE(ring->attend().away);
-  EXPECT_THAT(ring->attend().message,
+  EXPECT_TRUE(ring->attend(rainbow()).away);
+  EXPECT_THAT(ring->attend(rainbow()).message,
               HasSubstr("/dev/spidev0.0: write failed: Connection timed out"));
   set("fail", 0);
-  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; })) << ring->attend().message;
+  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; }))
+      << ring->attend(rainbow()).message;
   EXPECT_THAT(shown_by(pictures().back()), ElementsAreArray(rainbow().leds));
 }
 
@@ -178,7 +179,7 @@ TEST_F(SpiRing, TheLightIsSentAgain) {
   config.spi_check_rate = false;
   const auto ring = open_spi_ring(config);
   ASSERT_TRUE(ring->show(rainbow()).ok);
-  ASSERT_TRUE(eventually([&] { return ring->attend().ok && recorded().size() >= 4; }));
+  ASSERT_TRUE(eventually([&] { return ring->attend(rainbow()).ok && recorded().size() >= 4; }));
   for (const Transfer& transfer : recorded()) {
     EXPECT_THAT(shown_by(transfer), ElementsAreArray(rainbow().leds));
   }
@@ -203,19 +204,21 @@ TEST_F(SpiRing, WithoutPermissionTheFixIsNamedAndTheRingComesWithIt) {
   {
     const AsNobody nobody;
     ring = open_spi_ring(fast());
-    EXPECT_THAT(ring->attend().message,
+    EXPECT_THAT(ring->attend(rainbow()).message,
                 HasSubstr("/dev/spidev0.0: cannot be opened: Permission denied"));
-    EXPECT_THAT(ring->attend().message, HasSubstr("usermod -aG spi"));
+    EXPECT_THAT(ring->attend(rainbow()).message, HasSubstr("usermod -aG spi"));
     EXPECT_TRUE(ring->show(rainbow()).away);
   }
-  ASSERT_TRUE(eventually([&] { return !ring->attend().away; })) << ring->attend().message;
+  ASSERT_TRUE(eventually([&] { return !ring->attend(rainbow()).away; }))
+      << ring->attend(rainbow()).message;
 }
 
 // As on a Raspberry Pi 4 at idle: the core clock falls from 500 to 200 MHz under a divider made for
 // 500, and no call says so.
 TEST_F(SpiRing, AClockThatFallsIsNoticedAndTheLightComesBackWithIt) {
   const auto ring = open_spi_ring(fast());
-  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; })) << ring->attend().message;
+  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; }))
+      << ring->attend(rainbow()).message;
   forget();
   set("clock_percent", 40);
   const ShowResult result = ring->show(rainbow());
@@ -227,28 +230,31 @@ TEST_F(SpiRing, AClockThatFallsIsNoticedAndTheLightComesBackWithIt) {
   // Another look at the clock or two, in which no LED is written to.
   for (int i = 0; i < 100; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    EXPECT_TRUE(ring->attend().away);
+    EXPECT_TRUE(ring->attend(rainbow()).away);
   }
   EXPECT_EQ(pictures().size(), 3U);
-  EXPECT_TRUE(ring->attend().away);
+  EXPECT_TRUE(ring->attend(rainbow()).away);
 
   set("clock_percent", 100);
-  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; })) << ring->attend().message;
+  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; }))
+      << ring->attend(rainbow()).message;
   EXPECT_THAT(shown_by(pictures().back()), ElementsAreArray(rainbow().leds));
 }
 
 TEST_F(SpiRing, AClockThatRisesIsNoticed) {
   const auto ring = open_spi_ring(fast());
-  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; })) << ring->attend().message;
+  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; }))
+      << ring->attend(rainbow()).message;
   set("clock_percent", 500);
   ASSERT_TRUE(eventually([&] { return !ring->show(rainbow()).ok; }));
-  EXPECT_TRUE(ring->attend().away);
-  EXPECT_THAT(ring->attend().message, HasSubstr("use 3.00 … 4.54 MHz"));
+  EXPECT_TRUE(ring->attend(rainbow()).away);
+  EXPECT_THAT(ring->attend(rainbow()).message, HasSubstr("use 3.00 … 4.54 MHz"));
 }
 
 TEST_F(SpiRing, ATransferThatWasOffIsSentAgain) {
   const auto ring = open_spi_ring(fast());
-  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; })) << ring->attend().message;
+  ASSERT_TRUE(eventually([&] { return ring->show(rainbow()).ok; }))
+      << ring->attend(rainbow()).message;
   forget();
   set("clock_transfers", 2);
   set("clock_percent", 40);
@@ -256,7 +262,8 @@ TEST_F(SpiRing, ATransferThatWasOffIsSentAgain) {
   EXPECT_TRUE(result.ok) << result.message;
   EXPECT_GE(pictures().size(), 3U);
   EXPECT_THAT(shown_by(pictures().back()), ElementsAreArray(rainbow().leds));
-  EXPECT_THAT(ring->attend().note, HasSubstr("transfers were off and sent again, the last"));
+  EXPECT_THAT(ring->attend(rainbow()).note,
+              HasSubstr("transfers were off and sent again, the last"));
 }
 
 /// Run with spi-mock's max_hz=2000000: the driver clocks slower than asked and says nothing.
@@ -264,9 +271,9 @@ class SlowSpi : public SpiRing {};
 
 TEST_F(SlowSpi, IsRefusedWithBothRatesAndTheCure) {
   const auto ring = open_spi_ring(quiet());
-  const std::string refused = ring->attend().message;
+  const std::string refused = ring->attend(rainbow()).message;
   std::printf("refused: %s\n", refused.c_str());
-  EXPECT_TRUE(ring->attend().away);
+  EXPECT_TRUE(ring->attend(rainbow()).away);
   EXPECT_THAT(refused, HasSubstr("asked for 3.200 MHz, the controller really sends"));
   EXPECT_THAT(refused, HasSubstr("core_freq=500"));
 }

@@ -115,6 +115,25 @@ TEST_F(LightDriverTest, AFailureIsAnswerConditionAndSentence) {
                 {true, 200}, {false, 200}, {true, 100}, {false, 200}, {true, 100}, {false, 100}}));
 }
 
+TEST_F(LightDriverTest, AfterAFailedCommandTheLightBeforeItIsReSent) {
+  hal::RingReport often;
+  often.due = std::chrono::milliseconds(1);
+  ring.set_report(often);
+  driver.start();
+  ring.broken = true;
+  ASSERT_TRUE(driver.submit({SetLight{dimmed(100)}}));
+  ASSERT_TRUE(next());
+  {
+    const std::scoped_lock lock(ring.mutex);
+    ring.attended.reset();
+  }
+  ASSERT_TRUE(eventually([&] {
+    const std::scoped_lock lock(ring.mutex);
+    return ring.attended.has_value();
+  }));
+  EXPECT_EQ(ring.attended->brightness, 200);
+}
+
 TEST_F(LightDriverTest, AReSendThatFailsIsAConditionUntilItHeals) {
   driver.start();
   ring.set_report(

@@ -16,6 +16,7 @@
 namespace dtact::pipeline {
 namespace {
 
+constexpr std::int64_t kPeriodNs = 16'666'667;
 constexpr int kReferenceFrames = 16;
 constexpr FrameState kUnsettled{.settled = false, .whole = true};
 
@@ -59,13 +60,20 @@ class ReferenceTrackerTest : public ::testing::Test {
     return image_.quality() == ReferenceQuality::fresh && image_.health_flags().empty();
   }
   fakes::ToyFrame next() { return fakes::ToyFrame(scene_, sequence_++); }
+  void set_light(const hal::Light& light) {
+    const hal::Light before = light_.light();
+    light_.change_begins(light, now_ns_);
+    light_.change_ends(light, now_ns_, false);
+    image_.light_changed(before);
+  }
   [[nodiscard]] bool has(Health health) const { return image_.health_flags().has(health); }
 
   PipelineConfig config_ = config();
   fakes::ToyScene scene_{.marks = 2};
   CalibratedImage calibrated_{fakes::toy_calibration(scene_)};
   std::filesystem::path folder_ = fakes::own_path();
-  ReferenceTracker image_{fakes::kToyWidth, fakes::kToyHeight, config_.light, config_};
+  LightTimeline light_{config_.light, 0, kPeriodNs};
+  ReferenceTracker image_{fakes::kToyWidth, fakes::kToyHeight, light_, config_};
   std::uint64_t sequence_ = 0;
   std::int64_t now_ns_ = 0;
 };
@@ -73,7 +81,8 @@ class ReferenceTrackerTest : public ::testing::Test {
 TEST_F(ReferenceTrackerTest, AnotherLightThanAtCalibrationIsReportedFromTheStart) {
   hal::Light dim = config_.light;
   dim.brightness = 128;
-  ReferenceTracker dimmed(fakes::kToyWidth, fakes::kToyHeight, dim, config_);
+  const LightTimeline light(dim, 0, kPeriodNs);
+  ReferenceTracker dimmed(fakes::kToyWidth, fakes::kToyHeight, light, config_);
   dimmed.use(&calibrated_);
   EXPECT_TRUE(dimmed.health_flags().has(Health::light_mismatch));
   EXPECT_FALSE(has(Health::light_mismatch));
@@ -161,11 +170,11 @@ TEST_F(ReferenceTrackerTest, ReportsADarkPictureBeforeTheFirstReference) {
 
 TEST_F(ReferenceTrackerTest, ReportsADarkPictureAfterTheLightIsSwitchedOff) {
   ASSERT_TRUE(settles());
-  image_.light_changes({.brightness = 0});
+  set_light({.brightness = 0});
   scene_.light = 0.04;
   show(config_.reference.settle_frames);
   EXPECT_TRUE(has(Health::image_dark));
-  image_.light_changes(config_.light);
+  set_light(config_.light);
   EXPECT_FALSE(has(Health::image_dark));
 }
 

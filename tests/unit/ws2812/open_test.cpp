@@ -16,10 +16,10 @@ TEST(OpenSpiRing, AnAbsentDeviceIsLookedForAndNamedWithItsFix) {
   const auto ring = open_spi_ring(config);
   EXPECT_EQ(ring->info().backend, "ws2812_spi");
   EXPECT_EQ(ring->info().identity, "/dev/spidev-that-is-not-there");
-  EXPECT_TRUE(ring->attend().away);
-  EXPECT_THAT(ring->attend().message,
+  EXPECT_TRUE(ring->attend({}).away);
+  EXPECT_THAT(ring->attend({}).message,
               HasSubstr("/dev/spidev-that-is-not-there: cannot be opened: No such file"));
-  EXPECT_THAT(ring->attend().message, HasSubstr("dtparam=spi=on"));
+  EXPECT_THAT(ring->attend({}).message, HasSubstr("dtparam=spi=on"));
 }
 
 TEST(OpenSpiRing, ARateWhosePulsesLeaveTheWindowStopsTheStart) {

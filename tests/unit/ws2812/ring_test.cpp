@@ -130,7 +130,7 @@ TEST(Ws2812Ring, GoesDarkAtTheEndThoughNothingWasShown) {
   EXPECT_EQ(record->writes[0], std::vector<Rgb>(8, Rgb{0, 0, 0}));
 }
 
-TEST(Ws2812Ring, ReSendsTheLastLight) {
+TEST(Ws2812Ring, ReSendsTheLightItIsGiven) {
   const auto record = std::make_shared<Record>();
   Ws2812Config config = quiet();
   config.resend_ms = 2;
@@ -140,7 +140,7 @@ TEST(Ws2812Ring, ReSendsTheLastLight) {
   const std::size_t before = record->all().size();
   const auto began = std::chrono::steady_clock::now();
   while (record->all().size() < before + 5) {
-    const RingReport report = ours->attend();
+    const RingReport report = ours->attend(kRed);
     EXPECT_LE(report.due, std::chrono::milliseconds(2));
     std::this_thread::sleep_for(report.due);
   }
@@ -157,25 +157,12 @@ TEST(Ws2812Ring, AFailedWriteIsTheCommandsErrorAndHealsByItself) {
   const ShowResult result = ours->show(kRed);
   EXPECT_FALSE(result.ok);
   EXPECT_EQ(result.message, "the wire is cut: fix it");
-  EXPECT_FALSE(ours->attend().ok);
-  EXPECT_GE(ours->attend().failures, 1U);
+  EXPECT_FALSE(ours->attend(kRed).ok);
+  EXPECT_GE(ours->attend(kRed).failures, 1U);
 
   record->fail_with("");
-  ASSERT_TRUE(eventually([&] { return ours->attend().ok; }));
-  EXPECT_EQ(ours->attend().message, "");
-  EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
-}
-
-TEST(Ws2812Ring, AfterAFailedCommandTheLightBeforeItIsSentAgain) {
-  const auto record = std::make_shared<Record>();
-  Ws2812Config config = quiet();
-  config.resend_ms = 2;
-  const auto ours = ring(record, config);
-  ASSERT_TRUE(ours->show(kRed).ok);
-  record->fail_with("the wire is cut: fix it");
-  EXPECT_FALSE(ours->show(Light{Light::all({0, 0, 9}), 255}).ok);
-  record->fail_with("");
-  ASSERT_TRUE(eventually([&] { return ours->attend().ok; }));
+  ASSERT_TRUE(eventually([&] { return ours->attend(kRed).ok; }));
+  EXPECT_EQ(ours->attend(kRed).message, "");
   EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
 }
 
@@ -186,8 +173,8 @@ TEST(Ws2812Ring, AReSendThatFailsShowsInTheReport) {
   const auto ours = ring(record, config);
   ASSERT_TRUE(ours->show(kRed).ok);
   record->fail_with("the wire is cut: fix it");
-  ASSERT_TRUE(eventually([&] { return !ours->attend().ok; }));
-  EXPECT_EQ(ours->attend().message, "the wire is cut: fix it");
+  ASSERT_TRUE(eventually([&] { return !ours->attend(kRed).ok; }));
+  EXPECT_EQ(ours->attend(kRed).message, "the wire is cut: fix it");
 }
 
 TEST(Ws2812Ring, SaysWhenTheBudgetDimmed) {
@@ -229,9 +216,9 @@ TEST(Ws2812Ring, AnAbsentRingIsLookedForAndWorksOnceItIsThere) {
   record->absence = "/dev/here: No such file or directory: turn it on";
   const auto ours = ring(record, quiet());
   EXPECT_EQ(ours->info().identity, "here");
-  EXPECT_TRUE(ours->attend().away);
-  EXPECT_FALSE(ours->attend().ok);
-  EXPECT_EQ(ours->attend().message, "/dev/here: No such file or directory: turn it on");
+  EXPECT_TRUE(ours->attend(kRed).away);
+  EXPECT_FALSE(ours->attend(kRed).ok);
+  EXPECT_EQ(ours->attend(kRed).message, "/dev/here: No such file or directory: turn it on");
   const ShowResult early = ours->show(kRed);
   EXPECT_FALSE(early.ok);
   EXPECT_TRUE(early.away);
@@ -239,9 +226,9 @@ TEST(Ws2812Ring, AnAbsentRingIsLookedForAndWorksOnceItIsThere) {
   EXPECT_EQ(record->powered, 0);
 
   record->be_absent("");
-  ASSERT_TRUE(eventually([&] { return !ours->attend().away; }));
-  EXPECT_TRUE(ours->attend().ok);
-  EXPECT_EQ(ours->attend().message, "");
+  ASSERT_TRUE(eventually([&] { return !ours->attend(kRed).away; }));
+  EXPECT_TRUE(ours->attend(kRed).ok);
+  EXPECT_EQ(ours->attend(kRed).message, "");
   EXPECT_EQ(record->powered, 1);
   EXPECT_TRUE(record->all().empty()) << "nothing is written before it is asked for";
   EXPECT_TRUE(ours->show(kRed).ok);
@@ -264,17 +251,17 @@ TEST(Ws2812Ring, AWireThatIsLostIsClosedAndOpenedAnew) {
   record->be_absent("/dev/here is gone");
   record->lost = true;
   record->fail_with("shut down");
-  ASSERT_TRUE(eventually([&] { return ours->attend().message == "/dev/here is gone"; }));
-  EXPECT_TRUE(ours->attend().away);
+  ASSERT_TRUE(eventually([&] { return ours->attend(kRed).message == "/dev/here is gone"; }));
+  EXPECT_TRUE(ours->attend(kRed).away);
   EXPECT_EQ(record->open, 0) << "the device is free for who comes next";
 
   record->fail_with("");
   record->be_absent("");
-  ASSERT_TRUE(eventually([&] { return ours->attend().ok; }));
+  ASSERT_TRUE(eventually([&] { return ours->attend(kRed).ok; }));
   EXPECT_EQ(record->opened, 2);
   EXPECT_EQ(record->powered, 1) << "the LEDs kept their power and with it their light";
   const std::size_t before = record->all().size();
-  ASSERT_TRUE(eventually([&] { return ours->attend().ok && record->all().size() > before; }));
+  ASSERT_TRUE(eventually([&] { return ours->attend(kRed).ok && record->all().size() > before; }));
   EXPECT_EQ(record->all().back(), std::vector<Rgb>(8, Rgb{255, 0, 0}));
 }
 
@@ -288,7 +275,7 @@ TEST(Ws2812Ring, AWireThatFailsIsKept) {
   EXPECT_FALSE(result.ok);
   EXPECT_FALSE(result.away);
   record->fail_with("");
-  ASSERT_TRUE(eventually([&] { return ours->attend().ok; }));
+  ASSERT_TRUE(eventually([&] { return ours->attend(kRed).ok; }));
   EXPECT_EQ(record->opened, 1);
 }
 
@@ -296,16 +283,16 @@ TEST(Ws2812Ring, AWireThatRefusesIsAskedAgain) {
   const auto record = std::make_shared<Record>();
   record->refusal = "too slow: use SPI";
   const auto ours = ring(record, quiet());
-  EXPECT_TRUE(ours->attend().away);
+  EXPECT_TRUE(ours->attend(kRed).away);
   EXPECT_EQ(ours->show(kRed).message, "too slow: use SPI");
-  ASSERT_TRUE(eventually([&] { return ours->attend().away && record->opened >= 2; }));
+  ASSERT_TRUE(eventually([&] { return ours->attend(kRed).away && record->opened >= 2; }));
   EXPECT_TRUE(record->all().empty());
 }
 
 TEST(Ws2812Ring, ANoteOfTheWireIsReported) {
   const auto record = std::make_shared<Record>();
   record->note = "a little slow";
-  EXPECT_EQ(ring(record, quiet())->attend().note, "a little slow");
+  EXPECT_EQ(ring(record, quiet())->attend(kRed).note, "a little slow");
 }
 
 TEST(Ws2812Ring, SettingsThatMakeNoSenseStopTheStart) {
