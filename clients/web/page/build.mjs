@@ -38,7 +38,6 @@ execFileSync(
   ],
   { stdio: "inherit" },
 );
-writeFileSync("gen/chart.ts", measured());
 execFileSync(tool("tsc"), [], { stdio: "inherit" });
 
 const common = { bundle: true, format: "esm", legalComments: "eof", logLevel: "warning" };
@@ -48,30 +47,6 @@ const browser = {
   minify: true,
   target: ["chrome109", "firefox115", "safari16.4"],
 };
-
-/** The settings from the project's chart of speed against accuracy that a daemon accepts. */
-function measured() {
-  const [names, ...rows] = readFileSync(
-    path.join(values.tree, "tests/accuracy/chart/chart.csv"),
-    "utf8",
-  )
-    .trim()
-    .split("\n")
-    .filter((row) => !row.includes('"'))
-    .map((row) => row.split(","));
-  const of = (row, name) => row[names.indexOf(name)];
-  const points = rows
-    .filter((row) => /^list (full|half|quarter) tiles 0.10$/.test(of(row, "setting")))
-    .filter((row) => ["ball", "screws"].includes(of(row, "shot")))
-    .map((row) => ({
-      name: `${of(row, "shot")}, ${of(row, "setting").split(" ")[1]}, as ./dev chart measured it`,
-      ms: Number(of(row, "median_us")) / 1000,
-      errorUm: Number(of(row, "error_um")),
-    }));
-  if (points.length !== 6) throw new Error("chart.csv has not the rows that the page shows");
-  const type = "readonly { name: string; ms: number; errorUm: number }[]";
-  return `export const MEASURED: ${type} = ${JSON.stringify(points)};\n`;
-}
 
 /** A package and all that it needs, each once. */
 function withNeeded(name, known = new Set()) {

@@ -2,7 +2,6 @@
 import { create } from "@bufbuild/protobuf";
 import { SetReconstructionSchema } from "../../gen/dtact_pb";
 import type { Reconstruction } from "../../gen/dtact_pb";
-import { MEASURED } from "../../gen/chart";
 import { Choice, el, say, svg } from "../dom";
 import type { Frame } from "../session/messages";
 import type { Sensor } from "../session/sensor";
@@ -171,10 +170,10 @@ export class ReconstructionPanel {
       const [x1, y1, x2, y2] = [...from, ...to].map(String) as [string, string, string, string];
       parts.push(svg("line", { x1, y1, x2, y2, class: kind }));
     };
-    const dot = ({ ms, errorUm }: Seen, name: string, r: string, kind: string): void => {
+    const dot = ({ ms, errorUm }: Seen, name: string, kind: string): void => {
       const reported = svg("title", {}, `${name}: ${fixed(ms, 2)} ms, ${fixed(errorUm, 0)} µm`);
       parts.push(
-        svg("circle", { cx: String(x(ms)), cy: String(y(errorUm)), r, class: kind }, reported),
+        svg("circle", { cx: String(x(ms)), cy: String(y(errorUm)), r: "4.5", class: kind }, reported),
       );
     };
     line([LEFT, HEIGHT - BOTTOM], [WIDTH - 8, HEIGHT - BOTTOM], "axis");
@@ -187,12 +186,8 @@ export class ReconstructionPanel {
       text([x(share * topMs), HEIGHT - BOTTOM + 12], fixed(share * topMs, 2), anchor);
     }
     if (bound) line([LEFT, y(bound)], [WIDTH - 8, y(bound)], "bound");
-    for (const measured of MEASURED) {
-      if (measured.ms > topMs || measured.errorUm > topUm) continue;
-      dot(measured, measured.name, "3", "measured");
-    }
     for (const [way, seen] of this.seen) {
-      dot(seen, way, "4.5", way === this.way ? "seen current" : "seen");
+      dot(seen, way, way === this.way ? "seen current" : "seen");
       const { ms, errorUm } = seen;
       text(
         [x(ms) + (x(ms) > WIDTH / 2 ? -8 : 8), y(errorUm) + 4],
