@@ -1,6 +1,7 @@
 #include "daemon/pipeline/command_executor.hpp"
 
 #include <algorithm>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -17,11 +18,19 @@ void CommandExecutor::take(bool camera_away, const Stamp& now) noexcept {
   // One at a time, and only while there is room for its result.
   Command command;
   while (!rezero_ && !reporter_.answer_due() && exchange_.commands.pop(command)) {
-    std::optional<Outcome> outcome;
-    if (auto* rezero = std::get_if<Rezero>(&command.what)) outcome = execute(*rezero, camera_away);
-    if (auto* use = std::get_if<UseCalibration>(&command.what)) outcome = execute(*use);
-    if (auto* how = std::get_if<SetReconstruction>(&command.what)) outcome = execute(*how);
-    if (auto* copy = std::get_if<CopyReference>(&command.what)) outcome = execute(*copy);
+    const std::optional<Outcome> outcome = std::visit(
+        [&](auto& what) -> std::optional<Outcome> {
+          using What = std::remove_reference_t<decltype(what)>;
+          if constexpr (std::is_same_v<What, Rezero>) {
+            return execute(what, camera_away);
+          } else if constexpr (std::is_same_v<What, SetLight>) {
+            // Never here: Pipeline::submit() gives it to the light driver.
+            return Outcome::device_error;
+          } else {
+            return execute(what);
+          }
+        },
+        command.what);
     if (outcome) {
       reporter_.answer({.command = std::move(command), .outcome = *outcome, .at = now});
     } else {

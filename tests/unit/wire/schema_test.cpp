@@ -121,9 +121,9 @@ TEST(Schema, LosesNothingUnnoticed) {
     EXPECT_EQ(lost(present_schema(), now).size(), 1U) << i;
   }
   FileDescriptorProto now = present_schema();
-  ASSERT_EQ(now.message_type(now.message_type_size() - 1).name(), "StoredCalibration");
+  const std::string last = now.message_type().rbegin()->name();
   now.mutable_message_type()->RemoveLast();
-  EXPECT_THAT(lost(present_schema(), now), testing::Contains("message StoredCalibration"));
+  EXPECT_THAT(lost(present_schema(), now), testing::Contains("message " + last));
 }
 
 // The example of proto/README.md.
