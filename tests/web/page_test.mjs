@@ -249,7 +249,7 @@ test("deeper is lighter in the colour map, step by step", () => {
 });
 
 test("the theme turns and is remembered", async () => {
-  const stored = () => view.page.evaluate(() => localStorage.getItem("dtact theme"));
+  const stored = () => view.page.evaluate(() => JSON.parse(localStorage.getItem("dtact theme")));
   const ground = () =>
     view.page.evaluate(() => getComputedStyle(document.documentElement).backgroundColor);
   const brightness = async () =>
@@ -365,6 +365,9 @@ test("a daemon that dies is told at once, and the page goes on when it is back",
     15_000,
   );
   assert.match(await pane.locator(".notice").textContent(), /away|Trying again/);
+  const controls = () => pane.locator(".commands").evaluate((element) => element.inert);
+  assert.ok(await controls(), "nothing can be commanded meanwhile");
+  assert.ok((await pane.locator(".side").first().evaluate((side) => getComputedStyle(side).opacity)) < 1);
   const before = Number(await pane.getAttribute("data-sequence"));
   // One that is opened meanwhile finds no list of calibrations.
   const early = await open(gateway);
@@ -387,6 +390,7 @@ test("a daemon that dies is told at once, and the page goes on when it is back",
     30_000,
   );
   assert.equal(await pane.locator(".notice").isVisible(), false);
+  assert.equal(await controls(), false);
   await until(
     () => earlyPane.getAttribute("data-sequence"),
     (sequence) => Number(sequence) > 0,
@@ -435,6 +439,50 @@ test("a sensor that is not chosen is not shown", async () => {
   const other = view.page.locator('[data-sensor="right"]');
   await view.page.getByRole("navigation").getByRole("button", { name: "right" }).click();
   assert.equal(await other.count(), 0);
+});
+
+test("sensors, range and panels are as they were after a reload", async () => {
+  await pane.getByLabel("Range to, mm").fill("0.8");
+  await pane.getByLabel("Range to, mm").press("Enter");
+  await pane.getByLabel("Speed and accuracy").locator("summary").click();
+  await view.page.reload();
+  await until(
+    () => pane.getAttribute("data-sequence"),
+    (sequence) => Number(sequence) > 0,
+    20_000,
+  );
+  assert.equal(await view.page.locator('[data-sensor="right"]').count(), 0);
+  assert.equal(await pane.getByLabel("Range to, mm").inputValue(), "0.8");
+  assert.match(await pane.locator("canvas.bar").getAttribute("aria-label"), /from 0 to 0.8 mm/);
+  assert.ok(await pane.getByLabel("Speed and accuracy").evaluate((panel) => panel.open));
+  await pane.getByLabel("Speed and accuracy").locator("summary").click();
+  await pane.getByLabel("Range to, mm").fill("1.5");
+  await pane.getByLabel("Range to, mm").press("Enter");
+});
+
+test("a value that a finger tapped stays when it lifts", async () => {
+  const box = await pane.locator("canvas.marks").boundingBox();
+  const at = { clientX: box.x + 0.3 * box.width, clientY: box.y + 0.6 * box.height };
+  for (const type of ["pointermove", "pointerdown", "pointerup", "pointerleave"])
+    await pane.locator("canvas.marks").dispatchEvent(type, { ...at, pointerType: "touch" });
+  assert.match(await pane.locator("output.readout").textContent(), /row 2[34]\d, column 1[45]\d/);
+  await pane.locator("canvas.marks").dispatchEvent("pointerleave", { ...at, pointerType: "mouse" });
+  assert.doesNotMatch(await pane.locator("output.readout").textContent(), /row/);
+});
+
+test("without a calibration the map's place offers to make one", async () => {
+  const bare = await startDaemon("bare", 0, ["calibration="]);
+  const bareGateway = await startGateway({ bare: bare.port });
+  const uncalibrated = await open(bareGateway);
+  try {
+    const offer = uncalibrated.page.locator(".veil").getByRole("button", { name: "Calibrate…" });
+    await offer.click();
+    assert.ok(await uncalibrated.page.getByRole("dialog").isVisible());
+  } finally {
+    await uncalibrated.close();
+    await bareGateway.stop();
+    await bare.stop();
+  }
 });
 
 test("on a phone everything is below each other and nothing is cut off", async () => {

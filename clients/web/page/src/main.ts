@@ -2,6 +2,7 @@
 import "uplot/dist/uPlot.min.css";
 import "./page.css";
 import { button, el, say } from "./dom";
+import { keep, kept } from "./kept";
 import { Pane } from "./pane";
 
 interface SensorEntry {
@@ -11,7 +12,8 @@ interface SensorEntry {
 }
 
 const POLL_MS = 3000;
-const THEME = "dtact theme";
+const THEME = "theme";
+const SENSORS = "sensors";
 
 class Page {
   private readonly chooser = el("nav", { class: "chooser", "aria-label": "Sensors" });
@@ -43,8 +45,8 @@ class Page {
       this.panes,
       this.help,
     );
-    const stored = localStorage.getItem(THEME);
-    if (stored) document.documentElement.dataset["theme"] = stored;
+    const theme = kept(THEME);
+    if (theme === "dark" || theme === "light") document.documentElement.dataset["theme"] = theme;
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.recolour());
     document.addEventListener("keydown", (event) => this.key(event));
     void this.poll();
@@ -68,21 +70,31 @@ class Page {
   }
 
   private list(sensors: SensorEntry[]): void {
+    const names = sensors.map(({ name }) => name);
+    const before = kept(SENSORS);
+    const chosen = Array.isArray(before) ? names.filter((name) => before.includes(name)) : [];
+    // At first as many as fit beside each other.
+    const first = chosen.length > 0 ? chosen : names.slice(0, 2);
+    const fresh = this.shown.size === 0;
     for (const { name, connected, error } of sensors) {
       let made = this.buttons.get(name);
       if (!made) {
-        made = button(name, () => this.toggle(name));
+        made = button(name, () => this.choose(name));
         this.buttons.set(name, made);
         this.chooser.append(made);
-        // All that were there at first, as far as they fit beside each other.
-        if (this.shown.size < 2) this.toggle(name);
       }
       made.dataset["connected"] = String(connected);
       made.title = error ?? "connected";
       made.setAttribute("aria-pressed", String(this.shown.has(name)));
     }
+    if (fresh) for (const name of first) this.toggle(name);
     if (sensors.length === 0) this.tell("dtact-web has no sensor: see its --help.");
     this.chooser.hidden = sensors.length < 2;
+  }
+
+  private choose(name: string): void {
+    this.toggle(name);
+    keep(SENSORS, [...this.shown.keys()]);
   }
 
   private toggle(name: string): void {
@@ -151,7 +163,7 @@ class Page {
       root.dataset["theme"] ??
       (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
     root.dataset["theme"] = dark === "dark" ? "light" : "dark";
-    localStorage.setItem(THEME, root.dataset["theme"]);
+    keep(THEME, root.dataset["theme"]);
     this.recolour();
   }
 

@@ -1,4 +1,5 @@
 // One sensor: its picture, its panels, and what its connection says.
+import { State } from "../gen/dtact_pb";
 import type { Event, HelloReply, Status } from "../gen/dtact_pb";
 import { button, Choice, el, say } from "./dom";
 import { Meter } from "./meter";
@@ -52,10 +53,9 @@ export class Pane {
   });
   private readonly steps = el("span", { class: "row steps", hidden: "" });
   private readonly behind = el("span", { class: "quiet" });
-  private readonly range = new RangeForm((range, outlineMm) => {
-    if (range) this.stage.range = range;
-    if (outlineMm !== undefined) this.stage.outlineMm = outlineMm;
-  });
+  private readonly range: RangeForm;
+  private readonly commands = el("div", { class: "side commands" });
+  private readonly calibrate = button("Calibrate…", () => void this.calibrations.guide());
   private readonly views: Choice<View>;
   private readonly tools: Choice<Tool>;
   private surface: SurfaceView | undefined;
@@ -68,6 +68,10 @@ export class Pane {
 
   /** Throws where the browser has no WebGL 2. */
   constructor(readonly name: string) {
+    this.range = new RangeForm(name, (range, outlineMm) => {
+      if (range) this.stage.range = range;
+      if (outlineMm !== undefined) this.stage.outlineMm = outlineMm;
+    });
     this.views = new Choice<View>(
       "View",
       { depth: "Depth", camera: "Camera", surface: "Surface" },
@@ -166,6 +170,11 @@ export class Pane {
       this.tools.element,
       ...this.range.elements,
     );
+    this.commands.append(
+      this.light.element,
+      this.reconstruction.element,
+      this.calibrations.element,
+    );
     return el(
       "article",
       { class: "pane", "aria-label": `Sensor ${this.name}`, "data-sensor": this.name },
@@ -181,13 +190,7 @@ export class Pane {
           el("div", { class: "main" }, tools, this.stage.element),
           this.profile.element,
           el("div", { class: "side" }, this.contact.element, this.quality.element),
-          el(
-            "div",
-            { class: "side commands" },
-            this.light.element,
-            this.reconstruction.element,
-            this.calibrations.element,
-          ),
+          this.commands,
         ),
         this.plots.element,
       ),
@@ -253,6 +256,7 @@ export class Pane {
 
   private link(link: Link): void {
     this.element.dataset["link"] = link.state;
+    this.commands.inert = link.state !== "live";
     say(
       this.state,
       {
@@ -316,7 +320,7 @@ export class Pane {
     if (this.paused !== (frame.behind !== undefined)) return false;
     this.frame = frame;
     if (!this.paused) this.meter.count(frame);
-    this.stage.cover(this.coverOf(frame));
+    this.stage.cover(this.coverOf(frame), this.offersCalibration(frame) ? this.calibrate : undefined);
     this.stage.show(frame);
     if (this.views.value === "surface" && frame.depth)
       this.surface?.show(frame.depth, this.stage.range);
@@ -338,9 +342,25 @@ export class Pane {
     if (this.views.value === "camera")
       return frame.luma || this.stage.luma ? "" : "Waiting for the camera's picture.";
     if (frame.depth) return "";
+    if (this.isUncalibrated(frame))
+      return this.sensor.mayControl
+        ? "No calibration yet."
+        : "No calibration yet. Your token may watch, not calibrate.";
     if (frame.contact) return this.stage.depth ? "" : "Waiting for depth.";
     const advice = this.lastStatus?.advice ?? "";
     return this.frame && advice ? advice : "No depth at present.";
+  }
+
+  private isUncalibrated(frame: Frame): boolean {
+    return (
+      !frame.depth &&
+      this.views.value !== "camera" &&
+      this.lastStatus?.state === State.UNCALIBRATED
+    );
+  }
+
+  private offersCalibration(frame: Frame): boolean {
+    return this.isUncalibrated(frame) && this.sensor.mayControl;
   }
 
   private tellRate(frame: Frame): void {

@@ -61,7 +61,8 @@ export class CalibrationsPanel {
     }
   }
 
-  private async guide(): Promise<void> {
+  /** Opens the guided calibration. */
+  async guide(): Promise<void> {
     // The list may not have come yet, and the map's shape is in it.
     await this.refresh();
     const guide = new Guide(this.sensor, this.inUse, () => void this.refresh());

@@ -142,7 +142,7 @@ export class LightPanel {
       const [x, y] = [44 * Math.cos(angle), 44 * Math.sin(angle)];
       const led = svg("circle", {
         class: "led",
-        r: "11",
+        r: "14",
         cx: String(x),
         cy: String(y),
         fill: "#000",

@@ -5,6 +5,7 @@ import type { Reconstruction } from "../../gen/dtact_pb";
 import { Choice, el, say, svg } from "../dom";
 import type { Frame } from "../session/messages";
 import type { Sensor } from "../session/sensor";
+import { keep, kept } from "../kept";
 import { fixed, um } from "../labels";
 
 const RESOLUTIONS = { full: "Full", half: "Half", quarter: "Quarter", auto: "Auto" };
@@ -15,6 +16,7 @@ type Resolution = keyof typeof RESOLUTIONS;
 type Sharpen = keyof typeof SHARPEN;
 
 const [WIDTH, HEIGHT, LEFT, BOTTOM] = [280, 150, 34, 26];
+const OPEN = "speed and accuracy";
 /** Weight of a new frame in the moving average of a setting's times. */
 const WEIGHT = 0.05;
 const REDRAW_MS = 250;
@@ -90,7 +92,11 @@ export class ReconstructionPanel {
 
   constructor(private readonly sensor: Sensor) {
     this.element.hidden = true;
-    this.element.addEventListener("toggle", () => this.draw());
+    if (kept(OPEN) === true) this.element.setAttribute("open", "");
+    this.element.addEventListener("toggle", () => {
+      keep(OPEN, this.element.hasAttribute("open"));
+      this.draw();
+    });
     this.bound.addEventListener("change", () => {
       const maxErrorUm = this.bound.valueAsNumber;
       if (maxErrorUm >= 1 && maxErrorUm <= 10000) void this.set({ maxErrorUm });

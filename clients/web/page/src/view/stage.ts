@@ -42,7 +42,8 @@ export class Stage {
   });
   private readonly bar = el("canvas", { class: "bar", role: "img" });
   private readonly readout = el("output", { class: "readout" }, "Point at the map for its values.");
-  private readonly veil = el("div", { class: "veil", role: "status" });
+  private readonly sentence = el("p", { role: "status" });
+  private readonly veil = el("div", { class: "veil" }, this.sentence);
   private readonly picture = el(
     "div",
     { class: "picture" },
@@ -80,8 +81,9 @@ export class Stage {
     this.map = new MapCanvas(this.canvas);
     const target = this.marksCanvas;
     target.addEventListener("pointermove", (event) => this.point(event));
-    target.addEventListener("pointerleave", () => {
-      if (!this.drawing) this.moveTo(undefined);
+    // A finger leaves when it lifts, and the value that it tapped stays.
+    target.addEventListener("pointerleave", (event) => {
+      if (!this.drawing && event.pointerType === "mouse") this.moveTo(undefined);
     });
     target.addEventListener("pointerdown", (event) => {
       this.point(event);
@@ -144,9 +146,11 @@ export class Stage {
     this.drawOver();
   }
 
-  /** Said over the picture; empty: nothing. */
-  cover(sentence: string): void {
-    say(this.veil, sentence);
+  /** A sentence over the picture, empty for none, and a button below it. */
+  cover(sentence: string, action?: HTMLButtonElement): void {
+    say(this.sentence, sentence);
+    if (action && action.parentElement !== this.veil) this.veil.append(action);
+    if (!action) this.sentence.nextElementSibling?.remove();
     this.picture.classList.toggle("covered", sentence !== "");
   }
 
