@@ -160,7 +160,7 @@ export class LightPanel {
         }
       });
       this.leds.push(led);
-      const text = svg("text", { x: String(0.6 * x), y: String(0.6 * y) }, String(i));
+      const text = svg("text", { x: String(0.52 * x), y: String(0.52 * y) }, String(i));
       ring.append(led, text);
     }
     return ring;
