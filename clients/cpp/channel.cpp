@@ -13,7 +13,9 @@
 #include <cerrno>
 #include <cstring>
 #include <memory>
+#include <span>
 #include <system_error>
+#include <vector>
 
 #include "clients/cpp/errors.hpp"
 
@@ -42,15 +44,36 @@ std::string text_of(int error) { return std::generic_category().message(error); 
   throw ConnectionError(fmt::format("cannot connect to {}: {}", name, text_of(error)));
 }
 
+/// Waits for the descriptors, the last of which ends the wait. False: it did, or `end` came first.
+bool poll_until(std::span<pollfd> descriptors, std::chrono::steady_clock::time_point end) {
+  for (;;) {
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+    const auto timeout = std::clamp<std::chrono::milliseconds::rep>(left.count(), 0, 1'000'000);
+    const int ready = ::poll(descriptors.data(), descriptors.size(), static_cast<int>(timeout));
+    if (ready > 0) {
+      return std::ranges::any_of(descriptors.first(descriptors.size() - 1),
+                                 [](const pollfd& one) { return one.revents != 0; });
+    }
+    if (ready == 0 && left.count() <= 1'000'000) return false;
+    if (ready < 0 && errno != EINTR) throw ConnectionError("cannot wait: " + text_of(errno));
+  }
+}
+
+/// What a connection attempt that has ended came to: 0 or errno.
+int result_of(int fd) {
+  int result = 0;
+  socklen_t length = sizeof result;
+  ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &result, &length);
+  return result;
+}
+
 /// Returns 0 or errno.
 int connect_within(int fd, const sockaddr* to, socklen_t size, const Limit& limit) {
   if (::connect(fd, to, size) == 0) return 0;
   if (errno != EINPROGRESS) return errno;
   if (!wait(fd, POLLOUT, limit)) return ETIMEDOUT;
-  int result = 0;
-  socklen_t length = sizeof result;
-  ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &result, &length);
-  return result;
+  return result_of(fd);
 }
 
 base::UniqueFd open_socket(int family) {
@@ -112,6 +135,50 @@ void tune(int fd) {
   set(IPPROTO_TCP, TCP_USER_TIMEOUT, 10'000);
 }
 
+/// How long an address is tried alone before the next one is tried beside it (RFC 8305, section 5).
+constexpr std::chrono::milliseconds kAttemptDelay{250};
+
+/// The first of the addresses that a connection is made to. Null when none is: `error` is errno
+/// then. An address that stays silent does not keep the next one from being tried.
+base::UniqueFd connect_first(const addrinfo* next, const Limit& limit, int& error) {
+  using Clock = std::chrono::steady_clock;
+  std::vector<base::UniqueFd> attempts;
+  auto next_due = Clock::now();
+  while (next != nullptr || !attempts.empty()) {
+    if (next != nullptr && (attempts.empty() || Clock::now() >= next_due)) {
+      base::UniqueFd fd = open_socket(next->ai_family);
+      if (fd && ::connect(fd.get(), next->ai_addr, next->ai_addrlen) == 0) return fd;
+      if (fd && errno == EINPROGRESS) {
+        attempts.push_back(std::move(fd));
+      } else {
+        error = errno;
+      }
+      next = next->ai_next;
+      next_due = Clock::now() + kAttemptDelay;
+      continue;
+    }
+    std::vector<pollfd> waiting;
+    for (const base::UniqueFd& fd : attempts) waiting.push_back({fd.get(), POLLOUT, 0});
+    waiting.push_back({limit.wake, POLLIN, 0});
+    const auto until = next == nullptr ? limit.end : std::min(limit.end, next_due);
+    if (!poll_until(waiting, until)) {
+      const bool woken = waiting.back().revents != 0;
+      if (!woken && until < limit.end) continue;
+      if (error == 0) error = ETIMEDOUT;
+      return {};
+    }
+    for (std::size_t i = attempts.size(); i-- > 0;) {
+      if (waiting[i].revents == 0) continue;
+      const int result = result_of(attempts[i].get());
+      if (result == 0) return std::move(attempts[i]);
+      error = result;
+      attempts.erase(attempts.begin() + static_cast<std::ptrdiff_t>(i));
+      next_due = Clock::now();
+    }
+  }
+  return {};
+}
+
 Socket connect_tcp(const Address& address, const Limit& limit) {
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;
@@ -125,22 +192,17 @@ Socket connect_tcp(const Address& address, const Limit& limit) {
   }
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(found, &::freeaddrinfo);
   int error = 0;
-  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
-    base::UniqueFd fd = open_socket(one->ai_family);
-    error = fd ? connect_within(fd.get(), one->ai_addr, one->ai_addrlen, limit) : errno;
-    if (error != 0) continue;
-    tune(fd.get());
-    sockaddr_storage here{};
-    sockaddr_storage there{};
-    socklen_t here_size = sizeof here;
-    socklen_t there_size = sizeof there;
-    const bool known =
-        ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&here), &here_size) == 0 &&
-        ::getpeername(fd.get(), reinterpret_cast<sockaddr*>(&there), &there_size) == 0;
-    const bool loopback = known && is_loopback(there);
-    return {std::move(fd), loopback, loopback || (known && same_host(here, there))};
-  }
-  refuse(error, address);
+  base::UniqueFd fd = connect_first(found, limit, error);
+  if (!fd) refuse(error, address);
+  tune(fd.get());
+  sockaddr_storage here{};
+  sockaddr_storage there{};
+  socklen_t here_size = sizeof here;
+  socklen_t there_size = sizeof there;
+  const bool known = ::getsockname(fd.get(), reinterpret_cast<sockaddr*>(&here), &here_size) == 0 &&
+                     ::getpeername(fd.get(), reinterpret_cast<sockaddr*>(&there), &there_size) == 0;
+  const bool loopback = known && is_loopback(there);
+  return {std::move(fd), loopback, loopback || (known && same_host(here, there))};
 }
 
 template <typename Count>
@@ -153,16 +215,8 @@ Transfer moved(Count count, short direction) {
 }  // namespace
 
 bool wait(int fd, short events, const Limit& limit) {
-  for (;;) {
-    const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>(limit.end - std::chrono::steady_clock::now());
-    std::array<pollfd, 2> descriptors{{{fd, events, 0}, {limit.wake, POLLIN, 0}}};
-    const auto timeout = std::clamp<std::chrono::milliseconds::rep>(left.count(), 0, 1'000'000);
-    const int ready = ::poll(descriptors.data(), descriptors.size(), static_cast<int>(timeout));
-    if (ready > 0) return descriptors[0].revents != 0;
-    if (ready == 0 && left.count() <= 1'000'000) return false;
-    if (ready < 0 && errno != EINTR) throw ConnectionError("cannot wait: " + text_of(errno));
-  }
+  std::array<pollfd, 2> one{{{fd, events, 0}, {limit.wake, POLLIN, 0}}};
+  return poll_until(one, limit.end);
 }
 
 Transfer PlainChannel::read(std::span<char> into) {

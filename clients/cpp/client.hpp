@@ -48,7 +48,8 @@ struct Handlers {
 /// signs; maps.hpp reads the pixels of the maps.
 ///
 /// Calls block the caller's thread. The library has no threads of its own and no state outside its
-/// objects. One thread at a time may use a Client; different Clients are independent.
+/// objects. One thread at a time may use a Client, in the process that made it; the other's call
+/// throws Error. Different Clients are independent.
 class DTACT_EXPORT Client {
  public:
   /// Connects, verifies the daemon where Options ask for it, and agrees on the version. Throws

@@ -9,7 +9,8 @@
 namespace dtact::client {
 
 /// Base of all exceptions of the library. The text is a sentence for the user that names the fix.
-/// Error itself is thrown for invalid options.
+/// Error itself is thrown for invalid options, and to a second thread or a forked process that uses
+/// a client.
 class DTACT_EXPORT Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

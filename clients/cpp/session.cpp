@@ -1,6 +1,7 @@
 #include "clients/cpp/session.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <random>
@@ -56,8 +57,37 @@ v1::Hello hello_for(const Options& options, const Connection& connection) {
   return hello;
 }
 
+/// A call in progress. Throws Error where it could not be told from another one on the same
+/// connection.
+class Session::Call {
+ public:
+  explicit Call(Session& session) : session_(session) {
+    if (const pid_t here = ::getpid(); here != session.process_) {
+      throw Error(
+          fmt::format("process {} made this client, and this is process {}: after a fork, "
+                      "make a client of its own there",
+                      session.process_, here));
+    }
+    pid_t other = 0;
+    if (!session.thread_.compare_exchange_strong(other, ::gettid())) {
+      throw Error(
+          fmt::format("thread {} is in a call of this client: one thread at a time may use "
+                      "it; make a client for each thread",
+                      other));
+    }
+  }
+  ~Call() { session_.thread_ = 0; }
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+
+ private:
+  Session& session_;
+};
+
 Session::Session(const Options& options)
-    : options_(options), backoff_(options.reconnect.value_or(Reconnect{}), std::random_device{}()) {
+    : options_(options),
+      backoff_(options.reconnect.value_or(Reconnect{}), std::random_device{}()),
+      process_(::getpid()) {
   open({Clock::now() + options_.timeout});
 }
 
@@ -162,6 +192,7 @@ v1::Reply Session::exchange(v1::ClientMessage& message, const Limit& limit) {
 }
 
 v1::Reply Session::request(v1::ClientMessage& message, std::chrono::milliseconds timeout) {
+  const Call call(*this);
   if (!connection_) {
     if (Clock::now() < loss_.retry_at) throw ConnectionError(loss_.reason);
     reopen(-1);
@@ -184,6 +215,7 @@ void Session::subscribe(const v1::Subscribe& subscription) {
 }
 
 std::optional<Item> Session::next(const Limit& limit) {
+  const Call call(*this);
   for (;;) {
     if (!inbox_.empty()) {
       std::optional<Item> item(std::move(inbox_.front()));

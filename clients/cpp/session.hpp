@@ -1,5 +1,8 @@
 #pragma once
 
+#include <sys/types.h>
+
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -40,6 +43,7 @@ class Session {
 
  private:
   using Clock = std::chrono::steady_clock;
+  class Call;
   struct Loss {
     std::string reason;
     Clock::time_point since;
@@ -67,6 +71,8 @@ class Session {
   bool lost_ = false;  ///< From then until one is open again, subscription and all.
   Clock::time_point opened_;
   BackOff backoff_;
+  pid_t process_;                 ///< That made the session.
+  std::atomic<pid_t> thread_{0};  ///< That is in a call now; 0: none.
 };
 
 }  // namespace dtact::client

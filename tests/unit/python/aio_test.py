@@ -10,7 +10,7 @@ from unittest import mock
 
 import certificate
 import dtact
-from fake_daemon import FakeDaemon, event, frame
+from fake_daemon import FakeDaemon, event, frame, silent_first
 
 
 class Aio(unittest.IsolatedAsyncioTestCase):
@@ -26,7 +26,7 @@ class Aio(unittest.IsolatedAsyncioTestCase):
     async def test_frames_events_and_requests(self):
         with FakeDaemon() as daemon:
             daemon.pushed = [frame(1), event(3), frame(2)]
-            async with dtact.aio.connect(daemon.address, token="t") as s:
+            async with dtact.aio.connect(daemon.address, token="t", kept_frames=2) as s:
                 self.assertTrue(s.same_machine)
                 sock = s._link.transport.get_extra_info("socket")
                 self.assertTrue(sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE))
@@ -50,6 +50,33 @@ class Aio(unittest.IsolatedAsyncioTestCase):
             async with dtact.aio.connect(daemon.address) as s:
                 lights = await asyncio.gather(*(s.set_light(brightness=b) for b in range(20)))
                 self.assertEqual([light.brightness for light in lights], list(range(20)))
+
+    async def test_a_slow_reader_gets_the_newest(self):
+        with FakeDaemon() as daemon:
+            async with dtact.aio.connect(daemon.address) as s:
+                daemon.pushed = [frame(1)]
+                frames = s.frames()
+                self.assertEqual((await anext(frames)).sequence, 1)
+                daemon.push(*(frame(n) for n in range(2, 31)))
+                asyncio.get_running_loop().slow_callback_duration = 1
+                time.sleep(0.2)  # The loop reads nothing meanwhile.
+                self.assertEqual((await anext(frames)).sequence, 30)
+
+    async def test_a_silent_address_does_not_delay_the_next_one(self):
+        with FakeDaemon() as daemon, silent_first(daemon.address) as host:
+            began = time.monotonic()
+            async with dtact.aio.connect(host, timeout=30) as s:
+                self.assertEqual((await s.status()).state, "serving")
+            self.assertLess(time.monotonic() - began, 10)
+
+    async def test_another_event_loop_is_named(self):
+        with FakeDaemon() as daemon:
+            async with dtact.aio.connect(daemon.address) as s:
+                def elsewhere():
+                    asyncio.run(s.status())
+                with self.assertRaisesRegex(dtact.SharedClient, "another event loop"):
+                    await asyncio.to_thread(elsewhere)
+                self.assertEqual((await s.status()).state, "serving")
 
     async def test_refusal_and_no_frame(self):
         def refuse(request, reply):
@@ -168,7 +195,7 @@ class Aio(unittest.IsolatedAsyncioTestCase):
 
     async def test_unix_socket(self):
         with tempfile.TemporaryDirectory() as folder, FakeDaemon(path=f"{folder}/socket") as daemon:
-            async with dtact.aio.connect(daemon.address, token="t") as s:
+            async with dtact.aio.connect(daemon.address, token="t", kept_frames=2) as s:
                 self.assertTrue(s.same_machine)
 
     async def test_tls(self):

@@ -12,7 +12,7 @@ from fake_daemon import FakeDaemon, event, frame
 
 class Breaking(unittest.TestCase):
     def test_what_came_before_is_given_first(self):
-        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, kept_frames=2) as s:
             daemon.pushed = [frame(1), frame(2)]
             frames = s.frames()
             self.assertEqual(next(frames).sequence, 1)

@@ -1,9 +1,11 @@
 """The client that waits, against a daemon that does as a test says."""
 import itertools
+import os
 import pathlib
 import socket
 import sys
 import tempfile
+import threading
 import time
 import types
 import unittest
@@ -12,7 +14,7 @@ from unittest import mock
 import numpy as np
 
 import dtact
-from fake_daemon import FakeDaemon, event, frame
+from fake_daemon import FakeDaemon, event, frame, silent_first
 
 
 def refuse(code, sentence):
@@ -128,7 +130,7 @@ class Connecting(unittest.TestCase):
 
 class Frames(unittest.TestCase):
     def test_come_as_arrays(self):
-        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, kept_frames=2) as s:
             daemon.pushed = [frame(1), event(3), frame(2)]
             f, g = itertools.islice(s.frames(), 2)
             self.assertEqual((f.sequence, g.sequence), (1, 2))
@@ -138,7 +140,17 @@ class Frames(unittest.TestCase):
             self.assertEqual(next(s.events()).light.brightness, 3)
             self.assertEqual(list(s.events(timeout=0.05)), [])
 
-    def test_who_comes_late_gets_the_newest(self):
+    def test_a_slow_reader_gets_the_newest(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            daemon.pushed = [frame(1)]
+            frames = s.frames()
+            next(frames)
+            for newest in (40, 80):
+                daemon.push(*(frame(n) for n in range(newest - 38, newest + 1)))
+                time.sleep(0.2)
+                self.assertEqual(next(frames).sequence, newest)
+
+    def test_a_queue_keeps_as_many_as_asked_for(self):
         with FakeDaemon() as daemon, dtact.connect(daemon.address, kept_frames=2) as s:
             daemon.pushed = [frame(n) for n in range(1, 21)]
             frames = s.frames()
@@ -157,7 +169,7 @@ class Frames(unittest.TestCase):
             self.assertIsNone(s.next(0))
 
     def test_a_request_between_frames_loses_none(self):
-        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, kept_frames=4) as s:
             def with_frames(request, reply):
                 daemon.push(frame(2), event(1), frame(3))
                 reply.light.brightness = 5
@@ -175,6 +187,61 @@ class Frames(unittest.TestCase):
             daemon.pushed = [broken]
             with self.assertRaises(dtact.ProtocolError):
                 next(s.frames()).depth_mm
+
+
+class Connecting(unittest.TestCase):
+    def test_a_silent_address_does_not_delay_the_next_one(self):
+        with FakeDaemon() as daemon, silent_first(daemon.address) as host:
+            began = time.monotonic()
+            with dtact.connect(host, timeout=30) as s:
+                self.assertEqual(s.status().state, "serving")
+            self.assertTrue(0.25 <= time.monotonic() - began < 10, time.monotonic() - began)
+
+    def test_what_an_address_answers_is_named_when_the_others_are_silent(self):
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            port = server.getsockname()[1]
+        with silent_first(f"127.0.0.1:{port}") as host:
+            with self.assertRaisesRegex(dtact.ConnectionError, "nothing listens on silent-first"):
+                dtact.connect(host, timeout=0.6)
+
+    def test_nobody_answers(self):
+        with FakeDaemon() as daemon, silent_first(daemon.address) as host:
+            with self.assertRaisesRegex(dtact.ConnectionError, "does not answer"):
+                dtact.connect(host, timeout=0.1)
+
+
+class Sharing(unittest.TestCase):
+    def test_a_second_thread_is_named_and_the_first_goes_on(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address, timeout=30) as s:
+            seen = []
+            s.subscribe()
+            waiting = threading.Thread(target=lambda: seen.append(next(s.frames())), name="reader")
+            waiting.start()
+            until = time.monotonic() + 10
+            while not s._in_use.locked() and time.monotonic() < until:
+                time.sleep(0.01)
+            for call in (s.status, lambda: next(s.frames()), s.close):
+                with self.assertRaisesRegex(dtact.SharedClient, "thread reader is in a call"):
+                    call()
+            daemon.push(frame(6))
+            waiting.join(10)
+            self.assertEqual(seen[0].sequence, 6)
+            self.assertEqual(s.status().state, "serving")
+
+    def test_a_forked_process_is_named_and_the_first_goes_on(self):
+        with FakeDaemon() as daemon, dtact.connect(daemon.address) as s:
+            child = os.fork()
+            if child == 0:
+                said = ""
+                try:
+                    s.status()
+                except dtact.SharedClient as e:
+                    said = str(e)
+                s.close()
+                os._exit(0 if f"process {os.getppid()} made this client" in said else 1)
+            self.assertEqual(os.waitpid(child, 0)[1], 0)
+            self.assertEqual(s.status().state, "serving")
+            self.assertEqual(daemon.connections, 1)
 
 
 class Requests(unittest.TestCase):

@@ -1,6 +1,8 @@
 """A daemon on a thread that answers as a test tells it to."""
+import contextlib
 import socket
 import threading
+from unittest import mock
 
 from dtact.messages import ClientMessage, ServerMessage
 
@@ -127,6 +129,28 @@ class FakeDaemon:
             # In one piece, so that drop() comes after all of it.
             behind = self.pushed if kind == "subscribe" else []
             connection.sendall(b"".join(packed(m) for m in [message, *behind]))
+
+
+@contextlib.contextmanager
+def silent_first(address):
+    """A host and port whose first address takes no connection and says nothing; the second is
+    `address`, "127.0.0.1:PORT"."""
+    port = int(address.rpartition(":")[2])
+    look_up = socket.getaddrinfo
+
+    def both(host, *arguments, **options):
+        if host != "silent-first":
+            return look_up(host, *arguments, **options)
+        return look_up("127.0.0.3", *arguments, **options) + look_up("127.0.0.1", *arguments, **options)
+
+    with contextlib.ExitStack() as stack:
+        listening = stack.enter_context(socket.create_server(("127.0.0.3", port), backlog=0))
+        for _ in range(4):  # A full queue: the kernel drops what asks for more.
+            waiting = stack.enter_context(socket.socket())
+            waiting.setblocking(False)
+            waiting.connect_ex(listening.getsockname())
+        stack.enter_context(mock.patch("socket.getaddrinfo", both))
+        yield f"silent-first:{port}"
 
 
 def packed(message):

@@ -22,6 +22,7 @@ from .errors import (
     NotInFrame,
     ProtocolError,
     Refused,
+    SharedClient,
     StorageFailed,
     TimeoutError,
     InContact,
@@ -65,7 +66,7 @@ __all__ = [
     "Error", "Event", "Frame", "IdentityError", "InContact", "Invalid", "Light", "LightEvent", "NoFrame",
     "NotInFrame", "ObjectPose", "PointCloud", "Pong", "ProtocolError", "Reconnected",
     "Reconstruction", "ReconstructionEvent", "Recording", "ReferenceEvent", "ReferenceImage",
-    "Refused", "Server", "StateEvent", "Status", "StorageFailed", "StoredCalibration",
+    "Refused", "Server", "SharedClient", "StateEvent", "Status", "StorageFailed", "StoredCalibration",
     "Subscription", "Surface", "TimeoutError", "Uncalibrated", "Unsupported", "aio", "connect",
     "read",
 ]

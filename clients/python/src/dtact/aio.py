@@ -11,20 +11,21 @@ from __future__ import annotations
 
 import asyncio
 import builtins
+import threading
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from types import TracebackType
 from typing import TypeVar
 
 from . import requests
-from .errors import ConnectionError, Error, NoFrame, ProtocolError, TimeoutError
+from .errors import ConnectionError, Error, NoFrame, ProtocolError, SharedClient, TimeoutError
 from .event import Event
 from .frame import Frame
 from .protocol import Conversation
 from .requests import Request, T
 from .session import Session
 from .subscription import Subscription
-from .transport import is_local, tune
+from .transport import ATTEMPT_DELAY_S, is_local, tune
 from .values import (
     CalibrationFiles,
     Light,
@@ -37,6 +38,9 @@ from .values import (
 
 _Item = TypeVar("_Item")
 
+#: Turns of the loop to read what lies ready: the newest frames count, and calls have to end.
+_MAX_TURNS = 4096
+
 
 class _Link(asyncio.BufferedProtocol):
     """Feeds received bytes to the conversation and wakes its waiters."""
@@ -45,6 +49,7 @@ class _Link(asyncio.BufferedProtocol):
         self._conversation = conversation
         self._waiters: set[asyncio.Future[None]] = set()
         self._error: Error | None = None
+        self.reads = 0
         self.transport: asyncio.Transport | None = None
         self.open = False
 
@@ -57,6 +62,7 @@ class _Link(asyncio.BufferedProtocol):
         return self._conversation.get_buffer()
 
     def buffer_updated(self, nbytes: int) -> None:
+        self.reads += 1
         try:
             self._conversation.buffer_updated(nbytes)
         except ProtocolError as e:
@@ -82,6 +88,16 @@ class _Link(asyncio.BufferedProtocol):
             if not waiter.done():
                 waiter.set_result(None)
 
+    async def catch_up(self) -> None:
+        """Until all that lies ready is read. A task that computes for long keeps the loop from reading."""
+        for _ in range(_MAX_TURNS):
+            before = self.reads
+            # The loop reads behind the callbacks of the turn in which it finds that it can.
+            await asyncio.sleep(0)
+            await asyncio.sleep(0)
+            if self.reads == before:
+                return
+
     async def changed(self) -> None:
         """Until more came or the connection ended."""
         waiter = asyncio.get_running_loop().create_future()
@@ -98,8 +114,11 @@ class Client(Session):
     _link: _Link | None = None
     #: Connects and subscribes, while that is under way.
     _opening: asyncio.Task[None] | None = None
+    #: The first that it is used in.
+    _loop: asyncio.AbstractEventLoop | None = None
 
     async def __aenter__(self) -> Client:
+        self._check_loop()
         try:
             await self._ensure_open()
         except asyncio.CancelledError:
@@ -130,8 +149,9 @@ class Client(Session):
 
     async def frames(self, timeout: float | None = None) -> AsyncIterator[Frame]:
         """Yields frames without end. Subscribes to depth if nothing is subscribed. A slow reader gets
-        the newest `kept_frames`. Raises NoFrame when none arrives within `timeout` seconds (default:
-        the client's timeout, or no limit with `reconnect`)."""
+        the newest frame each time, or with `kept_frames` the oldest of those kept. Raises NoFrame when
+        none arrives within `timeout` seconds (default: the client's timeout, or no limit with
+        `reconnect`)."""
         if self._subscription is None:
             await self.subscribe()
         limit = timeout if timeout is not None or self._reconnect else self._timeout
@@ -187,7 +207,17 @@ class Client(Session):
 
     # ------------------------------------------------------------ the connection
 
+    def _check_loop(self) -> None:
+        """SharedClient in another process or event loop, hence another thread, than before."""
+        self._check_process()
+        here = asyncio.get_running_loop()
+        self._loop = self._loop or here
+        if self._loop is not here:
+            raise SharedClient("this client belongs to another event loop: make a client for each loop "
+                               f"(this one runs in thread {threading.current_thread().name})")
+
     async def _ask(self, request: Request[T]) -> T:
+        self._check_loop()
         while self._link is None or self._opening is not None:
             if self._opening is None:
                 self._check_usable()
@@ -218,6 +248,9 @@ class Client(Session):
     async def _wait(self, take: Callable[[Conversation], _Item | None],
                     limit: float | None) -> _Item | None:
         """What `take` finds once it finds something; None when that takes longer than `limit`."""
+        self._check_loop()
+        if self._link is not None and self._opening is None:
+            await self._link.catch_up()
         try:
             async with asyncio.timeout(limit):
                 while (item := take(self._conversation)) is None:
@@ -300,8 +333,9 @@ class Client(Session):
         if address.path:
             transport, link = await loop.create_unix_connection(make, address.path)
         else:
-            transport, link = await loop.create_connection(make, address.host, address.port,
-                                                           ssl=self._tls)
+            transport, link = await loop.create_connection(
+                make, address.host, address.port, ssl=self._tls,
+                happy_eyeballs_delay=ATTEMPT_DELAY_S, interleave=0)
         if self._tls is not None:
             try:
                 self._check_pin(transport.get_extra_info("ssl_object").getpeercert(True))

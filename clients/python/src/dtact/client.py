@@ -2,13 +2,16 @@
 from __future__ import annotations
 
 import math
+import os
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from types import TracebackType
 from typing import Any, TypeVar, cast
 
 from . import requests
-from .errors import ConnectionError, Error, NoFrame, ProtocolError, TimeoutError
+from .errors import ConnectionError, Error, NoFrame, ProtocolError, SharedClient, TimeoutError
 from .event import Event
 from .frame import Frame
 from .protocol import Conversation
@@ -29,18 +32,20 @@ from .values import (
 
 _Item = TypeVar("_Item")
 
-#: Messages read at one go while more lie ready: the newest frames count, and calls have to end.
-_MAX_AT_ONCE = 64
+#: Reads at one go while more lies ready: the newest frames count, and calls have to end.
+_MAX_AT_ONCE = 4096
 
 
 class Client(Session):
     __doc__ = (Session.__doc__ or "") + """
-    Calls wait; one thread at a time. With `with`, or close() at the end. With `reconnect`, the last
+    Calls wait; one thread at a time, in the process that made it, else SharedClient. With `with`, or close() at the end. With `reconnect`, the last
     attempt to connect again may last for the client's `timeout` beyond the one given to a call."""
 
     _link: Link | None = None
 
     def _begin(self) -> None:
+        self._in_use = threading.Lock()
+        self._user = ""  # The name of the thread that has it.
         self._open(time.monotonic() + self._timeout)
 
     def __enter__(self) -> Client:
@@ -51,9 +56,11 @@ class Client(Session):
         self.close()
 
     def close(self) -> None:
-        """Ends the connection."""
-        self._lost(ConnectionError(f"the connection to {self._address} was closed"))
-        self._reconnect = False
+        """Ends the connection; in a forked process, only this process's end of it."""
+        # The lock may be one that another thread held at the fork.
+        with self._call() if os.getpid() == self._process else nullcontext():
+            self._lost(ConnectionError(f"the connection to {self._address} was closed"))
+            self._reconnect = False
 
     # ------------------------------------------------------------ frames and events
 
@@ -65,8 +72,9 @@ class Client(Session):
 
     def frames(self, timeout: float | None = None) -> Iterator[Frame]:
         """Yields frames without end. Subscribes to depth if nothing is subscribed. A slow reader gets
-        the newest `kept_frames`. Raises NoFrame when none arrives within `timeout` seconds (default:
-        the client's timeout, or no limit with `reconnect`)."""
+        the newest frame each time, or with `kept_frames` the oldest of those kept. Raises NoFrame when
+        none arrives within `timeout` seconds (default: the client's timeout, or no limit with
+        `reconnect`)."""
         if self._subscription is None:
             self.subscribe()
         limit = timeout if timeout is not None or self._reconnect else self._timeout
@@ -145,12 +153,27 @@ class Client(Session):
 
     # ------------------------------------------------------------ the connection
 
+    @contextmanager
+    def _call(self) -> Iterator[None]:
+        """While this thread uses the connection. SharedClient when another one does, or when another
+        process made it."""
+        self._check_process()
+        if not self._in_use.acquire(blocking=False):
+            raise SharedClient(f"thread {self._user} is in a call of this client: one thread at a "
+                               "time may use it; make a client for each thread")
+        self._user = threading.current_thread().name
+        try:
+            yield
+        finally:
+            self._in_use.release()
+
     def _ask(self, request: Request[T]) -> T:
-        deadline = time.monotonic() + self._patience(request)
-        if self._link is None:
-            self._check_usable()
-            self._open(deadline)
-        return self._exchange(request, deadline)
+        with self._call():
+            deadline = time.monotonic() + self._patience(request)
+            if self._link is None:
+                self._check_usable()
+                self._open(deadline)
+            return self._exchange(request, deadline)
 
     def _exchange(self, request: Request[T], deadline: float) -> T:
         number, data = self._prepare(request)
@@ -170,6 +193,11 @@ class Client(Session):
     def _wait(self, take: Callable[[Conversation], _Item | None],
               limit: float | None) -> _Item | None:
         """What `take` finds once it finds something; None when that takes longer than `limit`."""
+        with self._call():
+            return self._taken(take, limit)
+
+    def _taken(self, take: Callable[[Conversation], _Item | None],
+               limit: float | None) -> _Item | None:
         deadline = math.inf if limit is None else time.monotonic() + limit
         while True:
             # The newest frames count: what lies ready comes first.

@@ -38,6 +38,11 @@ class EndedByDaemon(ConnectionError):
         self.code = code
 
 
+class SharedClient(Error, RuntimeError):
+    """A client is used by a second thread while another one is in a call, or by a process that was
+    forked. Nothing was sent."""
+
+
 class NoFrame(Error, builtins.TimeoutError):
     """No frame came in time. The connection goes on."""
 

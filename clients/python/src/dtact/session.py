@@ -18,6 +18,7 @@ from .errors import (
     Error,
     IdentityError,
     ProtocolError,
+    SharedClient,
     refusal,
 )
 from .event import Reconnected
@@ -65,7 +66,8 @@ class Session:
     :param timeout: seconds for the connection, each request, and each frame.
     :param reconnect: connect and subscribe again when the connection breaks while frames or events
         are awaited. A pending request then fails with ConnectionError.
-    :param kept_frames: number of newest frames kept until they are taken; 1: only the newest.
+    :param kept_frames: number of newest frames kept until they are taken. 1: a slow reader gets the
+        newest frame only; more: a queue, from the oldest that is kept.
     """
 
     def __init__(
@@ -80,7 +82,7 @@ class Session:
         program: str = "dtact Python client",
         timeout: float = 5.0,
         reconnect: bool = False,
-        kept_frames: int = 4,
+        kept_frames: int = 1,
     ) -> None:
         if token is not None and token_file is not None:
             raise ValueError("give a token or a token_file, not both")
@@ -110,6 +112,7 @@ class Session:
         # Shared by all calls and tasks: polling with short time-outs does not shorten the back-off.
         self._back_off = BackOff()
         self._next_attempt = 0.0  # time.monotonic()
+        self._process = os.getpid()
         self._begin()
 
     def _begin(self) -> None:
@@ -131,17 +134,24 @@ class Session:
 
     def record(self, path: str | Path) -> Recording:
         """Records all that the daemon gives into an MCAP file until the end of the `with` block,
-        or stop(). `dtactctl record` does it, over a connection of its own."""
+        or stop(). `dtactctl record` does it, over a connection of its own. Returns once the first
+        frame is recorded. Error when the file cannot be written or no frame comes within the
+        client's timeout."""
         if self._token is not None and "--token-file" not in self._options:
             raise Error("give the token as a token_file: other users would see it in dtactctl's "
                         "command line")
-        return Recording(path, self._address, self._options)
+        return Recording(path, self._address, self._options, self._timeout)
 
     def __repr__(self) -> str:
         state = self._server.program if self._server else "not connected"
         return f"<dtact client of {self._address}: {state}>"
 
     # ------------------------------------------------------------ for the clients
+
+    def _check_process(self) -> None:
+        if os.getpid() != self._process:
+            raise SharedClient(f"process {self._process} made this client, and this is process "
+                               f"{os.getpid()}: after a fork, make a client of its own there")
 
     def _hello(self) -> Request[Server]:
         """The first request on a new connection, whose `_local` is known."""

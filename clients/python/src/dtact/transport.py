@@ -1,13 +1,16 @@
 """A connected socket, with deadlines."""
 from __future__ import annotations
 
+import errno
 import ipaddress
 import math
+import os
+import selectors
 import socket
 import ssl
 import sys
 import time
-from typing import Callable
+from typing import Any, Callable, cast
 
 from .address import Address
 
@@ -57,8 +60,57 @@ def _connected(address: Address, deadline: float) -> socket.socket:
             sock.close()
             raise
         return sock
-    sock = socket.create_connection((address.host, address.port), _left(deadline))
+    sock = _first_connected(
+        socket.getaddrinfo(address.host, address.port, type=socket.SOCK_STREAM), deadline)
     tune(sock)
+    return sock
+
+
+#: How long an address is tried alone before the next one is tried beside it (RFC 8305, section 5).
+ATTEMPT_DELAY_S = 0.25
+
+
+def _first_connected(addresses: list[Any], deadline: float) -> socket.socket:
+    """The first of getaddrinfo()'s addresses that a connection is made to. One that stays silent does
+    not keep the next one from being tried."""
+    error: OSError = TimeoutError("timed out")
+    next_due = 0.0
+    with selectors.DefaultSelector() as attempts:
+        try:
+            while addresses or attempts.get_map():
+                now = time.monotonic()
+                if now >= deadline:
+                    break
+                if addresses and (now >= next_due or not attempts.get_map()):
+                    next_due = now + ATTEMPT_DELAY_S
+                    try:
+                        attempts.register(_begun(*addresses.pop(0)), selectors.EVENT_WRITE)
+                    except OSError as e:
+                        error, next_due = e, 0.0
+                    continue
+                until = min(deadline, next_due) if addresses else deadline
+                for key, _ in attempts.select(until - now):
+                    sock = cast(socket.socket, key.fileobj)
+                    attempts.unregister(sock)
+                    failure = sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+                    if failure == 0:
+                        return sock
+                    sock.close()
+                    error, next_due = OSError(failure, os.strerror(failure)), 0.0
+        finally:
+            for key in attempts.get_map().values():
+                cast(socket.socket, key.fileobj).close()
+    raise error
+
+
+def _begun(family: int, kind: int, protocol: int, _: str, target: Any) -> socket.socket:
+    """A socket that is connecting, or connected. OSError when that cannot be."""
+    sock = socket.socket(family, kind, protocol)
+    sock.setblocking(False)
+    failure = sock.connect_ex(target)
+    if failure not in (0, errno.EINPROGRESS):
+        sock.close()
+        raise OSError(failure, os.strerror(failure))
     return sock
 
 
