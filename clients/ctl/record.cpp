@@ -103,6 +103,8 @@ class Recording {
     if (seen_++ > 0) return;
     recorder_.add(status);
     attach_files();
+    // The Python package waits for this line.
+    std::cerr << "recording to " << options_.output << '\n';
   }
 
   /// What depth is made by from here on.
@@ -166,8 +168,10 @@ void print(const Context& context, const cli::RecordReport& report) {
 }
 
 void run_record(const Context& context, const RecordOptions& options) {
-  // write() then reports a limit on the file's size, like a full disk.
+  // write() then reports a limit on the file's size, like a full disk, and a reader of the output
+  // that is gone, which does not matter to the recording.
   (void)std::signal(SIGXFSZ, SIG_IGN);
+  (void)std::signal(SIGPIPE, SIG_IGN);
   if (!options.force && std::filesystem::exists(options.output)) {
     throw std::runtime_error(options.output + " exists: name another file, or add --force");
   }

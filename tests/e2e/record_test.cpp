@@ -109,6 +109,26 @@ TEST_F(Record, SigtermFinishesTheFile) {
   EXPECT_EQ(statuses, 1);
 }
 
+TEST_F(Record, AClosedTerminalFinishesTheFile) {
+  const pid_t pid = start(command());
+  wait_for_bytes(1'000'000);
+  EXPECT_EQ(end(pid, SIGHUP), 0);
+  const mcap::Reader reader(file);
+  EXPECT_EQ(reader.damage(), "");
+  EXPECT_FALSE(frames_of(reader).empty());
+}
+
+TEST_F(Record, NohupGoesOnWithoutATerminal) {
+  const auto recorder = command({"--seconds", std::to_string(kSlower)});
+  std::vector<std::string> arguments = {"/usr/bin/nohup"};
+  arguments.insert(arguments.end(), recorder.begin(), recorder.end());
+  const auto began = std::chrono::steady_clock::now();
+  const pid_t pid = start(arguments);
+  wait_for_bytes(100);
+  EXPECT_EQ(end(pid, SIGHUP), 0);
+  EXPECT_GE(std::chrono::steady_clock::now() - began, std::chrono::seconds(kSlower));
+}
+
 TEST_F(Record, SigkillLosesTheOpenChunkOnly) {
   const pid_t pid = start(command());
   wait_for_bytes(3'000'000);

@@ -30,6 +30,11 @@ def tearDownModule():
     daemon.remove()
 
 
+def path_to_dtactctl():
+    folder = pathlib.Path(os.environ["DTACTCTL"]).parent
+    return mock.patch.dict(os.environ, {"PATH": f"{folder}:{os.environ['PATH']}"})
+
+
 def pressed(client):
     """A frame of the scene's press, some tenths of a millimetre deep."""
     until = time.monotonic() + 60
@@ -44,7 +49,7 @@ class Depth(unittest.TestCase):
     def test_is_what_dtactctl_saves(self):
         """The C++ library's decoder, on the very same frame, for every encoding."""
         file = daemon.folder / "depth.npy"
-        with dtact.connect(daemon.address) as s:
+        with dtact.connect(daemon.address, kept_frames=100) as s:
             for number, encoding in enumerate(["int16", "predict_zstd"], 1):
                 for _ in range(20):
                     s.subscribe(dtact.Subscription(depth=encoding))
@@ -169,11 +174,7 @@ class Commands(unittest.TestCase):
 
     def test_a_recording_is_read_back(self):
         file = daemon.folder / "press.mcap"
-        if " record " not in daemon.dtactctl("--help"):
-            self.skipTest("this dtactctl does not record")
-        program = pathlib.Path(os.environ["DTACTCTL"])
-        with mock.patch.dict(os.environ, {"PATH": f"{program.parent}:{os.environ['PATH']}"}), \
-                dtact.connect(daemon.address) as s:
+        with path_to_dtactctl(), dtact.connect(daemon.address, kept_frames=100) as s:
             with s.record(file):
                 # On a busy machine both miss frames.
                 seen = list(itertools.islice((f for f in s.frames() if f.has_depth), 200))
@@ -183,6 +184,24 @@ class Commands(unittest.TestCase):
         for f in common:
             np.testing.assert_array_equal(recorded[f.sequence].depth_mm, f.depth_mm)
             self.assertEqual(recorded[f.sequence].contact, f.contact)
+
+    def test_a_recording_fails_before_its_block(self):
+        taken = daemon.folder / "taken.mcap"
+        taken.write_text("mine")
+        with path_to_dtactctl(), dtact.connect(daemon.address) as s:
+            for file, said in ((taken, "exists: name another file"),
+                               (daemon.folder / "missing" / "a.mcap", "No such file or directory")):
+                with self.assertRaisesRegex(dtact.Error, said):
+                    with s.record(file):
+                        self.fail("the block ran")
+        self.assertEqual(taken.read_text(), "mine")
+
+    def test_a_block_that_ends_at_once_is_a_recording(self):
+        file = daemon.folder / "short.mcap"
+        with path_to_dtactctl(), dtact.connect(daemon.address) as s:
+            with s.record(file):
+                pass
+        self.assertTrue(any(isinstance(item, dtact.Frame) for item in dtact.read(file)))
 
 
 class Connections(unittest.TestCase):

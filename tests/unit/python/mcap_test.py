@@ -3,7 +3,6 @@ import os
 import pathlib
 import struct
 import tempfile
-import time
 import unittest
 from unittest import mock
 
@@ -104,35 +103,43 @@ class Record(unittest.TestCase):
         self.program.write_text(f"#!/bin/sh\n{script}\n")
         self.program.chmod(0o755)
 
-    def wait_until_it_said(self):
-        until = time.monotonic() + 30
-        while not (self.said.exists() and self.said.read_text()) and time.monotonic() < until:
-            time.sleep(0.01)
-
     def session(self, address, **options):
         # The sessions of both clients, without a connection.
         return dtact.aio.Client(address, **options)
 
     def test_is_started_and_reported_to_finish(self):
         self.dtactctl(f'trap "echo finished >> {self.said}; exit 0" TERM; echo "$@" > {self.said}\n'
-                      "while true; do sleep 0.01; done")
+                      "echo recording to press.mcap >&2; while true; do sleep 0.01; done")
         with self.session("gripper:7", fingerprint="AB" * 32).record("press.mcap"):
-            self.wait_until_it_said()
+            pass
         self.assertEqual(self.said.read_text(), "--host gripper --port 7 --fingerprint "
                          + "AB" * 32 + " record -o press.mcap\nfinished\n")
 
     def test_over_a_socket_file(self):
-        self.dtactctl(f'echo "$@" > {self.said}')
+        self.dtactctl(f'trap "" TERM; echo "$@" > {self.said}; echo recording to p.mcap >&2')
         with self.session("unix:/run/s").record("p.mcap"):
-            self.wait_until_it_said()
+            pass
         self.assertEqual(self.said.read_text(), "--host unix:/run/s record -o p.mcap\n")
 
-    def test_what_went_wrong_is_said(self):
-        self.dtactctl("echo dtactctl: the disk is full >&2; exit 1")
+    def test_what_went_wrong_is_said_on_entry(self):
+        self.dtactctl("echo dtactctl: press.mcap exists >&2; exit 1")
+        with self.assertRaisesRegex(dtact.Error, "^dtactctl: press.mcap exists$"):
+            self.session("gripper").record("press.mcap")
+
+    def test_no_frame_is_said_on_entry(self):
+        self.dtactctl(f'trap "echo finished >> {self.said}; exit 1" TERM\nwhile true; do sleep 0.01; done')
+        with mock.patch("dtact.recording._START_S", 0.5):
+            with self.assertRaisesRegex(dtact.Error, "no frame came within 0.1 s"):
+                self.session("gripper", timeout=0.1).record("press.mcap")
+        self.assertEqual(self.said.read_text(), "finished\n")
+
+    def test_what_went_wrong_later_is_said_at_the_end(self):
+        self.dtactctl('trap "" TERM; echo recording to press.mcap >&2\n'
+                      "echo dtactctl: the disk is full >&2; exit 1")
         recording = self.session("gripper").record("press.mcap")
-        with self.assertRaisesRegex(dtact.Error, "the disk is full"):
-            recording._process.wait(10)
-            recording.stop()
+        for _ in range(2):
+            with self.assertRaisesRegex(dtact.Error, "^dtactctl: the disk is full$"):
+                recording.stop()
 
     def test_without_dtactctl(self):
         with self.assertRaisesRegex(dtact.Error, "not in PATH"):
