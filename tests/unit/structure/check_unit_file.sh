@@ -28,6 +28,9 @@ for unit in dtactd.service dtactd@.service dtact-perceive.service dtact-web.serv
   tail -n 1 "$folder/score"
   grep -qx 'StartLimitIntervalSec=0' "$source/$unit" || fail "$unit gives up after five failures"
   ! grep -qE '^[^#]*network-online' "$source/$unit" || fail "$unit waits for the network"
+  for line in 'MemoryMax=[0-9]+%' 'TasksMax=[0-9]+' 'LimitCORE=0' 'OOMScoreAdjust=-?[0-9]+'; do
+    grep -qxE "$line" "$source/$unit" || fail "$unit has no $line"
+  done
 done
 for unit in dtactd.service dtactd@.service; do
   # The drivers that are modules, by the kind of device that systemd has to know.
