@@ -146,7 +146,7 @@ TEST(Guided, QuitRetakeAndGoOn) {
   std::string output;
   EXPECT_EQ(guide(sensor, "\n\n\nr\nq\n", &output), kNotMet) << output;
   EXPECT_THAT(output, AllOf(HasSubstr("[r] retake press-02"),
-                            HasSubstr("To go on: dtact-calibrate --port "),
+                            HasSubstr("To continue: dtact-calibrate --port "),
                             HasSubstr(" guided --radius-mm 4.0 ")));
   EXPECT_TRUE(there(sensor, "reference/sensor.toml"));
   EXPECT_TRUE(there(sensor, "press-02/15.png"));

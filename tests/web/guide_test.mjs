@@ -49,7 +49,7 @@ test("presses become a calibration that the daemon uses", async () => {
   await pane.getByRole("button", { name: "Calibrate…" }).click();
   const guide = view.page.getByRole("dialog", { name: "Guided calibration" });
   // As the calibration in use has them.
-  assert.equal(await guide.getByLabel("Millimetres a pixel").inputValue(), "0.0413793");
+  assert.equal(await guide.getByLabel("Millimetres per pixel").inputValue(), "0.0413793");
   assert.equal(await guide.getByLabel("Map's width, pixels").inputValue(), "500");
   assert.equal(await guide.getByLabel("Map's height, pixels").inputValue(), "400");
   // Wider than high, so that an order which is confused shows.
@@ -62,7 +62,7 @@ test("presses become a calibration that the daemon uses", async () => {
   // It asks again where a press was taken already.
   const end = Date.now() + 300_000;
   while (Date.now() < end && !done.test(await said.textContent())) {
-    const answer = guide.getByRole("button", { name: /^(take|yes)$/ });
+    const answer = guide.getByRole("button", { name: /^(take the press|take the images|yes)$/ });
     if (await answer.isVisible()) await answer.click({ timeout: 1000 }).catch(() => {});
     if (!refused && /press-01 taken/.test(await said.textContent())) {
       refused = await lastWord(view.page, JSON.stringify(START));

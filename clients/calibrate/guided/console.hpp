@@ -48,7 +48,7 @@ struct Answer {
   std::string words;  ///< What it does.
 };
 
-inline const Answer kQuit{"q", "quit"};
+inline const Answer kQuit{"q", "end the session"};
 
 /// What the user is asked.
 struct Prompt {
@@ -81,6 +81,8 @@ class Console {
   /// A person watches: live pictures are drawn, and a line may come at any time. Else lines lie
   /// ready, each for one prompt.
   [[nodiscard]] virtual bool interactive() const = 0;
+  /// The user sits at this machine's terminal; else paths and commands mean nothing to them.
+  [[nodiscard]] virtual bool at_terminal() const { return true; }
   /// Does not wait.
   [[nodiscard]] virtual Typed typed() = 0;
   /// Ctrl-C was pressed.
@@ -126,6 +128,7 @@ class JsonConsole : public Console {
   /// `in`: a descriptor, not owned.
   JsonConsole(int in, std::ostream& out, std::function<bool()> interrupted);
 
+  [[nodiscard]] bool at_terminal() const override { return false; }
   [[nodiscard]] bool interactive() const override { return true; }
   [[nodiscard]] Typed typed() override;
   [[nodiscard]] bool interrupted() const override { return interrupted_(); }

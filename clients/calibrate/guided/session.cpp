@@ -31,9 +31,14 @@ Session::Session(Sensor& sensor, Console& console, Plan plan)
 
 Outcome Session::run() {
   const auto kept = [this] {
-    console_.say(folder_.has_reference() ? fmt::format("What was taken lies in {}. To go on: {}",
-                                                       plan_.folder.string(), plan_.again)
-                                         : std::string("Nothing was taken yet."));
+    if (!folder_.has_reference()) {
+      console_.say("No image was taken yet.");
+    } else if (console_.at_terminal()) {
+      console_.say(
+          fmt::format("The images are in {}. To continue: {}", plan_.folder.string(), plan_.again));
+    } else {
+      console_.say("The images are kept. To continue, begin again with the last session.");
+    }
   };
   try {
     return guide();
@@ -170,7 +175,8 @@ std::string Session::ask(const Prompt& prompt) {
 void Session::reference_step() {
   capture_->expect_light({});
   for (;;) {
-    (void)ask({"Take your hands off: nothing may touch the surface.", {{"", "take"}, kQuit}});
+    (void)ask(
+        {"Take your hands off: nothing may touch the surface.", {{"", "take the images"}, kQuit}});
     try {
       const SteadyFrames still = capture_->reference(plan_.reference_frames);
       const std::string fault = fault_of(still, empty_.model->rectify);
@@ -212,7 +218,9 @@ Prompt Session::press_prompt() const {
   }
   text += taken == 0 ? ", anywhere; hold still" : ", elsewhere; hold still";
   const std::string last = taken == 0 ? WorkFolder::kReference : folder_.presses().back();
-  return {text, {{"", "take"}, {"r", "retake " + last}, {"p", "preview"}, {"s", "finish"}, kQuit}};
+  return {
+      text,
+      {{"", "take the press"}, {"r", "retake " + last}, {"p", "preview"}, {"s", "finish"}, kQuit}};
 }
 
 void Session::press_steps() {
@@ -232,7 +240,7 @@ void Session::press_steps() {
         if (const ObservedFrame* look = capture_->next()) {
           view_.still(look->image, std::nullopt);
         }
-        console_.say("preview: " + folder_.at("preview.png"));
+        if (console_.at_terminal()) console_.say("preview: " + folder_.at("preview.png"));
       } else if (line == "s") {
         if (make()) return;
         console_.say("that is not yet enough: " + coverage_.missing);
@@ -257,7 +265,7 @@ void Session::take_press(const std::string& name) {
   const std::string waiting =
       fmt::format("waiting up to {:g} s for a press that holds still", plan_.timeout_s);
   if (console_.interactive()) {
-    view_.set_prompt({waiting, {{"", "take it as it is"}, kQuit}});
+    view_.set_prompt({waiting, {{"", "take the press as it is"}, kQuit}});
   } else {
     console_.say(waiting);
   }
@@ -340,8 +348,8 @@ bool Session::make() {
 
 Outcome Session::finish() {
   calibration::save(*coverage_.made, folder_.path() / kCalibration);
-  console_.say(report_text(coverage_.report) + lut_text(*coverage_.made->model) + "saved in " +
-               folder_.at(kCalibration));
+  console_.say(report_text(coverage_.report) + lut_text(*coverage_.made->model) +
+               (console_.at_terminal() ? "saved in " + folder_.at(kCalibration) : "saved"));
   const std::string line =
       ask({fmt::format("Upload it to the daemon as {}?", folder_.calibration_name()),
            {{"", "yes"}, {"n", "not now"}}});
@@ -349,7 +357,11 @@ Outcome Session::finish() {
     upload();
     return Outcome::uploaded;
   }
-  console_.say("not uploaded; later: dtactctl calibration upload " + folder_.at(kCalibration));
+  if (console_.at_terminal()) {
+    console_.say("not uploaded; later: dtactctl calibration upload " + folder_.at(kCalibration));
+  } else {
+    console_.say("Not uploaded. The calibration is kept: begin again with the last session.");
+  }
   return Outcome::kept;
 }
 

@@ -18,7 +18,9 @@ inline constexpr int kMinFrameHeight = 2 * kGridHeight;
 
 /// A frame at low resolution: the mean grey of each of 40×30 cells, about 1 mm a side on the
 /// known sensors. Averaging 400 pixels leaves 0.05 grey levels of noise, and a contact covers a
-/// cell or more.
+/// cell or more. The cells of recon::CellLattice cannot serve here: they cover only what the map
+/// reads and grow in number with the frame, while ContactCheck fits the whole frame at a bounded
+/// cost.
 struct LumaGrid {
   std::array<float, kGridCells> cells{};  ///< Grey levels, row-major.
   float mean = 0;                         ///< over all cells

@@ -236,7 +236,7 @@ TEST_F(Piped, ReportsAnotherProgramInJson) {
   scene.picture = &picture;
   scene.mm_per_px = 0.05;
   scene.words = "untouched";
-  scene.prompt = {"Press", {{"", "take"}, kQuit}};
+  scene.prompt = {"Press", {{"", "take the press"}, kQuit}};
   scene.presses = {{"press-01", 3, 4, 5, 1.25}};
   scene.presses_required = 6;
   console.live(scene);
@@ -254,7 +254,7 @@ TEST_F(Piped, ReportsAnotherProgramInJson) {
   EXPECT_EQ(reported.scene().prompt(), "Press");
   ASSERT_EQ(reported.scene().answers_size(), 2);
   EXPECT_EQ(reported.scene().answers(0).key(), "");
-  EXPECT_EQ(reported.scene().answers(1).words(), "quit");
+  EXPECT_EQ(reported.scene().answers(1).words(), "end the session");
   ASSERT_EQ(reported.scene().presses_size(), 1);
   EXPECT_EQ(reported.scene().presses(0).depth_mm(), 1.25);
   EXPECT_EQ(reported.scene().presses_required(), 6U);
@@ -274,7 +274,7 @@ TEST_F(Piped, LiveLinesAreForPeople) {
   EXPECT_EQ(out_.str(), "");
   StreamConsole person(ends_[0], out_, true, [] { return false; });
   person.live(asked("picture"));
-  EXPECT_THAT(out_.str(), HasSubstr("picture\n[q] quit > "));
+  EXPECT_THAT(out_.str(), HasSubstr("picture\n[q] end the session > "));
   person.live(asked("other"));
   EXPECT_THAT(out_.str(), HasSubstr("\r\x1b[1A\x1b[J\x1b[?7lother")) << "in place of a line below";
   person.say("done");

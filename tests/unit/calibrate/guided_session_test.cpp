@@ -135,7 +135,7 @@ TEST_F(GuidedSession, GoesOnAfterQuit) {
     FakeSensor sensor(kEnough);
     FakeConsole console({"", "", "", "q"});
     EXPECT_EQ(run(sensor, console), Outcome::unfinished);
-    EXPECT_THAT(console.said, HasSubstr("To go on: dtact-calibrate guided --folder X"));
+    EXPECT_THAT(console.said, HasSubstr("To continue: dtact-calibrate guided --folder X"));
   }
   EXPECT_TRUE(has("reference/sensor.toml"));
   EXPECT_TRUE(has("press-02/03.png"));
@@ -168,7 +168,7 @@ TEST_F(GuidedSession, ADaemonThatGoesSaysHowToGoOn) {
   sensor.frames_until_gone = 100;
   FakeConsole console({"", "", "", ""});
   EXPECT_THROW((void)run(sensor, console), client::ConnectionError);
-  EXPECT_THAT(console.said, HasSubstr("To go on: dtact-calibrate guided --folder X"));
+  EXPECT_THAT(console.said, HasSubstr("To continue: dtact-calibrate guided --folder X"));
   EXPECT_TRUE(has("press-01/00.png"));
 }
 
@@ -365,7 +365,7 @@ TEST_F(GuidedSession, DrawsForAPerson) {
   EXPECT_EQ(run(sensor, console), Outcome::unfinished);
   EXPECT_THAT(console.said, HasSubstr("preview.png"));
   EXPECT_TRUE(console.drew);
-  EXPECT_THAT(text_of(console.drawn.prompt), HasSubstr("[q] quit"));
+  EXPECT_THAT(text_of(console.drawn.prompt), HasSubstr("[q] end the session"));
   EXPECT_EQ(console.drawn.presses_required, plan_.presses);
 }
 

@@ -34,7 +34,7 @@ export class Guide {
     required: "",
     value: "4",
   });
-  private readonly scale = number("Millimetres a pixel", {
+  private readonly scale = number("Millimetres per pixel", {
     min: "0.001",
     max: "1",
     step: "any",
@@ -124,13 +124,13 @@ export class Guide {
         "p",
         { class: "quiet" },
         "First the undeformed surface is taken, then presses of a ball of known radius at different " +
-          "places and depths. Each is saved on the gateway's machine as soon as it is taken.",
+          "places and depths.",
       ),
       field("Ball's radius, mm", this.radius),
-      field("Scale of the picture, mm a pixel", this.scale),
+      field("Scale of the picture, mm per pixel", this.scale),
       field("Map, pixels: the whole picture, or", this.width, this.height),
       field("Presses", this.presses),
-      field("Go on with the last session", this.resume),
+      field("Continue the last session", this.resume),
       el("button", { type: "submit" }, "Begin"),
     );
     form.addEventListener("submit", (event) => {
@@ -157,13 +157,13 @@ export class Guide {
     this.socket = socket;
     socket.onopen = () => socket.send(start);
     socket.onmessage = (message) => this.take(message.data as string);
-    socket.onclose = () => this.end("The connection was lost; the next session can go on.");
+    socket.onclose = () => this.end("The connection was lost. Begin again with the last session to continue.");
   }
 
   private take(text: string): void {
     const { line } = fromJsonString(GuidedLineSchema, text);
     if (line.case === "text") this.tell(line.value);
-    else if (line.case === "started") this.tell(`Saved in ${line.value.folder}`);
+    else if (line.case === "started") this.tell("Every image is saved as soon as it is taken.");
     else if (line.case === "scene") void this.show(line.value);
     else if (line.case === "ended") this.end(line.value.error);
   }
