@@ -25,7 +25,7 @@ const SWITCHES = [
 ];
 
 /** Opens a page of the gateway. What its console complains of, and each foreign address, fails it. */
-export async function open(gateway, { viewport = DESKTOP, dark = true, before = undefined } = {}) {
+export async function open(gateway, { viewport = DESKTOP, dark = true, before = undefined, path: place = "/" } = {}) {
   const context = await chromium.launchPersistentContext(path.join(work, `profile-${Date.now()}`), {
     executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
     args: SWITCHES,
@@ -49,7 +49,7 @@ export async function open(gateway, { viewport = DESKTOP, dark = true, before = 
   });
   // Runs in the page before its own scripts.
   if (before) await page.addInitScript(before);
-  await page.goto(`http://127.0.0.1:${gateway.port}/`);
+  await page.goto(`http://127.0.0.1:${gateway.port}${place}`);
   return {
     page,
     complaints,

@@ -4,7 +4,7 @@ import { readFile } from "node:fs/promises";
 import path from "node:path";
 import { after, before, beforeEach, test } from "node:test";
 import { canvas, fact, numberOf, open, pause, PHONE, resume, until } from "./browser.mjs";
-import { MAP, beyond, startDaemon, startGateway, stopAll, work } from "./programs.mjs";
+import { MAP, beyond, startDaemon, startGateway, startProxy, stopAll, work } from "./programs.mjs";
 import { Tap } from "./tap.mjs";
 
 const { colourMap } = await import(path.resolve(process.env.PAGE_NODE, "colour_map.mjs"));
@@ -482,6 +482,21 @@ test("without a calibration the map's place offers to make one", async () => {
     await uncalibrated.close();
     await bareGateway.stop();
     await bare.stop();
+  }
+});
+
+test("behind a proxy's path it shows depth", async () => {
+  const proxy = await startProxy(gateway);
+  const proxied = await open(proxy, { path: "/dtact/" });
+  try {
+    await until(
+      () => proxied.page.locator('[data-sensor="left"]').getAttribute("data-sequence"),
+      (sequence) => Number(sequence) > 0,
+      20_000,
+    );
+  } finally {
+    await proxied.close();
+    proxy.close();
   }
 });
 

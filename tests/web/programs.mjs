@@ -3,6 +3,7 @@
 // to be tried in place of the one built into the gateway.
 import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdirSync, mkdtempSync, rmSync, statSync, writeFileSync } from "node:fs";
+import http from "node:http";
 import path from "node:path";
 import { fileURLToPath } from "node:url";
 
@@ -119,6 +120,42 @@ export async function startGateway(daemons, words = []) {
   ]);
   gateway.port = await gateway.listening();
   return gateway;
+}
+
+/** A reverse proxy that serves the gateway below /dtact/ and keeps the Host header. Returns its port. */
+export async function startProxy(gateway) {
+  const target = (request) => ({
+    host: "127.0.0.1",
+    port: gateway.port,
+    method: request.method,
+    path: request.url.slice("/dtact".length),
+    headers: request.headers,
+  });
+  const proxy = http.createServer((request, response) => {
+    if (!request.url.startsWith("/dtact/")) return response.writeHead(404).end();
+    const forwarded = http.request(target(request), (answer) => {
+      response.writeHead(answer.statusCode, answer.headers);
+      answer.pipe(response);
+    });
+    forwarded.on("error", () => response.destroy());
+    request.pipe(forwarded);
+  });
+  proxy.on("upgrade", (request, socket, head) => {
+    const forwarded = http.request(target(request)).end();
+    forwarded.on("error", () => socket.destroy());
+    forwarded.on("upgrade", (answer, upstream, first) => {
+      const fields = answer.rawHeaders.flatMap((field, i) =>
+        i % 2 === 0 ? [`${field}: ${answer.rawHeaders[i + 1]}`] : [],
+      );
+      socket.write(["HTTP/1.1 101 Switching Protocols", ...fields, "", ""].join("\r\n"));
+      upstream.unshift(first);
+      socket.unshift(head);
+      upstream.pipe(socket).pipe(upstream);
+      for (const end of [upstream, socket]) end.on("error", () => end.destroy());
+    });
+  });
+  await new Promise((done) => proxy.listen(0, "127.0.0.1", done));
+  return { port: proxy.address().port, close: () => proxy.close() };
 }
 
 /** dtact-perceive beside a daemon of this machine. It listens on any free port unless told which. */

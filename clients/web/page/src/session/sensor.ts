@@ -64,10 +64,11 @@ export class Sensor {
     return this.rights !== Rights.VIEW;
   }
 
-  /** A WebSocket that the gateway has for this sensor. */
+  /** A WebSocket that the gateway has for this sensor, beside the page: a proxy may serve it below a path. */
   private address(what: string): string {
-    const scheme = location.protocol === "https:" ? "wss" : "ws";
-    return `${scheme}://${location.host}/sensors/${encodeURIComponent(this.name)}/${what}`;
+    const url = new URL(`sensors/${encodeURIComponent(this.name)}/${what}`, document.baseURI);
+    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+    return url.href;
   }
 
   /** That of a guided calibration. */
