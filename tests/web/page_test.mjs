@@ -172,6 +172,27 @@ test("the cursor tells the frame's value, by mouse and by keyboard", async () =>
   await resume(pane);
 });
 
+test("wheel and drag zoom and move the map, and the cursor tells the pixel under it", async () => {
+  const box = await pane.locator("canvas.marks").boundingBox();
+  const at = [box.x + 0.7511 * box.width, box.y + 0.2512 * box.height];
+  const readout = () => pane.locator("output.readout").textContent();
+  await view.page.mouse.move(...at);
+  const before = /row \d+, column \d+/.exec(await readout())[0];
+  await view.page.mouse.wheel(0, -800);
+  const zoom = () =>
+    pane.locator("canvas.map").evaluate((map) => new DOMMatrix(getComputedStyle(map).transform).a);
+  await until(zoom, (factor) => factor > 7 && factor < 8);
+  await view.page.mouse.move(at[0] + 1, at[1]);
+  assert.equal(/row \d+, column \d+/.exec(await readout())[0], before);
+  await view.page.mouse.down();
+  await view.page.mouse.move(at[0] - 0.2 * box.width, at[1], { steps: 3 });
+  await view.page.mouse.up();
+  assert.equal(/row \d+, column \d+/.exec(await readout())[0], before, "it went with the pointer");
+  await view.page.mouse.dblclick(...at);
+  await until(zoom, (factor) => factor === 1);
+  await view.page.mouse.move(box.x + box.width + 5, box.y);
+});
+
 test("a line tells its length and the difference of its ends", async () => {
   const frame = await pausedAt(1.0);
   await pane.getByRole("radio", { name: "Line" }).click();

@@ -135,6 +135,7 @@ class Page {
       ["1 2 3", "depth, camera, surface"],
       ["P L", "point, line from A to B"],
       ["arrows on the map", "move the cursor; with Shift by ten"],
+      ["+ − 0 on the map", "zoom; also by the wheel or two fingers, a drag moves the map"],
       ["Space", "pause, and on"],
       ["← →", "step through the last seconds, paused"],
       ["S", "snapshot"],

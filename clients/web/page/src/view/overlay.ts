@@ -1,5 +1,6 @@
 // What is drawn over the map: scale bar, centroid and deepest point, the cursor, the drawn line.
 import type { Contact } from "../../gen/dtact_pb";
+import type { Zoom } from "./zoom";
 
 /** A place of the surface frame, millimetres. */
 export interface Place {
@@ -43,11 +44,12 @@ export interface Marks {
   contact: Contact | undefined;
   cursor: Place | undefined;
   line: Line | undefined;
+  zoom: Zoom;
 }
 
-/** A length in round millimetres of about a fifth of the picture. */
-export function scaleLength(grid: Grid): number {
-  const fifth = (grid.width * grid.mmPerPx) / 5;
+/** A length in round millimetres of about a fifth of what is shown. */
+export function scaleLength(grid: Grid, zoom: Zoom): number {
+  const fifth = (grid.width * grid.mmPerPx) / zoom.factor / 5;
   return LENGTHS_MM.reduce((best, length) => (length <= fifth * 1.05 ? length : best));
 }
 
@@ -58,11 +60,11 @@ export function drawMarks(
   height: number,
   marks: Marks,
 ): void {
-  const { grid } = marks;
-  const scale = width / grid.width;
+  const { grid, zoom } = marks;
+  const scale = (width / grid.width) * zoom.factor;
   const at = (place: Place): [number, number] => [
-    (place.xMm / grid.mmPerPx + grid.width / 2) * scale,
-    (place.yMm / grid.mmPerPx + grid.height / 2) * scale,
+    (place.xMm / grid.mmPerPx + grid.width * (0.5 - zoom.left)) * scale,
+    (place.yMm / grid.mmPerPx + grid.height * (0.5 - zoom.top)) * scale,
   ];
   // Each stroke twice: a dark one under a light one is seen on any colour.
   const stroke = (path: () => void, line = 1.5): void => {
@@ -128,7 +130,7 @@ export function drawMarks(
       }
     }, 1);
   }
-  const length = scaleLength(grid);
+  const length = scaleLength(grid, zoom);
   const long = (length / grid.mmPerPx) * scale;
   stroke(() => {
     context.moveTo(14, height - 14);

@@ -9,6 +9,7 @@ import { drawMarks, pixelOf, placeOf } from "./overlay";
 import type { Line, Marks, Place } from "./overlay";
 import { lineText, profileOf, valueUm } from "./reading";
 import type { Profile } from "./reading";
+import { Zoom } from "./zoom";
 
 export type View = "depth" | "camera" | "surface";
 export type Tool = "point" | "line";
@@ -38,7 +39,7 @@ export class Stage {
     class: "marks",
     tabindex: "0",
     role: "img",
-    "aria-label": "Depth map. Arrow keys move the cursor; Shift moves it by ten pixels.",
+    "aria-label": "Depth map. Arrow keys move the cursor, Shift moves it by ten pixels; plus, minus and 0 zoom.",
   });
   private readonly bar = el("canvas", { class: "bar", role: "img" });
   private readonly readout = el("output", { class: "readout" }, "Point at the map for its values.");
@@ -70,6 +71,9 @@ export class Stage {
   private cursor: Place | undefined;
   private line: Line | undefined;
   private drawing = false;
+  private readonly zoom = new Zoom();
+  /** Pointers that are down, by id: where each was last, as shares of the window. */
+  private readonly held = new Map<number, [number, number]>();
   private frame: Frame | undefined;
   depth: DepthMap | undefined;
   luma: LumaMap | undefined;
@@ -80,19 +84,37 @@ export class Stage {
   constructor() {
     this.map = new MapCanvas(this.canvas);
     const target = this.marksCanvas;
-    target.addEventListener("pointermove", (event) => this.point(event));
+    target.addEventListener("pointermove", (event) => {
+      this.drag(event);
+      this.point(event);
+    });
     // A finger leaves when it lifts, and the value that it tapped stays.
     target.addEventListener("pointerleave", (event) => {
       if (!this.drawing && event.pointerType === "mouse") this.moveTo(undefined);
     });
     target.addEventListener("pointerdown", (event) => {
+      this.held.set(event.pointerId, this.shares(event));
       this.point(event);
       if (this.tool !== "line" || this.view !== "depth" || !this.cursor) return;
       target.setPointerCapture(event.pointerId);
       this.drawing = true;
       this.line = { from: this.cursor, to: this.cursor };
     });
-    target.addEventListener("pointerup", () => (this.drawing = false));
+    for (const type of ["pointerup", "pointercancel", "pointerleave"] as const)
+      target.addEventListener(type, (event) => {
+        this.held.delete(event.pointerId);
+        if (type !== "pointerleave") this.drawing = false;
+      });
+    target.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const [x, y] = this.shares(event);
+      this.zoom.about(x, y, Math.exp(-event.deltaY / 400));
+      this.zoomed();
+    });
+    target.addEventListener("dblclick", () => {
+      this.zoom.reset();
+      this.zoomed();
+    });
     target.addEventListener("keydown", (event) => this.steer(event));
     new ResizeObserver(() => {
       this.drawOver();
@@ -126,7 +148,11 @@ export class Stage {
 
   look(view: View): void {
     // A place is in millimetres on the map, in pixels on the camera's picture.
-    if ((view === "camera") !== (this.view === "camera")) this.cursor = undefined;
+    if ((view === "camera") !== (this.view === "camera")) {
+      this.cursor = undefined;
+      this.zoom.reset();
+      this.zoomed();
+    }
     this.drawing = false;
     this.view = view;
     this.element.dataset["view"] = view;
@@ -199,7 +225,7 @@ export class Stage {
     context.translate(12, 12);
     context.drawImage(this.canvas, 0, 0, mapWidth, mapHeight);
     if (depth) {
-      drawMarks(context, mapWidth, mapHeight, this.marks(depth));
+      drawMarks(context, mapWidth, mapHeight, { ...this.marks(depth), zoom: new Zoom() });
       drawColourBar(context, mapWidth + 10, 0, mapHeight, this.range, ink);
     }
     context.restore();
@@ -225,7 +251,8 @@ export class Stage {
   }
 
   private marks(grid: DepthMap): Marks {
-    return { grid, contact: this.frame?.contact, cursor: this.cursor, line: this.line };
+    const { cursor, line, zoom } = this;
+    return { grid, contact: this.frame?.contact, cursor, line, zoom };
   }
 
   private drawOver(): void {
@@ -237,15 +264,54 @@ export class Stage {
 
   private point(event: PointerEvent): void {
     const map = this.shown();
-    const box = this.marksCanvas.getBoundingClientRect();
-    if (!map || box.width === 0) return;
-    const column = Math.floor(((event.clientX - box.left) / box.width) * map.width);
-    const row = Math.floor(((event.clientY - box.top) / box.height) * map.height);
+    if (!map) return;
+    const [x, y] = this.zoom.toPicture(...this.shares(event));
+    const column = Math.floor(x * map.width);
+    const row = Math.floor(y * map.height);
     const inside = column >= 0 && row >= 0 && column < map.width && row < map.height;
     if (inside) this.moveTo(placeOf(this.grid(map), column, row));
   }
 
+  /** Where the pointer is in the window: shares of its width and height. */
+  private shares(event: MouseEvent): [number, number] {
+    const box = this.marksCanvas.getBoundingClientRect();
+    return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+  }
+
+  /** One pointer moves the picture, two zoom it; a line is drawn by one. */
+  private drag(event: PointerEvent): void {
+    const before = this.held.get(event.pointerId);
+    if (!before || this.drawing) return;
+    const now = this.shares(event);
+    this.held.set(event.pointerId, now);
+    const other = [...this.held].find(([id]) => id !== event.pointerId)?.[1];
+    if (other) {
+      const distance = ([x, y]: [number, number]): number => Math.hypot(x - other[0], y - other[1]);
+      const factor = distance(before) > 0 ? distance(now) / distance(before) : 1;
+      this.zoom.about((now[0] + other[0]) / 2, (now[1] + other[1]) / 2, factor);
+    } else {
+      this.zoom.pan(now[0] - before[0], now[1] - before[1]);
+    }
+    this.zoomed();
+  }
+
+  private zoomed(): void {
+    const { factor, left, top } = this.zoom;
+    this.picture.style.setProperty("--zoom", String(factor));
+    this.picture.style.setProperty("--shift-x", `${-100 * left * factor}%`);
+    this.picture.style.setProperty("--shift-y", `${-100 * top * factor}%`);
+    this.drawOver();
+  }
+
   private steer(event: KeyboardEvent): void {
+    const factor = { "+": 1.5, "-": 1 / 1.5, "0": 0 }[event.key];
+    if (factor !== undefined) {
+      event.stopPropagation();
+      if (factor === 0) this.zoom.reset();
+      else this.zoom.about(0.5, 0.5, factor);
+      this.zoomed();
+      return;
+    }
     const ways: Record<string, [number, number]> = {
       ArrowLeft: [-1, 0],
       ArrowRight: [1, 0],
