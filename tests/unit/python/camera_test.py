@@ -1,9 +1,11 @@
 """LeRobot's camera shape: the names, arguments and exceptions that its robots and recorder use."""
 import abc
 import importlib
+import importlib.metadata
 import inspect
 import os
 import pathlib
+import re
 import sys
 import tempfile
 import threading
@@ -22,6 +24,7 @@ from fake_daemon import FakeDaemon, frame
 # Facts of huggingface/lerobot: src/lerobot/cameras/camera.py (commit 0cd71c3) and, for the depth and
 # for the age of the newest frame, its cameras as of pull request 3644 (release 0.6).
 ATTRIBUTES = ["fps", "width", "height", "use_rgb", "use_depth"]
+LEROBOT = pathlib.Path(__file__).parents[3] / "clients/python/lerobot"
 METHODS = {
     "find_cameras": [],
     "connect": [("warmup", True)],
@@ -98,6 +101,54 @@ class Reading(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "it gives 2 × 2, 1 × 1"):
             dtact.Camera(self.daemon.address, width=3, height=2).connect()
 
+    def test_a_rate_that_the_daemon_does_not_give(self):
+        with self.assertRaisesRegex(ValueError, "100 frames a second were asked for, and the daemon's "
+                                    "camera delivers 60"):
+            dtact.Camera(self.daemon.address, fps=100).connect()
+        self.assertEqual(self.camera(fps=62).fps, 62)  # As good as the measured rate.
+        for fps in (0, -3):
+            with self.assertRaisesRegex(ValueError, f"fps is {fps}: it has to be above 0"):
+                dtact.Camera(self.daemon.address, fps=fps)
+
+    def test_no_stream_at_all(self):
+        with self.assertRaisesRegex(ValueError, "nothing would be read"):
+            dtact.Camera(use_rgb=False, use_depth=False)
+
+    def test_the_cameras_own_picture(self):
+        message = frame(1)
+        message.frame.ClearField("depth")
+        luma = message.frame.luma
+        luma.encoding, luma.width, luma.height, luma.data = 1, 3, 2, bytes(range(6))
+        self.daemon.pushed = [message]
+        camera = self.camera(picture="camera", use_depth=False, fps=20)
+        sent = self.daemon.requests[-1].subscribe
+        self.assertEqual((sent.depth, sent.luma, sent.luma_hz), (0, 1, 20))
+        self.assertEqual((camera.width, camera.height), (3, 2))
+        self.assertEqual(camera.read_latest(10_000).tolist(),
+                         [[[v] * 3 for v in row] for row in ((0, 1, 2), (3, 4, 5))])
+        with self.assertRaisesRegex(ValueError, "2 × 2 is no size of this daemon's camera's image: it "
+                                    "gives 3 × 2"):
+            dtact.Camera(self.daemon.address, picture="camera", use_depth=False, width=2,
+                         height=2).connect()
+
+    def test_pictures_that_cannot_be(self):
+        with self.assertRaisesRegex(ValueError, "set use_depth to False"):
+            dtact.Camera(picture="camera")
+        with self.assertRaisesRegex(ValueError, '"depth" or "camera"'):
+            dtact.Camera(picture="jpeg", use_depth=False)
+
+    def test_after_a_fork(self):
+        camera = self.camera()
+        child = os.fork()
+        if child == 0:
+            try:
+                camera.read_latest()
+            except ConnectionError as e:
+                os._exit(0 if "connect() after the fork" in str(e) else 2)
+            os._exit(1)
+        self.assertEqual(os.waitpid(child, 0)[1], 0)
+        camera.read_latest(60_000)
+
     def test_async_read_gives_each_frame_once(self):
         camera = self.camera()
         camera.async_read(10_000)
@@ -125,7 +176,7 @@ class Reading(unittest.TestCase):
         self.daemon.pushed = []
         camera = dtact.Camera(self.daemon.address)
         camera.connect(warmup=False)
-        with self.assertRaisesRegex(RuntimeError, "no depth has come yet"):
+        with self.assertRaisesRegex(RuntimeError, "no frame has come yet"):
             camera.read_latest_depth()
         camera.disconnect()
 
@@ -211,10 +262,20 @@ class Colours(unittest.TestCase):
                          [[[0, 0, 0], [0, 0, 0], [252, 253, 191], [252, 253, 191], [0, 0, 0]]])
 
 
+class LeRobotErrors:
+    """Of src/lerobot/utils/errors.py."""
+
+    class DeviceNotConnectedError(ConnectionError):
+        pass
+
+    class DeviceAlreadyConnectedError(ConnectionError):
+        pass
+
+
 class Plugin(unittest.TestCase):
     """lerobot_camera_dtact on a stand-in of the parts of LeRobot that it touches."""
 
-    def test_type_and_class(self):
+    def setUp(self):
         @dataclass(kw_only=True)
         class CameraConfig:
             fps: int | None = None
@@ -235,38 +296,103 @@ class Plugin(unittest.TestCase):
 
         Camera.__abstractmethods__ = frozenset(
             ["is_connected", "find_cameras", "connect", "read", "async_read", "disconnect"])
+        self.base = Camera
 
         modules = {name: types.ModuleType(name) for name in
-                   ["lerobot", "lerobot.cameras", "lerobot.cameras.camera", "lerobot.cameras.configs"]}
+                   ["lerobot", "lerobot.cameras", "lerobot.cameras.camera", "lerobot.cameras.configs",
+                    "lerobot.utils", "lerobot.utils.errors"]}
         modules["lerobot.cameras.camera"].Camera = Camera
         modules["lerobot.cameras.configs"].CameraConfig = CameraConfig
+        vars(modules["lerobot.utils.errors"]).update(vars(LeRobotErrors))
         with mock.patch.dict(sys.modules, modules):
-            plugin = importlib.import_module("lerobot_camera_dtact")
-        config_class = CameraConfig.choices["dtact"]
-        self.assertIs(config_class, plugin.DtactCameraConfig)
-        # LeRobot looks for the device's class under the name of the configuration's, without
-        # "Config", in the package of its module.
-        package = sys.modules[config_class.__module__.rpartition(".")[0]] \
-            if config_class.__module__ in sys.modules else plugin
-        camera_class = getattr(package, config_class.__name__.removesuffix("Config"))
-        self.assertIs(camera_class, plugin.DtactCamera)
-        self.assertEqual([f.name for f in fields(config_class)],
-                         ["fps", "width", "height", "address", "use_rgb", "use_depth", "token_file",
-                          "fingerprint"])
+            self.plugin = importlib.import_module("lerobot_camera_dtact")
+            # LeRobot looks for the device's class under the name of the configuration's, without
+            # "Config", in the package of its module.
+            self.config_class = CameraConfig.choices["dtact"]
+            package = sys.modules[self.config_class.__module__.rpartition(".")[0]]
+            self.camera_class = getattr(package, self.config_class.__name__.removesuffix("Config"))
+
+    def test_type_and_class(self):
+        self.assertIs(self.config_class, self.plugin.DtactCameraConfig)
+        self.assertIs(self.camera_class, self.plugin.DtactCamera)
         with FakeDaemon() as daemon:
             daemon.pushed = [frame(1)]
-            camera = camera_class(config_class(address=daemon.address, fps=30))
-            self.assertIsInstance(camera, Camera)
+            camera = self.camera_class(self.config_class(address=daemon.address, fps=30))
+            self.assertIsInstance(camera, self.base)
             camera.connect()
             self.assertEqual(camera.read_latest_depth(10_000).shape, (2, 2, 1))
             self.assertEqual((camera.fps, camera.width), (30, 2))
             camera.disconnect()
 
-    def test_readme_says_how_micrometres_are_kept(self):
-        readme = pathlib.Path(__file__).parents[3] / "clients/python/lerobot/README.md"
-        text = readme.read_text()
-        for setting in ("depth_min=0 ", "depth_max=0.004 ", "use_log=false"):
-            self.assertIn(f"--dataset.depth_encoder.{setting}", text)
+    def test_the_configuration_can_be_written_and_read(self):
+        # draccus takes the types as the fields have them, and knows no names of types.
+        self.assertEqual({f.name: f.type for f in fields(self.config_class)}, {
+            "fps": int | None, "width": int | None, "height": int | None, "address": str,
+            "use_rgb": bool, "use_depth": bool, "picture": str, "token_file": str | None,
+            "fingerprint": str | None})
+
+    def test_errors_are_lerobots(self):
+        with FakeDaemon() as daemon:
+            daemon.pushed = [frame(1)]
+            camera = self.camera_class(self.config_class(address=daemon.address))
+            for call in (camera.read, camera.read_latest_depth, camera.disconnect):
+                self.assertRaises(LeRobotErrors.DeviceNotConnectedError, call)
+            camera.connect()
+            self.assertRaises(LeRobotErrors.DeviceAlreadyConnectedError, camera.connect)
+            camera.read_latest(10_000)
+            daemon.drop()
+            with self.assertRaisesRegex(LeRobotErrors.DeviceNotConnectedError, "ended the connection"):
+                camera.read()
+            camera.disconnect()
+
+    def test_a_size_that_videos_cannot_have_is_said(self):
+        with FakeDaemon() as daemon:
+            daemon.pushed = [frame(1)]
+            camera = self.camera_class(self.config_class(address=daemon.address, width=1, height=1))
+            with self.assertLogs("lerobot_camera_dtact.camera", "WARNING") as logged:
+                camera.connect()
+            camera.disconnect()
+            self.assertIn("1 × 1 pixels, and LeRobot's default video encoder takes even sizes only",
+                          logged.output[0])
+
+    def test_the_name_that_lerobot_looks_for(self):
+        from setuptools import __version__
+        requires = (LEROBOT / "pyproject.toml").read_text()
+        self.assertIn('requires = ["setuptools>=69.0.3"]', requires)
+        if tuple(map(int, __version__.split(".")[:2])) < (69, 1):
+            self.skipTest(f"setuptools {__version__} takes the underscores out of names")
+        names = [d.metadata["Name"] for d in importlib.metadata.distributions()]
+        self.assertIn("lerobot_camera_dtact", names)
+
+
+class PluginReadme(unittest.TestCase):
+    """What its lines do, computed."""
+
+    def setUp(self):
+        self.text = (LEROBOT / "README.md").read_text()
+
+    def test_the_robot_has_what_lerobot_requires(self):
+        line = re.search(r'--robot\.cameras="\{ finger: \{(.*)\} \}"', self.text)[1]
+        options = dict(part.split(": ") for part in line.split(", "))
+        for required in ("width", "height", "fps"):
+            self.assertEqual(int(options[required]) % 2, 0, required)
+        self.assertEqual(options["type"], "dtact")
+
+    def test_depth_that_is_recorded_and_read_back(self):
+        settings = dict(re.findall(r"--dataset\.(?:depth_encoder\.)?(\w+)=(\S+)", self.text))
+        self.assertEqual(settings["use_log"], "false")
+        least, most = float(settings["depth_min"]), float(settings["depth_max"])
+        depth_m = np.linspace(0.000_123, 0.003_9, 1000, dtype=np.float32)
+        # LeRobot's 12-bit codes, and what they are read back as: float32 metres, or uint16 millimetres.
+        codes = np.rint((depth_m - least) / (most - least) * 4095).clip(0, 4095).astype(np.uint16)
+        metres = least + codes.astype(np.float32) * (most - least) / 4095
+        read_back = {"m": metres, "mm": np.rint(metres * 1e3).astype(np.uint16) * 1e-3}
+
+        def error_um(unit):
+            return 1e6 * np.abs(read_back[unit] - depth_m).max()
+
+        self.assertLess(error_um(settings["depth_output_unit"]), 0.5)
+        self.assertGreater(error_um("mm"), 490)  # Its default.
 
 
 if __name__ == "__main__":

@@ -119,6 +119,7 @@ class FakeDaemon:
                 reply.status.state = 3
                 reply.status.advice = "All is well."
                 reply.status.camera.fps = 60
+                reply.status.camera.width, reply.status.camera.height = 3, 2
                 reply.status.calibration.width = 2
                 reply.status.calibration.height = 2
             elif kind == "ping":

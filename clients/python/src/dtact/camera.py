@@ -5,6 +5,7 @@ LeRobot camera of it."""
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import threading
@@ -69,11 +70,17 @@ class Camera:
     always available.
 
     :param address: see dtact.Client, as for `token`, `token_file`, `fingerprint` and `ca_file`.
-    :param fps: limit, frames a second; None: all of the daemon's.
+    :param fps: frames a second, at most the daemon's; None: the daemon's.
     :param width: and `height`: size of depth and image in pixels, the daemon's or a half or a
         quarter of it; None: the daemon's.
-    :param use_rgb: and `use_depth`, as in LeRobot's depth cameras.
+    :param use_rgb: and `use_depth`, as in LeRobot's depth cameras; one of them at least.
+    :param picture: "depth": the image is the depth in colours; "camera": the camera's own image, grey,
+        of the camera's size, without depth.
     """
+
+    # What is raised where the camera is not connected, and where it is already.
+    _NotConnected: type[Exception] = ConnectionError
+    _AlreadyConnected: type[Exception] = ConnectionError
 
     def __init__(
         self,
@@ -84,17 +91,29 @@ class Camera:
         height: int | None = None,
         use_rgb: bool = True,
         use_depth: bool = True,
+        picture: str = "depth",
         token: str | None = None,
         token_file: str | Path | None = None,
         fingerprint: str | None = None,
         ca_file: str | Path | None = None,
     ) -> None:
+        if fps is not None and fps <= 0:
+            raise ValueError(f"fps is {fps}: it has to be above 0, or left out for the daemon's")
+        if not (use_rgb or use_depth):
+            raise ValueError("use_rgb and use_depth are both off: nothing would be read")
+        if picture not in ("depth", "camera"):
+            raise ValueError(f'picture is "{picture}": it has to be "depth" or "camera"')
+        if picture == "camera" and use_depth:
+            raise ValueError('picture "camera" has another size than depth: set use_depth to False, and '
+                             "configure a second camera of the same address for the depth")
         self.fps = fps
         self.width = width
         self.height = height
         self.use_rgb = use_rgb
         self.use_depth = use_depth
+        self._camera_picture = picture == "camera"
         self._address = address
+        self._process = 0  # That has connected.
         self._identity: dict[str, Any] = {
             "token": token, "token_file": token_file, "fingerprint": fingerprint,
             "ca_file": ca_file}
@@ -144,7 +163,7 @@ class Camera:
         first depth is there. Sets fps, width and height where they were left out. ConnectionError;
         ValueError for a size or rate that the daemon cannot give."""
         if self.is_connected:
-            raise ConnectionError(f"{self} is already connected")
+            raise self._AlreadyConnected(f"{self} is already connected")
         if self._thread is not None:
             self.disconnect()  # What is left of a connection that broke.
         client = Client(self._address, program="dtact camera", kept_frames=1, **self._identity)
@@ -153,6 +172,7 @@ class Camera:
         except BaseException:
             client.close()
             raise
+        self._process = os.getpid()
         self._stop.clear()
         self._newest = self._error = None
         self._count = 0
@@ -170,7 +190,7 @@ class Camera:
     def disconnect(self) -> None:
         """Ends the connection."""
         if self._thread is None:
-            raise ConnectionError(f"{self} is not connected")
+            raise self._NotConnected(f"{self} is not connected")
         self._stop.set()
         self._thread.join()
         self._thread = None
@@ -178,7 +198,7 @@ class Camera:
     # ------------------------------------------------------------ pictures
 
     def read(self) -> NDArray[np.uint8]:
-        """The next frame's depth in colours: uint8 (H, W, 3), RGB. Waits for it."""
+        """The next frame's depth in colours, or the camera's image: uint8 (H, W, 3), RGB. Waits for it."""
         return self._picture(self._after(self._checked("rgb"), 10_000))
 
     def async_read(self, timeout_ms: float = 200) -> NDArray[np.uint8]:
@@ -219,23 +239,30 @@ class Camera:
     def _subscription(self, client: Client) -> Subscription:
         """What is asked of the daemon; completes fps, width and height."""
         status = client.status()
-        size = status.calibration
+        size = status.message.camera if self._camera_picture else status.calibration
         if size is None:
             raise ConnectionError(f"{self}: the daemon has no calibration. {status.advice}")
         if self.width is None and self.height is None:
             self.width, self.height = size.width, size.height
-        sizes = {(size.width // d, size.height // d): d for d in (4, 2, 1)}
+        divisors = (1,) if self._camera_picture else (4, 2, 1)
+        sizes = {(size.width // d, size.height // d): d for d in divisors}
         decimation = sizes.get((self.width or 0, self.height or 0))
         if decimation is None:
             possible = ", ".join(f"{w} × {h}" for w, h in reversed(sizes))
+            what = "camera's image" if self._camera_picture else "depth"
             raise ValueError(f"{self}: {self.width} × {self.height} is no size of this daemon's "
-                             f"depth: it gives {possible}")
+                             f"{what}: it gives {possible}")
         camera_fps = float(status.message.camera.fps) or status.fps
         if self.fps is None:
             self.fps = round(camera_fps)
-        if self.fps >= round(camera_fps):
-            return Subscription(decimation=decimation)
-        return Subscription(decimation=decimation, depth_hz=self.fps)
+        # A camera that states 30 may be measured at 29.
+        if self.fps > 1.1 * camera_fps:
+            raise ValueError(f"{self}: {self.fps} frames a second were asked for, and the daemon's "
+                             f"camera delivers {camera_fps:.3g}")
+        limit = self.fps if self.fps < round(camera_fps) else 0
+        if self._camera_picture:
+            return Subscription(depth=None, luma=True, luma_hz=limit)
+        return Subscription(decimation=decimation, depth_hz=limit)
 
     def _read_loop(self, client: Client) -> None:
         error: Exception = ConnectionError(f"{self} was disconnected")
@@ -243,7 +270,8 @@ class Camera:
             with client:
                 while not self._stop.is_set():
                     frame = client.next(0.1)
-                    if isinstance(frame, Frame) and frame.has_depth:
+                    if isinstance(frame, Frame) and (
+                            frame.has_luma if self._camera_picture else frame.has_depth):
                         with self._changed:
                             self._newest = frame
                             self._came_at = time.perf_counter()
@@ -258,7 +286,10 @@ class Camera:
     def _checked(self, what: str) -> int:
         """How many frames came so far. Raises when `what` cannot be read."""
         if self._thread is None:
-            raise ConnectionError(f"{self} is not connected: call connect() first")
+            raise self._NotConnected(f"{self} is not connected: call connect() first")
+        if self._process != os.getpid():
+            raise self._NotConnected(f"{self} was connected by process {self._process}, and this is "
+                                     f"process {os.getpid()}: call connect() after the fork")
         if not (self.use_rgb if what == "rgb" else self.use_depth):
             raise RuntimeError(f"{self} was made with use_{what}=False")
         with self._changed:
@@ -273,23 +304,25 @@ class Camera:
                     self._seen[reader] = self._count
                 return self._newest
             if self._error is not None:
-                raise self._error
-        raise NoFrame(f"{self}: no new depth within {timeout_ms:g} ms; dtactctl status says why")
+                raise self._NotConnected(str(self._error)) from self._error
+        raise NoFrame(f"{self}: no new frame within {timeout_ms:g} ms; dtactctl status says why")
 
     def _latest(self, max_age_ms: float) -> Frame:
         with self._changed:
             frame, age_ms = self._newest, (time.perf_counter() - self._came_at) * 1e3
             error = self._error
         if error is not None and (frame is None or age_ms > max_age_ms):
-            raise error
+            raise self._NotConnected(str(error)) from error
         if frame is None:
-            raise RuntimeError(f"{self}: no depth has come yet")
+            raise RuntimeError(f"{self}: no frame has come yet")
         if age_ms > max_age_ms:
-            raise NoFrame(f"{self}: the newest depth came {age_ms:.0f} ms ago, at most "
+            raise NoFrame(f"{self}: the newest frame came {age_ms:.0f} ms ago, at most "
                           f"{max_age_ms:g} were asked for")
         return frame
 
     def _picture(self, frame: Frame) -> NDArray[np.uint8]:
+        if self._camera_picture:
+            return np.repeat(frame.luma[:, :, np.newaxis], 3, axis=2)
         return colour(frame.depth_mm)
 
     def _metres(self, frame: Frame) -> NDArray[np.float32]:

@@ -1,6 +1,5 @@
-"""A robot's configuration under `cameras`."""
-from __future__ import annotations
-
+"""A robot's configuration under `cameras`. LeRobot writes and reads it by the types of its fields, which
+therefore are types and not, as `from __future__ import annotations` makes them, their names."""
 from dataclasses import dataclass
 
 from lerobot.cameras.configs import CameraConfig
@@ -14,5 +13,6 @@ class DtactCameraConfig(CameraConfig):
     address: str = "127.0.0.1"  #: "host", "host:port" or "unix:/path"
     use_rgb: bool = True
     use_depth: bool = True
+    picture: str = "depth"  #: or "camera", see dtact.Camera
     token_file: str | None = None
     fingerprint: str | None = None  #: of the daemon's certificate, beyond this machine
