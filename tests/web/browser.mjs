@@ -1,11 +1,17 @@
 // Chromium with the page in it, and what the tests read there.
 import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import path from "node:path";
 import { work } from "./programs.mjs";
 
 const { chromium } = createRequire(path.resolve(process.env.FOLDER, "browser/package.json"))(
   "playwright-core",
+);
+
+const axe = readFileSync(
+  path.resolve(process.env.FOLDER, "browser/node_modules/axe-core/axe.min.js"),
+  "utf8",
 );
 
 export const DESKTOP = { width: 1440, height: 900 };
@@ -58,6 +64,15 @@ export async function open(gateway, { viewport = DESKTOP, dark = true, before = 
       assert.deepEqual(complaints, []);
     },
   };
+}
+
+/** What axe-core finds wrong with the page's accessibility, a line each. */
+export async function accessibilityFaults(page) {
+  await page.evaluate(axe);
+  const { violations } = await page.evaluate(() => window.axe.run());
+  return violations.flatMap(({ id, help, nodes }) =>
+    nodes.map(({ target }) => `${id}: ${help}: ${target.join(" ")}`),
+  );
 }
 
 export const fact = (root, name) => root.locator(`[data-fact="${name}"]`);

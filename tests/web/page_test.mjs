@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { readFile } from "node:fs/promises";
 import path from "node:path";
 import { after, before, beforeEach, test } from "node:test";
-import { canvas, fact, numberOf, open, pause, PHONE, resume, until } from "./browser.mjs";
+import { accessibilityFaults, canvas, fact, numberOf, open, pause, PHONE, resume, until } from "./browser.mjs";
 import { MAP, beyond, startDaemon, startGateway, startProxy, stopAll, work } from "./programs.mjs";
 import { Tap } from "./tap.mjs";
 
@@ -278,7 +278,7 @@ test("the theme turns and is remembered", async () => {
       .match(/\d+/g)
       .slice(0, 3)
       .reduce((sum, part) => sum + Number(part), 0);
-  const turn = view.page.getByRole("button", { name: "Switch between light and dark" });
+  const turn = view.page.getByRole("button", { name: "Light / dark" });
   const before = await brightness();
   await turn.click();
   const turned = await brightness();
@@ -555,6 +555,14 @@ test("on a phone everything is below each other and nothing is cut off", async (
   );
   await view.page.screenshot({ path: path.join(work, "phone.png"), fullPage: true });
   await view.page.setViewportSize({ width: 1440, height: 900 });
+});
+
+test("axe-core finds nothing, in either theme", async () => {
+  assert.deepEqual(await accessibilityFaults(view.page), []);
+  const turn = view.page.getByRole("button", { name: "Light / dark" });
+  await turn.click();
+  assert.deepEqual(await accessibilityFaults(view.page), []);
+  await turn.click();
 });
 
 test("on a desktop picture, numbers and plots are seen at once", async () => {

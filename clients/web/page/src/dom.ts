@@ -103,5 +103,5 @@ export class Facts {
 }
 
 export function panel(title: string, ...children: Child[]): HTMLElement {
-  return el("section", { class: "panel", "aria-label": title }, el("h3", {}, title), ...children);
+  return el("section", { class: "panel", role: "group", "aria-label": title }, el("h3", {}, title), ...children);
 }

@@ -37,7 +37,7 @@ class Page {
           { class: "row end" },
           button("Keys", () => this.help.showModal(), { title: "?" }),
           button("Light / dark", () => this.switchTheme(), {
-            "aria-label": "Switch between light and dark",
+            title: "Switch between light and dark",
           }),
         ),
       ),

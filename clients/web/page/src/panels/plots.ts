@@ -63,7 +63,11 @@ function plotIn(place: HTMLElement, height: number, make: (width: number) => uPl
 }
 
 export class Plots {
-  readonly element = el("section", { class: "plots", "aria-label": "The last 30 seconds" });
+  readonly element = el("section", {
+    class: "plots",
+    role: "group",
+    "aria-label": "The last 30 seconds",
+  });
   private readonly plots: {
     of: (typeof SERIES)[string]["of"];
     plot: uPlot;
